@@ -1,0 +1,40 @@
+# `make demo` sets everything up in ./.venv and runs the main job; `make test` sets up and passes all checks.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+ARGS ?=
+
+.PHONY: demo test lint check-tools clean
+.DEFAULT_GOAL := demo
+
+check-tools:
+	@command -v cargo >/dev/null || { echo "Rust is missing: install it from https://rustup.rs"; exit 1; }
+	@command -v cc >/dev/null || { echo "A C compiler is missing: install gcc or clang (Debian: apt install build-essential)"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { echo "Python 3.10 or later is missing (set PYTHON=...)"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python's venv is missing (Debian: apt install python3-venv)"; exit 1; }
+
+$(BIN)/python: | check-tools
+	$(PYTHON) -m venv $(VENV)
+
+# The extension is rebuilt when a source changes; cargo itself decides how much.
+$(VENV)/.installed: $(BIN)/python pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.9,<2"
+	. $(BIN)/activate && maturin develop --release --quiet --extras test >$(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
+	@touch $@
+
+demo: $(VENV)/.installed
+	$(BIN)/palpate demo $(ARGS)
+
+test: $(VENV)/.installed lint
+	cargo test --release --quiet --workspace --exclude palpate-python
+	$(BIN)/python -m pytest --quiet $(ARGS)
+
+lint: $(VENV)/.installed
+	cargo fmt --all --check
+	cargo clippy --release --quiet --workspace --all-targets -- -D warnings
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/python scripts/check_architecture.py
+
+clean:
+	rm -rf target $(VENV)

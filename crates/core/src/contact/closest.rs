@@ -1,0 +1,65 @@
+//! Closest point of the rest surface, with a sign: parry's bounding volume hierarchy and pseudo-normals.
+
+use glam::DVec3;
+use parry3d_f64::shape::{TriMesh, TriMeshFlags};
+
+use crate::mesh::Surface;
+use crate::{Error, Result};
+
+/// A point of the rest surface.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SurfacePoint {
+    /// Position, m.
+    pub position: DVec3,
+    /// Triangle it lies on.
+    pub triangle: u32,
+    /// Barycentric coordinates: the shape functions `N_i` there.
+    pub barycentric: [f64; 3],
+    /// Unit outward direction: towards the query point from outside, away from it from inside.
+    pub normal: DVec3,
+    /// Distance of the query point, m; negative inside.
+    pub signed_distance: f64,
+}
+
+/// Closest-point queries on a surface; a query never allocates.
+pub struct SurfaceQuery {
+    mesh: TriMesh,
+}
+
+impl SurfaceQuery {
+    /// Builds the hierarchy.
+    ///
+    /// # Errors
+    /// A surface without triangles.
+    pub fn new(surface: &Surface) -> Result<Self> {
+        let mesh = TriMesh::with_flags(surface.positions.clone(), surface.triangles.clone(), TriMeshFlags::ORIENTED)
+            .map_err(|e| Error::Invalid(format!("the surface cannot be searched: {e}")))?;
+        Ok(Self { mesh })
+    }
+
+    /// The surface point closest to `point`; `None` if `point` is not finite.
+    pub fn closest(&self, surface: &Surface, point: DVec3) -> Option<SurfacePoint> {
+        if !point.is_finite() {
+            return None;
+        }
+        use parry3d_f64::query::PointQueryWithLocation;
+        let (projection, (triangle, _)) = self.mesh.project_local_point_and_get_location(point, false);
+        let position = projection.point;
+        let sign = if projection.is_inside { -1.0 } else { 1.0 };
+        let offset = point - position;
+        let distance = offset.length();
+        // On the surface itself the direction is lost in round-off; the triangle's own normal serves.
+        let normal = if distance > 1e-9 { sign * offset / distance } else { surface.normals[triangle as usize] };
+        let barycentric = barycentric(surface.corners(triangle), position);
+        Some(SurfacePoint { position, triangle, barycentric, normal, signed_distance: sign * distance })
+    }
+}
+
+/// Barycentric coordinates of `p` in the plane of a triangle, by areas.
+fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
+    let n = (b - a).cross(c - a);
+    let scale = 1.0 / n.length_squared();
+    let wa = (c - b).cross(p - b).dot(n) * scale;
+    let wb = (a - c).cross(p - c).dot(n) * scale;
+    [wa, wb, 1.0 - wa - wb]
+}

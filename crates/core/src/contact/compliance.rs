@@ -1,0 +1,118 @@
+//! The compliance `C = W^T Psi W` that a patch feels: three by three, m/N.
+
+use glam::{DMat3, DVec3};
+
+use super::{Patch, PatchScratch, SurfaceQuery, patch_weights};
+use crate::green::GreensFunction;
+use crate::{Error, Result};
+
+/// `W_a^T Psi W_b` between two patches: mean displacement of `a` per unit force spread over `b`. Supported dofs do not
+/// move. `None` if a node of either patch may not be touched.
+pub fn compliance_block(green: &GreensFunction, a: &Patch, b: &Patch) -> Option<DMat3> {
+    let mut sum = [[0.0; 3]; 3];
+    for (source, source_weight) in b.iter() {
+        let first = green.first_column(source)?;
+        for (axis, column_sum) in sum.iter_mut().enumerate() {
+            if green.row_is_fixed[3 * source + axis] {
+                continue;
+            }
+            for (target, target_weight) in a.iter() {
+                let weight = source_weight * target_weight;
+                for (k, s) in column_sum.iter_mut().enumerate() {
+                    let row = 3 * target + k;
+                    if !green.row_is_fixed[row] {
+                        *s += weight * green.entry(row, first + axis);
+                    }
+                }
+            }
+        }
+    }
+    Some(DMat3::from_cols_array_2d(&sum))
+}
+
+/// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
+pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
+    let mean = (m.x_axis.x + m.y_axis.y + m.z_axis.z) / 3.0;
+    let deviator = *m - DMat3::from_diagonal(DVec3::splat(mean));
+    let squared =
+        deviator.x_axis.length_squared() + deviator.y_axis.length_squared() + deviator.z_axis.length_squared();
+    let p = (squared / 6.0).sqrt();
+    if p <= f64::EPSILON * mean.abs() {
+        return mean;
+    }
+    let r = (deviator.determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
+    mean + 2.0 * p * (r.acos() / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3).cos()
+}
+
+/// Presses a patch at `point` by `displacement` (m; `None` leaves a component free). Returns the force on the body (N)
+/// and the displacements of all surface dofs (m, 3s).
+///
+/// # Errors
+/// A patch with a node outside the touch region, on the support only, or with too many nodes.
+pub fn touch(
+    green: &GreensFunction,
+    point: DVec3,
+    displacement: [Option<f64>; 3],
+    radius: f64,
+) -> Result<(DVec3, Vec<f64>)> {
+    let query = SurfaceQuery::new(&green.surface)?;
+    let centre =
+        query.closest(&green.surface, point).ok_or_else(|| Error::Invalid("the touch point must be finite".into()))?;
+    let mut patch = Patch::default();
+    let covered = patch_weights(&green.surface, &centre, radius, &mut PatchScratch::new(&green.surface), &mut patch);
+    if covered > patch.count {
+        return Err(Error::Invalid(format!(
+            "a contact radius of {radius} m covers {covered} nodes; choose a smaller one"
+        )));
+    }
+    if let Some((node, _)) = patch.iter().find(|&(n, _)| green.first_column(n).is_none()) {
+        let node = green.surface_nodes[node];
+        return Err(Error::Invalid(format!("node {node} under the contact is not touchable")));
+    }
+    let compliance = compliance_block(green, &patch, &patch).unwrap_or(DMat3::ZERO);
+    let force = constrained_force(&compliance, displacement)
+        .ok_or_else(|| Error::Invalid("the contact lies on the support, which does not give".into()))?;
+    let mut displacements = vec![0.0; 3 * green.surface_count()];
+    add_patch_response(green, &patch, force, &mut displacements);
+    Ok((force, displacements))
+}
+
+/// Adds `Psi W f` to the surface displacements (3s).
+pub(crate) fn add_patch_response(green: &GreensFunction, patch: &Patch, force: DVec3, displacements: &mut [f64]) {
+    let surface = displacements.len();
+    for (node, weight) in patch.iter() {
+        let Some(first) = green.first_column(node) else { continue };
+        for axis in 0..3 {
+            if !green.row_is_fixed[3 * node + axis] && force[axis] != 0.0 {
+                green.add_column(first + axis, weight * force[axis], &mut displacements[..surface]);
+            }
+        }
+    }
+    for (u, &fixed) in displacements.iter_mut().zip(&green.row_is_fixed) {
+        if fixed {
+            *u = 0.0;
+        }
+    }
+}
+
+/// `C_aa f_a = d_a` for the prescribed components, zero force on the free ones: free components are replaced by the
+/// identity. `None` if the compliance is zero there.
+fn constrained_force(compliance: &DMat3, displacement: [Option<f64>; 3]) -> Option<DVec3> {
+    let mut matrix = *compliance;
+    let mut right = DVec3::ZERO;
+    let scale = (0..3).map(|k| compliance.col(k)[k]).fold(0.0, f64::max);
+    for (k, component) in displacement.into_iter().enumerate() {
+        match component {
+            Some(d) => right[k] = d,
+            None => {
+                for j in 0..3 {
+                    matrix.col_mut(j)[k] = 0.0;
+                    matrix.col_mut(k)[j] = 0.0;
+                }
+                matrix.col_mut(k)[k] = scale;
+            }
+        }
+    }
+    let force = matrix.inverse() * right;
+    (scale > 0.0 && force.is_finite()).then_some(force)
+}

@@ -1,0 +1,148 @@
+//! The precomputed operator `Psi` and access to its entries.
+
+use std::path::PathBuf;
+
+use memmap2::Mmap;
+
+use crate::mesh::Surface;
+
+/// Number format of the stored values; arithmetic is always f64.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 4 bytes an entry.
+    F32,
+    /// 8 bytes an entry.
+    F64,
+}
+
+impl Precision {
+    /// `"f32"` or `"f64"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Precision::F32 => "f32",
+            Precision::F64 => "f64",
+        }
+    }
+
+    /// The format called `name`.
+    pub fn parse(name: &str) -> Option<Self> {
+        [Precision::F32, Precision::F64].into_iter().find(|p| p.name() == name)
+    }
+}
+
+/// Where the entries live; column after column.
+pub enum Values {
+    /// In memory, single.
+    F32(Vec<f32>),
+    /// In memory, double.
+    F64(Vec<f64>),
+    /// In a mapped store: the map, first byte, number of entries, format.
+    Mapped(Mmap, usize, usize, Precision),
+}
+
+/// The entries as a slice.
+#[derive(Clone, Copy)]
+pub enum ValueSlice<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+}
+
+impl Values {
+    /// Borrow as a slice of the stored type. The alignment of a mapped store was checked when it was opened.
+    pub fn as_slice(&self) -> ValueSlice<'_> {
+        match self {
+            Values::F32(v) => ValueSlice::F32(v),
+            Values::F64(v) => ValueSlice::F64(v),
+            Values::Mapped(map, at, len, Precision::F32) => {
+                ValueSlice::F32(bytemuck::cast_slice(&map[*at..*at + 4 * len]))
+            }
+            Values::Mapped(map, at, len, Precision::F64) => {
+                ValueSlice::F64(bytemuck::cast_slice(&map[*at..*at + 8 * len]))
+            }
+        }
+    }
+
+    /// Stored format.
+    pub fn precision(&self) -> Precision {
+        match self {
+            Values::F32(_) | Values::Mapped(.., Precision::F32) => Precision::F32,
+            Values::F64(_) | Values::Mapped(.., Precision::F64) => Precision::F64,
+        }
+    }
+}
+
+/// Green's function of a body: columns of touchable surface dofs, rows of surface dofs and then of supported dofs inside.
+pub struct GreensFunction {
+    /// Mesh indices of the surface nodes, ascending (s).
+    pub surface_nodes: Vec<u32>,
+    /// The surface in its own numbering.
+    pub surface: Surface,
+    /// Touchable surface nodes as ascending ranks in `surface_nodes` (t); three columns each.
+    pub touch: Vec<u32>,
+    /// For each surface node its rank in `touch`, or `u32::MAX`.
+    pub touch_rank: Vec<u32>,
+    /// Fixed dofs of the mesh, ascending.
+    pub fixed_dofs: Vec<u32>,
+    /// For each fixed dof its row.
+    pub fixed_rows: Vec<u32>,
+    /// Number of rows.
+    pub rows: usize,
+    /// Whether each row's known is a displacement (a supported dof).
+    pub row_is_fixed: Vec<bool>,
+    /// The entries, columns contiguous.
+    pub values: Values,
+    /// Content key.
+    pub key: String,
+    /// Young's modulus if the whole body has one, Pa: then it only scales forces.
+    pub youngs_modulus: Option<f64>,
+    /// What the file was made from, in JSON, for people.
+    pub description: String,
+    /// The file behind it, if any.
+    pub path: Option<PathBuf>,
+}
+
+impl GreensFunction {
+    /// Number of surface nodes.
+    pub fn surface_count(&self) -> usize {
+        self.surface_nodes.len()
+    }
+
+    /// First of the three columns of surface node `node` (a rank in `surface_nodes`), if it may be touched.
+    pub fn first_column(&self, node: usize) -> Option<usize> {
+        match self.touch_rank[node] {
+            u32::MAX => None,
+            rank => Some(3 * rank as usize),
+        }
+    }
+
+    /// Entry of row `row` and column `column`.
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        let at = column * self.rows + row;
+        match self.values.as_slice() {
+            ValueSlice::F32(v) => f64::from(v[at]),
+            ValueSlice::F64(v) => v[at],
+        }
+    }
+
+    /// `out += factor * Psi(0..out.len(), column)`.
+    pub fn add_column(&self, column: usize, factor: f64, out: &mut [f64]) {
+        let at = column * self.rows;
+        match self.values.as_slice() {
+            ValueSlice::F32(v) => add_scaled(&v[at..at + out.len()], factor, out),
+            ValueSlice::F64(v) => add_scaled(&v[at..at + out.len()], factor, out),
+        }
+    }
+
+    /// Row of the dof in column `column`.
+    pub fn row_of_column(&self, column: usize) -> usize {
+        3 * self.touch[column / 3] as usize + column % 3
+    }
+}
+
+fn add_scaled<T: Copy + Into<f64>>(column: &[T], factor: f64, out: &mut [f64]) {
+    for (o, &c) in out.iter_mut().zip(column) {
+        *o += factor * c.into();
+    }
+}

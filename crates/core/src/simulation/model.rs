@@ -1,0 +1,83 @@
+//! What is fixed while a simulation runs, and its reusable memory.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::State;
+use crate::contact::{MAX_PATCH_NODES, Patch, PatchScratch, SurfacePoint, SurfaceQuery, patch_weights};
+use crate::green::GreensFunction;
+use crate::{Error, Result};
+
+/// A body's Green's function, its surface prepared for contact, and the tool.
+pub struct Model {
+    pub(crate) green: Arc<GreensFunction>,
+    pub(crate) query: SurfaceQuery,
+    /// Radius of the tool sphere, m.
+    pub tool_radius: f64,
+    /// Stiffest contact rendered, N/m: near a support the body alone would be rigid, which no device can render.
+    pub max_stiffness: f64,
+}
+
+/// Memory a tick needs, sized once.
+pub struct Scratch {
+    pub(crate) patch: PatchScratch,
+    pub(crate) candidate: Patch,
+}
+
+impl Model {
+    /// Prepares the surface.
+    ///
+    /// # Errors
+    /// A radius or stiffness that is not positive and finite.
+    pub fn new(green: Arc<GreensFunction>, tool_radius: f64, max_stiffness: f64) -> Result<Self> {
+        for (name, value) in [("tool radius", tool_radius), ("maximum stiffness", max_stiffness)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::Invalid(format!("the {name} must be positive, got {value}")));
+            }
+        }
+        let query = SurfaceQuery::new(&green.surface)?;
+        Ok(Self { green, query, tool_radius, max_stiffness })
+    }
+
+    /// The Green's function behind the model.
+    pub fn green(&self) -> &GreensFunction {
+        &self.green
+    }
+
+    /// A state at rest, nothing touched.
+    pub fn state(&self) -> State {
+        State::default()
+    }
+
+    /// Memory for [`super::step`].
+    pub fn scratch(&self) -> Scratch {
+        Scratch { patch: PatchScratch::new(&self.green.surface), candidate: Patch::default() }
+    }
+
+    /// Refuses a contact radius under which some contact would cover more nodes than a tick can weigh.
+    ///
+    /// # Errors
+    /// The radius, with the number of nodes and the limit.
+    pub fn check_contact_radius(&self, radius: f64) -> Result<()> {
+        if !(radius >= 0.0 && radius.is_finite()) {
+            return Err(Error::Invalid(format!("the contact radius must not be negative, got {radius} m")));
+        }
+        let surface = &self.green.surface;
+        let mut scratch = self.scratch();
+        for triangle in 0..surface.triangles.len() as u32 {
+            let corners = surface.corners(triangle);
+            let position: DVec3 = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let normal = surface.normals[triangle as usize];
+            let centre = SurfacePoint { position, triangle, barycentric: [1.0 / 3.0; 3], normal, signed_distance: 0.0 };
+            let covered = patch_weights(surface, &centre, radius, &mut scratch.patch, &mut scratch.candidate);
+            if covered > MAX_PATCH_NODES {
+                return Err(Error::Invalid(format!(
+                    "a contact radius of {radius} m covers {covered} surface nodes, the limit is {MAX_PATCH_NODES}: \
+                     choose a smaller radius or a coarser mesh"
+                )));
+            }
+        }
+        Ok(())
+    }
+}

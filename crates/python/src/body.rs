@@ -1,0 +1,90 @@
+//! Matrices of a body.
+
+use glam::DVec3;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use palpate_core::fem::{self, Isotropic, SymmetricCsc};
+use palpate_core::mesh::TetMesh;
+use palpate_core::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::errors::to_python;
+
+/// Column starts, rows and values of a compressed sparse matrix.
+type CscArrays<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>);
+
+/// Rows of an `(n, 3)` array as vectors.
+pub fn vectors(array: &PyReadonlyArray2<'_, f64>) -> Result<Vec<DVec3>> {
+    let view = array.as_array();
+    if view.ncols() != 3 {
+        return Err(Error::Invalid(format!("positions must have 3 columns, got {}", view.ncols())));
+    }
+    Ok(view.rows().into_iter().map(|r| DVec3::new(r[0], r[1], r[2])).collect())
+}
+
+/// Rows of an `(m, N)` array of indices.
+pub fn index_rows<const N: usize>(array: &PyReadonlyArray2<'_, u32>) -> Result<Vec<[u32; N]>> {
+    let view = array.as_array();
+    if view.ncols() != N {
+        return Err(Error::Invalid(format!("connectivity must have {N} columns, got {}", view.ncols())));
+    }
+    Ok(view.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect())
+}
+
+/// Materials from an `(m, 3)` array of Young's modulus (Pa), Poisson's ratio and density (kg/m^3).
+pub fn materials(array: &PyReadonlyArray2<'_, f64>, elements: usize) -> Result<Vec<Isotropic>> {
+    let view = array.as_array();
+    if view.dim() != (elements, 3) {
+        return Err(Error::Invalid(format!("materials must have shape ({elements}, 3), got {:?}", view.dim())));
+    }
+    view.rows().into_iter().map(|r| Isotropic::new(r[0], r[1], r[2])).collect()
+}
+
+/// Copy of a one-dimensional index array.
+pub fn indices(array: &PyReadonlyArray1<'_, u32>) -> Vec<u32> {
+    array.as_array().iter().copied().collect()
+}
+
+fn to_arrays(py: Python<'_>, matrix: SymmetricCsc) -> CscArrays<'_> {
+    let start: Vec<i64> = matrix.column_start.iter().map(|&s| s as i64).collect();
+    (start.into_pyarray(py), matrix.rows.into_pyarray(py), matrix.values.into_pyarray(py))
+}
+
+fn assembled<'py>(
+    py: Python<'py>,
+    nodes: &PyReadonlyArray2<'py, f64>,
+    tets: &PyReadonlyArray2<'py, u32>,
+    material: &PyReadonlyArray2<'py, f64>,
+    assemble: impl FnOnce(&TetMesh, &[Isotropic]) -> SymmetricCsc + Send,
+) -> PyResult<CscArrays<'py>> {
+    let prepare = || {
+        let mesh = TetMesh::new(vectors(nodes)?, index_rows(tets)?)?;
+        let materials = materials(material, mesh.tets.len())?;
+        Ok((mesh, materials))
+    };
+    let (mesh, materials) = prepare().map_err(|e| to_python(py, e))?;
+    let matrix = py.detach(|| assemble(&mesh, &materials));
+    Ok(to_arrays(py, matrix))
+}
+
+/// Stiffness matrix (3n, 3n), N/m.
+#[pyfunction]
+pub fn stiffness<'py>(
+    py: Python<'py>,
+    nodes: PyReadonlyArray2<'py, f64>,
+    tets: PyReadonlyArray2<'py, u32>,
+    material: PyReadonlyArray2<'py, f64>,
+) -> PyResult<CscArrays<'py>> {
+    assembled(py, &nodes, &tets, &material, fem::stiffness)
+}
+
+/// Mass matrix (3n, 3n), kg.
+#[pyfunction]
+pub fn mass<'py>(
+    py: Python<'py>,
+    nodes: PyReadonlyArray2<'py, f64>,
+    tets: PyReadonlyArray2<'py, u32>,
+    material: PyReadonlyArray2<'py, f64>,
+    lumped: bool,
+) -> PyResult<CscArrays<'py>> {
+    assembled(py, &nodes, &tets, &material, |mesh, materials| fem::mass(mesh, materials, lumped))
+}

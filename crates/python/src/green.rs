@@ -1,0 +1,247 @@
+//! The Green's function: precompute, store, answers.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use glam::DVec3;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use palpate_core::fem::Supports;
+use palpate_core::green::{GreensFunction, Precision, Problem, precompute};
+use palpate_core::mesh::TetMesh;
+use palpate_core::{Error, Result, capacitance, contact};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+use crate::body::{index_rows, indices, materials, vectors};
+use crate::errors::to_python;
+
+/// A Green's function in memory or in a mapped store.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct GreenCore {
+    pub(crate) green: Arc<GreensFunction>,
+}
+
+/// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_triangles, touch)`.
+fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
+    type Arguments<'py> = (
+        PyReadonlyArray2<'py, f64>,
+        PyReadonlyArray2<'py, u32>,
+        PyReadonlyArray2<'py, f64>,
+        PyReadonlyArray1<'py, u32>,
+        PyReadonlyArray1<'py, u32>,
+        PyReadonlyArray2<'py, u32>,
+        PyReadonlyArray1<'py, u32>,
+    );
+    let (nodes, tets, material, fixed, surface_nodes, triangles, touch): Arguments<'_> = arguments.extract()?;
+    let build = || -> Result<Problem> {
+        let mesh = TetMesh::new(vectors(&nodes)?, index_rows(&tets)?)?;
+        let materials = materials(&material, mesh.tets.len())?;
+        let supports = Supports::new(3 * mesh.nodes.len(), indices(&fixed))?;
+        Ok(Problem {
+            mesh,
+            materials,
+            supports,
+            surface_nodes: indices(&surface_nodes),
+            surface_triangles: index_rows(&triangles)?,
+            touch: indices(&touch),
+        })
+    };
+    build().map_err(|e| to_python(arguments.py(), e))
+}
+
+fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
+    Precision::parse(name)
+        .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f32' or 'f64'"))))
+}
+
+#[pymethods]
+impl GreenCore {
+    /// Content key of the Green's function of a problem.
+    #[staticmethod]
+    fn content_key(py: Python<'_>, arguments: &Bound<'_, PyTuple>, precision_name: &str) -> PyResult<String> {
+        let problem = problem(arguments)?;
+        let precision = precision(py, precision_name)?;
+        Ok(py.detach(|| problem.key(precision)))
+    }
+
+    /// Solves the reference problem. `progress(done, total)` is called a few times a second; Ctrl-C stops.
+    #[staticmethod]
+    fn precompute(
+        py: Python<'_>,
+        arguments: &Bound<'_, PyTuple>,
+        precision_name: &str,
+        description: String,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let problem = problem(arguments)?;
+        let precision = precision(py, precision_name)?;
+        let mut green = run_watched(py, &problem, precision, progress.as_ref())?;
+        green.description = description;
+        Ok(Self { green: Arc::new(green) })
+    }
+
+    /// Writes the store, beside and then renamed.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| self.green.save(&path)).map_err(|e| to_python(py, e))
+    }
+
+    /// Maps and verifies a store.
+    #[staticmethod]
+    #[pyo3(signature = (path, expected_key=None))]
+    fn load(py: Python<'_>, path: PathBuf, expected_key: Option<String>) -> PyResult<Self> {
+        let green = py.detach(|| GreensFunction::load(&path, expected_key.as_deref())).map_err(|e| to_python(py, e))?;
+        Ok(Self { green: Arc::new(green) })
+    }
+
+    /// Answers a change of boundary conditions: displacements (3s), forces (3s), reactions at the fixed dofs.
+    #[allow(clippy::type_complexity)] // three arrays; naming them would need a class nobody else uses
+    fn solve<'py>(
+        &self,
+        py: Python<'py>,
+        known: Vec<(usize, f64)>,
+        switched: Vec<(usize, f64)>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let answer = py.detach(|| capacitance::solve(&self.green, &known, &switched)).map_err(|e| to_python(py, e))?;
+        Ok((answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py), answer.reactions.into_pyarray(py)))
+    }
+
+    /// Presses a patch: force on the body (3) and displacements (3s).
+    fn touch<'py>(
+        &self,
+        py: Python<'py>,
+        point: [f64; 3],
+        displacement: [Option<f64>; 3],
+        radius: f64,
+    ) -> PyResult<([f64; 3], Bound<'py, PyArray1<f64>>)> {
+        let (force, displacements) = py
+            .detach(|| contact::touch(&self.green, DVec3::from(point), displacement, radius))
+            .map_err(|e| to_python(py, e))?;
+        Ok((force.to_array(), displacements.into_pyarray(py)))
+    }
+
+    /// One entry of the operator.
+    fn entry(&self, row: usize, column: usize) -> PyResult<f64> {
+        if row < self.green.rows && column < 3 * self.green.touch.len() {
+            Ok(self.green.entry(row, column))
+        } else {
+            Err(pyo3::exceptions::PyIndexError::new_err("row or column out of range"))
+        }
+    }
+
+    /// Mesh indices of the surface nodes (s).
+    #[getter]
+    fn surface_nodes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.green.surface_nodes.clone().into_pyarray(py)
+    }
+
+    /// Rest positions of the surface nodes (3s), m.
+    #[getter]
+    fn surface_positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.green.surface.positions.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>().into_pyarray(py)
+    }
+
+    /// Surface triangles as ranks of surface nodes (3k).
+    #[getter]
+    fn surface_triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.green.surface.triangles.as_flattened().to_vec().into_pyarray(py)
+    }
+
+    /// Touchable nodes as ranks of surface nodes (t).
+    #[getter]
+    fn touch_ranks<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.green.touch.clone().into_pyarray(py)
+    }
+
+    /// Fixed dofs, ascending.
+    #[getter]
+    fn fixed_dofs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.green.fixed_dofs.clone().into_pyarray(py)
+    }
+
+    /// Stored number format.
+    #[getter]
+    fn precision(&self) -> &'static str {
+        self.green.values.precision().name()
+    }
+
+    /// Content key.
+    #[getter]
+    fn key(&self) -> &str {
+        &self.green.key
+    }
+
+    /// What it was made from (JSON).
+    #[getter]
+    fn description(&self) -> &str {
+        &self.green.description
+    }
+
+    /// Young's modulus, if the whole body has one, Pa.
+    #[getter]
+    fn youngs_modulus(&self) -> Option<f64> {
+        self.green.youngs_modulus
+    }
+
+    /// The store's file, if any.
+    #[getter]
+    fn path(&self) -> Option<PathBuf> {
+        self.green.path.clone()
+    }
+}
+
+/// Runs the computation on its own thread, while this one reports progress and listens for Ctrl-C.
+fn run_watched(
+    py: Python<'_>,
+    problem: &Problem,
+    precision: Precision,
+    progress: Option<&Py<PyAny>>,
+) -> PyResult<GreensFunction> {
+    let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(3 * problem.touch.len()));
+    let stop = AtomicBool::new(false);
+    let note = |finished: usize, all: usize| {
+        done.fetch_max(finished, Ordering::Relaxed);
+        total.store(all, Ordering::Relaxed);
+        !stop.load(Ordering::Relaxed)
+    };
+    std::thread::scope(|scope| {
+        let worker = scope.spawn(|| palpate_precompute(problem, precision, &note));
+        while !worker.is_finished() {
+            py.detach(|| wait_a_little(&worker));
+            let report = || match progress {
+                Some(callback) => {
+                    callback.call1(py, (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed))).map(|_| ())
+                }
+                None => Ok(()),
+            };
+            if let Err(error) = py.check_signals().and_then(|()| report()) {
+                stop.store(true, Ordering::Relaxed);
+                let _ = py.detach(|| worker.join());
+                return Err(error);
+            }
+        }
+        match worker.join() {
+            Ok(result) => result.map_err(|e| to_python(py, e)),
+            Err(_) => Err(to_python(py, Error::Invalid("the precomputation failed unexpectedly".into()))),
+        }
+    })
+}
+
+fn palpate_precompute(
+    problem: &Problem,
+    precision: Precision,
+    note: &(dyn Fn(usize, usize) -> bool + Sync),
+) -> Result<GreensFunction> {
+    precompute(problem, precision, note)
+}
+
+/// Up to a tenth of a second, less when the worker ends.
+fn wait_a_little<T>(worker: &std::thread::ScopedJoinHandle<'_, T>) {
+    for _ in 0..20 {
+        if worker.is_finished() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}

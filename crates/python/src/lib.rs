@@ -1,0 +1,18 @@
+//! `palpate._native`: the numerical core for Python. Arguments are checked arrays; the Python package names things for
+//! people. The interpreter lock is released in everything long.
+
+mod body;
+mod errors;
+mod green;
+
+use pyo3::prelude::*;
+
+/// The module `palpate._native`.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
+    module.add_function(wrap_pyfunction!(body::mass, module)?)?;
+    module.add_class::<green::GreenCore>()?;
+    Ok(())
+}

@@ -1,0 +1,35 @@
+"""Finite elements you can feel: soft bodies for haptics.
+
+SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
+"""
+
+from importlib.metadata import version
+
+from palpate.body import Body, Material
+from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError
+from palpate.green import Answer, GreensFunction, Touch, precompute
+from palpate.mesh import TetMesh, tetrahedralize
+
+__version__ = version("palpate")
+
+__all__ = [
+    "Answer",
+    "Body",
+    "BodyError",
+    "Contact",
+    "Error",
+    "Frame",
+    "GreensFunction",
+    "Material",
+    "MeshError",
+    "MeshWarning",
+    "Scene",
+    "SceneError",
+    "Simulation",
+    "StoreError",
+    "TetMesh",
+    "Touch",
+    "UnitError",
+    "precompute",
+    "tetrahedralize",
+]

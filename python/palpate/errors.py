@@ -1,0 +1,29 @@
+"""Exceptions of Palpate: one-line messages that say what is wrong, where, and what helps."""
+
+
+class Error(Exception):
+    """Base of everything Palpate raises for a user's mistake or a broken input."""
+
+
+class MeshError(Error):
+    """A mesh or surface that cannot be used."""
+
+
+class BodyError(Error):
+    """A body, boundary condition or touch that makes no sense."""
+
+
+class StoreError(Error):
+    """A precomputed file that is damaged or belongs to another body."""
+
+
+class SceneError(Error):
+    """A scene file with a mistake in it."""
+
+
+class UnitError(Error):
+    """An unknown unit, or a quantity that cannot be read."""
+
+
+class MeshWarning(UserWarning):
+    """Something about a mesh was repaired or left out."""

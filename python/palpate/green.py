@@ -1,0 +1,336 @@
+"""The Green's function of a body: precompute it once, then answer any touch by a small solve."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import _native
+from palpate.body import Body
+from palpate.errors import BodyError, StoreError
+from palpate.progress import progress_reporter
+
+Components = Sequence[float | None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Solution of a changed boundary value problem.
+
+    Attributes
+    ----------
+    displacements
+        (s, 3) m; rows follow the surface nodes.
+    forces
+        (s, 3) N, `K u` at the surface nodes: applied loads, contact forces and support reactions.
+    reactions
+        (f, 3) N, `K u` at the body's fixed nodes.
+
+    """
+
+    displacements: np.ndarray
+    forces: np.ndarray
+    reactions: np.ndarray
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Answer to a patch contact: force on the body (3,), N, and displacements (s, 3), m."""
+
+    force: np.ndarray
+    displacements: np.ndarray
+
+
+def cache_directory() -> Path:
+    """Folder of precomputed files: ``$XDG_CACHE_HOME/palpate``."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "palpate"
+
+
+class GreensFunction:
+    """Compliance of a body seen from its touchable surface.
+
+    Made by :func:`precompute` or :meth:`load`; immutable.
+    """
+
+    def __init__(self, core: _native.GreenCore):
+        self._core = core
+        self.surface_nodes = core.surface_nodes.astype(np.int64)
+        self.surface_positions = core.surface_positions.reshape(-1, 3)
+        self.surface_triangles = self.surface_nodes[core.surface_triangles.reshape(-1, 3)]
+        ranks = core.touch_ranks.astype(np.int64)
+        self.touchable_nodes = self.surface_nodes[ranks]
+        self.fixed_dofs = core.fixed_dofs.astype(np.int64)
+        self.fixed_nodes = np.unique(self.fixed_dofs // 3)
+        self._fixed = frozenset(self.fixed_dofs.tolist())
+        self._first_column = {int(n): 3 * i for i, n in enumerate(self.touchable_nodes)}
+        self._surface_rank = {int(n): i for i, n in enumerate(self.surface_nodes)}
+
+    @property
+    def precision(self) -> str:
+        """Stored number format, ``"f32"`` or ``"f64"``."""
+        return self._core.precision
+
+    @property
+    def key(self) -> str:
+        """Hash of everything that determines the numbers."""
+        return self._core.key
+
+    @property
+    def path(self) -> Path | None:
+        """File behind it, if any."""
+        return None if self._core.path is None else Path(self._core.path)
+
+    @property
+    def youngs_modulus(self) -> float | None:
+        """Young's modulus, Pa, if the whole body has one: then it only scales forces."""
+        return self._core.youngs_modulus
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What it was made from."""
+        return json.loads(self._core.description or "{}")
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the store; an existing file is replaced only when the new one is complete."""
+        self._core.save(Path(path))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, body: Body | None = None) -> GreensFunction:
+        """Map a store and verify every block of it.
+
+        Parameters
+        ----------
+        path
+            The file.
+        body
+            If given, a store that was made for another body is refused.
+
+        Raises
+        ------
+        StoreError
+            Not a store, damaged, of another version, or made for another body.
+
+        """
+        path = Path(path)
+        if not path.exists():
+            raise StoreError(f"{path}: no such file")
+        green = cls(_native.GreenCore.load(path))
+        if body is not None:
+            touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
+            expected = _native.GreenCore.content_key(_problem(body, touch), green.precision)
+            if expected != green.key:
+                raise StoreError(f"{path}: {_difference(green, body)}; compute it again")
+        return green
+
+    def solve(
+        self,
+        *,
+        displacements: Mapping[int, Components] | None = None,
+        forces: Mapping[int, Components] | None = None,
+        release: Sequence[int] = (),
+    ) -> Answer:
+        """Answer a change of boundary conditions by the capacitance matrix algorithm.
+
+        Parameters
+        ----------
+        displacements
+            Prescribed displacement of touchable nodes, m; None leaves a component free. Fixed nodes may be named: their
+            support moves.
+        forces
+            Forces on touchable nodes, N.
+        release
+            Fixed nodes on the surface whose support is taken away.
+
+        Raises
+        ------
+        BodyError
+            A node that is not touchable, a wrong length, a number that is not finite.
+
+        """
+        known: dict[int, float] = {}
+        switched: dict[int, float] = {}
+        released = {self._released_node(node) for node in release}
+        for node in released:
+            for axis in range(3):
+                if 3 * node + axis in self._fixed:
+                    switched[self._column(node, "release") + axis] = 0.0
+        for node, values in (forces or {}).items():
+            first = self._column(node, "forces")
+            for axis, value in enumerate(_components(values, node, "forces")):
+                if value is None or (3 * node + axis in self._fixed and node not in released):
+                    continue  # a load on a support goes straight into it and moves nothing
+                target = switched if 3 * node + axis in self._fixed else known
+                target[first + axis] = value
+        for node, values in (displacements or {}).items():
+            first = self._column(node, "displacements")
+            for axis, value in enumerate(_components(values, node, "displacements")):
+                if value is None:
+                    continue
+                column = first + axis
+                if 3 * node + axis in self._fixed:
+                    switched.pop(column, None)
+                    known[column] = value
+                elif known.get(column):
+                    raise BodyError(f"node {node} has both a force and a displacement along {'xyz'[axis]}")
+                else:
+                    known.pop(column, None)
+                    switched[column] = value
+        u, f, reactions = self._core.solve(sorted(known.items()), sorted(switched.items()))
+        u, f = u.reshape(-1, 3), f.reshape(-1, 3)
+        return Answer(u, f, self._reactions(f, reactions))
+
+    def touch(self, point: Sequence[float], displacement: Components, radius: float = 0.0) -> Touch:
+        """Press a patch of the surface.
+
+        Parameters
+        ----------
+        point
+            Contact point, m; the closest point of the surface is taken.
+        displacement
+            Weighted mean displacement of the patch, m; None leaves a component free.
+        radius
+            Contact radius, m; 0 is a point contact.
+
+        """
+        if not (np.isfinite(radius) and radius >= 0):
+            raise BodyError(f"the contact radius must not be negative, got {radius}")
+        target = _components(point, None, "point")
+        if None in target:
+            raise BodyError("the touch point needs three numbers")
+        force, u = self._core.touch(target, _components(displacement, None, "displacement"), float(radius))
+        return Touch(np.array(force), u.reshape(-1, 3))
+
+    def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
+        """`K u` at the fixed nodes; a free component inside the body carries nothing, on the surface its load."""
+        reactions = np.zeros((len(self.fixed_nodes), 3))
+        for i, node in enumerate(self.fixed_nodes):
+            rank = self._surface_rank.get(int(node))
+            if rank is not None:
+                reactions[i] = surface_forces[rank]
+        rows = np.searchsorted(self.fixed_nodes, self.fixed_dofs // 3)
+        reactions[rows, self.fixed_dofs % 3] = fixed_dof_forces
+        return reactions
+
+    def _column(self, node: int, argument: str) -> int:
+        try:
+            return self._first_column[node]
+        except (KeyError, TypeError):
+            raise BodyError(f"{argument}: node {node!r} is not touchable") from None
+
+    def _released_node(self, node: int) -> int:
+        if (
+            3 * node not in self._fixed
+            and 3 * node + 1 not in self._fixed
+            and 3 * node + 2 not in self._fixed
+        ):
+            raise BodyError(f"release: node {node} is not fixed")
+        if node not in self._surface_rank:
+            raise BodyError(
+                f"release: fixed node {node} lies inside the body; only surface nodes can be released"
+            )
+        return int(node)
+
+
+def precompute(
+    body: Body,
+    *,
+    precision: str = "f32",
+    touch: Sequence[int] | np.ndarray | None = None,
+    path: str | os.PathLike[str] | None = None,
+    progress: bool | Callable[[int, int], None] = True,
+) -> GreensFunction:
+    """Green's function of a body, from its file if that matches, else computed and written there.
+
+    Parameters
+    ----------
+    body
+        A supported body.
+    precision
+        Stored number format, ``"f32"`` or ``"f64"``; arithmetic is always double.
+    touch
+        Surface nodes that may be touched; None: all.
+    path
+        File; None keeps it in the cache under its content key.
+    progress
+        True shows a bar on a terminal; a function is called with columns done and in all.
+
+    Raises
+    ------
+    BodyError
+        A body that its supports do not hold, or a touch node that is not on the surface.
+
+    """
+    body.require_supported()
+    problem = _problem(body, touch)
+    key = _native.GreenCore.content_key(problem, precision)
+    if path is None:
+        target = cache_directory() / f"{key[:32]}.palpate"
+        target.parent.mkdir(parents=True, exist_ok=True)
+    else:
+        target = Path(path)
+    if target.exists():
+        with contextlib.suppress(StoreError):
+            return GreensFunction(_native.GreenCore.load(target, key))
+    with progress_reporter("precomputing", progress) as report:
+        core = _native.GreenCore.precompute(problem, precision, json.dumps(_describe(body)), report)
+    core.save(target)
+    return GreensFunction(_native.GreenCore.load(target, key))
+
+
+def _problem(body: Body, touch: Sequence[int] | np.ndarray | None) -> tuple[np.ndarray, ...]:
+    surface_nodes = body.mesh.surface_nodes
+    if touch is None:
+        ranks = np.arange(len(surface_nodes))
+    else:
+        nodes = np.unique(np.asarray(touch))
+        if nodes.size == 0 or not np.issubdtype(nodes.dtype, np.integer):
+            raise BodyError("touch must be a list of surface node indices")
+        ranks = np.searchsorted(surface_nodes, nodes)
+        inside = np.flatnonzero(surface_nodes[np.minimum(ranks, len(surface_nodes) - 1)] != nodes)
+        if inside.size:
+            raise BodyError(f"touch: node {nodes[inside[0]]} is not on the surface")
+    indices = [body.fixed_dofs, surface_nodes, body.mesh.surface_triangles, ranks]
+    return (*body._element_arrays(), *(np.ascontiguousarray(i, dtype=np.uint32) for i in indices))
+
+
+def _describe(body: Body) -> dict[str, Any]:
+    materials = body.material if isinstance(body.material, Mapping) else {"all": body.material}
+    return {
+        "nodes": len(body.mesh.nodes),
+        "tets": len(body.mesh.tets),
+        "surface_nodes": len(body.mesh.surface_nodes),
+        "fixed_nodes": len(body.fixed_nodes),
+        "materials": {str(k): [m.youngs_modulus, m.poissons_ratio, m.density] for k, m in materials.items()},
+    }
+
+
+def _difference(green: GreensFunction, body: Body) -> str:
+    """First thing in which a store and a body are seen to differ."""
+    stored, now = green.description, _describe(body)
+    for name in ("nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
+        if stored.get(name) != now[name]:
+            return f"was made for another body ({name.replace('_', ' ')}: {stored.get(name)} there, {now[name]} here)"
+    if not np.array_equal(green.fixed_dofs, body.fixed_dofs):
+        return "was made for another body (other nodes are fixed)"
+    return "was made for another body (node positions or elements differ)"
+
+
+def _components(values: Components, node: int | None, argument: str) -> tuple[float | None, ...]:
+    where = argument if node is None else f"{argument}: node {node}"
+    try:
+        result = tuple(None if v is None else float(v) for v in values)
+    except (TypeError, ValueError):
+        raise BodyError(f"{where} needs three numbers") from None
+    if len(result) != 3:
+        raise BodyError(f"{where} needs three numbers, got {len(result)}")
+    if not all(v is None or np.isfinite(v) for v in result):
+        raise BodyError(f"{where} has a number that is not finite")
+    return result

@@ -1,0 +1,177 @@
+"""Volume mesh files, by meshio; Netgen's own .vol by a reader of ours, for meshio cannot read today's."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.errors import MeshError
+from palpate.units import length_scale
+
+if TYPE_CHECKING:
+    import meshio
+
+    from palpate.mesh.tetmesh import TetMesh
+
+# meshio's name of the format to write, where it is not what the ending suggests. Its ASCII Gmsh files with point data do
+# not read back, so Gmsh is written in binary.
+WRITERS = {
+    ".msh": "gmsh",
+    ".vtu": "vtu",
+    ".vtk": "vtk",
+    ".inp": "abaqus",
+    ".node": "tetgen",
+    ".ele": "tetgen",
+    ".vol": "netgen",
+    ".mesh": "medit",
+}
+REGION_NAMES = ("region", "gmsh:physical", "medit:ref")
+
+
+def read_volume(path: Path, unit: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes (n, 3) in m, tetrahedra (m, 4) and regions (m,) of a file."""
+    scale = length_scale(unit)
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise MeshError(f"{path}: the file is empty")
+    if path.suffix == ".vol":
+        nodes, tets, regions = _read_netgen(path)
+    else:
+        nodes, tets, regions = _tetrahedra(path, _read_meshio(path))
+    return nodes * scale, tets, regions
+
+
+def _read_meshio(path: Path) -> meshio.Mesh:
+    import meshio
+
+    if path.suffix not in WRITERS:
+        raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    # meshio prints its complaints and may end the program; both become one error of ours.
+    noise = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:
+        said = noise.getvalue().strip()
+        reason = (
+            said if isinstance(error, SystemExit) and said else str(error).strip() or type(error).__name__
+        )
+        reason = " ".join(reason.split())[:200]
+        raise MeshError(f"{path}: cannot be read as {WRITERS[path.suffix]} ({reason})") from None
+
+
+def _tetrahedra(path: Path, mesh: meshio.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    blocks = [i for i, cells in enumerate(mesh.cells) if cells.type in {"tetra", "tetra10"}]
+    if not blocks:
+        found = ", ".join(sorted({cells.type for cells in mesh.cells})) or "nothing"
+        hint = "; make tetrahedra with 'palpate mesh'" if "triangle" in found else ""
+        raise MeshError(f"{path}: holds no tetrahedra (found: {found}){hint}")
+    if len({mesh.cells[i].type for i in blocks}) > 1:
+        raise MeshError(f"{path}: mixes 4-node and 10-node tetrahedra")
+    tets = np.concatenate([mesh.cells[i].data for i in blocks]).astype(np.int64)
+    candidates = {
+        name: np.concatenate([np.asarray(data[i]).ravel() for i in blocks])
+        for name, data in mesh.cell_data.items()
+        if all(np.issubdtype(np.asarray(data[i]).dtype, np.integer) for i in blocks)
+    }
+    named = [name for name in REGION_NAMES if name in candidates]
+    chosen = named[0] if named else next(iter(candidates)) if len(candidates) == 1 else None
+    regions = np.zeros(len(tets), dtype=np.int64) if chosen is None else candidates[chosen].astype(np.int64)
+    return np.asarray(mesh.points, dtype=np.float64)[:, :3], tets, regions
+
+
+def _read_netgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The ``points`` and ``volumeelements`` sections of a Netgen mesh (1-based, negatively oriented)."""
+    lines = path.read_text(errors="replace").splitlines()
+    heads = {line.strip(): i for i, line in enumerate(lines) if line.strip() in {"points", "volumeelements"}}
+    if len(heads) != 2:
+        raise MeshError(f"{path}: holds no points and volume elements of a Netgen mesh")
+    try:
+        elements = _section(lines, heads["volumeelements"])
+        if any(int(e[1]) != 4 for e in elements):
+            raise MeshError(f"{path}: holds elements that are not 4-node tetrahedra")
+        nodes = np.array([[float(v) for v in row[:3]] for row in _section(lines, heads["points"])])
+        tets = np.array([[int(v) - 1 for v in e[2:6]] for e in elements])
+        regions = np.array([int(e[0]) for e in elements])
+    except (ValueError, IndexError) as error:
+        raise MeshError(f"{path}: damaged Netgen mesh ({error})") from None
+    return nodes.reshape(-1, 3), tets.reshape(-1, 4), regions
+
+
+def _section(lines: list[str], head: int) -> list[list[str]]:
+    count = int(lines[head + 1])
+    rows = [line.split() for line in lines[head + 2 : head + 2 + count]]
+    if len(rows) < count:
+        raise ValueError(f"'{lines[head].strip()}' is cut short")
+    return rows
+
+
+def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
+    """Write beside the file, then rename."""
+    import meshio
+
+    if path.suffix not in WRITERS:
+        raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    name = {".msh": "gmsh:physical", ".mesh": "medit:ref"}.get(path.suffix, "region")
+    data = {name: [mesh.regions]}
+    if path.suffix == ".msh":
+        data["gmsh:geometrical"] = [mesh.regions]
+    if path.suffix in {".inp", ".vol"}:
+        data = {}
+    points = mesh.nodes / length_scale(unit)
+    content = meshio.Mesh(points, [("tetra", mesh.tets)], cell_data=data)
+    if path.suffix == ".vol":
+        _replace(path, lambda partial: _write_netgen(partial, points, mesh))
+        return
+    options = {"binary": True} if path.suffix == ".msh" else {}
+    noise = io.StringIO()
+    with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
+        if WRITERS[path.suffix] == "tetgen":
+            _write_tetgen(content, path)
+        else:
+            _replace(path, lambda partial: meshio.write(partial, content, WRITERS[path.suffix], **options))
+
+
+def _replace(path: Path, write) -> None:
+    partial = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        write(partial)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _write_tetgen(content: meshio.Mesh, path: Path) -> None:
+    """TetGen keeps nodes and elements in two files beside each other."""
+    import meshio
+
+    partial = path.with_name(f".{os.getpid()}.{path.stem}.node")
+    try:
+        meshio.write(partial, content, "tetgen")
+        for ending in (".node", ".ele"):
+            os.replace(partial.with_suffix(ending), path.with_suffix(ending))
+    finally:
+        for ending in (".node", ".ele"):
+            partial.with_suffix(ending).unlink(missing_ok=True)
+
+
+def _write_netgen(path: Path, points: np.ndarray, mesh: TetMesh) -> None:
+    """Points, volume elements and the outer surface as Netgen reads them."""
+    triangles = mesh.surface_triangles + 1
+    tets = mesh.tets[:, [0, 2, 1, 3]] + 1
+    with path.open("w") as file:
+        file.write("mesh3d\ndimension\n3\ngeomtype\n0\n\nsurfaceelements\n")
+        file.write(f"{len(triangles)}\n")
+        file.writelines(f"1 1 1 0 3 {a} {b} {c}\n" for a, b, c in triangles)
+        file.write(f"\nvolumeelements\n{len(tets)}\n")
+        rows = zip(mesh.regions, tets, strict=True)
+        file.writelines(f"{region} 4 {a} {b} {c} {d}\n" for region, (a, b, c, d) in rows)
+        file.write(f"\npoints\n{len(points)}\n")
+        file.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
+        file.write("\nendmesh\n")

@@ -1,0 +1,189 @@
+"""Tetrahedral meshes with their touchable surface."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from palpate.errors import MeshError, MeshWarning
+
+# Corners of the face opposite each corner, counter-clockwise seen from outside a positively oriented tetrahedron.
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+# An element flatter than this part of the cube of its longest edge has no usable shape functions.
+DEGENERATE = 1e-12
+
+
+class TetMesh:
+    """4-node tetrahedra in metres.
+
+    Parameters
+    ----------
+    nodes
+        (n, 3) m.
+    tets
+        (m, 4) 0-based node indices. Inverted elements are turned round; nodes that no element uses are dropped
+        with a :class:`palpate.MeshWarning`, the others keep their order.
+    regions
+        (m,) integer label of each element; zeros if None.
+
+    Raises
+    ------
+    MeshError
+        Coordinates that are not finite, indices out of range, degenerate elements, or a surface that is not a
+        closed manifold, each with the index of the first.
+
+    """
+
+    def __init__(self, nodes: np.ndarray, tets: np.ndarray, regions: np.ndarray | None = None):
+        nodes = np.array(nodes, dtype=np.float64, order="C", copy=True)
+        tets = _index_array(tets)
+        if nodes.ndim != 2 or nodes.shape[1] != 3:
+            raise MeshError(f"nodes must have shape (n, 3), got {nodes.shape}")
+        regions = (
+            np.zeros(len(tets), dtype=np.int64) if regions is None else np.array(regions, dtype=np.int64)
+        )
+        if regions.shape != (len(tets),):
+            raise MeshError(f"regions must have shape ({len(tets)},), got {regions.shape}")
+        _check_indices(nodes, tets)
+        nodes, tets = _drop_orphans(nodes, tets)
+        self.nodes = nodes
+        self.tets = _orient(nodes, tets)
+        self.regions = regions
+        for array in (self.nodes, self.tets, self.regions):
+            array.setflags(write=False)
+
+    def __repr__(self) -> str:
+        return f"TetMesh({len(self.nodes)} nodes, {len(self.tets)} tets, {len(self.surface_nodes)} on the surface)"
+
+    @cached_property
+    def surface_triangles(self) -> np.ndarray:
+        """Boundary triangles, (k, 3) node indices, outward."""
+        faces = self.tets[:, FACES].reshape(-1, 3)
+        ordered = np.sort(faces, axis=1)
+        _, first, inverse, counts = np.unique(
+            ordered, axis=0, return_index=True, return_inverse=True, return_counts=True
+        )
+        if counts.max() > 2:
+            face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
+            raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
+        triangles = faces[np.sort(first[counts == 1])]
+        triangles.setflags(write=False)
+        return triangles
+
+    @cached_property
+    def surface_nodes(self) -> np.ndarray:
+        """Nodes on the boundary, ascending (s,)."""
+        nodes = np.unique(self.surface_triangles)
+        nodes.setflags(write=False)
+        return nodes
+
+    @cached_property
+    def volumes(self) -> np.ndarray:
+        """Volume of each element, (m,) m^3."""
+        return _signed_volumes(self.nodes, self.tets)
+
+    @property
+    def volume(self) -> float:
+        """Volume, m^3."""
+        return float(self.volumes.sum())
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lowest and highest corner, (2, 3) m."""
+        return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
+
+    def dihedral_angles(self) -> np.ndarray:
+        """Smallest dihedral angle of each element, (m,) degrees: below about 5 an element is poor."""
+        p = self.nodes[self.tets][:, FACES]
+        normals = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
+        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+        cosines = np.einsum("eik,ejk->eij", normals, normals)
+        i, j = np.triu_indices(4, 1)
+        return 180.0 - np.degrees(np.arccos(np.clip(cosines[:, i, j], -1, 1))).max(axis=1)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], unit: str = "m") -> TetMesh:
+        """Read a volume mesh; ``unit`` is the file's unit of length.
+
+        Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood. Node order
+        is the file's. Regions come from cell data ``region``, ``gmsh:physical`` or ``medit:ref``, else from the only
+        integer cell array.
+
+        Raises
+        ------
+        MeshError
+            A file that is missing, not readable, or holds no tetrahedra.
+
+        """
+        from palpate.mesh.files import read_volume
+
+        return cls(*read_volume(Path(path), unit))
+
+    def write(self, path: str | os.PathLike[str], unit: str = "m") -> None:
+        """Write the mesh and its regions in the format of the file's ending; replaced only when complete."""
+        from palpate.mesh.files import write_volume
+
+        write_volume(self, Path(path), unit)
+
+
+def _index_array(tets: np.ndarray) -> np.ndarray:
+    tets = np.array(tets, order="C", copy=True)
+    if tets.ndim == 2 and tets.shape[1] == 10:
+        raise MeshError("10-node tetrahedra are not supported yet: write the mesh with linear elements")
+    if tets.ndim != 2 or tets.shape[1] != 4 or not np.issubdtype(tets.dtype, np.integer):
+        raise MeshError(f"tets must be integers of shape (m, 4), got {tets.dtype} {tets.shape}")
+    if len(tets) == 0:
+        raise MeshError("the mesh has no tetrahedra")
+    return tets.astype(np.int64)
+
+
+def _check_indices(nodes: np.ndarray, tets: np.ndarray) -> None:
+    bad = np.flatnonzero(((tets < 0) | (tets >= len(nodes))).any(axis=1))
+    if bad.size:
+        raise MeshError(
+            f"tetrahedron {bad[0]} names a node that does not exist (nodes are 0 to {len(nodes) - 1})"
+        )
+    bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
+    if bad.size:
+        raise MeshError(f"node {bad[0]} has a coordinate that is not finite")
+    repeated = np.flatnonzero((np.diff(np.sort(tets, axis=1), axis=1) == 0).any(axis=1))
+    if repeated.size:
+        raise MeshError(f"tetrahedron {repeated[0]} names the same node twice")
+
+
+def _drop_orphans(nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    used = np.zeros(len(nodes), dtype=bool)
+    used[tets] = True
+    if used.all():
+        return nodes, tets
+    orphans = np.flatnonzero(~used)
+    warnings.warn(
+        f"{len(orphans)} nodes belong to no tetrahedron and were dropped (first: node {orphans[0]})",
+        MeshWarning,
+        stacklevel=3,
+    )
+    return np.ascontiguousarray(nodes[used]), (np.cumsum(used) - 1)[tets]
+
+
+def _orient(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    volumes = _signed_volumes(nodes, tets)
+    p = nodes[tets]
+    longest = np.max([np.linalg.norm(p[:, i] - p[:, j], axis=1) for i in range(4) for j in range(i)], axis=0)
+    flat = np.flatnonzero(np.abs(volumes) <= DEGENERATE * longest**3)
+    if flat.size:
+        raise MeshError(
+            f"{len(flat)} tetrahedra have no volume (first: tetrahedron {flat[0]}); mesh the body again"
+        )
+    inverted = volumes < 0
+    tets[inverted] = tets[inverted][:, [0, 2, 1, 3]]
+    return tets
+
+
+def _signed_volumes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    a, b, c, d = (nodes[tets[:, k]] for k in range(4))
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0

@@ -1,0 +1,196 @@
+"""Tetrahedra from a surface by NETGEN, which runs in a child process: bad surfaces can hang or crash a mesher."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.errors import MeshError, MeshWarning
+from palpate.mesh.tetmesh import TetMesh
+from palpate.units import length_scale
+
+if TYPE_CHECKING:
+    import trimesh
+
+SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
+Ball = tuple[tuple[float, float, float], float, float]
+
+# The mesh may cut corners of a curved surface, but not lose a part of it.
+VOLUME_TOLERANCE = 0.1
+REPAIR_HINT = "close it in Blender or MeshLab, or repair it with pytetwild ('pip install palpate[repair]')"
+
+
+def tetrahedralize(
+    surface: str | os.PathLike[str] | trimesh.Trimesh,
+    max_element_size: float | None = None,
+    unit: str = "m",
+    refine: Sequence[Ball] = (),
+    *,
+    time_limit: float = 300.0,
+) -> TetMesh:
+    """Fill a closed surface with tetrahedra.
+
+    Parameters
+    ----------
+    surface
+        STL, OBJ, PLY, OFF or GLB file, or a trimesh surface.
+    max_element_size
+        Longest edge wanted, m; None: a fifteenth of the longest side.
+    unit
+        Unit of length of the surface.
+    refine
+        Finer balls: ``((x, y, z), radius, size)`` in m.
+    time_limit
+        Seconds after which the mesher is stopped.
+
+    Raises
+    ------
+    MeshError
+        A surface that cannot be filled, with what is wrong with it, or a mesher that crashed, hung or returned
+        nothing.
+
+    """
+    name, shape = _load(surface)
+    shape = shape.copy()
+    shape.apply_scale(length_scale(unit))
+    _check_surface(name, shape)
+    extent = float(np.ptp(shape.vertices, axis=0).max())
+    size = extent / 15 if max_element_size is None else float(max_element_size)
+    if not (np.isfinite(size) and size > 0):
+        raise MeshError(f"max_element_size must be positive, got {max_element_size}")
+    for (x, y, z), radius, ball_size in refine:
+        if not (np.isfinite([x, y, z, radius, ball_size]).all() and radius > 0 and ball_size > 0):
+            raise MeshError("refine takes ((x, y, z), radius, size) with positive radius and size in metres")
+    nodes, tets = _run_mesher(name, shape, size, extent, refine, time_limit)
+    mesh = TetMesh(nodes, tets)
+    loss = abs(mesh.volume / shape.volume - 1)
+    if loss > VOLUME_TOLERANCE:
+        raise MeshError(
+            f"{name}: the mesh has {mesh.volume:.3g} m3, the surface {shape.volume:.3g} m3: "
+            f"it probably intersects itself; {REPAIR_HINT}"
+        )
+    return mesh
+
+
+def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trimesh.Trimesh]:
+    import trimesh
+
+    if isinstance(surface, trimesh.Trimesh):
+        return "surface", surface
+    path = Path(surface)
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise MeshError(f"{path}: the file is empty")
+    if path.suffix.lower() not in SURFACE_ENDINGS:
+        raise MeshError(
+            f"{path}: unknown surface format '{path.suffix}'; known are {', '.join(SURFACE_ENDINGS)}"
+        )
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            loaded = trimesh.load_mesh(path, process=False)
+            shape = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
+    except Exception as error:
+        reason = " ".join(str(error).split())[:150]
+        raise MeshError(f"{path}: cannot be read as a surface ({reason})") from None
+    if not isinstance(shape, trimesh.Trimesh) or len(shape.faces) == 0:
+        raise MeshError(f"{path}: holds no triangles; is it really a {path.suffix[1:].upper()} file?")
+    return str(path), shape
+
+
+def _check_surface(name: str, shape: trimesh.Trimesh) -> None:
+    """Refuse what NETGEN would crash or hang on, and turn an inverted surface round (in place)."""
+    bad = np.flatnonzero(~np.isfinite(shape.vertices).all(axis=1))
+    if bad.size:
+        raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")
+    shape.merge_vertices(merge_tex=True, merge_norm=True)
+    shape.update_faces(shape.nondegenerate_faces())
+    shape.update_faces(shape.unique_faces())
+    shape.remove_unreferenced_vertices()
+    _, counts = np.unique(shape.edges_sorted, axis=0, return_counts=True)
+    open_edges, crowded = int((counts == 1).sum()), int((counts > 2).sum())
+    if open_edges:
+        raise MeshError(f"{name}: the surface is not closed ({open_edges} open edges); {REPAIR_HINT}")
+    if crowded:
+        raise MeshError(f"{name}: {crowded} edges are shared by more than two triangles; {REPAIR_HINT}")
+    if not shape.is_winding_consistent:
+        raise MeshError(f"{name}: its triangles do not agree on which side is outside; {REPAIR_HINT}")
+    if shape.body_count != 1:
+        raise MeshError(
+            f"{name}: holds {shape.body_count} separate surfaces, one is needed; save them one by one"
+        )
+    if shape.volume < 0:
+        shape.invert()
+        warnings.warn(
+            f"{name}: the surface was inside out and has been turned round", MeshWarning, stacklevel=3
+        )
+    if shape.volume <= 0:
+        raise MeshError(f"{name}: the surface encloses no volume")
+
+
+def _run_mesher(
+    name: str, shape: trimesh.Trimesh, size: float, extent: float, refine: Sequence[Ball], time_limit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mesh in a unit box, for NETGEN's tolerances are absolute, and scale back."""
+    origin = shape.vertices.min(axis=0)
+    balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in refine]
+    vertices = (shape.vertices - origin) / extent
+    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
+        given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
+        np.savez(
+            given,
+            vertices=vertices,
+            faces=shape.faces,
+            size=size / extent,
+            balls=np.array(balls).reshape(-1, 5),
+        )
+        # Even triangles are best; where NETGEN cannot make them, the surface as given may still be filled.
+        failures = []
+        for route in ("remesh", "keep"):
+            command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(given), str(made)]
+            failure = _failure(_run_limited(command, time_limit), time_limit)
+            if failure is None and made.exists():
+                with np.load(made) as result:
+                    return result["nodes"] * extent + origin, result["tets"]
+            failures.append(failure or "returned no tetrahedra")
+        raise MeshError(
+            f"{name}: NETGEN {failures[0]} when remeshing the surface, and {failures[1]} when keeping it; "
+            f"the surface probably intersects itself: {REPAIR_HINT}"
+        )
+
+
+def _failure(status: int | None, time_limit: float) -> str | None:
+    if status is None:
+        return f"did not finish in {time_limit:g} s and was stopped"
+    if status < 0:
+        return f"crashed ({signal.Signals(-status).name})"
+    return "returned no tetrahedra" if status else None
+
+
+def _run_limited(command: list[str], time_limit: float) -> int | None:
+    """Exit status of a child in a process group of its own; None if it ran out of time."""
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        return process.wait(time_limit)
+    except subprocess.TimeoutExpired:
+        return None
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()

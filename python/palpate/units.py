@@ -1,0 +1,82 @@
+"""Quantities with units, read once at the edge; inside everything is SI."""
+
+from __future__ import annotations
+
+import re
+
+from palpate.errors import UnitError
+
+LENGTH_UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
+PRESSURE_UNITS = {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": 6894.757293168}
+DENSITY_UNITS = {"kg/m3": 1.0, "kg/m^3": 1.0, "g/cm3": 1e3, "g/cm^3": 1e3}
+STIFFNESS_UNITS = {"N/m": 1.0, "N/mm": 1e3}
+FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def quantity(value: str | float, units: dict[str, float], kind: str) -> float:
+    """Read a number (SI) or text such as ``"4mm"``; the result is SI.
+
+    Raises
+    ------
+    UnitError
+        Not a quantity, or a unit that is not in ``units``; the message lists them.
+
+    """
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        raise UnitError(f"'{value}' is not a {kind}: write a number and one of {', '.join(units)}")
+    number, unit = float(match[1]), match[2]
+    if unit == "":
+        return number
+    if unit not in units:
+        raise UnitError(f"unknown unit '{unit}' in '{value}': a {kind} is given in {', '.join(units)}")
+    return number * units[unit]
+
+
+def length(value: str | float) -> float:
+    """Length in m."""
+    return quantity(value, LENGTH_UNITS, "length")
+
+
+def pressure(value: str | float) -> float:
+    """Pressure or modulus in Pa."""
+    return quantity(value, PRESSURE_UNITS, "pressure")
+
+
+def density(value: str | float) -> float:
+    """Density in kg/m^3."""
+    return quantity(value, DENSITY_UNITS, "density")
+
+
+def stiffness(value: str | float) -> float:
+    """Stiffness in N/m."""
+    return quantity(value, STIFFNESS_UNITS, "stiffness")
+
+
+def force(value: str | float) -> float:
+    """Force in N."""
+    return quantity(value, FORCE_UNITS, "force")
+
+
+def time(value: str | float) -> float:
+    """Time in s."""
+    return quantity(value, TIME_UNITS, "time")
+
+
+def length_scale(unit: str) -> float:
+    """Metres in one ``unit``.
+
+    Raises
+    ------
+    UnitError
+        A unit that is not a length.
+
+    """
+    if unit not in LENGTH_UNITS:
+        raise UnitError(f"unknown length unit '{unit}': use one of {', '.join(LENGTH_UNITS)}")
+    return LENGTH_UNITS[unit]

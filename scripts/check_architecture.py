@@ -1,0 +1,82 @@
+"""Check that ARCHITECTURE.md is true: its folders exist, its dependency rules hold, files stay readable."""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+MAX_FILE_LINES = 500
+MAX_PAGE_LINES = 100
+
+# What each crate must not depend on, and why.
+FORBIDDEN = {
+    "core": (
+        {"pyo3", "numpy", "triple_buffer", "rtrb", "libc"},
+        "core knows no Python, no clock and no hand-off",
+    ),
+    "devices": ({"pyo3", "numpy", "palpate-core"}, "a driver knows positions and forces only"),
+    "servo": ({"pyo3", "numpy"}, "the loop runs without Python"),
+}
+
+
+def main() -> int:
+    """Print every broken rule; the exit status is 1 if there is one."""
+    problems = [*page_problems(), *dependency_problems(), *length_problems()]
+    for problem in problems:
+        print(f"check_architecture: {problem}", file=sys.stderr)
+    return 1 if problems else 0
+
+
+def page_problems() -> list[str]:
+    """Folders that the page names and nobody has."""
+    page = (ROOT / "ARCHITECTURE.md").read_text()
+    problems = []
+    if len(page.splitlines()) > MAX_PAGE_LINES:
+        problems.append(f"ARCHITECTURE.md is longer than {MAX_PAGE_LINES} lines")
+    for name in re.findall(r"`([\w./-]+/)`", page):
+        if not (ROOT / name).is_dir():
+            problems.append(f"ARCHITECTURE.md names the folder {name}, which does not exist")
+    for crate in sorted(p.name for p in (ROOT / "crates").iterdir()):
+        if f"crates/{crate}/" not in page:
+            problems.append(f"ARCHITECTURE.md does not mention crates/{crate}/")
+    return problems
+
+
+def dependency_problems() -> list[str]:
+    """Dependencies that a crate's place forbids."""
+    problems = []
+    for crate, (forbidden, reason) in FORBIDDEN.items():
+        manifest = ROOT / "crates" / crate / "Cargo.toml"
+        if manifest.exists():
+            used = set(tomllib.loads(manifest.read_text()).get("dependencies", {}))
+            problems += [
+                f"crates/{crate} must not depend on {name}: {reason}" for name in sorted(used & forbidden)
+            ]
+    core = "\n".join(p.read_text() for p in (ROOT / "crates/core/src").rglob("*.rs"))
+    problems += [
+        f"crates/core uses {name}: it reads no clock"
+        for name in ("Instant::now", "SystemTime")
+        if name in core
+    ]
+    return problems
+
+
+def length_problems() -> list[str]:
+    """Source files too long to be read in one go."""
+    sources = [
+        p
+        for pattern in ("crates/*/src/**/*.rs", "python/**/*.py", "tests/**/*.py")
+        for p in ROOT.glob(pattern)
+    ]
+    return [
+        f"{p.relative_to(ROOT)} has more than {MAX_FILE_LINES} lines"
+        for p in sources
+        if len(p.read_text().splitlines()) > MAX_FILE_LINES
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
