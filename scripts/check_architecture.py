@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import sys
-import tomllib
 from pathlib import Path
+
+import tomllib
 
 ROOT = Path(__file__).resolve().parent.parent
 MAX_FILE_LINES = 500
@@ -52,25 +53,17 @@ def dependency_problems() -> list[str]:
         manifest = ROOT / "crates" / crate / "Cargo.toml"
         if manifest.exists():
             used = set(tomllib.loads(manifest.read_text()).get("dependencies", {}))
-            problems += [
-                f"crates/{crate} must not depend on {name}: {reason}" for name in sorted(used & forbidden)
-            ]
+            problems += [f"crates/{crate} must not depend on {name}: {reason}" for name in sorted(used & forbidden)]
     core = "\n".join(p.read_text() for p in (ROOT / "crates/core/src").rglob("*.rs"))
     problems += [
-        f"crates/core uses {name}: it reads no clock"
-        for name in ("Instant::now", "SystemTime")
-        if name in core
+        f"crates/core uses {name}: it reads no clock" for name in ("Instant::now", "SystemTime") if name in core
     ]
     return problems
 
 
 def length_problems() -> list[str]:
     """Source files too long to be read in one go."""
-    sources = [
-        p
-        for pattern in ("crates/*/src/**/*.rs", "python/**/*.py", "tests/**/*.py")
-        for p in ROOT.glob(pattern)
-    ]
+    sources = [p for pattern in ("crates/*/src/**/*.rs", "python/**/*.py", "tests/**/*.py") for p in ROOT.glob(pattern)]
     return [
         f"{p.relative_to(ROOT)} has more than {MAX_FILE_LINES} lines"
         for p in sources

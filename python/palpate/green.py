@@ -226,16 +226,10 @@ class GreensFunction:
             raise BodyError(f"{argument}: node {node!r} is not touchable") from None
 
     def _released_node(self, node: int) -> int:
-        if (
-            3 * node not in self._fixed
-            and 3 * node + 1 not in self._fixed
-            and 3 * node + 2 not in self._fixed
-        ):
+        if 3 * node not in self._fixed and 3 * node + 1 not in self._fixed and 3 * node + 2 not in self._fixed:
             raise BodyError(f"release: node {node} is not fixed")
         if node not in self._surface_rank:
-            raise BodyError(
-                f"release: fixed node {node} lies inside the body; only surface nodes can be released"
-            )
+            raise BodyError(f"release: fixed node {node} lies inside the body; only surface nodes can be released")
         return int(node)
 
 

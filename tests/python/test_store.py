@@ -66,9 +66,7 @@ def test_store_of_another_body_is_refused_by_load_and_replaced_by_precompute(blo
         palpate.GreensFunction.load(store, body=other)
     nodes = block.mesh.nodes.copy()
     nodes[-1] *= 1.0 + 1e-12
-    moved = palpate.Body(
-        palpate.TetMesh(nodes, block.mesh.tets), material=block.material, fixed=block.fixed_nodes
-    )
+    moved = palpate.Body(palpate.TetMesh(nodes, block.mesh.tets), material=block.material, fixed=block.fixed_nodes)
     with pytest.raises(palpate.StoreError, match="node positions"):
         palpate.GreensFunction.load(store, body=moved)
     palpate.precompute(other, path=store)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from palpate.mesh.tetmesh import TetMesh
 
-# meshio's name of the format to write, where it is not what the ending suggests. Its ASCII Gmsh files with point data do
+# The format of each ending, in the words of meshio. Its ASCII Gmsh files with point data do
 # not read back, so Gmsh is written in binary.
 WRITERS = {
     ".msh": "gmsh",
@@ -59,9 +59,7 @@ def _read_meshio(path: Path) -> meshio.Mesh:
             return meshio.read(path)
     except (Exception, SystemExit) as error:
         said = noise.getvalue().strip()
-        reason = (
-            said if isinstance(error, SystemExit) and said else str(error).strip() or type(error).__name__
-        )
+        reason = said if isinstance(error, SystemExit) and said else str(error).strip() or type(error).__name__
         reason = " ".join(reason.split())[:200]
         raise MeshError(f"{path}: cannot be read as {WRITERS[path.suffix]} ({reason})") from None
 
@@ -87,7 +85,7 @@ def _tetrahedra(path: Path, mesh: meshio.Mesh) -> tuple[np.ndarray, np.ndarray, 
 
 
 def _read_netgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The ``points`` and ``volumeelements`` sections of a Netgen mesh (1-based, negatively oriented)."""
+    """Read the ``points`` and ``volumeelements`` sections of a Netgen mesh (1-based, negatively oriented)."""
     lines = path.read_text(errors="replace").splitlines()
     heads = {line.strip(): i for i, line in enumerate(lines) if line.strip() in {"points", "volumeelements"}}
     if len(heads) != 2:

@@ -73,9 +73,7 @@ def _ball_points(centre: np.ndarray, radius: float, spacing: float) -> np.ndarra
 
 
 def _write_stl(path: Path, corners: np.ndarray) -> None:
-    record = np.zeros(
-        len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
-    )
+    record = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     record["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     record["corners"] = corners

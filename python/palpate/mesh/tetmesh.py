@@ -44,9 +44,7 @@ class TetMesh:
         tets = _index_array(tets)
         if nodes.ndim != 2 or nodes.shape[1] != 3:
             raise MeshError(f"nodes must have shape (n, 3), got {nodes.shape}")
-        regions = (
-            np.zeros(len(tets), dtype=np.int64) if regions is None else np.array(regions, dtype=np.int64)
-        )
+        regions = np.zeros(len(tets), dtype=np.int64) if regions is None else np.array(regions, dtype=np.int64)
         if regions.shape != (len(tets),):
             raise MeshError(f"regions must have shape ({len(tets)},), got {regions.shape}")
         _check_indices(nodes, tets)
@@ -145,9 +143,7 @@ def _index_array(tets: np.ndarray) -> np.ndarray:
 def _check_indices(nodes: np.ndarray, tets: np.ndarray) -> None:
     bad = np.flatnonzero(((tets < 0) | (tets >= len(nodes))).any(axis=1))
     if bad.size:
-        raise MeshError(
-            f"tetrahedron {bad[0]} names a node that does not exist (nodes are 0 to {len(nodes) - 1})"
-        )
+        raise MeshError(f"tetrahedron {bad[0]} names a node that does not exist (nodes are 0 to {len(nodes) - 1})")
     bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if bad.size:
         raise MeshError(f"node {bad[0]} has a coordinate that is not finite")
@@ -176,9 +172,7 @@ def _orient(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     longest = np.max([np.linalg.norm(p[:, i] - p[:, j], axis=1) for i in range(4) for j in range(i)], axis=0)
     flat = np.flatnonzero(np.abs(volumes) <= DEGENERATE * longest**3)
     if flat.size:
-        raise MeshError(
-            f"{len(flat)} tetrahedra have no volume (first: tetrahedron {flat[0]}); mesh the body again"
-        )
+        raise MeshError(f"{len(flat)} tetrahedra have no volume (first: tetrahedron {flat[0]}); mesh the body again")
     inverted = volumes < 0
     tets[inverted] = tets[inverted][:, [0, 2, 1, 3]]
     return tets

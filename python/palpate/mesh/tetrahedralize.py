@@ -92,9 +92,7 @@ def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trime
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the file is empty")
     if path.suffix.lower() not in SURFACE_ENDINGS:
-        raise MeshError(
-            f"{path}: unknown surface format '{path.suffix}'; known are {', '.join(SURFACE_ENDINGS)}"
-        )
+        raise MeshError(f"{path}: unknown surface format '{path.suffix}'; known are {', '.join(SURFACE_ENDINGS)}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -126,14 +124,10 @@ def _check_surface(name: str, shape: trimesh.Trimesh) -> None:
     if not shape.is_winding_consistent:
         raise MeshError(f"{name}: its triangles do not agree on which side is outside; {REPAIR_HINT}")
     if shape.body_count != 1:
-        raise MeshError(
-            f"{name}: holds {shape.body_count} separate surfaces, one is needed; save them one by one"
-        )
+        raise MeshError(f"{name}: holds {shape.body_count} separate surfaces, one is needed; save them one by one")
     if shape.volume < 0:
         shape.invert()
-        warnings.warn(
-            f"{name}: the surface was inside out and has been turned round", MeshWarning, stacklevel=3
-        )
+        warnings.warn(f"{name}: the surface was inside out and has been turned round", MeshWarning, stacklevel=3)
     if shape.volume <= 0:
         raise MeshError(f"{name}: the surface encloses no volume")
 

@@ -1,0 +1,204 @@
+"""Commands. Heavy imports wait inside them, so that ``palpate --help`` is quick."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from palpate.body import Body
+    from palpate.mesh import TetMesh
+
+app = typer.Typer(
+    help="Finite elements you can feel.", no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
+)
+cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
+app.add_typer(cache_app, name="cache")
+
+Unit = Annotated[str, typer.Option(help="Unit of length of the file: m, cm, mm, um, in.")]
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line and exit code 2, Ctrl-C is 130."""
+    from palpate.errors import Error, MeshWarning
+
+    def show(message: Warning | str, category: type[Warning], *_args: object, **_kwargs: object) -> None:
+        label = "note" if issubclass(category, MeshWarning) else "warning"
+        print(f"palpate: {label}: {message}", file=sys.stderr)
+
+    warnings.showwarning = show
+    try:
+        app(standalone_mode=True)
+    except Error as error:
+        sys.exit(_complain(str(error)))
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        sys.exit(_complain(f"{where}{error.strerror or error}"))
+    except KeyboardInterrupt:
+        print("palpate: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+def _complain(message: str) -> int:
+    print(f"palpate: error: {message}", file=sys.stderr)
+    return 2
+
+
+@app.command()
+def mesh(
+    surface: Annotated[Path, typer.Argument(help="Closed surface: STL, OBJ, PLY, OFF or GLB.")],
+    out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
+    unit: Unit = "m",
+    max_size: Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")] = None,
+) -> None:
+    """Fill a closed surface with tetrahedra.
+
+    Example: palpate mesh liver.stl liver.vtu --unit mm --max-size 4mm
+    """
+    from palpate.mesh import tetrahedralize
+    from palpate.units import length
+
+    made = tetrahedralize(surface, None if max_size is None else length(max_size), unit)
+    made.write(out)
+    print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
+
+
+@app.command()
+def precompute(
+    mesh: Annotated[Path, typer.Argument(help="Volume mesh, or a surface to be meshed.")],
+    fix: Annotated[str, typer.Option(help="Supported nodes, such as 'z < 0.01' or 'z < min + 5mm'.")],
+    youngs_modulus: Annotated[str, typer.Option("-E", help="Young's modulus, such as 10kPa.")] = "10kPa",
+    poissons_ratio: Annotated[float, typer.Option("--nu", help="Poisson's ratio, below 0.5.")] = 0.45,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
+    unit: Unit = "m",
+    precision: Annotated[str, typer.Option(help="Stored number format: f32 or f64.")] = "f32",
+    touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
+) -> None:
+    """Solve the body once, so that any touch is answered in microseconds.
+
+    Example: palpate precompute liver.vtu --fix "z < min + 5mm" -E 10kPa --nu 0.45 -o liver.palpate
+    """
+    import palpate
+    from palpate.predicate import parse
+    from palpate.units import pressure
+
+    body = _body(_read_any(mesh, unit), pressure(youngs_modulus), poissons_ratio, fix)
+    region = None
+    if touch is not None:
+        surface = body.mesh.surface_nodes
+        region = surface[parse(touch)(body.mesh.nodes[surface])]
+        if len(region) == 0:
+            raise palpate.BodyError(f"no surface node satisfies --touch '{touch}'")
+    green = palpate.precompute(body, precision=precision, touch=region, path=out)
+    print(f"{green.path}: {_green_line(green)}")
+
+
+@app.command()
+def touch(
+    store: Annotated[Path, typer.Argument(help="A precomputed store.")],
+    point: Annotated[str, typer.Option(help="Contact point, such as 10mm,0,35mm.")],
+    press: Annotated[str, typer.Option(help="Displacement, such as 0,0,-3mm; '-' leaves a component free.")],
+    radius: Annotated[str, typer.Option(help="Contact radius, such as 5mm; 0 is a point.")] = "5mm",
+) -> None:
+    """Press a patch of the surface and print the force.
+
+    Example: palpate touch liver.palpate --point 0,4cm,2cm --press=-,-3mm,- --radius 5mm
+    """
+    import numpy as np
+
+    import palpate
+    from palpate.units import length
+
+    green = palpate.GreensFunction.load(store)
+    where = [length(v) for v in point.split(",")]
+    how = [None if v.strip() == "-" else length(v) for v in press.split(",")]
+    answer = green.touch(where, how, length(radius))
+    size = np.linalg.norm(answer.displacements, axis=1)
+    print(f"force on the body: {np.array2string(answer.force, precision=5)} N, {np.linalg.norm(answer.force):.5g} N")
+    print(f"largest displacement: {1e3 * size.max():.4g} mm at node {green.surface_nodes[size.argmax()]}")
+
+
+@app.command()
+def info(
+    file: Annotated[Path, typer.Argument(help="A store or a volume mesh.")],
+    unit: Unit = "m",
+) -> None:
+    """Say what a file holds.
+
+    Example: palpate info liver.palpate
+    """
+    import palpate
+
+    if file.suffix == ".palpate":
+        green = palpate.GreensFunction.load(file)
+        print(f"{file}: {_green_line(green)}")
+        for name, value in green.description.items():
+            print(f"  {name.replace('_', ' ')}: {value}")
+        print(f"  key: {green.key}")
+        return
+    made = palpate.TetMesh.read(file, unit)
+    print(f"{file}: {_mesh_line(made)}")
+    low, high = 1e3 * made.bounds
+    print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * made.volume:.4g} cm3")
+    print(
+        f"  regions: {sorted(set(made.regions.tolist()))}, dihedral angle >= {made.dihedral_angles().min():.1f} degrees"
+    )
+
+
+@cache_app.command("list")
+def cache_list() -> None:
+    """List the precomputed files in the cache."""
+    from palpate.green import cache_directory
+
+    files = sorted(cache_directory().glob("*.palpate"))
+    for file in files:
+        print(f"{file.stat().st_size / 1e6:9.1f} MB  {file}")
+    print(f"{len(files)} files, {sum(f.stat().st_size for f in files) / 1e6:.1f} MB in {cache_directory()}")
+
+
+@cache_app.command("clear")
+def cache_clear() -> None:
+    """Delete the precomputed files in the cache."""
+    from palpate.green import cache_directory
+
+    files = sorted(cache_directory().glob("*.palpate*"))
+    for file in files:
+        file.unlink()
+    print(f"deleted {len(files)} files")
+
+
+def _read_any(path: Path, unit: str) -> TetMesh:
+    from palpate.mesh import TetMesh, tetrahedralize
+    from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
+
+    return tetrahedralize(path, None, unit) if path.suffix.lower() in SURFACE_ENDINGS else TetMesh.read(path, unit)
+
+
+def _body(mesh: TetMesh, youngs_modulus: float, poissons_ratio: float, fix: str) -> Body:
+    import palpate
+    from palpate.predicate import parse
+
+    mask = parse(fix)(mesh.nodes)
+    if not mask.any():
+        low, high = mesh.bounds.round(4).tolist()
+        raise palpate.BodyError(f"no node satisfies --fix '{fix}': the body reaches from {low} to {high} m")
+    return palpate.Body(mesh, material=palpate.Material(youngs_modulus, poissons_ratio), fixed=mask)
+
+
+def _mesh_line(mesh: TetMesh) -> str:
+    return (
+        f"{len(mesh.nodes)} nodes, {len(mesh.tets)} tetrahedra, "
+        f"{len(mesh.surface_nodes)} surface nodes, {len(mesh.surface_triangles)} triangles"
+    )
+
+
+def _green_line(green) -> str:
+    size = green.path.stat().st_size / 1e6
+    return (
+        f"Green's function, {len(green.touchable_nodes)} of {len(green.surface_nodes)} surface nodes touchable, "
+        f"{len(green.fixed_nodes)} nodes fixed, {green.precision}, {size:.1f} MB"
+    )

@@ -1,0 +1,123 @@
+"""The command line as a user meets it: real files, and mistakes that cost one line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+import palpate
+
+
+def run(*arguments, cwd, **kwargs):
+    command = [sys.executable, "-c", "from palpate.cli import main; main()", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **kwargs)
+
+
+def refused(result, *words):
+    assert result.returncode == 2, result
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, result.stderr
+    for word in words:
+        assert word in lines[0], lines[0]
+
+
+@pytest.fixture
+def ball(tmp_path):
+    shape = trimesh.creation.icosphere(subdivisions=3, radius=40.0)
+    shape.export(tmp_path / "ball.stl")
+    return shape
+
+
+def test_surface_to_force(ball, tmp_path):
+    result = run("mesh", "ball.stl", "ball.vtu", "--unit", "mm", "--max-size", "8mm", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    mesh = palpate.TetMesh.read(tmp_path / "ball.vtu")
+    assert mesh.volume == pytest.approx(ball.volume * 1e-9, rel=0.03)
+    make = ("precompute", "ball.vtu", "--fix", "z < min + 15mm", "-E", "10kPa", "--nu", "0.4", "-o", "ball.palpate")
+    result = run(*make, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert sorted(os.listdir(tmp_path)) == ["ball.palpate", "ball.stl", "ball.vtu"]
+    press = ("touch", "ball.palpate", "--point", "0,0,4cm", "--press", "0,0,-2mm", "--radius", "8mm")
+    result = run(*press, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    force = palpate.GreensFunction.load(tmp_path / "ball.palpate").touch((0, 0, 0.04), (0, 0, -2e-3), 8e-3).force
+    assert force[2] < 0
+    assert f"{np.linalg.norm(force):.5g} N" in result.stdout
+    assert "surface nodes touchable" in run("info", "ball.palpate", cwd=tmp_path).stdout
+    assert "tetrahedra" in run("info", "ball.vtu", cwd=tmp_path).stdout
+
+
+def test_cache_is_listed_and_cleared(ball, tmp_path):
+    run("precompute", "ball.stl", "--unit", "mm", "--fix", "z < -2cm", cwd=tmp_path)
+    assert "1 files" in run("cache", "list", cwd=tmp_path).stdout
+    assert "deleted 1" in run("cache", "clear", cwd=tmp_path).stdout
+    assert "0 files" in run("cache", "list", cwd=tmp_path).stdout
+
+
+def broken_surfaces(folder):
+    cube = trimesh.creation.box(extents=(50, 50, 50)).subdivide()
+    opened = cube.copy()
+    opened.update_faces(np.arange(len(cube.faces)) != 3)
+    opened.export(folder / "open.stl")
+    (folder / "empty.stl").write_bytes(b"")
+    (folder / "garbage.stl").write_bytes(bytes(range(256)) * 8)
+    spiked = cube.copy()
+    spiked.vertices[5] = np.nan
+    spiked.export(folder / "nan.obj")
+    trimesh.util.concatenate([cube, cube.copy().apply_translation((100, 0, 0))]).export(folder / "two.stl")
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("missing.stl", ["missing.stl", "no such file"]),
+        ("empty.stl", ["empty.stl", "empty"]),
+        ("garbage.stl", ["garbage.stl"]),
+        ("open.stl", ["not closed", "3 open edges", "Blender"]),
+        ("nan.obj", ["nan.obj", "not finite"]),
+        ("two.stl", ["2 separate surfaces"]),
+    ],
+)
+def test_broken_surfaces_cost_one_line_and_leave_nothing(tmp_path, file, words):
+    broken_surfaces(tmp_path)
+    before = sorted(os.listdir(tmp_path))
+    refused(run("mesh", file, "out.vtu", "--unit", "mm", cwd=tmp_path), *words)
+    assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_inverted_surface_is_repaired_with_a_notice(tmp_path):
+    cube = trimesh.creation.box(extents=(50, 50, 50)).subdivide()
+    cube.invert()
+    cube.export(tmp_path / "inverted.stl")
+    result = run("mesh", "inverted.stl", "out.vtu", "--unit", "mm", "--max-size", "2cm", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "turned round" in result.stderr
+    assert palpate.TetMesh.read(tmp_path / "out.vtu").volume == pytest.approx(0.05**3, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--unit", "mm", "--fix", "z > 9"], ["no node satisfies", "z > 9"]),
+        (["--unit", "mm", "--fix", "z > -9"], ["every node is fixed"]),
+        (["--unit", "mm", "--fix", "open('x')"], ["not allowed"]),
+        (["--unit", "parsec", "--fix", "z < 0"], ["unknown length unit 'parsec'", "mm"]),
+        (["--unit", "mm", "--fix", "z < 0", "-E", "10kilo"], ["unknown unit 'kilo'"]),
+        (["--unit", "mm", "--fix", "z < 0", "-E", "0"], ["Young's modulus must be positive"]),
+        (["--unit", "mm", "--fix", "z < 0", "--nu", "0.5"], ["Poisson's ratio", "0.5"]),
+        (["--unit", "mm", "--fix", "z < 0", "--precision", "f12"], ["unknown precision 'f12'"]),
+    ],
+)
+def test_wrong_options_cost_one_line_and_leave_nothing(ball, tmp_path, options, words):
+    refused(run("precompute", "ball.stl", "-o", "ball.palpate", *options, cwd=tmp_path), *words)
+    assert os.listdir(tmp_path) == ["ball.stl"]
+
+
+def test_damaged_store_costs_one_line(tmp_path):
+    (tmp_path / "bad.palpate").write_bytes(b"not a store at all")
+    refused(run("info", "bad.palpate", cwd=tmp_path), "bad.palpate", "not a Palpate store")
