@@ -23,7 +23,7 @@ $(VENV)/.installed: $(BIN)/python pyproject.toml Cargo.toml Cargo.lock $(shell f
 	@touch $@
 
 demo: $(VENV)/.installed
-	$(BIN)/palpate demo $(ARGS)
+	$(BIN)/python examples/press_ball.py
 
 test: $(VENV)/.installed lint
 	cargo test --release --quiet --workspace --exclude palpate-python

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # The format of each ending, in the words of meshio. Its ASCII Gmsh files with point data do
 # not read back, so Gmsh is written in binary.
 WRITERS = {
-    ".msh": "gmsh",
+    ".msh": "gmsh22",
     ".vtu": "vtu",
     ".vtk": "vtk",
     ".inp": "abaqus",
@@ -61,7 +61,7 @@ def _read_meshio(path: Path) -> meshio.Mesh:
         said = noise.getvalue().strip()
         reason = said if isinstance(error, SystemExit) and said else str(error).strip() or type(error).__name__
         reason = " ".join(reason.split())[:200]
-        raise MeshError(f"{path}: cannot be read as {WRITERS[path.suffix]} ({reason})") from None
+        raise MeshError(f"{path}: cannot be read as a {path.suffix} file ({reason})") from None
 
 
 def _tetrahedra(path: Path, mesh: meshio.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -27,9 +27,11 @@ def main(route: str, given: str, made: str) -> int:
     with np.load(given) as job:
         vertices, faces, size, balls = job["vertices"], job["faces"], float(job["size"]), job["balls"]
     parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE)
-    for *centre, radius, ball_size in balls:
-        for point in _ball_points(np.array(centre), radius, ball_size):
-            parameters.RestrictH(*point, ball_size)
+    if len(balls):
+        # A file of sizes, for NETGEN forgets sizes given by RestrictH when it remeshes a surface.
+        sizes = Path(given).with_suffix(".msz")
+        _write_sizes(sizes, balls)
+        parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE, meshsizefilename=str(sizes))
     if route == "keep":
         mesh = _fill(vertices, faces, parameters)
     else:
@@ -43,6 +45,12 @@ def main(route: str, given: str, made: str) -> int:
     used = np.unique(tets)
     np.savez(made, nodes=nodes[used], tets=np.searchsorted(used, tets))
     return 0
+
+
+def _write_sizes(path: Path, balls: np.ndarray) -> None:
+    """Points with a local size each, and no lines, in NETGEN's format."""
+    points = [(*p, size) for *c, radius, size in balls for p in _ball_points(np.array(c), radius, size)]
+    path.write_text("\n".join([str(len(points)), *(" ".join(map(repr, map(float, p))) for p in points), "0", ""]))
 
 
 def _remesh(corners: np.ndarray, surface: Path, parameters: MeshingParameters) -> Mesh:

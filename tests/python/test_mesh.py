@@ -1,0 +1,149 @@
+"""Meshes: topology, repair, and files that other programs read."""
+
+from __future__ import annotations
+
+import os
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+import trimesh
+from conftest import box_mesh
+
+import palpate
+from palpate.mesh import tetrahedralize as module_function
+from palpate.mesh.files import WRITERS
+
+tetrahedralize = module_function
+
+
+def test_surface_is_closed_outward_and_complete():
+    mesh = box_mesh()
+    surface = trimesh.Trimesh(mesh.nodes, mesh.surface_triangles, process=False)
+    surface.remove_unreferenced_vertices()
+    assert surface.is_watertight
+    assert surface.volume == pytest.approx(0.08 * 0.05 * 0.05, rel=1e-12)
+    assert surface.area == pytest.approx(2 * (0.08 * 0.05 * 2 + 0.05**2), rel=1e-12)
+    assert mesh.volume == pytest.approx(surface.volume, rel=1e-12)
+    assert np.array_equal(mesh.surface_nodes, np.unique(mesh.surface_triangles))
+
+
+def test_inverted_tetrahedra_are_turned_round_without_reordering_nodes():
+    mesh = box_mesh()
+    tets = mesh.tets.copy()
+    tets[::3] = tets[::3][:, [1, 0, 2, 3]]
+    repaired = palpate.TetMesh(mesh.nodes, tets)
+    assert (repaired.volumes > 0).all()
+    assert np.array_equal(repaired.nodes, mesh.nodes)
+
+
+def test_orphans_are_dropped_with_a_warning():
+    mesh = box_mesh()
+    nodes = np.vstack([[9.0, 9.0, 9.0], mesh.nodes, [8.0, 8.0, 8.0]])
+    with pytest.warns(palpate.MeshWarning, match="2 nodes belong to no tetrahedron"):
+        cleaned = palpate.TetMesh(nodes, mesh.tets + 1)
+    assert np.array_equal(cleaned.nodes, mesh.nodes)
+    assert np.array_equal(cleaned.tets, mesh.tets)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda n, t: n.__setitem__((5, 1), np.nan), "node 5 has a coordinate that is not finite"),
+        (lambda n, t: t.__setitem__((7, 2), 10**6), "tetrahedron 7 names a node that does not exist"),
+        (lambda n, t: t.__setitem__((7, 2), t[7, 1]), "tetrahedron 7 names the same node twice"),
+        (lambda n, t: n.__setitem__(slice(None), n * [1, 1, 0]), "tetrahedra have no volume"),
+    ],
+)
+def test_unusable_meshes_are_refused_by_index(change, message):
+    mesh = box_mesh()
+    nodes, tets = mesh.nodes.copy(), mesh.tets.copy()
+    change(nodes, tets)
+    with pytest.raises(palpate.MeshError, match=message):
+        palpate.TetMesh(nodes, tets)
+
+
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_files_round_trip(tmp_path, ending):
+    mesh = box_mesh()
+    regions = (mesh.nodes[mesh.tets].mean(axis=1)[:, 0] > 0.04).astype(int) + 1
+    mesh = palpate.TetMesh(mesh.nodes, mesh.tets, regions)
+    path = tmp_path / f"body{ending}"
+    mesh.write(path, unit="mm")
+    again = palpate.TetMesh.read(path, unit="mm")
+    assert np.abs(again.nodes - mesh.nodes).max() <= 1e-15
+    assert np.array_equal(np.sort(again.tets), np.sort(mesh.tets))
+    if ending not in {".inp"}:  # Abaqus has no integer cell data
+        assert np.array_equal(again.regions, regions)
+    assert all(name.startswith("body") for name in os.listdir(tmp_path))
+
+
+def test_netgen_reads_our_vol_file(tmp_path):
+    from netgen.meshing import Mesh
+
+    mesh = box_mesh()
+    mesh.write(tmp_path / "body.vol")
+    theirs = Mesh(3)
+    theirs.Load(str(tmp_path / "body.vol"))
+    assert len(theirs.Elements3D()) == len(mesh.tets)
+    theirs.Save(str(tmp_path / "theirs.vol"))
+    again = palpate.TetMesh.read(tmp_path / "theirs.vol")
+    assert again.volume == pytest.approx(mesh.volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "glb"])
+def test_surfaces_are_filled(tmp_path, ending):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.04)
+    ball.export(tmp_path / f"ball.{ending}")
+    mesh = tetrahedralize(tmp_path / f"ball.{ending}", max_element_size=0.012)
+    assert mesh.volume == pytest.approx(ball.volume, rel=0.06)
+    assert np.linalg.norm(mesh.nodes[mesh.surface_nodes], axis=1) == pytest.approx(0.04, rel=0.03)
+    assert mesh.dihedral_angles().min() > 5
+
+
+def test_refinement_balls_are_local():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.04)
+    coarse = tetrahedralize(ball, max_element_size=0.012)
+    fine = tetrahedralize(ball, max_element_size=0.012, refine=[((0, 0, 0.04), 0.01, 0.002)])
+    near, far = (lambda m: np.linalg.norm(m.nodes - [0, 0, 0.04], axis=1) < 0.01), (lambda m: m.nodes[:, 2] < -0.01)
+    assert near(fine).sum() > 8 * near(coarse).sum()
+    assert far(fine).sum() < 1.5 * far(coarse).sum()
+
+
+def test_mesher_that_hangs_or_crashes_is_reported(tmp_path, monkeypatch):
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.04)
+    for program, message in [
+        ("import time; time.sleep(60)", "did not finish in 1 s"),
+        ("import os; os.abort()", "crashed .SIGABRT."),
+        ("pass", "returned no tetrahedra"),
+    ]:
+        fake = tmp_path / "fake.sh"
+        fake.write_text(
+            textwrap.dedent(f"""\
+            #!/bin/sh
+            exec {sys.executable} -c '{program}'
+            """)
+        )
+        fake.chmod(0o755)
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "executable", str(fake))
+            with pytest.raises(palpate.MeshError, match=message):
+                tetrahedralize(ball, time_limit=1 if "sleep" in program else 60)
+
+
+def test_self_intersecting_surface_is_reported():
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
+    ball.vertices[np.argmax(ball.vertices[:, 2])] = [0, 0, -0.08]
+    with pytest.raises(palpate.MeshError, match="intersects itself"):
+        tetrahedralize(ball, max_element_size=0.02, time_limit=20)
+
+
+@pytest.mark.parametrize(("name", "content", "message"), [
+    ("a.vtu", b"", "empty"), ("a.vtu", b"<nonsense", "cannot be read as a .vtu"), ("a.xyz", b"1", "unknown volume format"),
+    ("a.vol", b"mesh3d\n", "holds no points"), ("a.msh", b"$MeshFormat\n4.1 0 8\n", "cannot be read as a .msh"),
+])  # fmt: skip
+def test_unreadable_volumes_are_named(tmp_path, name, content, message):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(palpate.MeshError, match=message):
+        palpate.TetMesh.read(tmp_path / name)
