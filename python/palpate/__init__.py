@@ -9,6 +9,8 @@ from palpate.body import Body, Material
 from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError
 from palpate.green import Answer, GreensFunction, Touch, precompute
 from palpate.mesh import TetMesh, tetrahedralize
+from palpate.scene import Scene
+from palpate.simulation import Contact, Frame, Simulation
 
 __version__ = version("palpate")
 

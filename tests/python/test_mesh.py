@@ -140,7 +140,8 @@ def test_self_intersecting_surface_is_reported():
 
 
 @pytest.mark.parametrize(("name", "content", "message"), [
-    ("a.vtu", b"", "empty"), ("a.vtu", b"<nonsense", "cannot be read as a .vtu"), ("a.xyz", b"1", "unknown volume format"),
+    ("a.vtu", b"", "empty"), ("a.vtu", b"<nonsense", "cannot be read as a .vtu"),
+    ("a.xyz", b"1", "unknown volume format"),
     ("a.vol", b"mesh3d\n", "holds no points"), ("a.msh", b"$MeshFormat\n4.1 0 8\n", "cannot be read as a .msh"),
 ])  # fmt: skip
 def test_unreadable_volumes_are_named(tmp_path, name, content, message):

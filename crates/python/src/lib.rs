@@ -4,6 +4,7 @@
 mod body;
 mod errors;
 mod green;
+mod simulation;
 
 use pyo3::prelude::*;
 
@@ -14,5 +15,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(body::mass, module)?)?;
     module.add_class::<green::GreenCore>()?;
+    module.add_class::<simulation::SimulationCore>()?;
     Ok(())
 }

@@ -1,0 +1,67 @@
+//! Deadlines on the monotonic clock, real-time scheduling and locked memory: everything of this crate that calls the
+//! operating system.
+#![allow(unsafe_code)] // libc
+
+/// Nanoseconds of the monotonic clock.
+pub fn now_ns() -> u64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is a valid timespec that the call fills in.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+}
+
+/// Sleeps until an absolute time of the monotonic clock.
+pub fn sleep_until_ns(deadline: u64) {
+    let time = libc::timespec {
+        tv_sec: (deadline / 1_000_000_000) as libc::time_t,
+        tv_nsec: (deadline % 1_000_000_000) as libc::c_long,
+    };
+    // SAFETY: `time` outlives the call, the remaining time is not asked for with an absolute deadline. A signal
+    // (EINTR) is answered by sleeping on.
+    while unsafe { libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut()) }
+        == libc::EINTR
+    {}
+}
+
+/// Asks for a first-in first-out real-time priority for this thread; whether it was granted.
+pub fn request_realtime_priority() -> bool {
+    let parameters = libc::sched_param { sched_priority: 80 };
+    // SAFETY: `parameters` is valid for the call; 0 names the calling thread.
+    unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) == 0 }
+}
+
+/// Asks that no page of the process is ever swapped out; whether it was granted.
+pub fn lock_memory() -> bool {
+    // SAFETY: takes flags only.
+    unsafe { libc::mlockall(libc::MCL_CURRENT) == 0 }
+}
+
+/// The next deadline on the grid of `period` after `deadline` that is not yet past, and how many were missed.
+pub fn next_deadline(deadline: u64, now: u64, period: u64) -> (u64, u64) {
+    let next = deadline + period;
+    if now < next {
+        return (next, 0);
+    }
+    let missed = (now - next) / period + 1;
+    (next + missed * period, missed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deadlines_stay_on_the_grid_and_missed_ones_are_counted() {
+        assert_eq!(next_deadline(1000, 1000, 100), (1100, 0));
+        assert_eq!(next_deadline(1000, 1099, 100), (1100, 0));
+        assert_eq!(next_deadline(1000, 1100, 100), (1200, 1));
+        assert_eq!(next_deadline(1000, 1350, 100), (1400, 3));
+    }
+
+    #[test]
+    fn sleeping_reaches_the_deadline() {
+        let deadline = now_ns() + 2_000_000;
+        sleep_until_ns(deadline);
+        assert!(now_ns() >= deadline);
+    }
+}

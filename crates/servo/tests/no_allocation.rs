@@ -1,0 +1,122 @@
+//! A tick never allocates: counted, through contact, sliding target, release and a bad number.
+#![allow(unsafe_code)] // a counting allocator
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+use glam::DVec3;
+use palpate_core::fem::{Isotropic, Supports};
+use palpate_core::green::{Precision, Problem, precompute};
+use palpate_core::mesh::TetMesh;
+use palpate_core::simulation::{Input, MAX_TOOLS, Model};
+use palpate_devices::DeviceState;
+use palpate_servo::{SafetyLimits, Ticker};
+
+thread_local! {
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call is passed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|c| c.set(c.get() + 1));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        COUNT.with(|c| c.set(c.get() + 1));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// A cube of `n`^3 cells of five tetrahedra each, 0.1 m wide, clamped below.
+fn cube(n: u32) -> Problem {
+    let at = |i: u32, j: u32, k: u32| (i * (n + 1) + j) * (n + 1) + k;
+    let mut nodes = Vec::new();
+    for i in 0..=n {
+        for j in 0..=n {
+            for k in 0..=n {
+                nodes.push(0.1 / f64::from(n) * DVec3::new(f64::from(i), f64::from(j), f64::from(k)));
+            }
+        }
+    }
+    let mut tets = Vec::new();
+    for (i, j, k) in (0..n * n * n).map(|c| (c / (n * n), c / n % n, c % n)) {
+        let corner = |b: u32| at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
+        // The two ways of cutting a cube alternate, so that the diagonals of neighbours meet.
+        let cuts: [[u32; 4]; 5] = if (i + j + k) % 2 == 0 {
+            [[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]]
+        } else {
+            [[1, 0, 5, 3], [2, 3, 6, 0], [4, 5, 0, 6], [7, 6, 3, 5], [0, 3, 5, 6]]
+        };
+        for cut in cuts {
+            let [a, b, c, d] = cut.map(corner);
+            let p = [a, b, c, d].map(|v| nodes[v as usize]);
+            let positive = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]) > 0.0;
+            tets.push(if positive { [a, b, c, d] } else { [b, a, c, d] });
+        }
+    }
+    let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::new();
+    for &[a, b, c, d] in &tets {
+        for face in [[b, c, d], [a, d, c], [a, b, d], [a, c, b]] {
+            let mut key = face;
+            key.sort_unstable();
+            faces.push((key, face));
+        }
+    }
+    faces.sort_unstable();
+    let triangles: Vec<[u32; 3]> = faces.chunk_by(|x, y| x.0 == y.0).filter(|c| c.len() == 1).map(|c| c[0].1).collect();
+    let mut surface_nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
+    surface_nodes.sort_unstable();
+    surface_nodes.dedup();
+    let below = (0..nodes.len() as u32).filter(|&i| nodes[i as usize].z < 1e-9);
+    let fixed: Vec<u32> = below.flat_map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let (elements, dofs) = (tets.len(), 3 * nodes.len());
+    Problem {
+        mesh: TetMesh::new(nodes, tets).expect("a valid mesh"),
+        materials: vec![Isotropic::new(10e3, 0.4, 1000.0).expect("a valid material"); elements],
+        supports: Supports::new(dofs, fixed).expect("valid supports"),
+        touch: (0..surface_nodes.len() as u32).collect(),
+        surface_nodes,
+        surface_triangles: triangles,
+    }
+}
+
+#[test]
+fn a_tick_never_allocates_and_repeats_its_bits() {
+    let green = precompute(&cube(6), Precision::F32, &|_, _| true).expect("a solvable cube");
+    let model = Arc::new(Model::new(Arc::new(green), 0.005, 5000.0).expect("a valid model"));
+    let settings = Input { contact_radius: 0.02, ..Input::default() };
+    let path = |tick: usize| {
+        let t = tick as f64 * 1e-3;
+        let depth = 0.012 * (6.0 * t).sin();
+        DVec3::new(0.03 + 0.02 * t, 0.05, 0.105 - depth)
+    };
+    let mut runs = [Vec::with_capacity(2000), Vec::with_capacity(2000)];
+    let mut touched = 0;
+    for run in &mut runs {
+        let mut ticker = Ticker::new(model.clone(), SafetyLimits::default());
+        let before = COUNT.with(Cell::get);
+        for tick in 0..2000 {
+            let mut devices = [DeviceState::default(); MAX_TOOLS];
+            let grab = (1200..1500).contains(&tick);
+            let position = if tick == 1990 { DVec3::splat(f64::NAN) } else { path(tick) };
+            devices[0] = DeviceState { position, active: true, grab, ..DeviceState::default() };
+            devices[1] = DeviceState { position: DVec3::new(0.07, 0.05, 0.101), active: tick > 500, ..devices[1] };
+            let output = ticker.tick(&devices, &settings, 1e-3);
+            touched += usize::from(output.forces[0].z > 0.0);
+            run.push(output.forces.map(|f| f.to_array().map(f64::to_bits)));
+        }
+        assert_eq!(COUNT.with(Cell::get), before, "a tick allocated");
+    }
+    assert!(touched > 1000, "the tool hardly touched: {touched}");
+    assert_eq!(runs[0], runs[1]);
+    assert_eq!(runs[0][1999][0], [0; 3], "a latched fault must keep the force at zero");
+}

@@ -1,0 +1,42 @@
+"""A press without a hand: down on the highest free point nearest the middle, held, and up again."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from palpate.errors import SceneError
+from palpate.scene import BuiltScene
+from palpate.simulation import Simulation
+
+# Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
+POINTER_RATE = 120.0
+# How deep the script presses, as a part of the body's longest side: small strains.
+DEPTH = 0.03
+
+
+def scripted_press(built: BuiltScene, seconds: float) -> tuple[np.ndarray, dict]:
+    """Log of the 1 kHz loop and its statistics."""
+    nodes, surface = built.body.mesh.nodes, built.body.mesh.surface_nodes
+    free = np.setdiff1d(surface, built.body.fixed_nodes)
+    if len(free) == 0:
+        raise SceneError("the whole surface is fixed: nothing can be pressed")
+    size = float(np.ptp(nodes, axis=0).max())
+    highest = free[nodes[free, 2] > nodes[free, 2].max() - 0.01 * size]
+    middle = nodes[:, :2].mean(axis=0)
+    top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
+    depth = DEPTH * size
+    rest = top + [0, 0, built.scene.tool.radius]
+    logs = []
+    with Simulation(built) as simulation:
+        start = time.monotonic()
+        while (elapsed := time.monotonic() - start) < seconds:
+            phase = elapsed / seconds
+            push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
+            simulation.move(rest - [0, 0, push])
+            time.sleep(1.0 / POINTER_RATE)
+            logs.append(simulation.drain_log())
+        statistics = simulation.frame().statistics
+        logs.append(simulation.drain_log())
+    return np.concatenate(logs), statistics

@@ -1,0 +1,52 @@
+"""Plots of a session, as PNG."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+
+def plot_log(log: np.ndarray, path: Path, title: str) -> None:
+    """Force on the device and tick times against time; written beside and renamed."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 6), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    time, force = log["time"], log["force"]
+    upper.plot(time, np.linalg.norm(force, axis=1), color="0.15", linewidth=1.8, label="magnitude")
+    for axis, color in enumerate(("tab:red", "tab:green", "tab:blue")):
+        upper.plot(time, force[:, axis], color=color, linewidth=1.0, label="xyz"[axis])
+    upper.set_ylabel("force on the device [N]")
+    upper.set_title(title)
+    upper.legend(loc="upper right", ncols=4, frameon=False)
+    lower.plot(time, log["compute_us"], color="tab:purple", linewidth=0.8, label="computing")
+    lower.plot(time, log["wakeup_us"], color="0.6", linewidth=0.6, label="wake-up delay", zorder=0)
+    lower.set_yscale("log")
+    lower.set_ylabel("time of a tick [us]")
+    lower.set_xlabel("time [s]")
+    lower.legend(loc="upper right", ncols=2, frameon=False)
+    for axes in (upper, lower):
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+    partial = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        figure.savefig(partial, format="png")
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_log(log: np.ndarray, path: Path) -> None:
+    """Write the 1 kHz log as CSV with units in the header; beside, then renamed."""
+    names = ("time_s", "x_m", "y_m", "z_m", "fx_N", "fy_N", "fz_N", "compute_us", "wakeup_us")
+    columns = [log["time"], *log["position"].T, *log["force"].T, log["compute_us"], log["wakeup_us"]]
+    partial = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        np.savetxt(partial, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)

@@ -1,0 +1,198 @@
+"""The scene file: TOML, checked key by key; quantities take units."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
+
+from palpate import units
+from palpate.body import Body, Material
+from palpate.errors import Error, SceneError
+from palpate.green import GreensFunction, precompute
+from palpate.mesh import TetMesh, tetrahedralize
+from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
+from palpate.predicate import parse
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+def _quantity(read: Callable[[Any], float]) -> BeforeValidator:
+    def convert(value: Any) -> float:
+        try:
+            return read(value)
+        except Error as error:
+            raise ValueError(str(error)) from None
+
+    return BeforeValidator(convert)
+
+
+Length = Annotated[float, _quantity(units.length), Field(gt=0, allow_inf_nan=False)]
+Radius = Annotated[float, _quantity(units.length), Field(ge=0, allow_inf_nan=False)]
+Pressure = Annotated[float, _quantity(units.pressure), Field(gt=0, allow_inf_nan=False)]
+Density = Annotated[float, _quantity(units.density), Field(ge=0, allow_inf_nan=False)]
+Force = Annotated[float, _quantity(units.force), Field(gt=0, allow_inf_nan=False)]
+Stiffness = Annotated[float, _quantity(units.stiffness), Field(gt=0, allow_inf_nan=False)]
+Time = Annotated[float, _quantity(units.time), Field(ge=0, allow_inf_nan=False)]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are mistakes."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class BodyTable(Table):
+    """The solid: a volume mesh, or a surface to be filled. Paths are relative to the scene file."""
+
+    mesh: str
+    unit: str = "m"
+    max_element_size: Length | None = None
+    precision: str = Field("f32", pattern="^f(32|64)$")
+
+
+class MaterialTable(Table):
+    """Isotropic material of the whole body."""
+
+    youngs_modulus: Pressure = 10e3
+    poissons_ratio: float = Field(0.45, gt=-1, lt=0.5)
+    density: Density = 1000.0
+
+
+class SupportsTable(Table):
+    """Where the body is held: a predicate over x, y, z, or node indices."""
+
+    fixed: str | list[int]
+
+
+class ToolTable(Table):
+    """A spherical tool: its radius, and the radius of the patch it presses."""
+
+    radius: Length = 5e-3
+    contact_radius: Radius = 5e-3
+
+
+class DeviceTable(Table):
+    """Limits of the device, kept by the safety stage."""
+
+    max_force: Force = 8.0
+    max_slew: Annotated[float, Field(gt=0)] = 500.0
+    ramp: Time = 0.25
+    max_stiffness: Stiffness = 5000.0
+
+
+class Scene(Table):
+    """What to touch, and with what."""
+
+    body: BodyTable
+    supports: SupportsTable
+    material: MaterialTable = MaterialTable()
+    tool: ToolTable = ToolTable()
+    device: DeviceTable = DeviceTable()
+
+    _folder: Path = PrivateAttr(default_factory=Path)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Scene:
+        """Read a scene file.
+
+        Raises
+        ------
+        SceneError
+            Missing, not TOML, or a wrong key or value, with its line.
+
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise SceneError(f"{path}: no such file")
+        text = path.read_text(errors="replace")
+        try:
+            scene = cls(**tomllib.loads(text))
+        except tomllib.TOMLDecodeError as error:
+            raise SceneError(f"{path}: {error}") from None
+        except ValidationError as error:
+            raise SceneError(_explain(path, text, error)) from None
+        scene._folder = path.parent
+        return scene
+
+    def build(self, progress: bool | Callable[[int, int], None] = True) -> BuiltScene:
+        """Mesh if need be, and precompute, or take both from the cache."""
+        source = self._folder / self.body.mesh
+        if source.suffix.lower() in SURFACE_ENDINGS:
+            mesh = tetrahedralize(source, self.body.max_element_size, self.body.unit)
+        else:
+            mesh = TetMesh.read(source, self.body.unit)
+        m = self.material
+        fixed: Any = self.supports.fixed
+        if isinstance(fixed, str):
+            fixed = parse(fixed)(mesh.nodes)
+            if not np.any(fixed):
+                low, high = mesh.bounds.round(4).tolist()
+                raise SceneError(
+                    f"no node satisfies supports.fixed = '{self.supports.fixed}': "
+                    f"the body reaches from {low} to {high} m"
+                )
+        body = Body(mesh, material=Material(m.youngs_modulus, m.poissons_ratio, m.density), fixed=fixed)
+        return BuiltScene(self, body, precompute(body, precision=self.body.precision, progress=progress))
+
+
+@dataclass(frozen=True)
+class BuiltScene:
+    """A scene with its body and Green's function."""
+
+    scene: Scene
+    body: Body
+    green: GreensFunction
+
+
+def _explain(path: Path, text: str, error: ValidationError) -> str:
+    """First mistake of the file, with its line and the nearest known key."""
+    first = error.errors()[0]
+    keys = [str(k) for k in first["loc"] if isinstance(k, str) and k not in {"str", "list[int]"}]
+    where = ".".join(keys)
+    line = _line_of(text, keys)
+    at = f"{path}:{line}" if line else str(path)
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(keys[:-1])
+        near = difflib.get_close_matches(keys[-1], known, 1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+        return f"{at}: unknown key '{where}'; {hint}"
+    if first["type"] == "missing":
+        return f"{at}: the key '{where}' is missing"
+    message = first["msg"].removeprefix("Value error, ")
+    return f"{at}: {where}: {message}" + ("" if first["type"] == "value_error" else f", got {first['input']!r}")
+
+
+def _known_keys(parents: list[str]) -> list[str]:
+    model: type[BaseModel] = Scene
+    for key in parents:
+        annotation = model.model_fields[key].annotation
+        assert isinstance(annotation, type)
+        model = annotation
+    return list(model.model_fields)
+
+
+def _line_of(text: str, keys: list[str]) -> int | None:
+    """Line of ``[table]`` followed by ``key =``, the deepest of them that is there."""
+    table, found = "", None
+    for number, line in enumerate(text.splitlines(), 1):
+        head = re.match(r"\s*\[\s*([\w.-]+)\s*\]", line)
+        if head:
+            table = head[1]
+            found = number if keys[:1] == [table] else found
+            continue
+        entry = re.match(r"\s*([\w.-]+)\s*=", line)
+        if entry and f"{table}.{entry[1]}".strip(".") == ".".join(keys):
+            return number
+    return found

@@ -1,0 +1,209 @@
+"""A scene brought to life: the 1 kHz force loop with simulated tools, and the same ticks offline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from types import TracebackType
+
+import numpy as np
+
+from palpate import _native
+from palpate.errors import SceneError
+from palpate.scene import BuiltScene, Scene
+
+LOG_DTYPE = np.dtype(
+    [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
+)
+PERCENTILES = ("p50", "p99", "p999", "max")
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one."""
+
+    tool: int
+    mode: str
+    point: np.ndarray
+    normal: np.ndarray
+    force: np.ndarray
+    nodes: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The latest tick.
+
+    Attributes
+    ----------
+    time
+        Since the start, s.
+    forces
+        (tools, 3) N on the devices.
+    positions
+        (tools, 3) m of the tools.
+    displacements
+        (s, 3) m; rows follow the surface nodes.
+    contacts
+        Of the tools that touch.
+    statistics
+        ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, ``fault`` (None or
+        what is wrong) and ``realtime`` (priority granted, memory locked).
+
+    """
+
+    time: float
+    forces: np.ndarray
+    positions: np.ndarray
+    displacements: np.ndarray
+    contacts: list[Contact] = field(repr=False)
+    statistics: dict
+
+
+class Simulation:
+    """Force loop of a scene.
+
+    As a context manager it runs at 1 kHz on a thread of its own; :meth:`run` needs no clock.
+
+    Parameters
+    ----------
+    scene
+        What to touch, and with what.
+
+    Raises
+    ------
+    Error
+        A body that cannot be solved, or a contact radius that covers too many nodes.
+
+    """
+
+    def __init__(self, scene: Scene | BuiltScene):
+        built = scene if isinstance(scene, BuiltScene) else scene.build()
+        self.scene, self.body, self.green = built.scene, built.body, built.green
+        tool, device = self.scene.tool, self.scene.device
+        self._contact_radius = tool.contact_radius
+        self._scale = 1.0
+        self._tools = 1
+        self._targets = [(0.0, 0.0, 0.0)] * self._tools
+        self._grab = [False] * self._tools
+        limits = (device.max_force, device.max_slew, device.ramp)
+        self._core = _native.SimulationCore(
+            self.green._core, self._tools, tool.radius, tool.contact_radius, device.max_stiffness, limits
+        )
+        self._running = False
+
+    def __enter__(self) -> Simulation:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Start the loop; tools are out of the scene until moved."""
+        if not self._running:
+            self._core.start()
+            self._running = True
+
+    def stop(self) -> None:
+        """Stop the loop; devices are left at zero force."""
+        self._core.stop()
+        self._running = False
+
+    def move(self, position: Sequence[float], velocity: Sequence[float] | None = None, tool: int = 0) -> None:
+        """Send a simulated tool to a position, m. It follows smoothly; ``velocity`` is derived from its path.
+
+        Raises
+        ------
+        SceneError
+            No such tool, or a position that is not three finite numbers.
+
+        """
+        del velocity  # the simulated hand has its own
+        target = np.asarray(position, dtype=float)
+        if target.shape != (3,) or not np.isfinite(target).all():
+            raise SceneError(f"a tool's position must be three finite numbers, got {position}")
+        self._targets[self._tool(tool)] = tuple(target.tolist())
+        self._core.set_target(tool, self._targets[tool], True, self._grab[tool])
+
+    def grab(self, on: bool, tool: int = 0) -> None:
+        """Hold on to the surface near the tool, or let go."""
+        self._grab[self._tool(tool)] = bool(on)
+        self._core.set_target(tool, self._targets[tool], True, bool(on))
+
+    def remove(self, tool: int = 0) -> None:
+        """Take a tool out of the scene until it is moved again."""
+        self._grab[self._tool(tool)] = False
+        self._core.set_target(tool, self._targets[tool], False, False)
+
+    def set_radius(self, contact_radius: float) -> None:
+        """Contact radius of contacts that begin from now on, m."""
+        self._core.configure(float(contact_radius), self._scale, False)
+        self._contact_radius = float(contact_radius)
+
+    def set_youngs_modulus(self, youngs_modulus: float) -> None:
+        """Change the stiffness of a body of one material at once, Pa: it only scales the compliance."""
+        reference = self.green.youngs_modulus
+        if reference is None:
+            raise SceneError("the body has several materials: its stiffness cannot be changed while running")
+        if not (np.isfinite(youngs_modulus) and youngs_modulus > 0):
+            raise SceneError(f"Young's modulus must be positive, got {youngs_modulus} Pa")
+        self._scale = youngs_modulus / reference
+        self._core.configure(self._contact_radius, self._scale, False)
+
+    def reset(self) -> None:
+        """Let go of everything and clear a latched fault; forces ramp in anew."""
+        self._core.configure(self._contact_radius, self._scale, True)
+
+    def frame(self) -> Frame:
+        """Read the latest tick."""
+        raw = self._core.frame()
+        if raw is None:
+            raise SceneError("the simulation does not run: use it in a with block, or call start()")
+        contacts = [
+            Contact(tool, mode, *map(np.array, vectors), self.green.surface_nodes[nodes], np.array(weights))
+            for tool, mode, vectors, nodes, weights in raw["contacts"]
+        ]
+        statistics = {k: raw[k] for k in ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused")}
+        for name in ("compute_us", "wakeup_us"):
+            statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
+        displacements = raw["displacements"].reshape(-1, 3)
+        forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
+        return Frame(raw["time"], forces, positions, displacements, contacts, statistics)
+
+    def drain_log(self) -> np.ndarray:
+        """Rows of the 1 kHz log since the last call: time, position, force, compute_us, wakeup_us."""
+        return np.ascontiguousarray(self._core.drain_log()).view(LOG_DTYPE)
+
+    def run(self, positions: np.ndarray) -> np.ndarray:
+        """Move the tool through (t, 3) positions, m, one tick each, without a clock; the same path gives the same bits.
+
+        Returns
+        -------
+        numpy.ndarray
+            (t, 3) force on the device after the safety stage, N.
+
+        Raises
+        ------
+        SceneError
+            Positions that are not finite or of another shape.
+
+        """
+        path = np.ascontiguousarray(positions, dtype=np.float64)
+        if path.ndim != 2 or path.shape[1] != 3:
+            raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
+        bad = np.flatnonzero(~np.isfinite(path).all(axis=1))
+        if bad.size:
+            raise SceneError(f"position {bad[0]} is not finite")
+        forces, fault = self._core.run(path)
+        if fault is not None:
+            raise SceneError(fault)
+        return forces.reshape(-1, 3)
+
+    def _tool(self, tool: int) -> int:
+        if not 0 <= tool < self._tools:
+            raise SceneError(f"there is no tool {tool}: the scene has {self._tools}")
+        return tool
