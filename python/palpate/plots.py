@@ -21,14 +21,14 @@ def plot_log(log: np.ndarray, path: Path, title: str) -> None:
     for axis, color in enumerate(("tab:red", "tab:green", "tab:blue")):
         upper.plot(time, force[:, axis], color=color, linewidth=1.0, label="xyz"[axis])
     upper.set_ylabel("force on the device [N]")
-    upper.set_title(title)
-    upper.legend(loc="upper right", ncols=4, frameon=False)
+    upper.set_title(title, loc="left")
+    upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, frameon=False)
     lower.plot(time, log["compute_us"], color="tab:purple", linewidth=0.8, label="computing")
     lower.plot(time, log["wakeup_us"], color="0.6", linewidth=0.6, label="wake-up delay", zorder=0)
     lower.set_yscale("log")
     lower.set_ylabel("time of a tick [us]")
     lower.set_xlabel("time [s]")
-    lower.legend(loc="upper right", ncols=2, frameon=False)
+    lower.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, frameon=False)
     for axes in (upper, lower):
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)

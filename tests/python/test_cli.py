@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,6 +118,24 @@ def test_inverted_surface_is_repaired_with_a_notice(tmp_path):
 def test_wrong_options_cost_one_line_and_leave_nothing(ball, tmp_path, options, words):
     refused(run("precompute", "ball.stl", "-o", "ball.palpate", *options, cwd=tmp_path), *words)
     assert os.listdir(tmp_path) == ["ball.stl"]
+
+
+def test_scripted_press_leaves_a_log_and_a_plot(tmp_path):
+    for name in ("block.toml", "block.obj"):
+        shutil.copy(Path(__file__).parents[2] / "examples" / name, tmp_path)
+    result = run("run", "block.toml", "--headless", "1.5", "--out", "results", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert sorted(os.listdir(tmp_path / "results")) == ["block.csv", "block.png"]
+    log = np.genfromtxt(tmp_path / "results" / "block.csv", delimiter=",", names=True)
+    assert log["fz_N"].max() > 0.1
+    assert log["fz_N"][[0, -1]] == pytest.approx(0)
+    assert np.median(np.diff(log["time_s"])) == pytest.approx(1e-3, rel=1e-6)
+    assert (tmp_path / "results" / "block.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_wrong_scene_costs_one_line(tmp_path):
+    (tmp_path / "a.toml").write_text("[body]\nmsh = 'a.stl'\n[supports]\nfixed = 'z < 0'\n")
+    refused(run("run", "a.toml", cwd=tmp_path), "a.toml:1", "body.mesh")
 
 
 def test_damaged_store_costs_one_line(tmp_path):
