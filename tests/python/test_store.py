@@ -97,6 +97,26 @@ def test_unwritable_folder_is_an_os_error_and_leaves_nothing(block, block_green,
     assert os.listdir(tmp_path) == []
 
 
+def test_write_cut_short_is_an_os_error_and_leaves_nothing(tmp_path):
+    """A file size limit cuts the write in the middle, as a full disk does."""
+    program = f"""
+import resource, signal, sys; sys.path.insert(0, {os.path.dirname(__file__)!r})
+from conftest import box_mesh
+import palpate
+body = palpate.Body(box_mesh(), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+try:
+    palpate.precompute(body, path={str(tmp_path / "cut.palpate")!r})
+except OSError as error:
+    print(error)
+"""
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    assert "cut.palpate'" in result.stdout
+    assert os.listdir(tmp_path) == []
+
+
 def test_failing_progress_stops_the_work_and_leaves_nothing(block, tmp_path):
     def stop(done, total):
         raise KeyboardInterrupt

@@ -30,10 +30,14 @@ impl GreensFunction {
             File::open(&partial).and_then(|f| f.sync_all()).map_err(io)?;
             fs::rename(&partial, path).map_err(io)
         });
-        if result.is_err() {
+        result.map_err(|error| {
             let _ = fs::remove_file(&partial);
-        }
-        result
+            match error {
+                // The user knows the file asked for, not the one beside it.
+                Error::Io { source, .. } => io(source),
+                other => other,
+            }
+        })
     }
 
     fn write(&self, path: &Path) -> Result<()> {
