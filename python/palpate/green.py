@@ -125,7 +125,7 @@ class GreensFunction:
         green = cls(_native.GreenCore.load(path))
         if body is not None:
             touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
-            expected = _native.GreenCore.content_key(_problem(body, touch), green.precision)
+            expected = _native.GreenCore.content_key(problem_arrays(body, touch), green.precision)
             if expected != green.key:
                 raise StoreError(f"{path}: {_difference(green, body)}; compute it again")
         return green
@@ -263,7 +263,7 @@ def precompute(
 
     """
     body.require_supported()
-    problem = _problem(body, touch)
+    problem = problem_arrays(body, touch)
     key = _native.GreenCore.content_key(problem, precision)
     if path is None:
         target = cache_directory() / f"{key[:32]}.palpate"
@@ -279,7 +279,7 @@ def precompute(
     return GreensFunction(_native.GreenCore.load(target, key))
 
 
-def _problem(body: Body, touch: Sequence[int] | np.ndarray | None) -> tuple[np.ndarray, ...]:
+def problem_arrays(body: Body, touch: Sequence[int] | np.ndarray | None) -> tuple[np.ndarray, ...]:
     surface_nodes = body.mesh.surface_nodes
     if touch is None:
         ranks = np.arange(len(surface_nodes))

@@ -8,6 +8,7 @@ import scipy.sparse.linalg
 from conftest import box_mesh, skfem_stiffness
 
 import palpate
+from palpate.interior import Interior
 
 RNG = np.random.default_rng(7)
 
@@ -237,3 +238,27 @@ def test_unattached_part_is_named():
 def test_impossible_materials_are_refused(e, nu):
     with pytest.raises(palpate.Error):
         palpate.Material(e, nu)
+
+
+
+def test_interior_displacements_equal_a_direct_solve(block, block_green):
+    """The whole field under surface loads and a pressed node, from the surface alone, against SciPy's."""
+    pressed, loaded = (int(n) for n in RNG.choice(np.setdiff1d(block_green.touchable_nodes, block.fixed_nodes), 2))
+    answer = block_green.solve(displacements={pressed: (0, 0, -1e-3)}, forces={loaded: (0.1, -0.2, 0.3)})
+    prescribed = {int(d): 0.0 for d in block.fixed_dofs} | {3 * pressed + k: v for k, v in enumerate((0, 0, -1e-3))}
+    loads = np.zeros(3 * len(block.mesh.nodes))
+    loads[3 * loaded : 3 * loaded + 3] = (0.1, -0.2, 0.3)
+    u, _ = direct_solve(block, prescribed, loads)
+    inside = np.setdiff1d(np.arange(len(block.mesh.nodes)), block.mesh.surface_nodes)
+    assert len(inside) > 5
+    assert relative(Interior(block).extend(answer.displacements), u) <= 1e-9
+
+
+def test_interior_of_a_body_without_inner_nodes():
+    """One tetrahedron: nothing is inside, the surface is the answer."""
+    mesh = palpate.TetMesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
+    body = palpate.Body(mesh, material=palpate.Material(1e3, 0.3), fixed=[0, 1, 2])
+    u = np.arange(12.0).reshape(4, 3)
+    assert np.array_equal(Interior(body).extend(u), u)
+    with pytest.raises(palpate.BodyError, match="finite"):
+        Interior(body).extend(np.full((4, 3), np.nan))

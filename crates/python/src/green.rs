@@ -56,6 +56,30 @@ fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
         .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f32' or 'f64'"))))
 }
 
+/// Displacements inside a body from those of its surface.
+#[pyclass(module = "palpate._native", frozen)]
+pub struct Interior {
+    interior: palpate_core::green::Interior,
+}
+
+#[pymethods]
+impl Interior {
+    /// Factorises the inner part of the stiffness of a problem.
+    #[new]
+    fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let problem = problem(arguments)?;
+        let interior = py.detach(|| palpate_core::green::Interior::new(&problem)).map_err(|e| to_python(py, e))?;
+        Ok(Self { interior })
+    }
+
+    /// Displacements (3n) of all nodes, m, for those (3s) of the surface nodes.
+    fn extend<'py>(&self, py: Python<'py>, surface: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let surface = surface.as_slice()?;
+        let all = py.detach(|| self.interior.extend(surface)).map_err(|e| to_python(py, e))?;
+        Ok(all.into_pyarray(py))
+    }
+}
+
 #[pymethods]
 impl GreenCore {
     /// Content key of the Green's function of a problem.

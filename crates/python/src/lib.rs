@@ -15,6 +15,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(body::mass, module)?)?;
     module.add_class::<green::GreenCore>()?;
+    module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
     Ok(())
 }

@@ -13,6 +13,7 @@
 
 mod columns;
 mod factor;
+mod interior;
 mod key;
 mod operator;
 mod ordering;
@@ -20,5 +21,6 @@ mod store;
 
 pub use columns::{Problem, precompute};
 pub use factor::Factor;
+pub use interior::Interior;
 pub use key::FORMAT_VERSION;
 pub use operator::{GreensFunction, Precision, Values};

@@ -1,0 +1,93 @@
+//! Displacements inside the body from those of its surface, for whoever wants to see or measure there.
+//!
+//! No load acts inside, so the equilibrium of the inner dofs `I` given the surface dofs `S` is `K_II u_I = -K_IS u_S`:
+//! the finite element solution itself, for any contact and any supports on the surface. It costs one sparse solve with
+//! a factor smaller than that of the body, far too long for the force loop, short enough for a frame.
+
+use faer::Par;
+use faer::dyn_stack::MemBuffer;
+use faer::mat::MatMut;
+
+use super::columns::Problem;
+use super::factor::Factor;
+use crate::fem::{Supports, stiffness};
+use crate::{Error, Result};
+
+/// Extension of surface displacements to all nodes.
+pub struct Interior {
+    surface_nodes: Vec<u32>,
+    /// Rows `K_IS` by inner dof: start of each, then (surface dof as mesh dof, value).
+    coupling_start: Vec<usize>,
+    coupling: Vec<(u32, f64)>,
+    /// Inner dofs that are free, mesh numbering.
+    inner: Vec<u32>,
+    factor: Option<Factor>,
+    dof_count: usize,
+}
+
+impl Interior {
+    /// Factorises the inner part of the stiffness.
+    ///
+    /// # Errors
+    /// An inner block that is not positive definite: degenerate elements.
+    pub fn new(problem: &Problem) -> Result<Self> {
+        let stiffness = stiffness(&problem.mesh, &problem.materials);
+        let dof_count = stiffness.dimension;
+        let mut held: Vec<u32> = problem.surface_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+        held.extend(problem.supports.fixed.iter().copied());
+        held.sort_unstable();
+        held.dedup();
+        let mut interior = Self {
+            surface_nodes: problem.surface_nodes.clone(),
+            coupling_start: vec![0],
+            coupling: Vec::new(),
+            inner: Vec::new(),
+            factor: None,
+            dof_count,
+        };
+        if held.len() == dof_count {
+            return Ok(interior);
+        }
+        let supports = Supports::new(dof_count, held)?;
+        interior.factor = Some(Factor::new(&stiffness, &supports, Par::rayon(0))?);
+        let is_surface = |dof: u32| problem.surface_nodes.binary_search(&(dof / 3)).is_ok();
+        for &dof in &supports.free {
+            // The matrix is symmetric: the row is the column.
+            interior.coupling.extend(stiffness.column(dof as usize).filter(|&(row, _)| is_surface(row)));
+            interior.coupling_start.push(interior.coupling.len());
+        }
+        interior.inner = supports.free;
+        Ok(interior)
+    }
+
+    /// Displacements of all dofs, m, for those of the surface dofs.
+    ///
+    /// # Errors
+    /// A length that is not three a surface node.
+    pub fn extend(&self, surface: &[f64]) -> Result<Vec<f64>> {
+        if surface.len() != 3 * self.surface_nodes.len() {
+            return Err(Error::Invalid(format!(
+                "displacements of {} surface nodes are needed, got {} numbers",
+                self.surface_nodes.len(),
+                surface.len()
+            )));
+        }
+        let mut all = vec![0.0; self.dof_count];
+        for (&node, u) in self.surface_nodes.iter().zip(surface.chunks_exact(3)) {
+            all[3 * node as usize..3 * node as usize + 3].copy_from_slice(u);
+        }
+        let Some(factor) = &self.factor else { return Ok(all) };
+        let mut load: Vec<f64> = self
+            .coupling_start
+            .windows(2)
+            .map(|range| -self.coupling[range[0]..range[1]].iter().map(|&(dof, k)| k * all[dof as usize]).sum::<f64>())
+            .collect();
+        let mut memory: MemBuffer = factor.solve_scratch(1);
+        let rows = load.len();
+        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut load, rows, 1), &mut memory);
+        for (&dof, u) in self.inner.iter().zip(load) {
+            all[dof as usize] = u;
+        }
+        Ok(all)
+    }
+}
