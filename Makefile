@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test lint check-tools clean
+.PHONY: demo test lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -12,6 +12,8 @@ check-tools:
 	@command -v cc >/dev/null || { echo "A C compiler is missing: install gcc or clang (Debian: apt install build-essential)"; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { echo "Python 3.10 or later is missing (set PYTHON=...)"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python's venv is missing (Debian: apt install python3-venv)"; exit 1; }
+	@command -v node >/dev/null && command -v npm >/dev/null || { echo "Node.js with npm is missing (version 20 or later): https://nodejs.org"; exit 1; }
+	@node -e 'process.exit(Number(process.versions.node.split(".")[0]) < 20)' || { echo "Node.js 20 or later is needed"; exit 1; }
 
 $(BIN)/python: | check-tools
 	$(PYTHON) -m venv $(VENV)
@@ -22,10 +24,21 @@ $(VENV)/.installed: $(BIN)/python pyproject.toml Cargo.toml Cargo.lock $(shell f
 	. $(BIN)/activate && maturin develop --release --quiet --extras test >$(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@touch $@
 
-demo: $(VENV)/.installed
-	$(BIN)/python examples/press_ball.py
+# The page of the viewer, served by the package.
+PAGE := python/palpate/viewer/static/index.html
+viewer/node_modules/.package-lock.json: viewer/package.json viewer/package-lock.json | check-tools
+	cd viewer && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
 
-test: $(VENV)/.installed lint
+$(PAGE): $(BIN)/python viewer/node_modules/.package-lock.json $(shell find viewer/src viewer/public -type f) viewer/index.html viewer/vite.config.ts viewer/tsconfig.json
+	cd viewer && npm run --silent build >../$(VENV)/viewer.log 2>&1 || { cat ../$(VENV)/viewer.log; exit 1; }
+
+viewer: $(PAGE)
+
+demo: $(VENV)/.installed $(PAGE)
+	$(BIN)/palpate demo $(ARGS)
+
+test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace --exclude palpate-python
 	$(BIN)/python -m pytest --quiet $(ARGS)
 
@@ -37,4 +50,4 @@ lint: $(VENV)/.installed
 	$(BIN)/python scripts/check_architecture.py
 
 clean:
-	rm -rf target $(VENV)
+	rm -rf target $(VENV) viewer/node_modules python/palpate/viewer/static

@@ -5,8 +5,9 @@ SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
 
 from importlib.metadata import version
 
+from palpate import models
 from palpate.body import Body, Material
-from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError
+from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError, ViewerError
 from palpate.green import Answer, GreensFunction, Touch, precompute
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.scene import Scene
@@ -32,6 +33,8 @@ __all__ = [
     "TetMesh",
     "Touch",
     "UnitError",
+    "ViewerError",
+    "models",
     "precompute",
     "tetrahedralize",
 ]

@@ -25,5 +25,9 @@ class UnitError(Error):
     """An unknown unit, or a quantity that cannot be read."""
 
 
+class ViewerError(Error):
+    """The browser viewer cannot be served, or was asked for something it cannot do."""
+
+
 class MeshWarning(UserWarning):
     """Something about a mesh was repaired or left out."""

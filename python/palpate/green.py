@@ -280,6 +280,7 @@ def precompute(
 
 
 def problem_arrays(body: Body, touch: Sequence[int] | np.ndarray | None) -> tuple[np.ndarray, ...]:
+    """Arrays that determine the reference problem, in the order of the native module."""
     surface_nodes = body.mesh.surface_nodes
     if touch is None:
         ranks = np.arange(len(surface_nodes))

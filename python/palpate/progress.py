@@ -25,3 +25,16 @@ def progress_reporter(
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def narrated(text: str) -> Iterator[None]:
+    """Say on a terminal what takes long; it disappears when done."""
+    shown = sys.stderr.isatty()
+    if shown:
+        print(f"{text} ...", end="\r", file=sys.stderr, flush=True)
+    try:
+        yield
+    finally:
+        if shown:
+            print(" " * (len(text) + 4), end="\r", file=sys.stderr, flush=True)

@@ -82,12 +82,12 @@ class Simulation:
         built = scene if isinstance(scene, BuiltScene) else scene.build()
         self.scene, self.body, self.green = built.scene, built.body, built.green
         tool, device = self.scene.tool, self.scene.device
-        self._contact_radius = tool.contact_radius
         self._scale = 1.0
         self._tools = 1
         self._targets = [(0.0, 0.0, 0.0)] * self._tools
         self._grab = [False] * self._tools
         limits = (device.max_force, device.max_slew, device.ramp)
+        self._contact_radius = tool.contact_radius
         self._core = _native.SimulationCore(
             self.green._core, self._tools, tool.radius, tool.contact_radius, device.max_stiffness, limits
         )
@@ -143,6 +143,27 @@ class Simulation:
         """Contact radius of contacts that begin from now on, m."""
         self._core.configure(float(contact_radius), self._scale, False)
         self._contact_radius = float(contact_radius)
+
+    @property
+    def contact_radius(self) -> float:
+        """Contact radius of contacts that begin from now on, m."""
+        return self._contact_radius
+
+    @property
+    def youngs_modulus(self) -> float | None:
+        """Young's modulus now, Pa; None for a body of several materials."""
+        reference = self.green.youngs_modulus
+        return None if reference is None else reference * self._scale
+
+    def largest_contact_radius(self, limit: float) -> float:
+        """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
+        low, high = 0.0, limit
+        if self._core.accepts_contact_radius(high):
+            return high
+        while high - low > 0.01 * limit:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._core.accepts_contact_radius(middle) else (low, middle)
+        return low
 
     def set_youngs_modulus(self, youngs_modulus: float) -> None:
         """Change the stiffness of a body of one material at once, Pa: it only scales the compliance."""

@@ -240,7 +240,6 @@ def test_impossible_materials_are_refused(e, nu):
         palpate.Material(e, nu)
 
 
-
 def test_interior_displacements_equal_a_direct_solve(block, block_green):
     """The whole field under surface loads and a pressed node, from the surface alone, against SciPy's."""
     pressed, loaded = (int(n) for n in RNG.choice(np.setdiff1d(block_green.touchable_nodes, block.fixed_nodes), 2))

@@ -103,6 +103,11 @@ impl SimulationCore {
         Ok(())
     }
 
+    /// Whether contacts of this radius (m) can be weighed everywhere on the surface.
+    fn accepts_contact_radius(&self, py: Python<'_>, radius: f64) -> bool {
+        py.detach(|| self.model.check_contact_radius(radius).is_ok())
+    }
+
     /// The latest tick as a dictionary; None if the loop does not run.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let tools = self.targets.len();

@@ -123,37 +123,8 @@ def touch(
 
 
 @app.command()
-def run(
-    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).")],
-    headless: Annotated[float, typer.Option(min=0.1, help="Seconds of a scripted press at 1 kHz.")] = 3.0,
-    out: Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (PNG).")] = Path(),
-) -> None:
-    """Run the 1 kHz force loop on a scene: a scripted press on its highest point, logged and plotted.
-
-    Example: palpate run scene.toml --headless 3 --out results
-    """
-    from palpate.cli.scripted import scripted_press
-    from palpate.plots import plot_log, write_log
-    from palpate.scene import Scene
-
-    built = Scene.read(scene).build()
-    out.mkdir(parents=True, exist_ok=True)
-    log, statistics = scripted_press(built, headless)
-    write_log(log, out / f"{scene.stem}.csv")
-    plot_log(log, out / f"{scene.stem}.png", f"{scene.stem}: scripted press at 1 kHz")
-    compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
-    print(f"{len(log)} ticks, largest force {(log['force'] ** 2).sum(axis=1).max() ** 0.5:.3f} N")
-    print("us            p50      p99    p99.9      max")
-    for name, row in (("computing", compute), ("wake-up", wakeup)):
-        print(f"{name:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")
-    print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / scene.stem}.csv and .png")
-    if not all(statistics["realtime"]):
-        print("palpate: note: the system granted no real-time priority or locked memory", file=sys.stderr)
-
-
-@app.command()
 def info(
-    file: Annotated[Path, typer.Argument(help="A store or a volume mesh.")],
+    file: Annotated[Path, typer.Argument(help="A store, a scene file, or a volume mesh.")],
     unit: Unit = "m",
 ) -> None:
     """Say what a file holds.
@@ -169,6 +140,14 @@ def info(
             print(f"  {name.replace('_', ' ')}: {value}")
         print(f"  key: {green.key}")
         return
+    if file.suffix == ".toml":
+        scene = palpate.Scene.read(file)
+        print(f"{file}: scene of {scene.name}")
+        for table, entries in scene.model_dump(exclude_none=True).items():
+            for name, value in entries.items():
+                print(f"  {table}.{name} = {value}")
+        print("  lengths in m, pressures in Pa, forces in N, times in s")
+        return
     made = palpate.TetMesh.read(file, unit)
     print(f"{file}: {_mesh_line(made)}")
     low, high = 1e3 * made.bounds
@@ -176,6 +155,17 @@ def info(
     print(
         f"  regions: {sorted(set(made.regions.tolist()))}, dihedral angle >= {made.dihedral_angles().min():.1f} degrees"
     )
+
+
+@app.command("models")
+def models_command() -> None:
+    """List the built-in models, beside the paper's own counts.
+
+    Example: palpate models
+    """
+    from palpate.cli.catalogue import print_models
+
+    print_models()
 
 
 @cache_app.command("list")

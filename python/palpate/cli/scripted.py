@@ -18,8 +18,9 @@ DEPTH = 0.03
 
 def scripted_press(built: BuiltScene, seconds: float) -> tuple[np.ndarray, dict]:
     """Log of the 1 kHz loop and its statistics."""
-    nodes, surface = built.body.mesh.nodes, built.body.mesh.surface_nodes
-    free = np.setdiff1d(surface, built.body.fixed_nodes)
+    green = built.green
+    nodes = green.surface_positions
+    free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
     if len(free) == 0:
         raise SceneError("the whole surface is fixed: nothing can be pressed")
     size = float(np.ptp(nodes, axis=0).max())

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
-from palpate import units
+from palpate import models, units
 from palpate.body import Body, Material
 from palpate.errors import Error, SceneError
 from palpate.green import GreensFunction, precompute
@@ -54,12 +54,26 @@ class Table(BaseModel):
 
 
 class BodyTable(Table):
-    """The solid: a volume mesh, or a surface to be filled. Paths are relative to the scene file."""
+    """The solid, one of: a mesh file (volume, or surface to be filled), a built-in model, a precomputed store.
 
-    mesh: str
+    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper.
+    """
+
+    mesh: str | None = None
+    model: str | None = None
+    store: str | None = None
+    paper: bool = False
     unit: str = "m"
     max_element_size: Length | None = None
     precision: str = Field("f32", pattern="^f(32|64)$")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> BodyTable:
+        if sum(source is not None for source in (self.mesh, self.model, self.store)) != 1:
+            raise ValueError("give exactly one of mesh, model and store")
+        if self.model is not None and self.model not in models.NAMES:
+            raise ValueError(f"unknown model '{self.model}'; there are {', '.join(models.NAMES)}")
+        return self
 
 
 class MaterialTable(Table):
@@ -71,9 +85,9 @@ class MaterialTable(Table):
 
 
 class SupportsTable(Table):
-    """Where the body is held: a predicate over x, y, z, or node indices."""
+    """Where the body is held: a predicate over x, y, z, or node indices; a model has its own."""
 
-    fixed: str | list[int]
+    fixed: str | list[int] | None = None
 
 
 class ToolTable(Table):
@@ -92,14 +106,22 @@ class DeviceTable(Table):
     max_stiffness: Stiffness = 5000.0
 
 
+class ViewTable(Table):
+    """Where the camera stands and what it looks at, m; by default the whole body is seen."""
+
+    position: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+
+
 class Scene(Table):
     """What to touch, and with what."""
 
     body: BodyTable
-    supports: SupportsTable
+    supports: SupportsTable = SupportsTable()
     material: MaterialTable = MaterialTable()
     tool: ToolTable = ToolTable()
     device: DeviceTable = DeviceTable()
+    view: ViewTable = ViewTable()
 
     _folder: Path = PrivateAttr(default_factory=Path)
 
@@ -123,36 +145,70 @@ class Scene(Table):
             raise SceneError(f"{path}: {error}") from None
         except ValidationError as error:
             raise SceneError(_explain(path, text, error)) from None
+        if scene.body.mesh is not None and scene.supports.fixed is None:
+            line = _line_of(text, ["supports"])
+            raise SceneError(f"{path}{f':{line}' if line else ''}: the key 'supports.fixed' is missing")
+        if scene.body.store is not None and (scene.supports.fixed is not None or "material" in scene.model_fields_set):
+            raise SceneError(f"{path}: a store carries its own material and supports: leave those tables out")
         scene._folder = path.parent
         return scene
 
+    @classmethod
+    def of_store(cls, path: str | os.PathLike[str]) -> Scene:
+        """Scene of a precomputed store, with the default tool and device."""
+        return cls(body=BodyTable(store=os.fspath(path)))
+
+    @property
+    def name(self) -> str:
+        """What the body is called: the model, or the file without its ending."""
+        body = self.body
+        return body.model or Path(body.mesh or body.store or "").stem
+
     def build(self, progress: bool | Callable[[int, int], None] = True) -> BuiltScene:
-        """Mesh if need be, and precompute, or take both from the cache."""
-        source = self._folder / self.body.mesh
-        if source.suffix.lower() in SURFACE_ENDINGS:
-            mesh = tetrahedralize(source, self.body.max_element_size, self.body.unit)
-        else:
-            mesh = TetMesh.read(source, self.body.unit)
+        """Mesh if need be, and precompute, or take both from the cache.
+
+        Raises
+        ------
+        Error
+            A mesh that cannot be read or made, supports that hold nothing, a store that does not match.
+
+        """
+        if self.body.store is not None:
+            return BuiltScene(self, None, GreensFunction.load(self._folder / self.body.store))
+        mesh = self._mesh()
         m = self.material
-        fixed: Any = self.supports.fixed
+        body = Body(mesh, material=Material(m.youngs_modulus, m.poissons_ratio, m.density), fixed=self._fixed(mesh))
+        return BuiltScene(self, body, precompute(body, precision=self.body.precision, progress=progress))
+
+    def _mesh(self) -> TetMesh:
+        if self.body.model is not None:
+            return models.load(self.body.model, paper=self.body.paper)
+        source = self._folder / str(self.body.mesh)
+        if source.suffix.lower() in SURFACE_ENDINGS:
+            return tetrahedralize(source, self.body.max_element_size, self.body.unit)
+        return TetMesh.read(source, self.body.unit)
+
+    def _fixed(self, mesh: TetMesh) -> Any:
+        fixed = self.supports.fixed
+        if fixed is None and self.body.model is not None:
+            return models.fixed(self.body.model, mesh)
         if isinstance(fixed, str):
-            fixed = parse(fixed)(mesh.nodes)
-            if not np.any(fixed):
+            mask = parse(fixed)(mesh.nodes)
+            if not np.any(mask):
                 low, high = mesh.bounds.round(4).tolist()
                 raise SceneError(
-                    f"no node satisfies supports.fixed = '{self.supports.fixed}': "
-                    f"the body reaches from {low} to {high} m"
+                    f"no node satisfies supports.fixed = '{fixed}': the body reaches from {low} to {high} m"
                 )
-        body = Body(mesh, material=Material(m.youngs_modulus, m.poissons_ratio, m.density), fixed=fixed)
-        return BuiltScene(self, body, precompute(body, precision=self.body.precision, progress=progress))
+            return mask
+        return fixed
 
 
 @dataclass(frozen=True)
 class BuiltScene:
-    """A scene with its body and Green's function."""
+    """A scene with its Green's function, and its body where it was not taken from a store."""
 
     scene: Scene
-    body: Body
+    body: Body | None
     green: GreensFunction
 
 

@@ -2,18 +2,21 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use faer::{MatMut, Par};
+use faer::Par;
 use rayon::prelude::*;
 
 use super::factor::Factor;
 use super::key::content_key;
 use super::operator::{GreensFunction, Precision, Values};
+use super::pruned::{Pruned, PrunedScratch};
 use crate::fem::{Isotropic, Supports, SymmetricCsc, stiffness};
 use crate::mesh::{Surface, TetMesh};
 use crate::{Error, Result};
 
 /// Right-hand sides a solve: enough for the matrix products of the supernodes, few enough to share among tasks.
 const BLOCK: usize = 96;
+/// Columns and rows of a tile when mirroring: both ends of a copy stay in the cache.
+const TILE: usize = 64;
 
 /// The reference problem (paper 3.1): a supported body without loads.
 pub struct Problem {
@@ -70,32 +73,38 @@ impl Problem {
 /// A stored number.
 trait Stored: Copy + Send + Sync + Default {
     fn from_f64(x: f64) -> Self;
-    fn to_f64(self) -> f64;
+    fn negated(self) -> Self;
 }
 impl Stored for f32 {
     fn from_f64(x: f64) -> Self {
         x as f32
     }
-    fn to_f64(self) -> f64 {
-        f64::from(self)
+    fn negated(self) -> Self {
+        -self
     }
 }
 impl Stored for f64 {
     fn from_f64(x: f64) -> Self {
         x
     }
-    fn to_f64(self) -> f64 {
-        self
+    fn negated(self) -> Self {
+        -self
     }
 }
 
 /// What the column tasks share.
 struct ColumnTask<'a> {
     stiffness: &'a SymmetricCsc,
-    factor: &'a Factor,
     supports: &'a Supports,
     row_dofs: &'a [u32],
     column_dofs: &'a [u32],
+    pruned: Pruned<'a>,
+    /// Permuted position of each free dof.
+    position: Vec<u32>,
+    /// Positions whose solution every column needs: free rows that have no column of their own, and what reactions read.
+    always_wanted: Vec<u32>,
+    /// Columns in the order in which they are solved: moved supports first, then by position.
+    order: Vec<u32>,
 }
 
 /// Solves the reference problem for every touchable dof.
@@ -119,8 +128,7 @@ pub fn precompute(
         .map(|row| row_dofs[row as usize])
         .collect();
     let supports = &problem.supports;
-    let task =
-        ColumnTask { stiffness: &stiffness, factor: &factor, supports, row_dofs: &row_dofs, column_dofs: &column_dofs };
+    let task = ColumnTask::new(&stiffness, &factor, supports, &row_dofs, &column_dofs)?;
     let row_is_fixed: Vec<bool> = row_dofs.iter().map(|&d| supports.is_fixed(d)).collect();
     let values = match precision {
         Precision::F32 => Values::F32(task.solve_all::<f32>(&problem.touch, &row_is_fixed, progress)?),
@@ -150,7 +158,37 @@ pub fn precompute(
     })
 }
 
-impl ColumnTask<'_> {
+impl<'a> ColumnTask<'a> {
+    fn new(
+        stiffness: &'a SymmetricCsc,
+        factor: &'a Factor,
+        supports: &'a Supports,
+        row_dofs: &'a [u32],
+        column_dofs: &'a [u32],
+    ) -> Result<Self> {
+        let position = factor.positions();
+        let at = |dof: u32| match supports.free_rank[dof as usize] {
+            u32::MAX => None,
+            rank => Some(position[rank as usize]),
+        };
+        let has_column: std::collections::HashSet<u32> = column_dofs.iter().copied().collect();
+        let mut always_wanted = Vec::new();
+        for &dof in row_dofs.iter().filter(|dof| !has_column.contains(dof)) {
+            match at(dof) {
+                Some(position) => always_wanted.push(position),
+                None => always_wanted.extend(stiffness.column(dof as usize).filter_map(|(other, _)| at(other))),
+            }
+        }
+        always_wanted.sort_unstable();
+        always_wanted.dedup();
+        let mut order: Vec<u32> = (0..column_dofs.len() as u32).collect();
+        order.sort_by_key(|&column| at(column_dofs[column as usize]));
+        let pruned = Pruned::new(factor.supernodal()?);
+        Ok(Self { stiffness, supports, row_dofs, column_dofs, pruned, position, always_wanted, order })
+    }
+
+    /// All columns: blocks in the order of elimination, each with the rows of its own and of later columns; the rest
+    /// mirrors them.
     fn solve_all<T: Stored>(
         &self,
         touch: &[u32],
@@ -160,59 +198,97 @@ impl ColumnTask<'_> {
         let (rows, columns) = (self.row_dofs.len(), self.column_dofs.len());
         let mut values = vec![T::default(); rows * columns];
         let done = AtomicUsize::new(0);
-        let n = self.factor.dimension();
-        values.par_chunks_mut(rows * BLOCK).enumerate().try_for_each_init(
-            || (vec![0.0; n * BLOCK], self.factor.solve_scratch(BLOCK)),
-            |(x, memory), (block, out)| {
-                let count = out.len() / rows;
-                let first = block * BLOCK;
-                let x = &mut x[..n * count];
-                x.fill(0.0);
-                for k in 0..count {
-                    self.right_hand_side(self.column_dofs[first + k], &mut x[k * n..(k + 1) * n]);
-                }
-                self.factor.solve_in_place(MatMut::from_column_major_slice_mut(x, n, count), memory);
-                for k in 0..count {
-                    let column = &mut out[k * rows..(k + 1) * rows];
-                    self.extract(self.column_dofs[first + k], &x[k * n..(k + 1) * n], column);
-                }
-                let finished = done.fetch_add(count, Ordering::Relaxed) + count;
+        let mut slices: Vec<Option<&mut [T]>> = values.chunks_mut(rows).map(Some).collect();
+        let mut ordered: Vec<(u32, &mut [T])> =
+            self.order.iter().filter_map(|&c| Some((c, slices[c as usize].take()?))).collect();
+        let supported = self.order.iter().take_while(|&&c| self.is_fixed(c)).count();
+        let (moved, forced) = ordered.split_at_mut(supported);
+        let blocks: Vec<&mut [(u32, &mut [T])]> = moved.chunks_mut(BLOCK).chain(forced.chunks_mut(BLOCK)).collect();
+        let mut later = columns;
+        let tasks: Vec<_> = blocks
+            .into_iter()
+            .map(|block| {
+                let first = columns - later;
+                later -= block.len();
+                (first, block)
+            })
+            .collect();
+        tasks.into_par_iter().try_for_each_init(
+            || self.pruned.scratch(BLOCK),
+            |scratch, (first, block)| {
+                self.solve_block(first, block, scratch);
+                let finished = done.fetch_add(block.len(), Ordering::Relaxed) + block.len();
                 if progress(finished, columns) { Ok(()) } else { Err(Error::Interrupted) }
             },
         )?;
-        symmetrise(&mut values, rows, touch, row_is_fixed);
+        mirror(&mut values, rows, touch, row_is_fixed, &self.order);
         Ok(values)
     }
 
-    /// A unit force on a free dof, or `-K_Nj` for a unit displacement of support `j`.
-    fn right_hand_side(&self, dof: u32, b: &mut [f64]) {
+    /// One block of columns, the `first` in the order and those after it.
+    fn solve_block<T: Stored>(&self, first: usize, block: &mut [(u32, &mut [T])], scratch: &mut PrunedScratch) {
+        let count = block.len();
+        scratch.x.fill(0.0);
+        let mut sources = Vec::new();
+        for (k, (column, _)) in block.iter().enumerate() {
+            self.right_hand_side(self.column_dofs[*column as usize], |position, value| {
+                scratch.x[position * count + k] = value;
+                sources.push(position);
+            });
+        }
+        if self.is_fixed(block[0].0) {
+            // A moved support is felt everywhere, and read by the reactions of all others.
+            self.pruned.solve(scratch, count, sources.into_iter(), 0..self.position.len());
+        } else {
+            let later = self.order[first..].iter().filter_map(|&c| self.position_of(self.column_dofs[c as usize]));
+            let wanted = later.chain(self.always_wanted.iter().map(|&p| p as usize));
+            self.pruned.solve(scratch, count, sources.into_iter(), wanted);
+        }
+        for (k, (column, out)) in block.iter_mut().enumerate() {
+            self.extract(self.column_dofs[*column as usize], |position| scratch.x[position * count + k], out);
+        }
+    }
+
+    fn is_fixed(&self, column: u32) -> bool {
+        self.supports.is_fixed(self.column_dofs[column as usize])
+    }
+
+    /// Permuted position of a dof, if it is free.
+    fn position_of(&self, dof: u32) -> Option<usize> {
         match self.supports.free_rank[dof as usize] {
-            u32::MAX => {
-                for (row, value) in self.stiffness.column(dof as usize) {
-                    let rank = self.supports.free_rank[row as usize];
-                    if rank != u32::MAX {
-                        b[rank as usize] = -value;
-                    }
-                }
+            u32::MAX => None,
+            rank => Some(self.position[rank as usize] as usize),
+        }
+    }
+
+    /// A unit force on a free dof, or `-K_Nj` for a unit displacement of support `j`.
+    fn right_hand_side(&self, dof: u32, mut set: impl FnMut(usize, f64)) {
+        if let Some(position) = self.position_of(dof) {
+            return set(position, 1.0);
+        }
+        for (row, value) in self.stiffness.column(dof as usize) {
+            if let Some(position) = self.position_of(row) {
+                set(position, -value);
             }
-            rank => b[rank as usize] = 1.0,
         }
     }
 
-    /// Displacements of free rows, `K_DN u_N` (and `K_Dj` of a moved support) on supported rows.
-    fn extract<T: Stored>(&self, dof: u32, x: &[f64], column: &mut [T]) {
+    /// Displacements of free rows, `K_DN u_N` (and `K_Dj` of a moved support) on supported rows. Rows that were not
+    /// wanted are mirrored later.
+    fn extract<T: Stored>(&self, dof: u32, solution: impl Fn(usize) -> f64, column: &mut [T]) {
         for (value, &row) in column.iter_mut().zip(self.row_dofs) {
-            let rank = self.supports.free_rank[row as usize];
-            *value = T::from_f64(if rank == u32::MAX { self.reaction(row, dof, x) } else { x[rank as usize] });
+            *value = T::from_f64(match self.position_of(row) {
+                Some(position) => solution(position),
+                None => self.reaction(row, dof, &solution),
+            });
         }
     }
 
-    fn reaction(&self, row: u32, dof: u32, x: &[f64]) -> f64 {
+    fn reaction(&self, row: u32, dof: u32, solution: impl Fn(usize) -> f64) -> f64 {
         let mut sum = 0.0;
         for (other, value) in self.stiffness.column(row as usize) {
-            let rank = self.supports.free_rank[other as usize];
-            if rank != u32::MAX {
-                sum += value * x[rank as usize];
+            if let Some(position) = self.position_of(other) {
+                sum += value * solution(position);
             } else if other == dof {
                 sum += value;
             }
@@ -221,18 +297,19 @@ impl ColumnTask<'_> {
     }
 }
 
-/// Makes the touchable square exactly symmetric: `Psi_NN` and `Psi_DD` symmetric, `Psi_DN = -Psi_ND^T`. An operator that
-/// is not lets a hand draw energy from a static spring.
-fn symmetrise<T: Stored>(values: &mut [T], rows: usize, touch: &[u32], row_is_fixed: &[bool]) {
-    let row_of = |column: usize| 3 * touch[column / 3] as usize + column % 3;
-    let columns = 3 * touch.len();
-    for j in 0..columns {
-        for i in 0..j {
-            let (upper, lower) = (j * rows + row_of(i), i * rows + row_of(j));
-            let sign = if row_is_fixed[row_of(i)] == row_is_fixed[row_of(j)] { 1.0 } else { -1.0 };
-            let mean = T::from_f64(0.5 * (values[upper].to_f64() + sign * values[lower].to_f64()));
-            values[upper] = mean;
-            values[lower] = T::from_f64(sign * mean.to_f64());
+/// Completes the touchable square from the part that was solved, so that it is symmetric to the bit: `Psi_NN` and
+/// `Psi_DD` symmetric, `Psi_DN = -Psi_ND^T`. An operator that is not lets a hand draw energy from a static spring.
+fn mirror<T: Stored>(values: &mut [T], rows: usize, touch: &[u32], row_is_fixed: &[bool], order: &[u32]) {
+    let row_of = |column: u32| 3 * touch[column as usize / 3] as usize + column as usize % 3;
+    for (i, tile) in order.chunks(TILE).enumerate() {
+        for (j, other) in order.chunks(TILE).enumerate().skip(i) {
+            for (a, &solved) in tile.iter().enumerate() {
+                for &mirrored in &other[if i == j { a + 1 } else { 0 }..] {
+                    let same_kind = row_is_fixed[row_of(solved)] == row_is_fixed[row_of(mirrored)];
+                    let value = values[solved as usize * rows + row_of(mirrored)];
+                    values[mirrored as usize * rows + row_of(solved)] = if same_kind { value } else { value.negated() };
+                }
+            }
         }
     }
 }

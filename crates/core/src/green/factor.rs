@@ -3,8 +3,11 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::Perm;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
@@ -37,7 +40,11 @@ impl Factor {
             lower.symbolic(),
             Side::Lower,
             SymmetricOrdering::Custom(perm.as_ref()),
-            CholeskySymbolicParams::default(),
+            // The solves of `pruned` walk the supernodes: never the simplicial form.
+            CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                ..CholeskySymbolicParams::default()
+            },
         )
         .map_err(|e| Error::Singular(format!("symbolic factorisation failed ({e:?})")))?;
         let mut values = vec![0.0; symbolic.len_val()];
@@ -72,6 +79,25 @@ impl Factor {
             Par::Seq,
             MemStack::new(memory),
         );
+    }
+
+    /// The factor's supernodes, in permuted positions.
+    ///
+    /// # Errors
+    /// Never: the factor is made supernodal.
+    pub fn supernodal(&self) -> Result<SupernodalLltRef<'_, usize, f64>> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => Ok(SupernodalLltRef::new(symbolic, &self.values)),
+            SymbolicCholeskyRaw::Simplicial(_) => Err(Error::Singular("the factor has no supernodes".into())),
+        }
+    }
+
+    /// Permuted position of each free dof.
+    pub fn positions(&self) -> Vec<u32> {
+        match self.symbolic.perm() {
+            Some(perm) => perm.arrays().1.iter().map(|&p| p as u32).collect(),
+            None => (0..self.dimension() as u32).collect(),
+        }
     }
 
     /// Scratch for [`Factor::solve_in_place`] with `columns` right-hand sides.

@@ -17,6 +17,7 @@ mod interior;
 mod key;
 mod operator;
 mod ordering;
+mod pruned;
 mod store;
 
 pub use columns::{Problem, precompute};

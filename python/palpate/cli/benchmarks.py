@@ -1,0 +1,77 @@
+"""Benchmarks from the command line."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.app import app
+
+if TYPE_CHECKING:
+    from palpate.bench.paper import Row
+
+bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
+app.add_typer(bench_app, name="bench")
+
+
+@bench_app.callback()
+def bench() -> None:
+    """Keep 'paper' a command of its own: typer would merge a single command into its parent."""
+
+
+@bench_app.command()
+def paper(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Table 1 of the paper: its figures, its method here, and Palpate.
+
+    Example: palpate bench paper --json > paper.json
+    """
+    from palpate.bench import paper as bench
+    from palpate.progress import narrated
+
+    with narrated("measuring doll, kidney and liver"):
+        rows = bench.run()
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+        return
+    _print_table(rows)
+
+
+def _print_table(rows: list[Row]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Table 1 of the paper, and here")
+    table.add_column("")
+    for row in rows:
+        table.add_column(row.model, justify="right")
+
+    def line(title: str, cell) -> None:
+        table.add_row(title, *(cell(row) for row in rows))
+
+    line("nodes: paper", lambda r: str(r.paper_nodes))
+    line("nodes: here", lambda r: str(r.nodes))
+    line("tetrahedra: paper", lambda r: str(r.paper_tets))
+    line("tetrahedra: here", lambda r: str(r.tets))
+    line("surface nodes: paper", lambda r: str(r.paper_surface_nodes))
+    line("surface nodes: here", lambda r: str(r.surface_nodes))
+    line("surface triangles: paper", lambda r: str(r.paper_surface_triangles))
+    line("surface triangles: here", lambda r: str(r.surface_triangles))
+    table.add_section()
+    line("precompute: paper, Pentium 4", lambda r: f"{r.paper_precompute_s / 60:.1f} min")
+    line("precompute: its dense inverse here", lambda r: f"{r.dense_precompute_s:.2f} s")
+    line("precompute: Palpate", lambda r: f"{r.precompute_s:.2f} s")
+    line("  times faster than its method here", lambda r: f"{r.precompute_ratio:.1f}")
+    table.add_section()
+    line("contact and surface: paper, Pentium 4", lambda r: f"{r.paper_simulation_us:.0f} us")
+    line("contact and surface: its method here", lambda r: f"{r.dense_simulation_us:.1f} us")
+    line("force alone, one tick: Palpate", lambda r: f"{r.force_us:.2f} us")
+    line("force and whole surface: Palpate", lambda r: f"{r.force_and_surface_us:.1f} us")
+    table.add_section()
+    line("force of both methods, relative difference", lambda r: f"{r.difference:.0e}")
+    console = Console()
+    console.print(table)
+    console.print("force alone: patch contact with geometry and safety stage, as the 1 kHz loop runs it")

@@ -1,0 +1,115 @@
+"""Commands that run the force loop: with the viewer, or headless by a scripted press."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.app import app
+
+if TYPE_CHECKING:
+    from palpate.scene import BuiltScene, Scene
+
+Headless = Annotated[
+    float | None, typer.Option(min=0.1, help="No viewer: this many seconds of a scripted press at 1 kHz.")
+]
+Out = Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (PNG) of --headless.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the viewer; 0 takes a free one.")]
+Host = Annotated[str, typer.Option(help="Address to listen on; others than 127.0.0.1 let other machines in.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]
+PORT = 8642
+
+
+@app.command()
+def demo(
+    model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.")] = "liver",
+    paper: Annotated[bool, typer.Option("--paper", help="The mesh in the size of the paper.")] = False,
+    headless: Headless = None,
+    out: Out = Path(),
+    port: Port = PORT,
+    host: Host = "127.0.0.1",
+    browser: Browser = True,
+) -> None:
+    """Press on a built-in model in the browser.
+
+    Example: palpate demo kidney --paper
+    """
+    from palpate import models
+    from palpate.cli.catalogue import model_scene
+
+    scene = model_scene(model, paper)
+    built = _build(scene)
+    if headless is not None:
+        _scripted(built, f"{model}-paper" if paper else model, headless, out)
+        return
+    _view(built, host, port, browser, models.NAMES, lambda name: model_scene(name, paper))
+
+
+@app.command()
+def run(
+    file: Annotated[Path, typer.Argument(help="Scene file (.toml) or precomputed store (.palpate).")],
+    headless: Headless = None,
+    out: Out = Path(),
+    port: Port = PORT,
+    host: Host = "127.0.0.1",
+    browser: Browser = True,
+) -> None:
+    """Run the 1 kHz force loop on a scene, in the browser.
+
+    With --headless it presses on the highest point by a script, and writes the log and a plot.
+
+    Example: palpate run scene.toml
+
+    Example: palpate run scene.toml --headless 3 --out results
+    """
+    from palpate.scene import Scene
+
+    scene = Scene.of_store(file) if file.suffix == ".palpate" else Scene.read(file)
+    built = _build(scene)
+    if headless is not None:
+        _scripted(built, file.stem, headless, out)
+        return
+    _view(built, host, port, browser)
+
+
+def _build(scene: Scene) -> BuiltScene:
+    from palpate.progress import narrated
+
+    with narrated(f"preparing {scene.name}"):
+        return scene.build()
+
+
+def _view(
+    built: BuiltScene,
+    host: str,
+    port: int,
+    browser: bool,
+    models: Sequence[str] = (),
+    scene_of: Callable[[str], Scene] | None = None,
+) -> None:
+    from palpate.viewer.live import open_viewer
+    from palpate.viewer.server import ViewerServer
+
+    open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of), browser=browser)
+
+
+def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
+    from palpate.cli.scripted import scripted_press
+    from palpate.plots import plot_log, write_log
+
+    out.mkdir(parents=True, exist_ok=True)
+    log, statistics = scripted_press(built, seconds)
+    write_log(log, out / f"{name}.csv")
+    plot_log(log, out / f"{name}.png", f"{name}: scripted press at 1 kHz")
+    compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
+    print(f"{len(log)} ticks, largest force {(log['force'] ** 2).sum(axis=1).max() ** 0.5:.3f} N")
+    print("us            p50      p99    p99.9      max")
+    for title, row in (("computing", compute), ("wake-up", wakeup)):
+        print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")
+    print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
+    if not all(statistics["realtime"]):
+        print("palpate: note: the system granted no real-time priority or locked memory", file=sys.stderr)

@@ -1,0 +1,1 @@
+"""The browser viewer: one page, one websocket, one port."""

@@ -1,0 +1,39 @@
+"""Open the viewer and stay until the person has had enough."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import webbrowser
+
+from palpate.viewer.server import ViewerServer
+
+
+def open_viewer(server: ViewerServer, *, browser: bool = True) -> None:
+    """Serve until Ctrl-C; the address is printed, and opened where there is a desktop."""
+    asyncio.run(_serve(server, browser))
+
+
+async def _serve(server: ViewerServer, browser: bool) -> None:
+    await server.start()
+    try:
+        print(f"Palpate is at {server.address}", flush=True)
+        print("Press on the body with the left mouse button. Ctrl-C here ends.", flush=True)
+        if browser and _has_desktop():
+            await asyncio.to_thread(webbrowser.open, server.address)
+        finished = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, finished.set)
+        await finished.wait()
+    finally:
+        await server.stop()
+
+
+def _has_desktop() -> bool:
+    """Whether a browser can show itself: elsewhere webbrowser would start a text browser in the terminal."""
+    if sys.platform.startswith(("win", "darwin")):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

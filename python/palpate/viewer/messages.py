@@ -1,0 +1,86 @@
+"""Messages of the viewer: text is JSON; binary is a JSON header and the arrays that it describes.
+
+A binary message is ``uint32`` header length, the header in UTF-8 padded with spaces so that the arrays start at a
+multiple of 8 bytes, then the arrays, little-endian, each at the offset after the header that its entry names.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import ViewerError
+
+VERSION = 1
+DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
+
+
+def encode(header: Mapping[str, Any], arrays: Mapping[str, tuple[str, np.ndarray]]) -> bytes:
+    """Binary message; ``arrays`` maps a name to (dtype name, array)."""
+    entries, blocks, offset = [], [], 0
+    for name, (dtype, array) in arrays.items():
+        data = np.ascontiguousarray(array, dtype=DTYPES[dtype])
+        entries.append({"name": name, "dtype": dtype, "shape": list(data.shape), "offset": offset})
+        padding = -data.nbytes % 8
+        blocks.append(data.tobytes() + b"\0" * padding)
+        offset += data.nbytes + padding
+    text = json.dumps({**header, "arrays": entries}, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-(4 + len(text)) % 8)
+    return b"".join([struct.pack("<I", len(text)), text, *blocks])
+
+
+def decode(message: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of a binary message, for programs other than the page."""
+    (length,) = struct.unpack_from("<I", message)
+    header = json.loads(message[4 : 4 + length])
+    arrays = {}
+    for entry in header["arrays"]:
+        count = int(np.prod(entry["shape"]))
+        data = np.frombuffer(message, DTYPES[entry["dtype"]], count, 4 + length + entry["offset"])
+        arrays[entry["name"]] = data.reshape(entry["shape"])
+    return header, arrays
+
+
+def parse(text: str | bytes) -> dict[str, Any]:
+    """Read a client's message: a JSON object with a type.
+
+    Raises
+    ------
+    ViewerError
+        Anything else.
+
+    """
+    if isinstance(text, bytes):
+        raise ViewerError("a client sends text messages only")
+    try:
+        message = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        raise ViewerError("a message is not JSON") from None
+    if not isinstance(message, dict) or not isinstance(message.get("type"), str):
+        raise ViewerError("a message is not an object with a type")
+    return message
+
+
+def number(message: Mapping[str, Any], key: str) -> float:
+    """Take a finite number of a client's message."""
+    value = message.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        raise ViewerError(f"{message['type']}: {key} must be a finite number")
+    return float(value)
+
+
+def vector(message: Mapping[str, Any], key: str) -> tuple[float, float, float]:
+    """Three finite numbers of a client's message."""
+    values = message.get(key)
+    if not isinstance(values, list) or len(values) != 3:
+        raise ViewerError(f"{message['type']}: {key} must be three numbers")
+    x, y, z = (number({"type": message["type"], key: v}, key) for v in values)
+    return x, y, z
+
+
+def _refuse(name: str) -> float:
+    raise ValueError(name)

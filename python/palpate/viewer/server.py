@@ -1,0 +1,296 @@
+"""The server: who may connect, who controls, and frames as fast as each client takes them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import json
+import secrets
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from palpate import __version__
+from palpate.errors import Error, ViewerError
+from palpate.scene import BuiltScene, Scene
+from palpate.viewer import messages
+from palpate.viewer.pages import headers, host_is_ours, load_pages
+from palpate.viewer.session import Session, choices
+
+DEFAULT_PORT = 8642
+FRAME_RATE = 60.0
+# Bounds on what a client may send and how many there may be.
+MAX_MESSAGE = 4096
+MAX_RATE = 1500.0
+MAX_CLIENTS = 8
+HELLO_TIMEOUT = 5.0
+# A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
+LOST_AFTER = 2.0
+BAD_TOKEN = 4401
+
+
+@dataclass(eq=False)
+class Client:
+    """One connected page."""
+
+    connection: ServerConnection
+    shown: Session | None = None
+    cutaway: bool = False
+    sent: int = 0
+    log_seen: int = 0
+    may_send: asyncio.Event = field(default_factory=asyncio.Event)
+    heard: float = field(default_factory=time.monotonic)
+    allowance: float = MAX_RATE
+
+    async def send(self, message: dict[str, Any]) -> None:
+        """Send a text message; a client that has gone is left to its own handler."""
+        with contextlib.suppress(ConnectionClosed):
+            await self.connection.send(json.dumps(message))
+
+
+class ViewerServer:
+    """Serves one session.
+
+    Parameters
+    ----------
+    built
+        What is shown first.
+    host, port
+        Where it listens; port 0 takes a free one.
+    models
+        Names the page may choose from, each made a scene by ``scene_of``.
+    scene_of
+        Scene of a model.
+
+    Raises
+    ------
+    ViewerError
+        The page was not built into this package.
+
+    """
+
+    def __init__(
+        self,
+        built: BuiltScene,
+        *,
+        host: str = "127.0.0.1",
+        port: int = DEFAULT_PORT,
+        models: Sequence[str] = (),
+        scene_of: Callable[[str], Scene] | None = None,
+    ):
+        self.host, self.port = host, port
+        self.token = secrets.token_urlsafe(24)
+        self._pages = load_pages()
+        self._session = Session(built)
+        self._models, self._scene_of = list(models), scene_of
+        self._clients: list[Client] = []
+        self._controller: Client | None = None
+        self._building = False
+        self._server: Server | None = None
+
+    @property
+    def address(self) -> str:
+        """What a person opens; the token stays in the browser, for fragments are never sent."""
+        shown = "127.0.0.1" if self.host in {"0.0.0.0", "::", ""} else self.host
+        name = f"[{shown}]" if ":" in shown else shown
+        return f"http://{name}:{self.port}/#token={self.token}"
+
+    async def start(self) -> None:
+        """Listen.
+
+        Raises
+        ------
+        ViewerError
+            The port is in use, or the address is not this machine's.
+
+        """
+        try:
+            self._server = await serve(
+                self._client,
+                self.host,
+                self.port,
+                process_request=self._request,
+                max_size=MAX_MESSAGE,
+                compression=None,
+                ping_interval=5,
+                ping_timeout=10,
+                close_timeout=1,
+                server_header=None,
+            )
+        except OSError as error:
+            self._session.close()
+            if error.errno == errno.EADDRINUSE:
+                raise ViewerError(
+                    f"port {self.port} on {self.host} is in use: choose another with --port, or --port 0 for a free one"
+                ) from None
+            raise ViewerError(f"cannot listen on {self.host}:{self.port}: {error.strerror or error}") from None
+        self.port = self._server.sockets[0].getsockname()[1]
+        self._watch = asyncio.create_task(self._watchdog())
+
+    async def stop(self) -> None:
+        """Close all connections and stop the loop."""
+        if self._server is not None:
+            self._watch.cancel()
+            self._server.close()
+            await self._server.wait_closed()
+        self._session.close()
+
+    def _request(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Serve the page, let the websocket through, refuse everything else."""
+        host = request.headers.get("Host")
+        if not host_is_ours(host, self.host, self.port):
+            return _answer(403, "text/plain", b"wrong Host\n", "")
+        assert host is not None
+        path = request.path.partition("?")[0]
+        if path == "/socket":
+            if request.headers.get("Origin") != f"http://{host}":
+                return _answer(403, "text/plain", b"wrong Origin\n", host)
+            return None
+        kind, content = self._pages.get(path, ("text/plain", b"not found\n"))
+        return _answer(200 if path in self._pages else 404, kind, content, host)
+
+    async def _client(self, connection: ServerConnection) -> None:
+        if not await self._welcome(connection):
+            return
+        client = Client(connection)
+        self._clients.append(client)
+        sender = None
+        try:
+            if self._controller is None:
+                self._controller = client
+            role = "control" if self._controller is client else "watch"
+            models = choices(self._models)
+            await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
+            client.may_send.set()
+            sender = asyncio.create_task(self._send_frames(client))
+            async for text in connection:
+                await self._message(client, text)
+        except ConnectionClosed:
+            pass
+        finally:
+            if sender is not None:
+                sender.cancel()
+            self._clients.remove(client)
+            await self._lose_control(client)
+
+    async def _welcome(self, connection: ServerConnection) -> bool:
+        """Whether the first message carries the token."""
+        try:
+            hello = messages.parse(await asyncio.wait_for(connection.recv(), HELLO_TIMEOUT))
+        except (asyncio.TimeoutError, ConnectionClosed, ViewerError):
+            hello = {}
+        token = hello.get("token")
+        if not (isinstance(token, str) and secrets.compare_digest(token.encode(), self.token.encode())):
+            await connection.close(BAD_TOKEN, "wrong or missing token")
+            return False
+        if hello.get("version") != messages.VERSION:
+            await connection.close(1002, "another version of the protocol: load the page again")
+            return False
+        if len(self._clients) >= MAX_CLIENTS:
+            await connection.close(1013, "too many viewers")
+            return False
+        return True
+
+    async def _message(self, client: Client, text: str | bytes) -> None:
+        now = time.monotonic()
+        client.allowance = min(client.allowance + (now - client.heard) * MAX_RATE, MAX_RATE) - 1.0
+        client.heard = now
+        if client.allowance < 0.0:
+            await client.connection.close(1008, "too many messages")
+            return
+        try:
+            message = messages.parse(text)
+            if message["type"] == "ack":
+                if message.get("frame") == client.sent:
+                    client.may_send.set()
+            elif message["type"] == "cutaway":
+                client.cutaway = message.get("on") is True
+            elif client is not self._controller:
+                raise ViewerError("another viewer has control; this one watches")
+            elif message["type"] == "model":
+                await self._choose(message.get("name"))
+            elif self._session.handle(message):
+                await self._tell_all(self._session.settings())
+        except Error as error:
+            await client.send({"type": "error", "text": str(error)})
+
+    async def _send_frames(self, client: Client) -> None:
+        """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await client.may_send.wait()
+                client.may_send.clear()
+                session = self._session
+                if client.shown is not session:
+                    client.shown, client.log_seen = session, 0
+                    await client.connection.send(session.scene_message())
+                    client.may_send.set()
+                    continue
+                client.sent += 1
+                message, client.log_seen = session.frame_message(client.sent, client.log_seen, client.cutaway)
+                await client.connection.send(message)
+                await asyncio.sleep(1.0 / FRAME_RATE)
+
+    async def _lose_control(self, client: Client) -> None:
+        """Let go of the body; who has watched longest takes over."""
+        if client is not self._controller:
+            return
+        self._session.release()
+        self._controller = self._clients[0] if self._clients else None
+        if self._controller is not None:
+            await self._controller.send({"type": "role", "role": "control"})
+
+    async def _watchdog(self) -> None:
+        while True:
+            await asyncio.sleep(0.25)
+            controller = self._controller
+            if controller is None or time.monotonic() - controller.heard > LOST_AFTER:
+                self._session.release()
+
+    async def _tell_all(self, message: dict[str, Any]) -> None:
+        for client in list(self._clients):
+            await client.send(message)
+
+    async def _choose(self, name: Any) -> None:
+        """Switch to another model; the one shown goes on until the new one is ready."""
+        if self._scene_of is None or name not in self._models:
+            raise ViewerError(f"there is no model '{str(name)[:40]}'")
+        if self._building:
+            raise ViewerError("another model is being prepared")
+        self._building = True
+        self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name)))
+
+    async def _switch(self, name: str, scene: Scene) -> None:
+        loop, started = asyncio.get_running_loop(), time.monotonic()
+
+        def report(done: int, total: int) -> None:
+            part = done / max(total, 1)
+            left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None
+            status = {"type": "status", "text": f"Solving the {name}", "progress": part, "left_s": left}
+            loop.call_soon_threadsafe(lambda: loop.create_task(self._tell_all(status)))
+
+        try:
+            await self._tell_all({"type": "status", "text": f"Loading the {name}", "progress": None, "left_s": None})
+            self._session.release()
+            built = await asyncio.to_thread(scene.build, report)
+            session = await asyncio.to_thread(Session, built)
+            old, self._session = self._session, session
+            old.close()
+        except Error as error:
+            await self._tell_all({"type": "error", "text": str(error)})
+        finally:
+            self._building = False
+            await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
+
+
+def _answer(status: int, kind: str, content: bytes, host: str) -> Response:
+    reasons = {200: "OK", 403: "Forbidden", 404: "Not Found"}
+    fields = {**headers(host), "Content-Type": kind, "Content-Length": str(len(content)), "Connection": "close"}
+    return Response(status, reasons[status], Headers(fields), content)

@@ -1,0 +1,240 @@
+"""What the viewer shows and does, without sockets: the running simulation, its commands, its messages."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import ViewerError
+from palpate.interior import Interior
+from palpate.scene import BuiltScene
+from palpate.simulation import Frame, Simulation
+from palpate.strain import SurfaceStrain
+from palpate.viewer.messages import encode, number, vector
+
+# The contact radius slider ends at this part of the body's longest side.
+LARGEST_RADIUS = 0.12
+# Tool targets farther than this many body sizes from the body are refused.
+REACH = 10.0
+# Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
+LOG_KEPT = 4000
+LOG_SENT = 64
+# The colour scale never spans less than this part of the body's size: rest is not noise blown up.
+LEAST_FIELD = 0.005
+# A frame younger than this serves all clients, s.
+FRAME_AGE = 0.008
+
+
+class Session:
+    """One running scene.
+
+    Parameters
+    ----------
+    built
+        Scene with its Green's function.
+
+    """
+
+    def __init__(self, built: BuiltScene):
+        self.built = built
+        green = built.green
+        self._positions = green.surface_positions
+        self._triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
+        self._strain = SurfaceStrain(self._positions, self._triangles)
+        self._interior: Interior | None = None
+        self._low, self._high = self._positions.min(axis=0), self._positions.max(axis=0)
+        self.size = float((self._high - self._low).max())
+        self.simulation = Simulation(built)
+        self._max_radius = max(
+            self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size), built.scene.tool.contact_radius
+        )
+        self._log = np.zeros((0, 3))
+        self._log_end = 0
+        self._frame: Frame | None = None
+        self._frame_time = 0.0
+        self.active = False
+        self.simulation.start()
+
+    def close(self) -> None:
+        """Stop the loop."""
+        self.simulation.stop()
+
+    def settings(self) -> dict[str, Any]:
+        """Message with what the sliders show."""
+        return {
+            "type": "settings",
+            "youngs_modulus": self.simulation.youngs_modulus,
+            "contact_radius": self.simulation.contact_radius,
+        }
+
+    def release(self) -> None:
+        """Take the tool out of the scene."""
+        if self.active:
+            self.simulation.remove()
+            self.active = False
+
+    def handle(self, message: Mapping[str, Any]) -> bool:
+        """Do what a controlling client says. Returns whether settings changed.
+
+        Raises
+        ------
+        Error
+            A message that makes no sense, or a value that is refused.
+
+        """
+        handlers: dict[str, Callable[[Mapping[str, Any]], bool]] = {
+            "press": self._press,
+            "release": self._release,
+            "set": self._set,
+            "reset": self._reset,
+        }
+        handler = handlers.get(message["type"])
+        if handler is None:
+            raise ViewerError(f"unknown message '{message['type'][:40]}'")
+        return handler(message)
+
+    def scene_message(self) -> bytes:
+        """Geometry and numbers of the scene."""
+        green, scene, body = self.built.green, self.built.scene, self.built.body
+        if body is None:  # from a store, which knows only the surface
+            nodes, tets = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4))
+            nodes[green.surface_nodes] = self._positions
+            fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)
+        else:
+            nodes, tets, fixed = body.mesh.nodes, body.mesh.tets, green.fixed_nodes
+        view = scene.view
+        header = {
+            "type": "scene",
+            "name": scene.name,
+            "title": scene.name.replace("_", " ").capitalize(),
+            "nodes": len(nodes),
+            "tets": len(tets),
+            "surface_nodes": len(green.surface_nodes),
+            "triangles": len(self._triangles),
+            "youngs_modulus": self.simulation.youngs_modulus,
+            "poissons_ratio": None if body is None else scene.material.poissons_ratio,
+            "contact_radius": self.simulation.contact_radius,
+            "max_contact_radius": self._max_radius,
+            "tool_radius": scene.tool.radius,
+            "max_force": scene.device.max_force,
+            "size": self.size,
+            "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
+        }
+        arrays = {
+            "nodes": ("f4", nodes),
+            "tets": ("u4", tets),
+            "surface_triangles": ("u4", green.surface_triangles),
+            "surface_nodes": ("u4", green.surface_nodes),
+            "fixed_nodes": ("u4", fixed),
+        }
+        return encode(header, arrays)
+
+    def frame_message(self, number: int, log_seen: int, cutaway: bool) -> tuple[bytes, int]:
+        """Binary message of the latest tick, and up to where it carries the log."""
+        frame = self._latest()
+        u = frame.displacements
+        magnitude = np.sqrt(np.einsum("ij,ij->i", u, u))
+        largest = max(float(magnitude.max()), LEAST_FIELD * self.size)
+        interior = cutaway and self.built.body is not None
+        log, seen = self._log_since(log_seen)
+        header = {
+            "type": "frame",
+            "frame": number,
+            "time": frame.time,
+            "tool": {"position": frame.positions[0].tolist(), "active": self.active},
+            "force": frame.forces[0].tolist(),
+            "contacts": [
+                {
+                    "mode": contact.mode,
+                    "point": contact.point.tolist(),
+                    "normal": contact.normal.tolist(),
+                    "force": contact.force.tolist(),
+                }
+                for contact in frame.contacts
+            ],
+            **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
+            "realtime": all(frame.statistics["realtime"]),
+            "refused": bool(frame.statistics["refused"][0]),
+            "strain": self._strain.largest(u),
+            "field": {"name": "displacement", "unit": "mm", "max": 1e3 * largest},
+            "interior": interior,
+        }
+        arrays = {
+            "displacements": ("f4", self._extended(u) if interior else u),
+            "scalar": ("u1", np.rint(255.0 * magnitude / largest)),
+            "log": ("f4", log),
+        }
+        return encode(header, arrays), seen
+
+    def _press(self, message: Mapping[str, Any]) -> bool:
+        position = np.array(vector(message, "position"))
+        grab = message.get("grab", False)
+        if not isinstance(grab, bool):
+            raise ViewerError("press: grab must be true or false")
+        if np.abs(position - 0.5 * (self._low + self._high)).max() > REACH * self.size:
+            raise ViewerError("press: the position is far away from the body")
+        self.simulation.move(position)
+        self.simulation.grab(grab)
+        self.active = True
+        return False
+
+    def _release(self, _message: Mapping[str, Any]) -> bool:
+        self.release()
+        return False
+
+    def _set(self, message: Mapping[str, Any]) -> bool:
+        known = {"youngs_modulus": self.simulation.set_youngs_modulus, "contact_radius": self._set_radius}
+        keys = set(message) - {"type"}
+        if not keys or not keys <= set(known):
+            raise ViewerError(f"set takes {' or '.join(known)}")
+        for key in sorted(keys):
+            known[key](number(message, key))
+        return True
+
+    def _set_radius(self, radius: float) -> None:
+        if radius > self._max_radius:
+            raise ViewerError(f"the contact radius goes up to {1e3 * self._max_radius:.3g} mm on this body")
+        self.simulation.set_radius(radius)
+
+    def _reset(self, _message: Mapping[str, Any]) -> bool:
+        self.release()
+        tool, reference = self.built.scene.tool, self.built.green.youngs_modulus
+        self.simulation.set_radius(tool.contact_radius)
+        if reference is not None:
+            self.simulation.set_youngs_modulus(reference)
+        self.simulation.reset()
+        return True
+
+    def _latest(self) -> Frame:
+        now = time.monotonic()
+        if self._frame is None or now - self._frame_time > FRAME_AGE:
+            self._frame, self._frame_time = self.simulation.frame(), now
+            rows = self.simulation.drain_log()
+            force = np.sqrt(np.einsum("ij,ij->i", rows["force"], rows["force"]))
+            new = np.column_stack([rows["time"], force, rows["compute_us"]])
+            self._log = np.vstack([self._log, new])[-LOG_KEPT:]
+            self._log_end += len(new)
+        return self._frame
+
+    def _log_since(self, seen: int) -> tuple[np.ndarray, int]:
+        """Rows since the client's last frame, thinned evenly; the largest computing time of each group is kept."""
+        rows = self._log[max(len(self._log) - max(self._log_end - seen, 0), 0) :]
+        stride = -(-len(rows) // LOG_SENT) or 1
+        thin = rows[::stride].copy()
+        if stride > 1 and len(rows):
+            thin[:, 2] = np.maximum.reduceat(rows[:, 2], np.arange(0, len(rows), stride))
+        return thin, self._log_end
+
+    def _extended(self, u: np.ndarray) -> np.ndarray:
+        if self._interior is None:
+            assert self.built.body is not None
+            self._interior = Interior(self.built.body)
+        return self._interior.extend(u)
+
+
+def choices(names: Sequence[str]) -> list[dict[str, str]]:
+    """Entries of the model chooser."""
+    return [{"name": name, "title": name.replace("_", " ").capitalize()} for name in names]

@@ -1,0 +1,346 @@
+"""The viewer's server: who gets in, who controls, what bad clients may do."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+import urllib.request
+from urllib.error import HTTPError
+
+import numpy as np
+import pytest
+import websockets
+from websockets.asyncio.client import connect
+
+import palpate
+from palpate.scene import BuiltScene
+from palpate.viewer import messages
+from palpate.viewer.pages import host_is_ours
+from palpate.viewer.server import MAX_MESSAGE, ViewerServer
+
+TOP = [0.04, 0.025, 0.05]
+
+
+@pytest.fixture(scope="module")
+def built(block, block_green) -> BuiltScene:
+    return BuiltScene(palpate.Scene.of_store("block.palpate"), block, block_green)
+
+
+class Page:
+    """A client that speaks the page's protocol."""
+
+    def __init__(self, server: ViewerServer, socket):
+        self.server, self.socket = server, socket
+        self.texts: list[dict] = []
+
+    async def say(self, **message):
+        await self.socket.send(json.dumps(message))
+
+    async def receive(self, kind: str, limit: float = 5.0):
+        """Next message of a kind; binary frames are acknowledged as a page would."""
+
+        async def wait():
+            while True:
+                raw = await self.socket.recv()
+                if isinstance(raw, bytes):
+                    header, arrays = messages.decode(raw)
+                    if header["type"] == "frame":
+                        await self.say(type="ack", frame=header["frame"])
+                else:
+                    header, arrays = json.loads(raw), {}
+                if header["type"] == kind:
+                    return header, arrays
+
+        return await asyncio.wait_for(wait(), limit)
+
+    async def frame_where(self, condition):
+        for _ in range(400):
+            header, arrays = await self.receive("frame")
+            if condition(header):
+                return header, arrays
+        raise AssertionError(f"no such frame came; the last was {header}")
+
+
+@contextlib.asynccontextmanager
+async def serving(built, **options):
+    server = ViewerServer(built, port=0, **options)
+    await server.start()
+    try:
+        yield server
+    finally:
+        await server.stop()
+
+
+@contextlib.asynccontextmanager
+async def page(server, *, token=None, origin=None):
+    base = f"127.0.0.1:{server.port}"
+    async with connect(f"ws://{base}/socket", origin=origin or f"http://{base}", proxy=None, max_size=None) as socket:
+        client = Page(server, socket)
+        await client.say(type="hello", token=token or server.token, version=messages.VERSION)
+        yield client
+
+
+def get(server, path="/", host=None):
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers={"Host": host} if host else {})
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    with opener.open(request, timeout=5) as answer:
+        return answer.status, dict(answer.headers), answer.read()
+
+
+def test_a_press_is_felt_and_released(built):
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            welcome, _ = await client.receive("welcome")
+            assert welcome["role"] == "control"
+            scene, arrays = await client.receive("scene")
+            assert np.allclose(arrays["nodes"], built.body.mesh.nodes, atol=1e-8)
+            assert np.array_equal(arrays["tets"], built.body.mesh.tets)
+            assert np.array_equal(arrays["fixed_nodes"], built.body.fixed_nodes)
+            radius = scene["tool_radius"]
+            deep = [TOP[0], TOP[1], TOP[2] + radius - 2e-3]
+            await client.say(type="press", position=[TOP[0], TOP[1], TOP[2] + radius + 1e-3], grab=False)
+            await client.receive("frame")
+            await client.say(type="press", position=deep, grab=False)
+            await client.say(type="cutaway", on=True)
+            # The hand needs some tens of milliseconds to get there, the ramp a quarter of a second.
+            settled = lambda h: h["time"] > 0.6 and h["tool"]["position"][2] < deep[2] + 1e-6 and h["interior"]  # noqa: E731
+            header, arrays = await client.frame_where(settled)
+            expected = built.green.touch(TOP, (0, 0, -2e-3), scene["contact_radius"])
+            assert np.allclose(header["force"], -expected.force, rtol=1e-3, atol=1e-4)
+            assert header["force"][2] > 0 > header["contacts"][0]["force"][2]
+            surface = arrays["displacements"][built.green.surface_nodes]
+            assert np.allclose(surface, expected.displacements, atol=1e-6)
+            assert len(arrays["displacements"]) == scene["nodes"]
+            assert arrays["scalar"].max() == 255
+            assert len(arrays["log"]) > 0
+            await client.say(type="release")
+            header, _ = await client.frame_where(lambda h: h["force"] == [0, 0, 0])
+            assert header["contacts"] == []
+
+    asyncio.run(session())
+
+
+def test_sliders_act_at_once_and_are_told_to_all(built):
+    async def session():
+        async with serving(built) as server, page(server) as client, page(server) as watcher:
+            await watcher.receive("welcome")
+            await client.say(type="set", youngs_modulus=20e3)
+            settings, _ = await watcher.receive("settings")
+            assert settings["youngs_modulus"] == 20e3
+            await client.say(type="set", youngs_modulus=-1)
+            error, _ = await client.receive("error")
+            assert "positive" in error["text"]
+            await client.say(type="reset")
+            settings, _ = await client.receive("settings")
+            assert settings["youngs_modulus"] == pytest.approx(10e3)
+
+    asyncio.run(session())
+
+
+def test_watchers_watch_and_take_over(built):
+    async def session():
+        async with serving(built) as server:
+            async with page(server) as first:
+                await first.receive("scene")
+                await first.say(type="press", position=[TOP[0], TOP[1], TOP[2]], grab=False)
+                async with page(server) as second:
+                    welcome, _ = await second.receive("welcome")
+                    assert welcome["role"] == "watch"
+                    await second.say(type="press", position=TOP, grab=False)
+                    error, _ = await second.receive("error")
+                    assert "control" in error["text"]
+                    await second.frame_where(lambda h: len(h["contacts"]) == 1)
+                    await first.socket.close()
+                    role, _ = await second.receive("role")
+                    assert role["role"] == "control"
+                    # The contact of the page that left is let go.
+                    await second.frame_where(lambda h: h["contacts"] == [] and h["force"] == [0, 0, 0])
+
+    asyncio.run(session())
+
+
+def test_a_silent_controller_lets_go(built, monkeypatch):
+    monkeypatch.setattr("palpate.viewer.server.LOST_AFTER", 0.3)
+
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            await client.receive("scene")
+            await client.say(type="press", position=TOP, grab=False)
+            await client.frame_where(lambda h: len(h["contacts"]) == 1)
+            await asyncio.sleep(1.0)  # no acknowledgement, no pointer
+            header, _ = await client.frame_where(lambda h: h["contacts"] == [])
+            assert not header["tool"]["active"]
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize("token", ["wrong", "", None, 5])
+def test_without_the_token_nobody_gets_in(built, token):
+    async def session():
+        async with serving(built) as server:
+            base = f"127.0.0.1:{server.port}"
+            async with connect(f"ws://{base}/socket", origin=f"http://{base}", proxy=None) as socket:
+                await socket.send(json.dumps({"type": "hello", "token": token, "version": 1}))
+                with pytest.raises(websockets.ConnectionClosed) as closed:
+                    await socket.recv()
+                assert closed.value.rcvd.code == 4401
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1", "https://127.0.0.1:{port}"])
+def test_another_origin_cannot_open_the_socket(built, origin):
+    async def session():
+        async with serving(built) as server:
+            with pytest.raises(websockets.InvalidStatus, match="403"):
+                async with page(server, origin=origin.format(port=server.port)):
+                    pass
+
+    asyncio.run(session())
+
+
+def test_another_host_gets_nothing(built):
+    async def session():
+        async with serving(built) as server:
+            with pytest.raises(HTTPError, match="403"):
+                await asyncio.to_thread(get, server, "/", "evil.example")
+            with pytest.raises(HTTPError, match="403"):
+                await asyncio.to_thread(get, server, "/", f"evil.example:{server.port}")
+            status, headers, content = await asyncio.to_thread(get, server)
+            assert status == 200 and b"<!doctype html>" in content.lower()
+            assert "default-src 'self'" in headers["Content-Security-Policy"]
+            assert server.token.encode() not in content
+            for path in ("/../server.py", "/%2e%2e/server.py", "/server.py", "/index.html/"):
+                with pytest.raises(HTTPError, match="404"):
+                    await asyncio.to_thread(get, server, path)
+
+    asyncio.run(session())
+
+
+def test_it_listens_on_this_machine_only(built):
+    async def session():
+        async with serving(built) as server:
+            assert [s.getsockname()[0] for s in server._server.sockets] == ["127.0.0.1"]
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize(
+    ("host", "bound", "ours"),
+    [
+        ("127.0.0.1:80", "127.0.0.1", True),
+        ("localhost:80", "127.0.0.1", True),
+        ("localhost", "127.0.0.1", True),
+        ("[::1]:80", "::1", True),
+        ("localhost:81", "127.0.0.1", False),
+        ("192.168.1.5:80", "127.0.0.1", False),
+        ("192.168.1.5:80", "0.0.0.0", True),
+        ("evil.example:80", "0.0.0.0", False),
+        ("127.0.0.1.evil.example:80", "127.0.0.1", False),
+        (None, "127.0.0.1", False),
+    ],
+)
+def test_host_header(host, bound, ours):
+    assert host_is_ours(host, bound, 80) is ours
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "nonsense",
+        "[]",
+        "{}",
+        '{"type": 5}',
+        '{"type": "press"}',
+        '{"type": "press", "position": [0, 0]}',
+        '{"type": "press", "position": [NaN, 0, 0]}',
+        '{"type": "press", "position": [1e300, 0, 0]}',
+        '{"type": "press", "position": [0, 0, 0], "grab": 1}',
+        '{"type": "set"}',
+        '{"type": "set", "youngs_modulus": "soft"}',
+        '{"type": "set", "contact_radius": 1e9}',
+        '{"type": "set", "token": 1}',
+        '{"type": "model", "name": "spleen"}',
+        '{"type": "shutdown"}',
+        "[" * 3000,
+    ],
+)
+def test_bad_messages_are_refused_and_the_session_goes_on(built, text):
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            await client.receive("scene")
+            await client.socket.send(text)
+            error, _ = await client.receive("error")
+            assert error["text"]
+            await client.receive("frame")
+
+    asyncio.run(session())
+
+
+def test_messages_are_bounded_in_size_and_rate(built):
+    async def session():
+        async with serving(built) as server:
+            async with page(server) as client:
+                await client.receive("scene")
+                await client.socket.send(" " * (MAX_MESSAGE + 1))
+                with pytest.raises(websockets.ConnectionClosed):
+                    await client.receive("never")
+            async with page(server) as client:
+                await client.receive("scene")
+                with pytest.raises(websockets.ConnectionClosed):
+                    for _ in range(20_000):
+                        await client.say(type="release")
+                    await client.receive("never")
+            async with page(server) as client:
+                await client.receive("scene")
+
+    asyncio.run(session())
+
+
+def test_frames_wait_for_the_client(built):
+    """A client that acknowledges nothing gets one frame, not a queue."""
+
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            received = []
+            with contextlib.suppress(asyncio.TimeoutError):
+                while True:
+                    raw = await asyncio.wait_for(client.socket.recv(), 0.5)
+                    if isinstance(raw, bytes):
+                        received.append(messages.decode(raw)[0]["type"])
+            assert received == ["scene", "frame"]
+
+    asyncio.run(session())
+
+
+def test_a_port_in_use_is_said(built):
+    async def session():
+        with socket.socket() as other:
+            other.bind(("127.0.0.1", 0))
+            other.listen()
+            port = other.getsockname()[1]
+            server = ViewerServer(built, port=port)
+            with pytest.raises(palpate.ViewerError, match=f"port {port} .* in use.*--port"):
+                await server.start()
+
+    asyncio.run(session())
+
+
+def test_another_model_is_shown_when_it_is_ready(built):
+    def scene_of(name):
+        return palpate.Scene(body={"model": name, "paper": True})
+
+    async def session():
+        async with serving(built, models=["beam"], scene_of=scene_of) as server, page(server) as client:
+            welcome, _ = await client.receive("welcome")
+            assert welcome["models"] == [{"name": "beam", "title": "Beam"}]
+            await client.receive("scene")
+            await client.say(type="model", name="beam")
+            scene, arrays = await client.receive("scene", 30)
+            assert scene["name"] == "beam"
+            _, arrays = await client.receive("frame")
+            assert len(arrays["displacements"]) == scene["surface_nodes"]
+
+    asyncio.run(session())
