@@ -1,0 +1,190 @@
+// Renderer, camera, light, and a loop that draws only when something changed.
+
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+import { fitDistance } from "./framing";
+import type { Surface } from "./surface";
+
+const FIELD_OF_VIEW_DEG = 35;
+/** Device pixels beyond these cost time and are hardly seen. */
+const PIXEL_RATIO_MAX = 2;
+const PIXELS_MAX = 4e6;
+/** Drivers that compute every sample on the processor, where smoothing edges would halve the frame rate. */
+const SOFTWARE_DRIVER = /swiftshader|llvmpipe|softpipe|software/i;
+/** From the front, a little to the right and above; z is up. */
+const DEFAULT_DIRECTION = new THREE.Vector3(0.45, -1, 0.62).normalize();
+
+export class Viewport {
+  readonly scene = new THREE.Scene();
+  readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.001, 10);
+  readonly controls: OrbitControls;
+  private readonly renderer: THREE.WebGLRenderer;
+  private dirty = true;
+  private framed: { surface: Surface; view: View | null } | null = null;
+
+  /** beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private readonly beforeDraw: () => boolean,
+    private readonly afterDraw: () => void,
+  ) {
+    // The page's style draws the backdrop behind a transparent canvas: that is cheaper than filling it here.
+    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: !drawsInSoftware() });
+    this.camera.up.set(0, 0, 1);
+    this.addLights();
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.mouseButtons = { LEFT: THREE.MOUSE.ROTATE, MIDDLE: THREE.MOUSE.PAN, RIGHT: THREE.MOUSE.ROTATE };
+    this.controls.addEventListener("change", () => this.invalidate());
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    this.resize();
+    this.renderer.setAnimationLoop(() => this.tick());
+  }
+
+  invalidate(): void {
+    this.dirty = true;
+  }
+
+  /** Looks at a body: from the view of its scene if it has one, never closer than where all of it is seen. */
+  frame(surface: Surface, size: number, view: View | null): void {
+    this.framed = { surface, view };
+    const centre = new THREE.Box3().setFromArray(surface.rest).getCenter(new THREE.Vector3());
+    const target = view ? new THREE.Vector3(...view.target) : centre;
+    const offset = view ? new THREE.Vector3(...view.position).sub(target) : DEFAULT_DIRECTION.clone();
+    const wanted = view ? offset.length() : 0;
+    offset.normalize();
+    const distance = Math.max(wanted, fitDistance(surface, target, offset, this.camera));
+    this.camera.near = 0.02 * size;
+    this.camera.far = distance + 30 * size;
+    this.camera.position.copy(target).addScaledVector(offset, distance);
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(target);
+    this.controls.minDistance = 0.1 * size;
+    this.controls.maxDistance = 15 * size;
+    this.controls.update();
+    this.invalidate();
+  }
+
+  reframe(size: number): void {
+    if (this.framed) this.frame(this.framed.surface, size, this.framed.view);
+  }
+
+  /** Unit vector from what is looked at to the viewer. */
+  towardsViewer(): THREE.Vector3 {
+    return this.camera.position.clone().sub(this.controls.target).normalize();
+  }
+
+  /** A ray through a point of the window, in CSS pixels. */
+  rayThrough(clientX: number, clientY: number): THREE.Raycaster {
+    const box = this.canvas.getBoundingClientRect();
+    const place = new THREE.Vector2(
+      (2 * (clientX - box.left)) / box.width - 1,
+      1 - (2 * (clientY - box.top)) / box.height,
+    );
+    const raycaster = new THREE.Raycaster();
+    this.camera.updateMatrixWorld();
+    raycaster.setFromCamera(place, this.camera);
+    return raycaster;
+  }
+
+  /** Window coordinates of a point of the world, in CSS pixels. */
+  project(point: THREE.Vector3): [number, number] {
+    const box = this.canvas.getBoundingClientRect();
+    this.camera.updateMatrixWorld();
+    const { x, y } = point.clone().project(this.camera);
+    return [box.left + ((x + 1) / 2) * box.width, box.top + ((1 - y) / 2) * box.height];
+  }
+
+  /** Metres at a point of the world that one CSS pixel covers across the line of sight. */
+  metresPerPixel(point: THREE.Vector3): number {
+    const forward = this.camera.getWorldDirection(new THREE.Vector3());
+    const depth = point.clone().sub(this.camera.position).dot(forward);
+    return (2 * depth * Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW_DEG) / 2)) / this.canvas.clientHeight;
+  }
+
+  /** The picture as PNG. Drawn anew first: the browser may clear what it has shown. */
+  toPng(): Promise<Blob | null> {
+    const background = backdrop();
+    this.scene.background = background;
+    this.renderer.render(this.scene, this.camera);
+    this.scene.background = null;
+    background.dispose();
+    this.invalidate();
+    return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
+  }
+
+  private tick(): void {
+    if (this.beforeDraw()) this.dirty = true;
+    if (this.dirty) {
+      this.dirty = false;
+      this.renderer.render(this.scene, this.camera);
+    }
+    this.afterDraw();
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.canvas.parentElement!;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    const fitBefore = this.fitHere();
+    const affordable = Math.sqrt(PIXELS_MAX / (clientWidth * clientHeight));
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX, affordable));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    // The body keeps its share of the window, whatever the user's own view.
+    const { target } = this.controls;
+    if (fitBefore > 0) {
+      this.camera.position.sub(target).multiplyScalar(this.fitHere() / fitBefore).add(target);
+    }
+    this.renderer.render(this.scene, this.camera);
+    this.invalidate();
+  }
+
+  private fitHere(): number {
+    if (!this.framed) return 0;
+    return fitDistance(this.framed.surface, this.controls.target, this.towardsViewer(), this.camera);
+  }
+
+  /** Key and fill travel with the camera, so that a dent shades the same from every side. */
+  private addLights(): void {
+    const sky = new THREE.HemisphereLight(0xf4f7ff, 0x5a4c44, 1.5);
+    sky.position.set(0, 0, 1);
+    const key = new THREE.DirectionalLight(0xfff4e8, 2.6);
+    key.position.set(-0.7, 1.1, 1.2);
+    const fill = new THREE.DirectionalLight(0xc8d8ff, 0.9);
+    fill.position.set(1.2, -0.3, 0.8);
+    for (const light of [key, fill]) {
+      // A light shines towards its target; a target that is a child too keeps the direction fixed to the camera.
+      this.camera.add(light, light.target);
+    }
+    this.scene.add(this.camera, sky);
+  }
+}
+
+interface View {
+  position: [number, number, number];
+  target: [number, number, number];
+}
+
+function drawsInSoftware(): boolean {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  if (!probe) return false;
+  const name = String(probe.getParameter(probe.RENDERER));
+  probe.getExtension("WEBGL_lose_context")?.loseContext();
+  return SOFTWARE_DRIVER.test(name);
+}
+
+/** For pictures that are saved: dark, and a little lighter in the middle, as the style of the page has it. */
+function backdrop(): THREE.CanvasTexture {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 256;
+  const context = canvas.getContext("2d")!;
+  const gradient = context.createRadialGradient(128, 112, 10, 128, 128, 190);
+  gradient.addColorStop(0, "#343b46");
+  gradient.addColorStop(1, "#171a20");
+  context.fillStyle = gradient;
+  context.fillRect(0, 0, 256, 256);
+  const texture = new THREE.CanvasTexture(canvas);
+  texture.colorSpace = THREE.SRGBColorSpace;
+  return texture;
+}
