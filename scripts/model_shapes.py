@@ -68,7 +68,7 @@ def common(a: np.ndarray, b: np.ndarray, k: float) -> np.ndarray:
 
 
 def cut(a: np.ndarray, b: np.ndarray, k: float) -> np.ndarray:
-    """``a`` without ``b``, rounded."""
+    """Smooth difference: ``a`` without ``b``."""
     return -join(-a, b, k)
 
 
@@ -98,11 +98,11 @@ def doll(p: np.ndarray) -> np.ndarray:
 
 
 def plain_doll(p: np.ndarray) -> np.ndarray:
-    """Same bear without what triangles of 14 mm cannot show: no eyes, thicker ears and arms."""
+    """Plush bear without what triangles of 14 mm cannot show: no eyes, thicker ears and arms."""
     m = _mirrored(p)
     muzzle = ellipsoid(p, (0, -46, 174), (27, 26, 21))
     head = join(join(_skull(p), muzzle, 10), ellipsoid(m, (44, -3, 226), (25, 16, 24)), 6)
-    return _seated(p, head, 3)
+    return _seated(p, head, 3.5)
 
 
 def _skull(p: np.ndarray) -> np.ndarray:

@@ -8,7 +8,8 @@ import { LogWindow, WINDOW_S } from "./log_window";
 /** The eye does not follow faster, and every redraw costs the page time. */
 const REDRAW_INTERVAL_MS = 80;
 const HEIGHT_PX = 112;
-const FONT = "10.5px system-ui, sans-serif";
+// Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
+const FONT = "11px system-ui, sans-serif";
 const TEXT_COLOR = "#9aa5b4";
 const GRID = { stroke: "#2a303a", width: 1 };
 /** Spans below these are noise, and would only dance: N, and us. */

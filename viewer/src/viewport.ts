@@ -147,12 +147,12 @@ export class Viewport {
 
   /** Key and fill travel with the camera, so that a dent shades the same from every side. */
   private addLights(): void {
-    const sky = new THREE.HemisphereLight(0xf4f7ff, 0x5a4c44, 1.5);
+    const sky = new THREE.HemisphereLight(0xf4f7ff, 0x6b5c54, 1.6);
     sky.position.set(0, 0, 1);
     const key = new THREE.DirectionalLight(0xfff4e8, 2.6);
-    key.position.set(-0.7, 1.1, 1.2);
-    const fill = new THREE.DirectionalLight(0xc8d8ff, 0.9);
-    fill.position.set(1.2, -0.3, 0.8);
+    key.position.set(-0.55, 0.8, 1.5);
+    const fill = new THREE.DirectionalLight(0xc8d8ff, 1.1);
+    fill.position.set(1, -0.5, 1);
     for (const light of [key, fill]) {
       // A light shines towards its target; a target that is a child too keeps the direction fixed to the camera.
       this.camera.add(light, light.target);

@@ -1,0 +1,296 @@
+"""The viewer's page in a real Chromium, driven by Playwright, against the program that a user starts."""
+
+from __future__ import annotations
+
+import http.server
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(
+        not Path(CHROMIUM).exists(), reason="no Chromium at /usr/bin/chromium (Debian: apt install chromium)"
+    ),
+]
+
+
+class Program:
+    """`palpate demo`, as a user starts it."""
+
+    def __init__(self, cache: Path, *arguments: str):
+        command = [sys.executable, "-m", "palpate", "demo", *arguments, "--port", "0", "--no-browser"]
+        environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        self.address = re.search(r"http://\S+", self.process.stdout.readline())[0]
+
+    def stop(self) -> int:
+        """Exit status after Ctrl-C."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        self.process.stdout.close()
+        return self.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def program(cache):
+    started = Program(cache, "liver", "--paper")
+    yield started
+    assert started.stop() == 0
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(chromium, program):
+    """The page with a scene on it; anything on its console is a failure."""
+    context = chromium.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    complaints = []
+    page.on(
+        "console", lambda message: complaints.append(message.text) if message.type in {"error", "warning"} else None
+    )
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(program.address)
+    until(page, lambda s: s["frames"] > 3)
+    yield page
+    context.close()
+    # Software rendering tells of its own slowness; that is the test machine's affair.
+    assert [text for text in complaints if "GPU stall" not in text] == []
+
+
+def state(page) -> dict:
+    return page.evaluate("window.palpate ? window.palpate.state() : {frames: 0, connected: false}")
+
+
+def until(page, condition, seconds: float = 30.0) -> dict:
+    """State of the page once a condition holds (its policy forbids Playwright's own waiting by eval)."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        seen = state(page)
+        if condition(seen):
+            return seen
+        time.sleep(0.02)
+    raise AssertionError(f"waited {seconds} s in vain; the last state was {seen}")
+
+
+def press(page, pixels: float = 40.0, steps: int = 20) -> dict:
+    """Press on the visible top and push deeper by dragging down; the button stays down."""
+    x, y = page.evaluate("window.palpate.pickPoint()")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, steps + 1):
+        page.mouse.move(x, y + pixels * step / steps)
+    return until(page, lambda s: s["contacts"] == 1 and s["forceMagnitude"] > 0.05)
+
+
+def settled_force(page) -> np.ndarray:
+    """Force once it stands still."""
+    before = np.zeros(3)
+    for _ in range(100):
+        now = np.array(state(page)["force"])
+        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= 1e-6 * np.linalg.norm(now):
+            return now
+        before = now
+        time.sleep(0.3)
+    raise AssertionError("the force does not settle")
+
+
+def displayed(page) -> float:
+    return float(page.get_by_test_id("force-value").inner_text().replace("\u2212", "-"))
+
+
+def test_a_press_is_felt_shown_and_released(page, capsys):
+    assert displayed(page) == 0.0
+    before, started = state(page), time.monotonic()
+    pressed = press(page, steps=60)
+    moved, took = state(page), time.monotonic() - started
+    # Pressed from above: the device is pushed up, the body's force on it has the sign of the outward normal.
+    assert pressed["force"][2] > 0
+    force = settled_force(page)
+    assert displayed(page) == pytest.approx(np.linalg.norm(force), rel=0.02)
+    page.mouse.up()
+    until(page, lambda s: s["contacts"] == 0 and s["force"] == [0, 0, 0])
+    time.sleep(0.3)
+    assert displayed(page) == 0.0
+    frames, pointer = (moved[k] - before[k] for k in ("frames", "pointerEvents"))
+    with capsys.disabled():
+        print(f"\n  {frames / took:.0f} frames applied/s, {pointer / took:.0f} pointer events/s (software GL)")
+
+
+def test_the_wheel_deepens_a_press(page):
+    press(page)
+    first = settled_force(page)
+    for _ in range(5):
+        page.mouse.wheel(0, 100)
+        time.sleep(0.05)
+    deeper = settled_force(page)
+    assert np.linalg.norm(first) != pytest.approx(np.linalg.norm(deeper), rel=0.01)
+    page.mouse.up()
+
+
+def test_a_grab_pulls(page):
+    x, y = page.evaluate("window.palpate.pickPoint()")
+    page.keyboard.down("Shift")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, 16):
+        page.mouse.move(x, y - 3 * step)
+    until(page, lambda s: s["contacts"] == 1 and s["force"][2] < -0.02)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    until(page, lambda s: s["force"] == [0, 0, 0])
+
+
+def test_stiffness_scales_the_force_at_once(page):
+    slider = page.get_by_test_id("stiffness")
+    press(page, 20)
+    soft = settled_force(page)
+    value = page.locator("#stiffness-value").inner_text()
+    modulus = float(value.split()[0])
+    slider.evaluate("e => { e.value = Number(e.value) + 0.15; e.dispatchEvent(new Event('input', {bubbles: true})); }")
+    until(page, lambda s: abs(s["forceMagnitude"] / np.linalg.norm(soft) - 1) > 0.2)
+    stiff = settled_force(page)
+    now = float(page.locator("#stiffness-value").inner_text().split()[0])
+    assert np.linalg.norm(stiff) / np.linalg.norm(soft) == pytest.approx(now / modulus, rel=0.03)
+    page.mouse.up()
+    page.locator("#reset").click()
+    until(page, lambda s: s["force"] == [0, 0, 0])
+
+
+def test_cut_away_and_another_model(page):
+    page.locator("#show-cutaway").click()
+    time.sleep(0.5)
+    press(page, 20)
+    page.mouse.up()
+    page.locator("#show-cutaway").click()
+    page.get_by_test_id("model-select").select_option("beam")
+    until(page, lambda s: s["scene"] == "beam", 60)
+    press(page, 10)
+    page.mouse.up()
+    page.get_by_test_id("model-select").select_option("liver")
+    until(page, lambda s: s["scene"] == "liver", 60)
+
+
+def test_a_screenshot_is_a_picture(page, tmp_path):
+    from PIL import Image
+
+    with page.expect_download() as download:
+        page.locator("#screenshot").click()
+    download.value.save_as(tmp_path / "shot.png")
+    pixels = np.asarray(Image.open(tmp_path / "shot.png").convert("RGB"), dtype=float)
+    assert pixels.std() > 5
+
+
+def test_leaving_the_page_lets_go(chromium, program, page):
+    watcher = chromium.new_context().new_page()
+    watcher.goto(program.address)
+    until(watcher, lambda s: s["frames"] > 3 and s["role"] == "watch")
+    assert watcher.locator("#watching").is_visible()
+    press(page)
+    until(watcher, lambda s: s["contacts"] == 1)
+    page.goto("about:blank")
+    until(watcher, lambda s: s["contacts"] == 0 and s["role"] == "control")
+    watcher.context.close()
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
+def test_nothing_is_cut_off(chromium, program, size):
+    context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+    page = context.new_page()
+    page.goto(program.address)
+    until(page, lambda s: s["frames"] > 3)
+    width, height = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert (width, height) == size
+    for name in ("force-value", "model-select", "stiffness", "radius", "connection"):
+        box = page.get_by_test_id(name).bounding_box()
+        assert box is not None and box["x"] >= 0 and box["x"] + box["width"] <= size[0]
+    press(page)
+    page.mouse.up()
+    context.close()
+
+
+def test_an_address_without_the_token_is_explained(chromium, program):
+    context = chromium.new_context()
+    page = context.new_page()
+    page.goto(program.address.partition("#")[0] + "#token=wrong")
+    page.get_by_text("no valid token").wait_for(timeout=10_000)
+    assert not state(page)["connected"]
+    context.close()
+
+
+def test_a_page_from_another_origin_cannot_connect(chromium, program, tmp_path):
+    """Even one that somehow knows the token."""
+    (tmp_path / "index.html").write_text("<title>elsewhere</title>")
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *arguments):
+            super().__init__(*arguments, directory=str(tmp_path))
+
+        def log_message(self, *arguments):
+            pass
+
+    elsewhere = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet)
+    threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+    context = chromium.new_context()
+    page = context.new_page()
+    page.goto(f"http://127.0.0.1:{elsewhere.server_port}/")
+    socket = program.address.partition("/#")[0].replace("http", "ws") + "/socket"
+    outcome = page.evaluate(
+        """address => new Promise(resolve => {
+            const socket = new WebSocket(address);
+            socket.onopen = () => resolve("opened");
+            socket.onerror = () => resolve("refused");
+        })""",
+        socket,
+    )
+    assert outcome == "refused"
+    context.close()
+    elsewhere.shutdown()
+    elsewhere.server_close()
+
+
+def test_a_program_that_ends_is_noticed(chromium, cache):
+    program = Program(cache, "liver", "--paper")
+    context = chromium.new_context()
+    page = context.new_page()
+    page.goto(program.address)
+    until(page, lambda s: s["frames"] > 3)
+    assert program.stop() == 0
+    page.get_by_text("Connection lost").wait_for(timeout=10_000)
+    context.close()
