@@ -42,11 +42,12 @@ test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace --exclude palpate-python
 	$(BIN)/python -m pytest --quiet $(ARGS)
 
-lint: $(VENV)/.installed
+lint: $(VENV)/.installed viewer/node_modules/.package-lock.json
 	cargo fmt --all --check
 	cargo clippy --release --quiet --workspace --all-targets -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	cd viewer && npm run --silent check
 	$(BIN)/python scripts/check_architecture.py
 
 clean:

@@ -7,6 +7,23 @@ import palpate
 from palpate.mesh import TetMesh
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--no-skips", action="store_true", help="a skipped test is a failure, as on a machine with all tools"
+    )
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    outcome = yield
+    report = outcome.get_result()
+    if report.skipped and item.config.getoption("--no-skips"):
+        report.outcome = "failed"
+        report.longrepr = (
+            f"skipped, and --no-skips was given: {call.excinfo.value if call.excinfo else report.longrepr}"
+        )
+
+
 def box_mesh(cells=(4, 3, 3), size=(0.08, 0.05, 0.05), jitter=0.15, seed=1) -> TetMesh:
     """Box of tetrahedra (scikit-fem's), interior nodes moved at random: independent of our own mesher."""
     import skfem

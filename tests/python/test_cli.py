@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -135,9 +136,53 @@ def test_scripted_press_leaves_a_log_and_a_plot(tmp_path):
 
 def test_wrong_scene_costs_one_line(tmp_path):
     (tmp_path / "a.toml").write_text("[body]\nmsh = 'a.stl'\n[supports]\nfixed = 'z < 0'\n")
-    refused(run("run", "a.toml", cwd=tmp_path), "a.toml:1", "body.mesh")
+    refused(run("run", "a.toml", cwd=tmp_path), "a.toml:2", "body.msh", "did you mean 'mesh'")
 
 
 def test_damaged_store_costs_one_line(tmp_path):
     (tmp_path / "bad.palpate").write_bytes(b"not a store at all")
     refused(run("info", "bad.palpate", cwd=tmp_path), "bad.palpate", "not a Palpate store")
+
+
+def test_demo_of_a_model_without_a_browser(tmp_path):
+    result = run("demo", "kidney", "--paper", "--headless", "1", "--out", "results", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert sorted(os.listdir(tmp_path / "results")) == ["kidney-paper.csv", "kidney-paper.png"]
+    log = np.genfromtxt(tmp_path / "results" / "kidney-paper.csv", delimiter=",", names=True)
+    assert log["fz_N"].max() > 0.05  # the body pushes the tool, which comes from above, upwards
+    refused(run("demo", "spleen", cwd=tmp_path), "no model 'spleen'", "doll, kidney, liver, beam")
+
+
+def test_models_beside_the_counts_of_the_paper(tmp_path):
+    shown = run("models", cwd=tmp_path, env={**os.environ, "COLUMNS": "100"}).stdout
+    for count in ("1686", "5430", "2803", "572"):  # table 1 of the paper
+        assert count in shown
+
+
+def test_info_on_a_scene(tmp_path):
+    (tmp_path / "a.toml").write_text('[body]\nmodel = "liver"\n[material]\nyoungs_modulus = "5kPa"\n')
+    shown = run("info", "a.toml", cwd=tmp_path).stdout
+    assert "material.youngs_modulus = 5000.0" in shown
+
+
+def test_wrong_words_are_explained(tmp_path):
+    for arguments, word in (
+        (["presurize"], "presurize"),
+        (["mesh", "--unit"], "unit"),
+        (["run", "--prot", "1"], "prot"),
+    ):
+        result = run(*arguments, cwd=tmp_path)
+        assert result.returncode == 2
+        assert word in result.stderr
+        assert "Traceback" not in result.stderr
+
+
+@pytest.mark.slow
+def test_bench_of_the_paper(tmp_path):
+    """Both methods answer the same contact: the dense inverse is the outside value."""
+    result = run("bench", "paper", "--json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    rows = json.loads(result.stdout)
+    rows = rows["rows"] if isinstance(rows, dict) else rows
+    assert [row["model"] for row in rows] == ["doll", "kidney", "liver"]
+    assert all(row["difference"] < 1e-5 for row in rows)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from palpate import models
 from palpate.errors import SceneError
+from palpate.mesh import TetMesh
 from palpate.scene import Scene
 
 # Size of a fingertip against each model, m; and its stiffness, Pa: organs about as published for fresh tissue
@@ -28,30 +29,30 @@ def model_scene(name: str, paper: bool = False) -> Scene:
 
 
 def print_models() -> None:
-    """Table of the models, their sizes and the paper's."""
+    """Tables of the models: what the demo shows, and those in the paper's sizes beside its own counts."""
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title="Built-in models (the paper's own counts in brackets)")
-    for column in ("model", "size mm", "nodes", "tetrahedra", "surface nodes", "triangles"):
-        table.add_column(column, justify="left" if column == "model" else "right")
-    for name in models.NAMES:
-        _add_row(table, name, False)
-    table.add_section()
-    for name in models.PAPER:
-        _add_row(table, name, True)
     console = Console()
-    console.print(table)
-    for name, paper in models.PAPER.items():
-        if paper.note:
-            console.print(f"{name} --paper: {paper.note}")
+    fine = Table("model", "size in mm", title="Built-in models")
+    paper = Table("model", "", title="In the sizes of the paper (--paper)")
+    for table in (fine, paper):
+        for column in ("nodes", "tetrahedra", "surface nodes", "triangles"):
+            table.add_column(column, justify="right")
+    for name in models.NAMES:
+        mesh = models.load(name)
+        size = " x ".join(f"{1e3 * s:.0f}" for s in mesh.bounds[1] - mesh.bounds[0])
+        fine.add_row(name, size, *map(str, _counts(mesh)))
+    for name, published in models.PAPER.items():
+        theirs = (published.nodes, published.tets, published.surface_nodes, published.surface_triangles)
+        paper.add_row(name, "ours", *map(str, _counts(models.load(name, paper=True))))
+        paper.add_row("", "paper's", *("-" if n is None else str(n) for n in theirs), end_section=True)
+    console.print(fine)
+    console.print(paper)
+    for name, published in models.PAPER.items():
+        if published.note:
+            console.print(f"{name}: {published.note}")
 
 
-def _add_row(table, name: str, paper: bool) -> None:
-    mesh = models.load(name, paper=paper)
-    ours = (len(mesh.nodes), len(mesh.tets), len(mesh.surface_nodes), len(mesh.surface_triangles))
-    published = models.PAPER[name]
-    theirs = (published.nodes, published.tets, published.surface_nodes, published.surface_triangles)
-    size = " x ".join(f"{1e3 * s:.0f}" for s in mesh.bounds[1] - mesh.bounds[0])
-    cells = [f"{a} ({b if b is not None else '-'})" if paper else str(a) for a, b in zip(ours, theirs, strict=True)]
-    table.add_row(f"{name} --paper" if paper else name, size, *cells)
+def _counts(mesh: TetMesh) -> tuple[int, int, int, int]:
+    return len(mesh.nodes), len(mesh.tets), len(mesh.surface_nodes), len(mesh.surface_triangles)

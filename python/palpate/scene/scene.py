@@ -225,6 +225,8 @@ def _explain(path: Path, text: str, error: ValidationError) -> str:
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
         return f"{at}: unknown key '{where}'; {hint}"
     if first["type"] == "missing":
+        if isinstance(first["loc"][-1], int):
+            return f"{at}: {where}: a value is missing after the first {first['loc'][-1]}"
         return f"{at}: the key '{where}' is missing"
     message = first["msg"].removeprefix("Value error, ")
     return f"{at}: {where}: {message}" + ("" if first["type"] == "value_error" else f", got {first['input']!r}")
