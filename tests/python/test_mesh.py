@@ -148,3 +148,15 @@ def test_unreadable_volumes_are_named(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(palpate.MeshError, match=message):
         palpate.TetMesh.read(tmp_path / name)
+
+
+@pytest.mark.slow
+def test_open_surface_is_repaired_on_request(tmp_path):
+    pytest.importorskip("pytetwild", reason="pip install palpate[repair]", exc_type=ImportError)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=40.0)
+    ball.update_faces(np.arange(len(ball.faces)) > 5)
+    with pytest.raises(palpate.MeshError, match="not closed.*--repair"):
+        palpate.tetrahedralize(ball, 0.012, "mm")
+    with pytest.warns(palpate.MeshWarning, match="rebuilt"):
+        mesh = palpate.tetrahedralize(ball, 0.012, "mm", repair=True)
+    assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.04**3, rel=0.03)

@@ -54,15 +54,18 @@ def mesh(
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
     unit: Unit = "m",
     max_size: Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")] = None,
+    repair: Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")] = False,
 ) -> None:
     """Fill a closed surface with tetrahedra.
 
     Example: palpate mesh liver.stl liver.vtu --unit mm --max-size 4mm
+
+    Example: palpate mesh scan.ply scan.vtu --unit mm --repair
     """
     from palpate.mesh import tetrahedralize
     from palpate.units import length
 
-    made = tetrahedralize(surface, None if max_size is None else length(max_size), unit)
+    made = tetrahedralize(surface, None if max_size is None else length(max_size), unit, repair=repair)
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
 

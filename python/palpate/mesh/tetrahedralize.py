@@ -1,4 +1,4 @@
-"""Tetrahedra from a surface by NETGEN, which runs in a child process: bad surfaces can hang or crash a mesher."""
+"""Tetrahedra from a surface; the meshers run in child processes, for bad surfaces can hang or crash them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Ball = tuple[tuple[float, float, float], float, float]
 
 # The mesh may cut corners of a curved surface, but not lose a part of it.
 VOLUME_TOLERANCE = 0.1
-REPAIR_HINT = "close it in Blender or MeshLab, or repair it with pytetwild ('pip install palpate[repair]')"
+REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install palpate[repair]' and --repair"
 
 
 def tetrahedralize(
@@ -35,9 +35,10 @@ def tetrahedralize(
     unit: str = "m",
     refine: Sequence[Ball] = (),
     *,
+    repair: bool = False,
     time_limit: float = 300.0,
 ) -> TetMesh:
-    """Fill a closed surface with tetrahedra.
+    """Fill a closed surface with tetrahedra, by NETGEN; or a broken one, by fTetWild.
 
     Parameters
     ----------
@@ -49,6 +50,9 @@ def tetrahedralize(
         Unit of length of the surface.
     refine
         Finer balls: ``((x, y, z), radius, size)`` in m.
+    repair
+        Fill what an open or self-intersecting surface most plausibly encloses, within a thousandth of its size; needs
+        the ``repair`` extra.
     time_limit
         Seconds after which the mesher is stopped.
 
@@ -62,7 +66,10 @@ def tetrahedralize(
     name, shape = _load(surface)
     shape = shape.copy()
     shape.apply_scale(length_scale(unit))
-    _check_surface(name, shape)
+    if repair:
+        _check_finite(name, shape)
+    else:
+        _check_surface(name, shape)
     extent = float(np.ptp(shape.vertices, axis=0).max())
     size = extent / 15 if max_element_size is None else float(max_element_size)
     if not (np.isfinite(size) and size > 0):
@@ -70,7 +77,11 @@ def tetrahedralize(
     for (x, y, z), radius, ball_size in refine:
         if not (np.isfinite([x, y, z, radius, ball_size]).all() and radius > 0 and ball_size > 0):
             raise MeshError("refine takes ((x, y, z), radius, size) with positive radius and size in metres")
-    nodes, tets = _run_mesher(name, shape, size, extent, refine, time_limit)
+    if repair:
+        if refine:
+            raise MeshError("repair and refine do not go together: repair first, and mesh the result's surface again")
+        return _repaired(name, shape, size, extent, time_limit)
+    nodes, tets = _run_netgen(name, shape, size, extent, refine, time_limit)
     mesh = TetMesh(nodes, tets)
     loss = abs(mesh.volume / shape.volume - 1)
     if loss > VOLUME_TOLERANCE:
@@ -108,9 +119,7 @@ def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trime
 
 def _check_surface(name: str, shape: trimesh.Trimesh) -> None:
     """Refuse what NETGEN would crash or hang on, and turn an inverted surface round (in place)."""
-    bad = np.flatnonzero(~np.isfinite(shape.vertices).all(axis=1))
-    if bad.size:
-        raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")
+    _check_finite(name, shape)
     shape.merge_vertices(merge_tex=True, merge_norm=True)
     shape.update_faces(shape.nondegenerate_faces())
     shape.update_faces(shape.unique_faces())
@@ -132,7 +141,36 @@ def _check_surface(name: str, shape: trimesh.Trimesh) -> None:
         raise MeshError(f"{name}: the surface encloses no volume")
 
 
-def _run_mesher(
+def _check_finite(name: str, shape: trimesh.Trimesh) -> None:
+    bad = np.flatnonzero(~np.isfinite(shape.vertices).all(axis=1))
+    if bad.size:
+        raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")
+
+
+def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, time_limit: float) -> TetMesh:
+    """Mesh by fTetWild, in a unit box as NETGEN's."""
+    origin = shape.vertices.min(axis=0)
+    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
+        given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
+        np.savez(given, vertices=(shape.vertices - origin) / extent, faces=shape.faces, size=size / extent)
+        command = [sys.executable, "-m", "palpate.mesh.tetwild_child", str(given), str(made)]
+        status = _run_limited(command, time_limit)
+        if status == 3:
+            raise MeshError("repairing needs pytetwild: pip install 'palpate[repair]'")
+        failure = _failure(status, time_limit)
+        if failure is not None or not made.exists():
+            raise MeshError(f"{name}: fTetWild {failure or 'returned no tetrahedra'}")
+        with np.load(made) as result:
+            mesh = TetMesh(result["nodes"] * extent + origin, result["tets"])
+    warnings.warn(
+        f"{name}: the surface was rebuilt, within about {1e-3 * extent * 3**0.5:.2g} m of the given one",
+        MeshWarning,
+        stacklevel=3,
+    )
+    return mesh
+
+
+def _run_netgen(
     name: str, shape: trimesh.Trimesh, size: float, extent: float, refine: Sequence[Ball], time_limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mesh in a unit box, for NETGEN's tolerances are absolute, and scale back."""
