@@ -155,7 +155,7 @@ def test_open_surface_is_repaired_on_request(tmp_path):
     pytest.importorskip("pytetwild", reason="pip install palpate[repair]", exc_type=ImportError)
     ball = trimesh.creation.icosphere(subdivisions=3, radius=40.0)
     ball.update_faces(np.arange(len(ball.faces)) > 5)
-    with pytest.raises(palpate.MeshError, match="not closed.*--repair"):
+    with pytest.raises(palpate.MeshError, match=r"not closed.*--repair"):
         palpate.tetrahedralize(ball, 0.012, "mm")
     with pytest.warns(palpate.MeshWarning, match="rebuilt"):
         mesh = palpate.tetrahedralize(ball, 0.012, "mm", repair=True)
