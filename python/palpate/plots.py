@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
+
+from palpate.atomic import written_beside
 
 
 def plot_log(log: np.ndarray, path: Path, title: str) -> None:
@@ -32,21 +33,13 @@ def plot_log(log: np.ndarray, path: Path, title: str) -> None:
     for axes in (upper, lower):
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
-    partial = path.with_name(f".{os.getpid()}.{path.name}")
-    try:
+    with written_beside(path) as partial:
         figure.savefig(partial, format="png")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def write_log(log: np.ndarray, path: Path) -> None:
     """Write the 1 kHz log as CSV with units in the header; beside, then renamed."""
     names = ("time_s", "x_m", "y_m", "z_m", "fx_N", "fy_N", "fz_N", "compute_us", "wakeup_us")
     columns = [log["time"], *log["position"].T, *log["force"].T, log["compute_us"], log["wakeup_us"]]
-    partial = path.with_name(f".{os.getpid()}.{path.name}")
-    try:
+    with written_beside(path) as partial:
         np.savetxt(partial, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)

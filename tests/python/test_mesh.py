@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import textwrap
 
@@ -148,6 +149,28 @@ def test_unreadable_volumes_are_named(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(palpate.MeshError, match=message):
         palpate.TetMesh.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_a_full_disk_names_the_file_and_leaves_nothing(tmp_path, ending):
+    """Files of this child may not grow beyond 1 kB: writing fails midway, as on a full disk."""
+    box_mesh().write(tmp_path / "box.vtu")
+    code = f"""
+        import resource, signal
+        import palpate
+        mesh = palpate.TetMesh.read("box.vtu")
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+        try:
+            mesh.write("out{ending}")
+        except OSError as error:
+            print(error.filename)
+    """
+    result = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip().startswith("out.")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["box.vtu"]
 
 
 @pytest.mark.slow

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.atomic import written_beside
 from palpate.errors import MeshError
 from palpate.units import length_scale
 
@@ -136,27 +137,20 @@ def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
             _replace(path, lambda partial: meshio.write(partial, content, WRITERS[path.suffix], **options))
 
 
-def _replace(path: Path, write) -> None:
-    partial = path.with_name(f".{os.getpid()}.{path.name}")
-    try:
+def _replace(path: Path, write: Callable[[Path], None]) -> None:
+    with written_beside(path) as partial:
         write(partial)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _write_tetgen(content: meshio.Mesh, path: Path) -> None:
     """TetGen keeps nodes and elements in two files beside each other."""
     import meshio
 
-    partial = path.with_name(f".{os.getpid()}.{path.stem}.node")
-    try:
-        meshio.write(partial, content, "tetgen")
-        for ending in (".node", ".ele"):
-            os.replace(partial.with_suffix(ending), path.with_suffix(ending))
-    finally:
-        for ending in (".node", ".ele"):
-            partial.with_suffix(ending).unlink(missing_ok=True)
+    nodes, elements = path.with_suffix(".node"), path.with_suffix(".ele")
+    with written_beside(elements) as partial_elements, written_beside(nodes) as partial_nodes:
+        # Beside means the same stem, for meshio writes both files from the name of one.
+        meshio.write(partial_nodes, content, "tetgen")
+        assert partial_nodes.with_suffix(".ele") == partial_elements
 
 
 def _write_netgen(path: Path, points: np.ndarray, mesh: TetMesh) -> None:
