@@ -85,7 +85,7 @@ fn cube(n: u32) -> Problem {
         supports: Supports::new(dofs, fixed).expect("valid supports"),
         touch: (0..surface_nodes.len() as u32).collect(),
         surface_nodes,
-        surface_triangles: triangles,
+        surface_faces: triangles.into(),
     }
 }
 
