@@ -143,6 +143,8 @@ def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
     with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
         if WRITERS[path.suffix] == "tetgen":
             _write_tetgen(content, path)
+        elif path.suffix == ".inp":
+            _replace(path, lambda partial: _write_abaqus(partial, content))
         else:
             _replace(path, lambda partial: meshio.write(partial, content, WRITERS[path.suffix], **options))
 
@@ -168,6 +170,14 @@ def _write_tetgen(content: meshio.Mesh, path: Path) -> None:
     finally:
         for ending in (".node", ".ele"):
             partial.with_suffix(ending).unlink(missing_ok=True)
+
+
+def _write_abaqus(path: Path, content: meshio.Mesh) -> None:
+    """Plain elements: meshio names 10-node tetrahedra after Abaqus' modified hybrid ones, which are others."""
+    import meshio
+
+    meshio.write(path, content, "abaqus")
+    path.write_text(path.read_text().replace("TYPE=C3D10MH", "TYPE=C3D10"))
 
 
 def _write_netgen(path: Path, points: np.ndarray, mesh: TetMesh) -> None:

@@ -226,17 +226,6 @@ def _check_middles(nodes: np.ndarray, tets: np.ndarray) -> None:
         raise MeshError(
             f"node {tets[element, 4 + middle]} is a mid-side node of tetrahedron {element} and a corner of another"
         )
-    _, edges = unique_edges(tets[:, :4])
-    of_edge = np.zeros(edges.max() + 1, dtype=np.int64)
-    of_edge[edges] = tets[:, 4:]
-    unshared = np.argwhere(of_edge[edges] != tets[:, 4:])
-    if unshared.size:
-        element, edge = unshared[0]
-        a, b = tets[element, EDGES[edge]]
-        raise MeshError(
-            f"tetrahedron {element} does not share node {tets[element, 4 + edge]}, in the middle between nodes {a} "
-            f"and {b}, with its neighbours"
-        )
     a, b = nodes[tets[:, EDGES[:, 0]]], nodes[tets[:, EDGES[:, 1]]]
     offset, span = nodes[tets[:, 4:]] - 0.5 * (a + b), b - a
     squared = np.einsum("eij,eij->ei", span, span)
@@ -249,6 +238,17 @@ def _check_middles(nodes: np.ndarray, tets: np.ndarray) -> None:
         raise MeshError(
             f"node {tets[element, 4 + edge]} of tetrahedron {element} is not near the middle between its nodes {i} and "
             f"{j}: mid-side nodes follow the corners in the order of the edges 01, 12, 02, 03, 13, 23"
+        )
+    _, edges = unique_edges(tets[:, :4])
+    of_edge = np.zeros(edges.max() + 1, dtype=np.int64)
+    of_edge[edges] = tets[:, 4:]
+    unshared = np.argwhere(of_edge[edges] != tets[:, 4:])
+    if unshared.size:
+        element, edge = unshared[0]
+        a, b = tets[element, EDGES[edge]]
+        raise MeshError(
+            f"tetrahedron {element} does not share node {tets[element, 4 + edge]}, in the middle between nodes {a} "
+            f"and {b}, with its neighbours"
         )
 
 
