@@ -21,7 +21,7 @@ import numpy as np
 
 from model_shapes import SHAPES, Field, Shape
 from palpate.mesh import TetMesh
-from palpate.mesh.tetmesh import FACES
+from palpate.mesh.elements import FACES
 
 DATA = Path(__file__).resolve().parent.parent / "python" / "palpate" / "models" / "data"
 MILLIMETRE = 1e-3
@@ -343,7 +343,7 @@ def polish(mesh: TetMesh, field: Field, goal: float = 15.0, rounds: int = 6) -> 
 
 def smallest_angles(corners: np.ndarray) -> np.ndarray:
     """Smallest dihedral angle of each tetrahedron (..., 4, 3), degrees; below 0 where it is inverted."""
-    p = corners[..., FACES, :]
+    p = corners[..., FACES[4], :]
     normals = np.cross(p[..., 1, :] - p[..., 0, :], p[..., 2, :] - p[..., 0, :])
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
     cosines = np.einsum("...ik,...jk->...ij", normals, normals)

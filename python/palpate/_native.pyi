@@ -12,11 +12,14 @@ def stiffness(
 def mass(
     nodes: np.ndarray, tets: np.ndarray, material: np.ndarray, lumped: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+def determinant_ranges(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray: ...
+def volumes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray: ...
 
 class GreenCore:
     surface_nodes: np.ndarray
     surface_positions: np.ndarray
     surface_triangles: np.ndarray
+    surface_faces: tuple[np.ndarray, int]
     touch_ranks: np.ndarray
     fixed_dofs: np.ndarray
     precision: str

@@ -30,7 +30,7 @@ class Material:
     youngs_modulus
         Pa, positive.
     poissons_ratio
-        In (-1, 0.5); 4-node tetrahedra lock above about 0.45.
+        In (-1, 0.5); 4-node tetrahedra lock above about 0.45, 10-node ones hardly.
     density
         kg/m^3.
 
@@ -92,7 +92,7 @@ class Body:
         return self._csc(_native.stiffness(*self._element_arrays()))
 
     def mass(self, *, lumped: bool = False) -> scipy.sparse.csc_array:
-        """Mass matrix of all dofs, (3n, 3n), kg; consistent, or lumped to the nodes."""
+        """Mass matrix of all dofs, (3n, 3n), kg; consistent, or lumped to the diagonal."""
         return self._csc(_native.mass(*self._element_arrays(), lumped))
 
     def _csc(self, arrays: tuple[np.ndarray, np.ndarray, np.ndarray]) -> scipy.sparse.csc_array:

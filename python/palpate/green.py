@@ -64,6 +64,8 @@ class GreensFunction:
         self._core = core
         self.surface_nodes = core.surface_nodes.astype(np.int64)
         self.surface_positions = core.surface_positions.reshape(-1, 3)
+        faces, width = core.surface_faces
+        self.surface_faces = self.surface_nodes[faces.reshape(-1, width)]
         self.surface_triangles = self.surface_nodes[core.surface_triangles.reshape(-1, 3)]
         ranks = core.touch_ranks.astype(np.int64)
         self.touchable_nodes = self.surface_nodes[ranks]
@@ -292,7 +294,7 @@ def problem_arrays(body: Body, touch: Sequence[int] | np.ndarray | None) -> tupl
         inside = np.flatnonzero(surface_nodes[np.minimum(ranks, len(surface_nodes) - 1)] != nodes)
         if inside.size:
             raise BodyError(f"touch: node {nodes[inside[0]]} is not on the surface")
-    indices = [body.fixed_dofs, surface_nodes, body.mesh.surface_triangles, ranks]
+    indices = [body.fixed_dofs, surface_nodes, body.mesh.surface_faces, ranks]
     return (*body._element_arrays(), *(np.ascontiguousarray(i, dtype=np.uint32) for i in indices))
 
 
@@ -301,6 +303,7 @@ def _describe(body: Body) -> dict[str, Any]:
     return {
         "nodes": len(body.mesh.nodes),
         "tets": len(body.mesh.tets),
+        "element": "quadratic" if body.mesh.is_quadratic else "linear",
         "surface_nodes": len(body.mesh.surface_nodes),
         "fixed_nodes": len(body.fixed_nodes),
         "materials": {str(k): [m.youngs_modulus, m.poissons_ratio, m.density] for k, m in materials.items()},
@@ -310,7 +313,7 @@ def _describe(body: Body) -> dict[str, Any]:
 def _difference(green: GreensFunction, body: Body) -> str:
     """First thing in which a store and a body are seen to differ."""
     stored, now = green.description, _describe(body)
-    for name in ("nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
+    for name in ("element", "nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
         if stored.get(name) != now[name]:
             return f"was made for another body ({name.replace('_', ' ')}: {stored.get(name)} there, {now[name]} here)"
     if not np.array_equal(green.fixed_dofs, body.fixed_dofs):

@@ -8,45 +8,77 @@ import numpy as np
 HONEST_STRAIN = 0.1
 
 
-class SurfaceStrain:
-    """Green strain in the plane of each surface triangle.
+# Derivatives along the edges from corner 0 to corners 1 and 2 of the shape functions of a face, (places, nodes, 2), by
+# the number of its nodes: anywhere on a flat triangle; at each node of a 6-node face, whose barycentric coordinates are
+# the first rows below.
+_PLACES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+_SLOPES = {
+    3: np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]),
+    6: np.array(
+        [
+            [
+                [1 - 4 * r, 1 - 4 * r],
+                [4 * s - 1, 0],
+                [0, 4 * t - 1],
+                [4 * (r - s), -4 * s],
+                [4 * t, 4 * s],
+                [-4 * t, 4 * (r - t)],
+            ]
+            for r, s, t in _PLACES
+        ]
+    ),
+}
 
-    With the edges of a triangle as columns, ``R`` at rest (in its plane, 2x2) and ``D`` deformed (3x2), the deformation
-    gradient is ``F = D R^-1`` and ``E = (F^T F - I) / 2``. It is zero for rigid motions, so a large rotation, which the
-    linear solution draws as growth, is reported too.
+
+class SurfaceStrain:
+    """Green strain in the plane of the elements' faces.
+
+    With the tangents of a face as columns, ``R`` at rest (in their plane, 2x2) and ``D`` deformed (3x2), the
+    deformation gradient is ``F = D R^-1`` and ``E = (F^T F - I) / 2``. It is zero for rigid motions, so a large
+    rotation, which the linear solution draws as growth, is reported too. On a flat triangle it is constant; on a 6-node
+    face it is taken at the nodes, where the magnitudes of all faces around a node are averaged: they bound that of the
+    mean strain, and faces need not lie in one plane.
 
     Parameters
     ----------
     positions
         (s, 3) m, the surface at rest.
-    triangles
-        (k, 3) rows of ``positions``.
+    faces
+        (k, 3) or (k, 6) rows of ``positions``.
 
     """
 
-    def __init__(self, positions: np.ndarray, triangles: np.ndarray):
-        self._triangles = triangles
+    def __init__(self, positions: np.ndarray, faces: np.ndarray):
+        self._faces = faces
         self._positions = positions
-        first, second = self._edges(positions)
-        length = np.linalg.norm(first, axis=1)
-        axis = first / length[:, None]
-        along = np.einsum("ij,ij->i", second, axis)
-        across = np.linalg.norm(second - along[:, None] * axis, axis=1)
+        self._slopes = _SLOPES[faces.shape[1]]
+        self._faces_around = np.maximum(np.bincount(faces.ravel(), minlength=len(positions)), 1)
+        first, second = self._tangents(positions)
+        length = np.linalg.norm(first, axis=-1)
+        axis = first / length[..., None]
+        along = np.einsum("...i,...i->...", second, axis)
+        across = np.linalg.norm(second - along[..., None] * axis, axis=-1)
         # R = [[length, along], [0, across]] is upper triangular: its inverse is written out.
         self._inverse = (1.0 / length, -along / (length * across), 1.0 / across)
 
     def largest(self, displacements: np.ndarray) -> float:
         """Largest principal strain, in magnitude, for displacements (s, 3) m."""
-        first, second = self._edges(self._positions + displacements)
+        first, second = self._tangents(self._positions + displacements)
         a, b, c = self._inverse
-        g1 = a[:, None] * first
-        g2 = b[:, None] * first + c[:, None] * second
-        exx = 0.5 * (np.einsum("ij,ij->i", g1, g1) - 1.0)
-        eyy = 0.5 * (np.einsum("ij,ij->i", g2, g2) - 1.0)
-        exy = 0.5 * np.einsum("ij,ij->i", g1, g2)
+        g1 = a[..., None] * first
+        g2 = b[..., None] * first + c[..., None] * second
+        exx = 0.5 * (np.einsum("...i,...i->...", g1, g1) - 1.0)
+        eyy = 0.5 * (np.einsum("...i,...i->...", g2, g2) - 1.0)
+        exy = 0.5 * np.einsum("...i,...i->...", g1, g2)
         mean, radius = 0.5 * (exx + eyy), np.hypot(0.5 * (exx - eyy), exy)
-        return float((np.abs(mean) + radius).max())
+        magnitude = np.abs(mean) + radius
+        if len(self._slopes) > 1:
+            sums = np.bincount(self._faces.ravel(), magnitude.ravel(), minlength=len(self._positions))
+            magnitude = sums / self._faces_around
+        return float(magnitude.max())
 
-    def _edges(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        corners = positions[self._triangles]
-        return corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    def _tangents(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tangents along both edges from corner 0, (k, places, 3) each."""
+        nodes = positions[self._faces]
+        first, second = (np.tensordot(nodes, self._slopes[:, :, k], axes=(1, 1)).swapaxes(1, 2) for k in (0, 1))
+        return first, second

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::fem::{self, Isotropic, SymmetricCsc};
-use palpate_core::mesh::TetMesh;
+use palpate_core::mesh::{Faces, TetMesh, Tets};
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -22,12 +22,28 @@ pub fn vectors(array: &PyReadonlyArray2<'_, f64>) -> Result<Vec<DVec3>> {
 }
 
 /// Rows of an `(m, N)` array of indices.
-pub fn index_rows<const N: usize>(array: &PyReadonlyArray2<'_, u32>) -> Result<Vec<[u32; N]>> {
+fn index_rows<const N: usize>(array: &PyReadonlyArray2<'_, u32>) -> Result<Vec<[u32; N]>> {
     let view = array.as_array();
     if view.ncols() != N {
         return Err(Error::Invalid(format!("connectivity must have {N} columns, got {}", view.ncols())));
     }
     Ok(view.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect())
+}
+
+/// Elements from an `(m, 4)` or `(m, 10)` array.
+pub fn tets(array: &PyReadonlyArray2<'_, u32>) -> Result<Tets> {
+    match array.as_array().ncols() {
+        10 => Ok(Tets::Quadratic(index_rows(array)?)),
+        _ => Ok(Tets::Linear(index_rows(array)?)),
+    }
+}
+
+/// Faces from a `(k, 3)` or `(k, 6)` array.
+pub fn faces(array: &PyReadonlyArray2<'_, u32>) -> Result<Faces> {
+    match array.as_array().ncols() {
+        6 => Ok(Faces::Quadratic(index_rows(array)?)),
+        _ => Ok(Faces::Linear(index_rows(array)?)),
+    }
 }
 
 /// Materials from an `(m, 3)` array of Young's modulus (Pa), Poisson's ratio and density (kg/m^3).
@@ -57,7 +73,7 @@ fn assembled<'py>(
     assemble: impl FnOnce(&TetMesh, &[Isotropic]) -> SymmetricCsc + Send,
 ) -> PyResult<CscArrays<'py>> {
     let prepare = || {
-        let mesh = TetMesh::new(vectors(nodes)?, index_rows(tets)?)?;
+        let mesh = TetMesh::new(vectors(nodes)?, self::tets(tets)?)?;
         let materials = materials(material, mesh.tets.len())?;
         Ok((mesh, materials))
     };
@@ -87,4 +103,27 @@ pub fn mass<'py>(
     lumped: bool,
 ) -> PyResult<CscArrays<'py>> {
     assembled(py, &nodes, &tets, &material, |mesh, materials| fem::mass(mesh, materials, lumped))
+}
+
+/// Least and largest determinant (2m) of the map from the reference element, m^3; not positive where it is inverted.
+#[pyfunction]
+pub fn determinant_ranges<'py>(
+    py: Python<'py>,
+    nodes: PyReadonlyArray2<'py, f64>,
+    tets: PyReadonlyArray2<'py, u32>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let measure = || self::tets(&tets)?.determinant_ranges(&vectors(&nodes)?);
+    let ranges = measure().map_err(|e| to_python(py, e))?;
+    Ok(ranges.as_flattened().to_vec().into_pyarray(py))
+}
+
+/// Volume of each element (m), m^3.
+#[pyfunction]
+pub fn volumes<'py>(
+    py: Python<'py>,
+    nodes: PyReadonlyArray2<'py, f64>,
+    tets: PyReadonlyArray2<'py, u32>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let measure = || self::tets(&tets)?.volumes(&vectors(&nodes)?);
+    Ok(measure().map_err(|e| to_python(py, e))?.into_pyarray(py))
 }

@@ -14,7 +14,7 @@ use palpate_core::{Error, Result, capacitance, contact};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::body::{index_rows, indices, materials, vectors};
+use crate::body::{self, indices, materials, vectors};
 use crate::errors::to_python;
 
 /// A Green's function in memory or in a mapped store.
@@ -23,7 +23,7 @@ pub struct GreenCore {
     pub(crate) green: Arc<GreensFunction>,
 }
 
-/// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_triangles, touch)`.
+/// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_faces, touch)`.
 fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
     type Arguments<'py> = (
         PyReadonlyArray2<'py, f64>,
@@ -34,9 +34,9 @@ fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
         PyReadonlyArray2<'py, u32>,
         PyReadonlyArray1<'py, u32>,
     );
-    let (nodes, tets, material, fixed, surface_nodes, triangles, touch): Arguments<'_> = arguments.extract()?;
+    let (nodes, tets, material, fixed, surface_nodes, faces, touch): Arguments<'_> = arguments.extract()?;
     let build = || -> Result<Problem> {
-        let mesh = TetMesh::new(vectors(&nodes)?, index_rows(&tets)?)?;
+        let mesh = TetMesh::new(vectors(&nodes)?, body::tets(&tets)?)?;
         let materials = materials(&material, mesh.tets.len())?;
         let supports = Supports::new(3 * mesh.nodes.len(), indices(&fixed))?;
         Ok(Problem {
@@ -44,7 +44,7 @@ fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
             materials,
             supports,
             surface_nodes: indices(&surface_nodes),
-            surface_triangles: index_rows(&triangles)?,
+            surface_faces: body::faces(&faces)?,
             touch: indices(&touch),
         })
     };
@@ -170,6 +170,13 @@ impl GreenCore {
     #[getter]
     fn surface_triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         self.green.surface.triangles.as_flattened().to_vec().into_pyarray(py)
+    }
+
+    /// The elements' faces on the surface as ranks of surface nodes, and nodes a face.
+    #[getter]
+    fn surface_faces<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u32>>, usize) {
+        let faces = &self.green.surface.faces;
+        (faces.as_flattened().to_vec().into_pyarray(py), faces.nodes_per_face())
     }
 
     /// Touchable nodes as ranks of surface nodes (t).

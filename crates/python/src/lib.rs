@@ -14,6 +14,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(body::mass, module)?)?;
+    module.add_function(wrap_pyfunction!(body::determinant_ranges, module)?)?;
+    module.add_function(wrap_pyfunction!(body::volumes, module)?)?;
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;

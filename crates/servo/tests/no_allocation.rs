@@ -3,12 +3,13 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_core::fem::{Isotropic, Supports};
 use palpate_core::green::{Precision, Problem, precompute};
-use palpate_core::mesh::TetMesh;
+use palpate_core::mesh::{Faces, TetMesh, Tets};
 use palpate_core::simulation::{Input, MAX_TOOLS, Model};
 use palpate_devices::DeviceState;
 use palpate_servo::{SafetyLimits, Ticker};
@@ -85,13 +86,59 @@ fn cube(n: u32) -> Problem {
         supports: Supports::new(dofs, fixed).expect("valid supports"),
         touch: (0..surface_nodes.len() as u32).collect(),
         surface_nodes,
-        surface_triangles: triangles,
+        surface_faces: triangles.into(),
+    }
+}
+
+/// The same body in 10-node tetrahedra, with the middles of its edges after its nodes.
+fn raised(linear: Problem) -> Problem {
+    let (Tets::Linear(tets), Faces::Linear(triangles)) = (&linear.mesh.tets, &linear.surface_faces) else {
+        panic!("4-node tetrahedra")
+    };
+    let mut nodes = linear.mesh.nodes.clone();
+    let mut middles = HashMap::new();
+    let mut middle = |a: u32, b: u32| {
+        *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+            nodes.push(0.5 * (nodes[a as usize] + nodes[b as usize]));
+            nodes.len() as u32 - 1
+        })
+    };
+    let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
+    let tets: Vec<[u32; 10]> = tets
+        .iter()
+        .map(|t| std::array::from_fn(|k| if k < 4 { t[k] } else { middle(t[edges[k - 4][0]], t[edges[k - 4][1]]) }))
+        .collect();
+    let faces: Vec<[u32; 6]> = triangles
+        .iter()
+        .map(|t| std::array::from_fn(|k| if k < 3 { t[k] } else { middle(t[k - 3], t[(k - 2) % 3]) }))
+        .collect();
+    let mut surface_nodes = faces.as_flattened().to_vec();
+    surface_nodes.sort_unstable();
+    surface_nodes.dedup();
+    let below = (0..nodes.len() as u32).filter(|&i| nodes[i as usize].z < 1e-9);
+    let fixed: Vec<u32> = below.flat_map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Problem {
+        supports: Supports::new(3 * nodes.len(), fixed).expect("valid supports"),
+        mesh: TetMesh::new(nodes, tets).expect("a valid mesh"),
+        materials: linear.materials,
+        touch: (0..surface_nodes.len() as u32).collect(),
+        surface_nodes,
+        surface_faces: faces.into(),
     }
 }
 
 #[test]
 fn a_tick_never_allocates_and_repeats_its_bits() {
-    let green = precompute(&cube(6), Precision::F32, &|_, _| true).expect("a solvable cube");
+    exercise(&cube(6));
+}
+
+#[test]
+fn a_tick_on_quadratic_elements_never_allocates() {
+    exercise(&raised(cube(4)));
+}
+
+fn exercise(problem: &Problem) {
+    let green = precompute(problem, Precision::F32, &|_, _| true).expect("a solvable cube");
     let model = Arc::new(Model::new(Arc::new(green), 0.005, 5000.0).expect("a valid model"));
     let settings = Input { contact_radius: 0.02, ..Input::default() };
     let path = |tick: usize| {

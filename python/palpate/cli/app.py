@@ -19,6 +19,7 @@ app = typer.Typer(
 cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 
+Quadratic = Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra: they do not lock near nu = 0.5.")]
 Unit = Annotated[str, typer.Option(help="Unit of length of the file: m, cm, mm, um, in.")]
 
 
@@ -55,6 +56,7 @@ def mesh(
     unit: Unit = "m",
     max_size: Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")] = None,
     repair: Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")] = False,
+    quadratic: Quadratic = False,
 ) -> None:
     """Fill a closed surface with tetrahedra.
 
@@ -66,6 +68,7 @@ def mesh(
     from palpate.units import length
 
     made = tetrahedralize(surface, None if max_size is None else length(max_size), unit, repair=repair)
+    made = made.to_quadratic() if quadratic else made
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
 
@@ -80,6 +83,7 @@ def precompute(
     unit: Unit = "m",
     precision: Annotated[str, typer.Option(help="Stored number format: f32 or f64.")] = "f32",
     touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
+    quadratic: Quadratic = False,
 ) -> None:
     """Solve the body once, so that any touch is answered in microseconds.
 
@@ -89,7 +93,9 @@ def precompute(
     from palpate.predicate import parse
     from palpate.units import pressure
 
-    body = _body(_read_any(mesh, unit), pressure(youngs_modulus), poissons_ratio, fix)
+    made = _read_any(mesh, unit)
+    made = made.to_quadratic() if quadratic else made
+    body = _body(made, pressure(youngs_modulus), poissons_ratio, fix)
     region = None
     if touch is not None:
         surface = body.mesh.surface_nodes
@@ -213,7 +219,7 @@ def _body(mesh: TetMesh, youngs_modulus: float, poissons_ratio: float, fix: str)
 
 def _mesh_line(mesh: TetMesh) -> str:
     return (
-        f"{len(mesh.nodes)} nodes, {len(mesh.tets)} tetrahedra, "
+        f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {'10-node ' if mesh.is_quadratic else ''}tetrahedra, "
         f"{len(mesh.surface_nodes)} surface nodes, {len(mesh.surface_triangles)} triangles"
     )
 

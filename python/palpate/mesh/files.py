@@ -31,11 +31,17 @@ WRITERS = {
     ".vol": "netgen",
     ".mesh": "medit",
 }
+# Endings whose writer, or format as meshio knows it, has 4-node tetrahedra only.
+LINEAR_ONLY = {".node", ".ele", ".mesh"}
+# Netgen's node at each place of ours, by the number of an element's nodes. It is negatively oriented, and its mid-side
+# nodes are those of its edges 01, 02, 03, 12, 13, 23; those of a face of its edges 12, 20, 01.
+FROM_NETGEN = {4: [0, 2, 1, 3], 10: [0, 2, 1, 3, 5, 7, 4, 6, 9, 8]}
+FACE_FROM_NETGEN = {3: [0, 1, 2], 6: [0, 1, 2, 5, 3, 4]}
 REGION_NAMES = ("region", "gmsh:physical", "medit:ref")
 
 
 def read_volume(path: Path, unit: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes (n, 3) in m, tetrahedra (m, 4) and regions (m,) of a file."""
+    """Nodes (n, 3) in m, tetrahedra (m, 4) or (m, 10) and regions (m,) of a file."""
     scale = length_scale(unit)
     if not path.is_file():
         raise MeshError(f"{path}: no such file")
@@ -93,14 +99,16 @@ def _read_netgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         raise MeshError(f"{path}: holds no points and volume elements of a Netgen mesh")
     try:
         elements = _section(lines, heads["volumeelements"])
-        if any(int(e[1]) != 4 for e in elements):
-            raise MeshError(f"{path}: holds elements that are not 4-node tetrahedra")
+        counts = {int(e[1]) for e in elements}
+        if len(counts) != 1 or not counts <= set(FROM_NETGEN):
+            raise MeshError(f"{path}: holds elements that are not 4-node or not 10-node tetrahedra")
+        count = counts.pop()
         nodes = np.array([[float(v) for v in row[:3]] for row in _section(lines, heads["points"])])
-        tets = np.array([[int(v) - 1 for v in e[2:6]] for e in elements])
+        tets = np.array([[int(v) - 1 for v in e[2 : 2 + count]] for e in elements])
         regions = np.array([int(e[0]) for e in elements])
     except (ValueError, IndexError) as error:
         raise MeshError(f"{path}: damaged Netgen mesh ({error})") from None
-    return nodes.reshape(-1, 3), tets.reshape(-1, 4), regions
+    return nodes.reshape(-1, 3), tets[:, FROM_NETGEN[count]], regions
 
 
 def _section(lines: list[str], head: int) -> list[list[str]]:
@@ -117,6 +125,9 @@ def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    if mesh.is_quadratic and path.suffix in LINEAR_ONLY:
+        known = ", ".join(ending for ending in WRITERS if ending not in LINEAR_ONLY)
+        raise MeshError(f"{path}: 10-node tetrahedra cannot be written to {path.suffix} files; use {known}")
     name = {".msh": "gmsh:physical", ".mesh": "medit:ref"}.get(path.suffix, "region")
     data = {name: [mesh.regions]}
     if path.suffix == ".msh":
@@ -124,7 +135,7 @@ def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
     if path.suffix in {".inp", ".vol"}:
         data = {}
     points = mesh.nodes / length_scale(unit)
-    content = meshio.Mesh(points, [("tetra", mesh.tets)], cell_data=data)
+    content = meshio.Mesh(points, [("tetra10" if mesh.is_quadratic else "tetra", mesh.tets)], cell_data=data)
     if path.suffix == ".vol":
         _replace(path, lambda partial: _write_netgen(partial, points, mesh))
         return
@@ -133,6 +144,8 @@ def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
     with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
         if WRITERS[path.suffix] == "tetgen":
             _write_tetgen(content, path)
+        elif path.suffix == ".inp":
+            _replace(path, lambda partial: _write_abaqus(partial, content))
         else:
             _replace(path, lambda partial: meshio.write(partial, content, WRITERS[path.suffix], **options))
 
@@ -153,17 +166,25 @@ def _write_tetgen(content: meshio.Mesh, path: Path) -> None:
         assert partial_nodes.with_suffix(".ele") == partial_elements
 
 
+def _write_abaqus(path: Path, content: meshio.Mesh) -> None:
+    """Plain elements: meshio names 10-node tetrahedra after Abaqus' modified hybrid ones, which are others."""
+    import meshio
+
+    meshio.write(path, content, "abaqus")
+    path.write_text(path.read_text().replace("TYPE=C3D10MH", "TYPE=C3D10"))
+
+
 def _write_netgen(path: Path, points: np.ndarray, mesh: TetMesh) -> None:
     """Points, volume elements and the outer surface as Netgen reads them."""
-    triangles = mesh.surface_triangles + 1
-    tets = mesh.tets[:, [0, 2, 1, 3]] + 1
+    faces = mesh.surface_faces[:, np.argsort(FACE_FROM_NETGEN[mesh.surface_faces.shape[1]])] + 1
+    tets = mesh.tets[:, np.argsort(FROM_NETGEN[mesh.tets.shape[1]])] + 1
+    rows = np.column_stack([mesh.regions, np.full(len(tets), tets.shape[1]), tets])
     with path.open("w") as file:
         file.write("mesh3d\ndimension\n3\ngeomtype\n0\n\nsurfaceelements\n")
-        file.write(f"{len(triangles)}\n")
-        file.writelines(f"1 1 1 0 3 {a} {b} {c}\n" for a, b, c in triangles)
+        file.write(f"{len(faces)}\n")
+        file.writelines(f"1 1 1 0 {len(face)} {' '.join(map(str, face))}\n" for face in faces.tolist())
         file.write(f"\nvolumeelements\n{len(tets)}\n")
-        rows = zip(mesh.regions, tets, strict=True)
-        file.writelines(f"{region} 4 {a} {b} {c} {d}\n" for region, (a, b, c, d) in rows)
+        file.writelines(f"{' '.join(map(str, row))}\n" for row in rows.tolist())
         file.write(f"\npoints\n{len(points)}\n")
         file.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
         file.write("\nendmesh\n")

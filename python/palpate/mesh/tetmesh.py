@@ -9,33 +9,38 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate import _native
 from palpate.errors import MeshError, MeshWarning
-
-# Corners of the face opposite each corner, counter-clockwise seen from outside a positively oriented tetrahedron.
-FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+from palpate.mesh.elements import EDGES, FACES, MIRRORED, drawing_triangles, unique_edges
 
 # An element flatter than this part of the cube of its longest edge has no usable shape functions.
 DEGENERATE = 1e-12
 
+# Where the middle of an edge may lie, in parts of the edge's length from the middle between its ends: beyond a quarter
+# along the edge its quadratic map folds back, and half across is a half circle.
+MIDDLE_ALONG, MIDDLE_ACROSS = 0.25, 0.5
+
 
 class TetMesh:
-    """4-node tetrahedra in metres.
+    """Tetrahedra with 4 or 10 nodes, in metres.
 
     Parameters
     ----------
     nodes
         (n, 3) m.
     tets
-        (m, 4) 0-based node indices. Inverted elements are turned round; nodes that no element uses are dropped
-        with a :class:`palpate.MeshWarning`, the others keep their order.
+        (m, 4) or (m, 10) 0-based node indices: corners, then the middles of the edges 01, 12, 02, 03, 13, 23, which
+        need not be straight. Inverted elements are turned round; nodes that no element uses are dropped with a
+        :class:`palpate.MeshWarning`, the others keep their order.
     regions
         (m,) integer label of each element; zeros if None.
 
     Raises
     ------
     MeshError
-        Coordinates that are not finite, indices out of range, degenerate elements, or a surface that is not a
-        closed manifold, each with the index of the first.
+        Coordinates that are not finite, indices out of range, degenerate or folded elements, mid-side nodes away
+        from their edge or not shared by all elements around it, or a surface that is not a closed manifold, each with
+        the index of the first.
 
     """
 
@@ -56,20 +61,46 @@ class TetMesh:
             array.setflags(write=False)
 
     def __repr__(self) -> str:
-        return f"TetMesh({len(self.nodes)} nodes, {len(self.tets)} tets, {len(self.surface_nodes)} on the surface)"
+        order = "10-node " if self.is_quadratic else ""
+        surface = f"{len(self.surface_nodes)} on the surface"
+        return f"TetMesh({len(self.nodes)} nodes, {len(self.tets)} {order}tets, {surface})"
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether elements have 10 nodes."""
+        return self.tets.shape[1] == 10
+
+    def to_quadratic(self) -> TetMesh:
+        """Return the same body in 10-node tetrahedra with straight edges, or this mesh if it has them already.
+
+        Nodes keep their indices; the middles of the edges follow them, one for all elements around an edge.
+        """
+        if self.is_quadratic:
+            return self
+        edges, of_element = unique_edges(self.tets)
+        nodes = np.vstack([self.nodes, self.nodes[edges].mean(axis=1)])
+        return TetMesh(nodes, np.hstack([self.tets, len(self.nodes) + of_element]), self.regions)
 
     @cached_property
-    def surface_triangles(self) -> np.ndarray:
-        """Boundary triangles, (k, 3) node indices, outward."""
-        faces = self.tets[:, FACES].reshape(-1, 3)
-        ordered = np.sort(faces, axis=1)
+    def surface_faces(self) -> np.ndarray:
+        """Elements' faces on the boundary, outward: (k, 3), or (k, 6) with the middles of the edges 01, 12, 20."""
+        of_element = FACES[self.tets.shape[1]]
+        faces = self.tets[:, of_element].reshape(-1, of_element.shape[1])
+        ordered = np.sort(faces[:, :3], axis=1)
         _, first, inverse, counts = np.unique(
             ordered, axis=0, return_index=True, return_inverse=True, return_counts=True
         )
         if counts.max() > 2:
             face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
             raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
-        triangles = faces[np.sort(first[counts == 1])]
+        boundary = faces[np.sort(first[counts == 1])]
+        boundary.setflags(write=False)
+        return boundary
+
+    @cached_property
+    def surface_triangles(self) -> np.ndarray:
+        """Boundary triangles, (k, 3) node indices, outward; four for a face with mid-side nodes."""
+        triangles = drawing_triangles(self.surface_faces)
         triangles.setflags(write=False)
         return triangles
 
@@ -83,7 +114,7 @@ class TetMesh:
     @cached_property
     def volumes(self) -> np.ndarray:
         """Volume of each element, (m,) m^3."""
-        return _signed_volumes(self.nodes, self.tets)
+        return _native.volumes(self.nodes, self.tets.astype(np.uint32))
 
     @property
     def volume(self) -> float:
@@ -96,8 +127,8 @@ class TetMesh:
         return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
 
     def dihedral_angles(self) -> np.ndarray:
-        """Smallest dihedral angle of each element, (m,) degrees: below about 5 an element is poor."""
-        p = self.nodes[self.tets][:, FACES]
+        """Smallest dihedral angle of each element, (m,) degrees, by its corners: below about 5 an element is poor."""
+        p = self.nodes[self.tets[:, FACES[4]]]
         normals = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
         cosines = np.einsum("eik,ejk->eij", normals, normals)
@@ -108,9 +139,9 @@ class TetMesh:
     def read(cls, path: str | os.PathLike[str], unit: str = "m") -> TetMesh:
         """Read a volume mesh; ``unit`` is the file's unit of length.
 
-        Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood. Node order
-        is the file's. Regions come from cell data ``region``, ``gmsh:physical`` or ``medit:ref``, else from the only
-        integer cell array.
+        Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood; 10-node
+        tetrahedra in all but TetGen's and Medit's. Node order is the file's. Regions come from cell data ``region``,
+        ``gmsh:physical`` or ``medit:ref``, else from the only integer cell array.
 
         Raises
         ------
@@ -131,10 +162,8 @@ class TetMesh:
 
 def _index_array(tets: np.ndarray) -> np.ndarray:
     tets = np.array(tets, order="C", copy=True)
-    if tets.ndim == 2 and tets.shape[1] == 10:
-        raise MeshError("10-node tetrahedra are not supported yet: write the mesh with linear elements")
-    if tets.ndim != 2 or tets.shape[1] != 4 or not np.issubdtype(tets.dtype, np.integer):
-        raise MeshError(f"tets must be integers of shape (m, 4), got {tets.dtype} {tets.shape}")
+    if tets.ndim != 2 or tets.shape[1] not in FACES or not np.issubdtype(tets.dtype, np.integer):
+        raise MeshError(f"tets must be integers of shape (m, 4) or (m, 10), got {tets.dtype} {tets.shape}")
     if len(tets) == 0:
         raise MeshError("the mesh has no tetrahedra")
     return tets.astype(np.int64)
@@ -167,17 +196,63 @@ def _drop_orphans(nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _orient(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
-    volumes = _signed_volumes(nodes, tets)
-    p = nodes[tets]
-    longest = np.max([np.linalg.norm(p[:, i] - p[:, j], axis=1) for i in range(4) for j in range(i)], axis=0)
+    """Turn inverted elements round; refuse those without volume, and folded ones."""
+    volumes = _corner_volumes(nodes, tets)
+    p = nodes[tets[:, :4]]
+    longest = np.max([np.linalg.norm(p[:, i] - p[:, j], axis=1) for i, j in EDGES], axis=0)
     flat = np.flatnonzero(np.abs(volumes) <= DEGENERATE * longest**3)
     if flat.size:
         raise MeshError(f"{len(flat)} tetrahedra have no volume (first: tetrahedron {flat[0]}); mesh the body again")
     inverted = volumes < 0
-    tets[inverted] = tets[inverted][:, [0, 2, 1, 3]]
+    tets[inverted] = tets[inverted][:, MIRRORED[tets.shape[1]]]
+    if tets.shape[1] == 10:
+        _check_middles(nodes, tets)
+        least = _native.determinant_ranges(nodes, tets.astype(np.uint32)).reshape(-1, 2)[:, 0]
+        folded = np.flatnonzero(least <= 0)
+        if folded.size:
+            raise MeshError(
+                f"{len(folded)} tetrahedra are folded over by their mid-side nodes (first: tetrahedron {folded[0]})"
+            )
     return tets
 
 
-def _signed_volumes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+def _check_middles(nodes: np.ndarray, tets: np.ndarray) -> None:
+    """Refuse mid-side nodes that are corners, that neighbours do not share, or that are away from their edge."""
+    corner = np.zeros(len(nodes), dtype=bool)
+    corner[tets[:, :4]] = True
+    both = np.argwhere(corner[tets[:, 4:]])
+    if both.size:
+        element, middle = both[0]
+        raise MeshError(
+            f"node {tets[element, 4 + middle]} is a mid-side node of tetrahedron {element} and a corner of another"
+        )
+    a, b = nodes[tets[:, EDGES[:, 0]]], nodes[tets[:, EDGES[:, 1]]]
+    offset, span = nodes[tets[:, 4:]] - 0.5 * (a + b), b - a
+    squared = np.einsum("eij,eij->ei", span, span)
+    along = np.einsum("eij,eij->ei", offset, span) / squared
+    across = np.linalg.norm(offset - along[:, :, None] * span, axis=2) / np.sqrt(squared)
+    away = np.argwhere((np.abs(along) >= MIDDLE_ALONG) | (across >= MIDDLE_ACROSS))
+    if away.size:
+        element, edge = away[0]
+        i, j = tets[element, EDGES[edge]]
+        raise MeshError(
+            f"node {tets[element, 4 + edge]} of tetrahedron {element} is not near the middle between its nodes {i} and "
+            f"{j}: mid-side nodes follow the corners in the order of the edges 01, 12, 02, 03, 13, 23"
+        )
+    _, edges = unique_edges(tets[:, :4])
+    of_edge = np.zeros(edges.max() + 1, dtype=np.int64)
+    of_edge[edges] = tets[:, 4:]
+    unshared = np.argwhere(of_edge[edges] != tets[:, 4:])
+    if unshared.size:
+        element, edge = unshared[0]
+        a, b = tets[element, EDGES[edge]]
+        raise MeshError(
+            f"tetrahedron {element} does not share node {tets[element, 4 + edge]}, in the middle between nodes {a} "
+            f"and {b}, with its neighbours"
+        )
+
+
+def _corner_volumes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Volume between the corners, negative where they are inverted."""
     a, b, c, d = (nodes[tets[:, k]] for k in range(4))
     return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
@@ -19,6 +19,7 @@ from palpate.body import Body, Material
 from palpate.errors import Error, SceneError
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh, tetrahedralize
+from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
 from palpate.predicate import parse
 
@@ -56,7 +57,8 @@ class Table(BaseModel):
 class BodyTable(Table):
     """The solid, one of: a mesh file (volume, or surface to be filled), a built-in model, a precomputed store.
 
-    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper.
+    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. ``element = "quadratic"``
+    gives 4-node tetrahedra the middles of their edges as nodes; supports listed by node then hold those between them.
     """
 
     mesh: str | None = None
@@ -65,6 +67,7 @@ class BodyTable(Table):
     paper: bool = False
     unit: str = "m"
     max_element_size: Length | None = None
+    element: Literal["linear", "quadratic"] | None = None
     precision: str = Field("f32", pattern="^f(32|64)$")
 
     @model_validator(mode="after")
@@ -176,6 +179,10 @@ class Scene(Table):
         if self.body.store is not None:
             return BuiltScene(self, None, GreensFunction.load(self._folder / self.body.store))
         mesh = self._mesh()
+        if self.body.element == "linear" and mesh.is_quadratic:
+            raise SceneError(f"{self.body.mesh} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
+        if self.body.element == "quadratic":
+            mesh = mesh.to_quadratic()
         m = self.material
         body = Body(mesh, material=Material(m.youngs_modulus, m.poissons_ratio, m.density), fixed=self._fixed(mesh))
         return BuiltScene(self, body, precompute(body, precision=self.body.precision, progress=progress))
@@ -200,6 +207,12 @@ class Scene(Table):
                     f"no node satisfies supports.fixed = '{fixed}': the body reaches from {low} to {high} m"
                 )
             return mask
+        if self.body.element == "quadratic" and max(fixed, default=0) < len(mesh.nodes):
+            held = np.zeros(len(mesh.nodes), dtype=bool)
+            held[fixed] = True
+            between = held[mesh.tets[:, EDGES]].all(axis=2)
+            held[mesh.tets[:, 4:][between]] = True
+            return held
         return fixed
 
 

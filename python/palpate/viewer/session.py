@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.errors import ViewerError
 from palpate.interior import Interior
+from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltScene
 from palpate.simulation import Frame, Simulation
 from palpate.strain import SurfaceStrain
@@ -43,7 +44,7 @@ class Session:
         green = built.green
         self._positions = green.surface_positions
         self._triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
-        self._strain = SurfaceStrain(self._positions, self._triangles)
+        self._strain = SurfaceStrain(self._positions, np.searchsorted(green.surface_nodes, green.surface_faces))
         self._interior: Interior | None = None
         self._low, self._high = self._positions.min(axis=0), self._positions.max(axis=0)
         self.size = float((self._high - self._low).max())
@@ -100,18 +101,19 @@ class Session:
         """Geometry and numbers of the scene."""
         green, scene, body = self.built.green, self.built.scene, self.built.body
         if body is None:  # from a store, which knows only the surface
-            nodes, tets = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4))
+            nodes, tets, count = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4)), 0
             nodes[green.surface_nodes] = self._positions
             fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)
         else:
-            nodes, tets, fixed = body.mesh.nodes, body.mesh.tets, green.fixed_nodes
+            nodes, tets, fixed = body.mesh.nodes, drawing_tets(body.mesh.tets), green.fixed_nodes
+            count = len(body.mesh.tets)
         view = scene.view
         header = {
             "type": "scene",
             "name": scene.name,
             "title": scene.name.replace("_", " ").capitalize(),
             "nodes": len(nodes),
-            "tets": len(tets),
+            "tets": count,
             "surface_nodes": len(green.surface_nodes),
             "triangles": len(self._triangles),
             "youngs_modulus": self.simulation.youngs_modulus,

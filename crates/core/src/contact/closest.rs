@@ -6,14 +6,15 @@ use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 use crate::mesh::Surface;
 use crate::{Error, Result};
 
-/// A point of the rest surface.
+/// A point of the rest surface as it is drawn: on curved faces it lies off the face itself by the sagitta of a drawn
+/// triangle, an eighth of its edge's length times the angle through which the face turns along it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SurfacePoint {
     /// Position, m.
     pub position: DVec3,
     /// Triangle it lies on.
     pub triangle: u32,
-    /// Barycentric coordinates: the shape functions `N_i` there.
+    /// Barycentric coordinates in the triangle.
     pub barycentric: [f64; 3],
     /// Unit outward direction: towards the query point from outside, away from it from inside.
     pub normal: DVec3,

@@ -1,4 +1,4 @@
-//! Chapter 5: where a tool touches, and which nodes carry it.
+//! Chapter 6: where a tool touches, and which nodes carry it.
 
 mod closest;
 mod compliance;

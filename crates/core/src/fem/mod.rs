@@ -1,4 +1,4 @@
-//! Chapter 2: linear elasticity on tetrahedra: element matrices and their assembly.
+//! Chapter 3: linear elasticity: element matrices and their assembly, for any [`crate::element`].
 //!
 //! Isotropic Hooke: `sigma = lambda tr(eps) I + 2 mu eps` (paper 2.7, 2.8).
 

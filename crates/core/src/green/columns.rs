@@ -10,7 +10,7 @@ use super::key::content_key;
 use super::operator::{GreensFunction, Precision, Values};
 use super::pruned::{Pruned, PrunedScratch};
 use crate::fem::{Isotropic, Supports, SymmetricCsc, stiffness};
-use crate::mesh::{Surface, TetMesh};
+use crate::mesh::{Faces, Surface, TetMesh};
 use crate::{Error, Result};
 
 /// Right-hand sides a solve: enough for the matrix products of the supernodes, few enough to share among tasks.
@@ -28,8 +28,8 @@ pub struct Problem {
     pub supports: Supports,
     /// Mesh indices of the surface nodes, ascending.
     pub surface_nodes: Vec<u32>,
-    /// Outward surface triangles, mesh indices.
-    pub surface_triangles: Vec<[u32; 3]>,
+    /// Outward faces of the surface, mesh indices.
+    pub surface_faces: Faces,
     /// Touchable surface nodes as ascending ranks in `surface_nodes`.
     pub touch: Vec<u32>,
 }
@@ -41,19 +41,9 @@ impl Problem {
     }
 
     fn surface(&self) -> Result<Surface> {
-        let local = |n: u32| self.surface_nodes.binary_search(&n).map(|i| i as u32);
-        let mut triangles = Vec::with_capacity(self.surface_triangles.len());
-        for t in &self.surface_triangles {
-            match (local(t[0]), local(t[1]), local(t[2])) {
-                (Ok(a), Ok(b), Ok(c)) => triangles.push([a, b, c]),
-                _ => {
-                    return Err(Error::Invalid(format!(
-                        "surface triangle {t:?} names a node that is not on the surface"
-                    )));
-                }
-            }
-        }
-        Surface::new(self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect(), triangles)
+        let local = |n: u32| self.surface_nodes.binary_search(&n).ok().map(|i| i as u32);
+        let positions = self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect();
+        Surface::new(positions, self.surface_faces.renumbered(local)?)
     }
 
     /// Dof of every row: the surface's, then the supported ones inside.

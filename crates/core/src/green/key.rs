@@ -3,18 +3,19 @@
 use super::{Precision, Problem};
 
 /// Version of the store's layout; part of the key, so that an old file is recomputed, never misread.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// Hex BLAKE3 hash of mesh, materials, supports, touch region, element, precision and format version.
 pub fn content_key(problem: &Problem, precision: Precision) -> String {
+    let element = problem.mesh.tets.element_name();
     let mut hash = blake3::Hasher::new();
-    hash.update(format!("palpate green {FORMAT_VERSION} tet4 {}", precision.name()).as_bytes());
+    hash.update(format!("palpate green {FORMAT_VERSION} {element} {}", precision.name()).as_bytes());
     let mut section = |bytes: &[u8]| {
         hash.update(&(bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     };
     section(bytemuck::cast_slice(&problem.mesh.nodes));
-    section(bytemuck::cast_slice(&problem.mesh.tets));
+    section(bytemuck::cast_slice(problem.mesh.tets.as_flattened()));
     for material in &problem.materials {
         // Density does not enter the static answer.
         section(bytemuck::cast_slice(&[material.youngs_modulus, material.poissons_ratio]));

@@ -12,7 +12,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use super::key::FORMAT_VERSION;
 use super::operator::{GreensFunction, Precision, ValueSlice, Values};
-use crate::mesh::Surface;
+use crate::mesh::{Faces, Surface};
 use crate::{Error, Result};
 
 /// Bytes under one checksum.
@@ -75,11 +75,12 @@ impl GreensFunction {
     fn small_tensors(&self) -> Vec<(&'static str, Dtype, Vec<usize>, Vec<u8>)> {
         let bytes = |s: &[u32]| bytemuck::cast_slice(s).to_vec();
         let s = &self.surface;
+        let (faces, face_nodes) = (s.faces.as_flattened(), s.faces.nodes_per_face());
         let fixed: Vec<u8> = self.row_is_fixed.iter().map(|&b| u8::from(b)).collect();
         vec![
             ("surface_nodes", Dtype::U32, vec![self.surface_nodes.len()], bytes(&self.surface_nodes)),
             ("surface_positions", Dtype::F64, vec![s.positions.len(), 3], bytemuck::cast_slice(&s.positions).to_vec()),
-            ("surface_triangles", Dtype::U32, vec![s.triangles.len(), 3], bytemuck::cast_slice(&s.triangles).to_vec()),
+            ("surface_faces", Dtype::U32, vec![faces.len() / face_nodes, face_nodes], bytes(faces)),
             ("touch", Dtype::U32, vec![self.touch.len()], bytes(&self.touch)),
             ("fixed_dofs", Dtype::U32, vec![self.fixed_dofs.len()], bytes(&self.fixed_dofs)),
             ("fixed_rows", Dtype::U32, vec![self.fixed_rows.len()], bytes(&self.fixed_rows)),
@@ -153,6 +154,15 @@ impl Reader<'_> {
         Ok(view.data().chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
     }
 
+    /// Faces of as many nodes as the block has columns.
+    fn faces(&self) -> Result<Faces> {
+        match self.tensor("surface_faces")?.shape() {
+            [_, 3] => Ok(Faces::Linear(self.numbers("surface_faces")?)),
+            [_, 6] => Ok(Faces::Quadratic(self.numbers("surface_faces")?)),
+            shape => Err(self.damaged(&format!("surface faces of shape {shape:?}"))),
+        }
+    }
+
     fn geometry(&self, metadata: &HashMap<String, String>) -> Result<GreensFunction> {
         let field = |name: &str| metadata.get(name).cloned().unwrap_or_default();
         let positions: Vec<[f64; 3]> = self.numbers("surface_positions")?;
@@ -165,7 +175,7 @@ impl Reader<'_> {
             *touch_rank.get_mut(node as usize).ok_or_else(|| self.damaged("touch"))? = rank as u32;
         }
         let green = GreensFunction {
-            surface: Surface::new(positions, self.numbers("surface_triangles")?)?,
+            surface: Surface::new(positions, self.faces()?)?,
             surface_nodes,
             touch,
             touch_rank,

@@ -1,7 +1,7 @@
-//! Chapter 1: the discretised body: tetrahedra, and the surface that can be touched.
+//! Chapter 2: the discretised body: tetrahedra, and the surface that can be touched.
 
 mod surface;
 mod tetrahedra;
 
-pub use surface::Surface;
-pub use tetrahedra::TetMesh;
+pub use surface::{Faces, Surface};
+pub use tetrahedra::{TetMesh, Tets, node_elements, positions};

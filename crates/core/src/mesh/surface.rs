@@ -1,15 +1,87 @@
-//! The touchable boundary: rest positions, outward triangles, and who is next to whom.
+//! The touchable boundary: rest positions, outward faces and the triangles they are drawn by, and who is next to whom.
 
 use glam::DVec3;
 
+use crate::element::{Face, Tri3, Tri6};
 use crate::{Error, Result};
 
-/// A closed, outward-oriented triangle surface. Indices are local to the surface.
+/// The elements' faces on the boundary; node indices, counter-clockwise seen from outside.
+#[derive(Clone, Debug)]
+pub enum Faces {
+    /// Faces of 4-node tetrahedra.
+    Linear(Vec<[u32; 3]>),
+    /// Faces of 10-node tetrahedra: corners, then the middles of the edges 01, 12, 20.
+    Quadratic(Vec<[u32; 6]>),
+}
+
+impl From<Vec<[u32; 3]>> for Faces {
+    fn from(faces: Vec<[u32; 3]>) -> Self {
+        Faces::Linear(faces)
+    }
+}
+
+impl From<Vec<[u32; 6]>> for Faces {
+    fn from(faces: Vec<[u32; 6]>) -> Self {
+        Faces::Quadratic(faces)
+    }
+}
+
+impl Faces {
+    /// Nodes of all faces, one face after the other.
+    pub fn as_flattened(&self) -> &[u32] {
+        match self {
+            Faces::Linear(faces) => faces.as_flattened(),
+            Faces::Quadratic(faces) => faces.as_flattened(),
+        }
+    }
+
+    /// Nodes a face.
+    pub fn nodes_per_face(&self) -> usize {
+        match self {
+            Faces::Linear(_) => 3,
+            Faces::Quadratic(_) => 6,
+        }
+    }
+
+    /// The same faces with other node numbers.
+    ///
+    /// # Errors
+    /// The first node without a number.
+    pub fn renumbered(&self, number: impl Fn(u32) -> Option<u32>) -> Result<Self> {
+        fn rows<const N: usize>(faces: &[[u32; N]], number: impl Fn(u32) -> Option<u32>) -> Result<Vec<[u32; N]>> {
+            let missing = |n| Error::Invalid(format!("a surface face names node {n}, which is not on the surface"));
+            let mut renumbered = faces.to_vec();
+            for n in renumbered.as_flattened_mut() {
+                *n = number(*n).ok_or_else(|| missing(*n))?;
+            }
+            Ok(renumbered)
+        }
+        Ok(match self {
+            Faces::Linear(faces) => Faces::Linear(rows(faces, number)?),
+            Faces::Quadratic(faces) => Faces::Quadratic(rows(faces, number)?),
+        })
+    }
+
+    /// The flat triangles of all faces, in order.
+    fn triangles(&self) -> Vec<[u32; 3]> {
+        fn parts<F: Face<N>, const N: usize>(faces: &[[u32; N]]) -> Vec<[u32; 3]> {
+            faces.iter().flat_map(|face| F::PARTS.iter().map(|part| part.map(|k| face[k]))).collect()
+        }
+        match self {
+            Faces::Linear(faces) => parts::<Tri3, 3>(faces),
+            Faces::Quadratic(faces) => parts::<Tri6, 6>(faces),
+        }
+    }
+}
+
+/// A closed, outward-oriented surface. Indices are local to the surface.
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Rest positions, m; row `i` is `mesh.surface_nodes[i]`.
     pub positions: Vec<DVec3>,
-    /// Local node indices, counter-clockwise seen from outside.
+    /// The elements' faces, on which contact weights are integrated.
+    pub faces: Faces,
+    /// The flat triangles of the faces, in order, by which the surface is drawn and searched.
     pub triangles: Vec<[u32; 3]>,
     /// Unit outward normal of each triangle.
     pub normals: Vec<DVec3>,
@@ -18,15 +90,17 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Builds normals and adjacency.
+    /// Builds triangles, normals and adjacency.
     ///
     /// # Errors
-    /// A triangle that names a missing node.
-    pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
+    /// A face that names a missing node.
+    pub fn new(positions: Vec<DVec3>, faces: Faces) -> Result<Self> {
         let count = positions.len();
-        if let Some(t) = triangles.iter().position(|t| t.iter().any(|&n| n as usize >= count)) {
-            return Err(Error::Invalid(format!("surface triangle {t} names a node beyond the {count} surface nodes")));
+        if let Some(at) = faces.as_flattened().iter().position(|&n| n as usize >= count) {
+            let face = at / faces.nodes_per_face();
+            return Err(Error::Invalid(format!("surface face {face} names a node beyond the {count} surface nodes")));
         }
+        let triangles = faces.triangles();
         let normals = triangles
             .iter()
             .map(|t| {
@@ -35,7 +109,7 @@ impl Surface {
             })
             .collect();
         let neighbours = edge_neighbours(&triangles);
-        Ok(Self { positions, triangles, normals, neighbours })
+        Ok(Self { positions, faces, triangles, normals, neighbours })
     }
 
     /// Corner positions of triangle `t`, m.

@@ -1,4 +1,4 @@
-//! Chapter 6: the tick. `step(&Model, &mut State, &mut Scratch, &Input) -> Output` never allocates, locks, reads a clock
+//! Chapter 7: the tick. `step(&Model, &mut State, &mut Scratch, &Input) -> Output` never allocates, locks, reads a clock
 //! or panics on bad numbers; the same input gives the same bits.
 
 mod contact_forces;

@@ -1,0 +1,57 @@
+"""Node orders of the elements (VTK's): corners, then the middles of the edges 01, 12, 02, 03, 13, 23."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Corners of each edge, in the order of the mid-side nodes.
+EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+
+# By the number of an element's nodes. Its faces, opposite each corner, counter-clockwise seen from outside a positively
+# oriented tetrahedron: corners, then the middles of the face's edges 01, 12, 20.
+FACES = {
+    4: np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]),
+    10: np.array([[1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6], [0, 1, 3, 4, 8, 7], [0, 2, 1, 6, 5, 4]]),
+}
+
+# The nodes in the order that turns an element inside out: corners 1 and 2 change places, and their edges' middles.
+MIRRORED = {4: np.array([0, 2, 1, 3]), 10: np.array([0, 2, 1, 3, 6, 5, 4, 7, 9, 8])}
+
+# By the number of a face's nodes: the flat triangles it is drawn by.
+FACE_TRIANGLES = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
+
+# The flat tetrahedra an element is drawn by: one at each corner, and the octahedron between the mid-side nodes, cut
+# along its diagonal 6-8.
+PARTS = {
+    4: np.array([[0, 1, 2, 3]]),
+    10: np.array(
+        [
+            [0, 4, 6, 7],
+            [4, 1, 5, 8],
+            [6, 5, 2, 9],
+            [7, 8, 9, 3],
+            [8, 6, 5, 4],
+            [8, 6, 9, 5],
+            [8, 6, 7, 9],
+            [8, 6, 4, 7],
+        ]
+    ),
+}
+
+
+def drawing_triangles(faces: np.ndarray) -> np.ndarray:
+    """Flat triangles of faces with 3 or 6 nodes, (k, 3), in the faces' order."""
+    return faces[:, FACE_TRIANGLES[faces.shape[1]]].reshape(-1, 3)
+
+
+def drawing_tets(tets: np.ndarray) -> np.ndarray:
+    """Flat tetrahedra of elements with 4 or 10 nodes, (k, 4), in the elements' order."""
+    return tets[:, PARTS[tets.shape[1]]].reshape(-1, 4)
+
+
+def unique_edges(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of all elements once, (e, 2) corners ascending, and each element's six among them, (m, 6)."""
+    ends = np.sort(tets[:, EDGES].reshape(-1, 2).astype(np.int64), axis=1)
+    count = int(tets.max()) + 1
+    keys, which = np.unique(ends[:, 0] * count + ends[:, 1], return_inverse=True)
+    return np.stack([keys // count, keys % count], axis=1), which.reshape(-1, 6)
