@@ -9,6 +9,7 @@ from palpate import models
 from palpate.body import Body, Material
 from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError, ViewerError
 from palpate.green import Answer, GreensFunction, Touch, precompute
+from palpate.loads import Loads
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.scene import Scene
 from palpate.simulation import Contact, Frame, Simulation
@@ -23,6 +24,7 @@ __all__ = [
     "Error",
     "Frame",
     "GreensFunction",
+    "Loads",
     "Material",
     "MeshError",
     "MeshWarning",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse
@@ -12,6 +12,8 @@ from scipy.sparse.csgraph import connected_components
 
 from palpate import _native
 from palpate.errors import BodyError
+from palpate.loads import Loads
+from palpate.selection import node_indices
 
 if TYPE_CHECKING:
     from palpate.mesh import TetMesh
@@ -61,6 +63,8 @@ class Body:
     fixed
         Supported nodes: indices, an (n,) mask, an (n, 3) mask of components, ``{"z": indices}``, a function of
         the (n, 3) node positions that returns a mask, or None for a body without supports.
+    loads
+        What acts on it at rest, before it is touched: weight, pressure, forces.
 
     Raises
     ------
@@ -69,13 +73,21 @@ class Body:
 
     """
 
-    def __init__(self, mesh: TetMesh, *, material: Material | Mapping[int, Material], fixed: Fixed = None):
+    def __init__(
+        self,
+        mesh: TetMesh,
+        *,
+        material: Material | Mapping[int, Material],
+        fixed: Fixed = None,
+        loads: Loads | None = None,
+    ):
         self.mesh = mesh
         self.material = material
         self._material_rows = _material_rows(mesh, material)
         mask = _fixed_mask(mesh.nodes, fixed)
         mask.setflags(write=False)
         self.fixed_mask = mask
+        self.loads = loads
 
     @property
     def fixed_nodes(self) -> np.ndarray:
@@ -94,6 +106,17 @@ class Body:
     def mass(self, *, lumped: bool = False) -> scipy.sparse.csc_array:
         """Mass matrix of all dofs, (3n, 3n), kg; consistent, or lumped to the nodes."""
         return self._csc(_native.mass(*self._element_arrays(), lumped))
+
+    def load_vector(self) -> np.ndarray:
+        """Turn the reference loads into nodal forces, (n, 3) N; what falls on a support goes straight into it.
+
+        Raises
+        ------
+        BodyError
+            A node that does not exist, or a part of the surface without faces.
+
+        """
+        return np.zeros((len(self.mesh.nodes), 3)) if self.loads is None else self.loads.nodal(self)
 
     def _csc(self, arrays: tuple[np.ndarray, np.ndarray, np.ndarray]) -> scipy.sparse.csc_array:
         start, rows, values = arrays
@@ -178,7 +201,7 @@ def _fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
         for name, nodes_of_axis in fixed.items():
             if name not in AXES:
                 raise BodyError(f"unknown axis '{name}' in fixed: use 'x', 'y' or 'z'")
-            mask[_node_indices(nodes_of_axis, count), AXES[name]] = True
+            mask[node_indices(nodes_of_axis, count, "fixed"), AXES[name]] = True
         return mask
     array = np.asarray(fixed)
     if array.dtype == bool:
@@ -188,21 +211,5 @@ def _fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
             mask[array] = True
             return mask
         raise BodyError(f"a mask for fixed must have length {count}, got shape {array.shape}")
-    mask[_node_indices(array, count)] = True
+    mask[node_indices(array, count, "fixed")] = True
     return mask
-
-
-def _node_indices(values: Any, count: int) -> np.ndarray:
-    array = np.asarray(values)
-    if array.dtype == bool:
-        if array.shape != (count,):
-            raise BodyError(f"a mask for fixed must have length {count}, got shape {array.shape}")
-        return np.flatnonzero(array)
-    if array.size == 0:
-        return np.empty(0, dtype=np.int64)
-    if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
-        raise BodyError("fixed nodes must be a one-dimensional list of integers or a mask")
-    bad = array[(array < 0) | (array >= count)]
-    if bad.size:
-        raise BodyError(f"fixed node {bad[0]} does not exist: the mesh has nodes 0 to {count - 1}")
-    return array.astype(np.int64)

@@ -84,6 +84,7 @@ fn cube(n: u32) -> Problem {
         materials: vec![Isotropic::new(10e3, 0.4, 1000.0).expect("a valid material"); elements],
         supports: Supports::new(dofs, fixed).expect("valid supports"),
         touch: (0..surface_nodes.len() as u32).collect(),
+        loads: Vec::new(),
         surface_nodes,
         surface_triangles: triangles,
     }
