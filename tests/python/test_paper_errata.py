@@ -1,6 +1,6 @@
 """The paper's equations 3.2 to 3.10, read literally and corrected, against a direct solve on a small dense problem.
 
-`K`, `Psi`, `A`, `Ab` (the paper's barred right-hand operator), `E`, `v`, `vb` as in docs/theory.md. `D` are supported dofs,
+`K`, `Psi`, `A`, `Ab`, `E`, `v` and `vb` are those of docs/theory.md: `D` supported dofs,
 `N` free ones, `S` those whose condition changes.
 """
 
