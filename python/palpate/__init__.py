@@ -5,9 +5,20 @@ SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
 
 from importlib.metadata import version
 
-from palpate import models
+from palpate import models, shapes
 from palpate.body import Body, Material
-from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError, ViewerError
+from palpate.errors import (
+    BodyError,
+    Error,
+    LockingWarning,
+    MeshError,
+    MeshWarning,
+    PalpateWarning,
+    SceneError,
+    StoreError,
+    UnitError,
+    ViewerError,
+)
 from palpate.green import Answer, GreensFunction, Touch, precompute
 from palpate.loads import Loads
 from palpate.mesh import TetMesh, tetrahedralize
@@ -25,9 +36,11 @@ __all__ = [
     "Frame",
     "GreensFunction",
     "Loads",
+    "LockingWarning",
     "Material",
     "MeshError",
     "MeshWarning",
+    "PalpateWarning",
     "Scene",
     "SceneError",
     "Simulation",
@@ -38,5 +51,6 @@ __all__ = [
     "ViewerError",
     "models",
     "precompute",
+    "shapes",
     "tetrahedralize",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,12 +12,16 @@ import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
 from palpate import _native
-from palpate.errors import BodyError
+from palpate.errors import BodyError, LockingWarning
 from palpate.loads import Loads
 from palpate.selection import node_indices
 
 if TYPE_CHECKING:
     from palpate.mesh import TetMesh
+
+# Largest Poisson's ratio without volumetric locking to speak of, by nodes an element: 4-node tetrahedra cannot keep
+# their volume without keeping their shape; 10-node ones can until the conditioning of K gives out.
+LOCKING = {4: 0.45, 10: 0.499}
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -32,7 +37,8 @@ class Material:
     youngs_modulus
         Pa, positive.
     poissons_ratio
-        In (-1, 0.5); 4-node tetrahedra lock above about 0.45.
+        In (-1, 0.5). Nearly incompressible materials make elements lock: a :class:`palpate.LockingWarning` says from
+        where on.
     density
         kg/m^3.
 
@@ -59,7 +65,7 @@ class Body:
     mesh
         The tetrahedra.
     material
-        One :class:`Material`, or one for each region of the mesh.
+        One :class:`Material`, or one for each region of the mesh, by number or name.
     fixed
         Supported nodes: indices, an (n,) mask, an (n, 3) mask of components, ``{"z": indices}``, a function of
         the (n, 3) node positions that returns a mask, or None for a body without supports.
@@ -77,13 +83,14 @@ class Body:
         self,
         mesh: TetMesh,
         *,
-        material: Material | Mapping[int, Material],
+        material: Material | Mapping[int | str, Material],
         fixed: Fixed = None,
         loads: Loads | None = None,
     ):
         self.mesh = mesh
         self.material = material
         self._material_rows = _material_rows(mesh, material)
+        _warn_of_locking(mesh, self._material_rows[:, 1].max())
         mask = _fixed_mask(mesh.nodes, fixed)
         mask.setflags(write=False)
         self.fixed_mask = mask
@@ -173,19 +180,43 @@ def _rigid_constraint_rank(nodes: np.ndarray, mask: np.ndarray) -> int:
     return int(np.linalg.matrix_rank(rows.T @ rows, tol=1e-10 * len(where)))
 
 
-def _material_rows(mesh: TetMesh, material: Material | Mapping[int, Material]) -> np.ndarray:
+def _material_rows(mesh: TetMesh, material: Material | Mapping[int | str, Material]) -> np.ndarray:
     """Young's modulus, Poisson's ratio and density of each element, (m, 3)."""
     if isinstance(material, Material):
         table = {int(region): material for region in np.unique(mesh.regions)}
     else:
-        table = dict(material)
+        table = {_region_number(mesh, region): m for region, m in material.items()}
     missing = sorted(set(np.unique(mesh.regions).tolist()) - set(table))
     if missing:
-        raise BodyError(f"region {missing[0]} of the mesh has no material; given are {sorted(table)}")
+        names = {number: name for name, number in mesh.region_names.items()}
+        region = names.get(missing[0], missing[0])
+        raise BodyError(f"region {region} of the mesh has no material; given are {', '.join(map(str, material))}")
     rows = np.empty((len(mesh.tets), 3))
     for region, m in table.items():
         rows[mesh.regions == region] = (m.youngs_modulus, m.poissons_ratio, m.density)
     return rows
+
+
+def _region_number(mesh: TetMesh, region: int | str) -> int:
+    if not isinstance(region, str):
+        return int(region)
+    if region not in mesh.region_names:
+        known = ", ".join(mesh.region_names) or "none"
+        raise BodyError(f"the mesh has no region called '{region}'; it has {known}")
+    return mesh.region_names[region]
+
+
+def _warn_of_locking(mesh: TetMesh, poissons_ratio: float) -> None:
+    count = mesh.tets.shape[1]
+    if poissons_ratio <= LOCKING[count]:
+        return
+    remedy = "10-node ones (mesh.to_quadratic()), " if count == 4 else ""
+    warnings.warn(
+        f"volumetric locking: {count}-node tetrahedra are too stiff at Poisson's ratio {poissons_ratio:g}, above "
+        f"{LOCKING[count]}; {remedy}a smaller ratio or a finer mesh help",
+        LockingWarning,
+        stacklevel=3,
+    )
 
 
 def _fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:

@@ -261,6 +261,12 @@ def test_impossible_materials_are_refused(e, nu):
         palpate.Material(e, nu)
 
 
+def test_locking_is_warned_of(block):
+    with pytest.warns(palpate.LockingWarning, match=r"volumetric locking: 4-node .* ratio 0.46, above 0.45; 10-node"):
+        palpate.Body(block.mesh, material=palpate.Material(1e4, 0.46))
+    assert issubclass(palpate.LockingWarning, palpate.PalpateWarning)
+
+
 def test_interior_displacements_equal_a_direct_solve(block, block_green):
     """The whole field under surface loads and a pressed node, from the surface alone, against SciPy's."""
     pressed, loaded = (int(n) for n in RNG.choice(np.setdiff1d(block_green.touchable_nodes, block.fixed_nodes), 2))
