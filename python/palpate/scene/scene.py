@@ -24,7 +24,7 @@ from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
 from palpate.predicate import parse
 from palpate.scene.loads import LoadTable, together
 from palpate.scene.regions import MaterialTable, RegionTable
-from palpate.scene.table import Force, Length, Radius, Stiffness, Table, Time
+from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -34,6 +34,14 @@ else:
 
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
 UNION_MEMBERS = {"str", "int", "list[int]"}
+
+
+class RefineTable(Table):
+    """A ball of finer elements in a mesh made from a surface."""
+
+    center: Point
+    radius: Length
+    size: Length
 
 
 class BodyTable(Table):
@@ -48,6 +56,7 @@ class BodyTable(Table):
     paper: bool = False
     unit: str = "m"
     max_element_size: Length | None = None
+    refine: list[RefineTable] = Field(default_factory=list)
     precision: str = Field("f32", pattern="^f(32|64)$")
 
     @model_validator(mode="after")
@@ -182,7 +191,8 @@ class Scene(Table):
             return models.load(self.body.model, paper=self.body.paper)
         source = self._folder / str(self.body.mesh)
         if source.suffix.lower() in SURFACE_ENDINGS:
-            return tetrahedralize(source, self.body.max_element_size, self.body.unit)
+            finer = [(ball.center, ball.radius, ball.size) for ball in self.body.refine]
+            return tetrahedralize(source, self.body.max_element_size, self.body.unit, finer)
         return TetMesh.read(source, self.body.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:
