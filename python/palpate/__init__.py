@@ -5,10 +5,22 @@ SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
 
 from importlib.metadata import version
 
-from palpate import models
+from palpate import models, shapes
 from palpate.body import Body, Material
-from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError, ViewerError
+from palpate.errors import (
+    BodyError,
+    Error,
+    LockingWarning,
+    MeshError,
+    MeshWarning,
+    PalpateWarning,
+    SceneError,
+    StoreError,
+    UnitError,
+    ViewerError,
+)
 from palpate.green import Answer, GreensFunction, Touch, precompute
+from palpate.loads import Loads
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.scene import Scene
 from palpate.simulation import Contact, Frame, Simulation
@@ -23,9 +35,12 @@ __all__ = [
     "Error",
     "Frame",
     "GreensFunction",
+    "Loads",
+    "LockingWarning",
     "Material",
     "MeshError",
     "MeshWarning",
+    "PalpateWarning",
     "Scene",
     "SceneError",
     "Simulation",
@@ -36,5 +51,6 @@ __all__ = [
     "ViewerError",
     "models",
     "precompute",
+    "shapes",
     "tetrahedralize",
 ]

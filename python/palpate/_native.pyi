@@ -26,6 +26,8 @@ class GreenCore:
     key: str
     description: str
     youngs_modulus: float | None
+    loads: np.ndarray
+    free_displacements: np.ndarray
     path: Path | None
     @staticmethod
     def content_key(arguments: tuple[np.ndarray, ...], precision_name: str) -> str: ...

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
 from palpate import _native
-from palpate.errors import BodyError
+from palpate.errors import BodyError, LockingWarning
+from palpate.loads import Loads
+from palpate.selection import node_indices
 
 if TYPE_CHECKING:
     from palpate.mesh import TetMesh
+
+# Largest Poisson's ratio without volumetric locking to speak of, by nodes an element: 4-node tetrahedra cannot keep
+# their volume without keeping their shape; 10-node ones can until the conditioning of K gives out.
+LOCKING = {4: 0.45, 10: 0.499}
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -30,7 +37,8 @@ class Material:
     youngs_modulus
         Pa, positive.
     poissons_ratio
-        In (-1, 0.5); 4-node tetrahedra lock above about 0.45, 10-node ones hardly.
+        In (-1, 0.5). Nearly incompressible materials make elements lock: 4-node tetrahedra above about 0.45, 10-node
+        ones hardly; a :class:`palpate.LockingWarning` says so.
     density
         kg/m^3.
 
@@ -57,10 +65,12 @@ class Body:
     mesh
         The tetrahedra.
     material
-        One :class:`Material`, or one for each region of the mesh.
+        One :class:`Material`, or one for each region of the mesh, by number or name.
     fixed
         Supported nodes: indices, an (n,) mask, an (n, 3) mask of components, ``{"z": indices}``, a function of
         the (n, 3) node positions that returns a mask, or None for a body without supports.
+    loads
+        What acts on it at rest, before it is touched: weight, pressure, forces.
 
     Raises
     ------
@@ -69,13 +79,22 @@ class Body:
 
     """
 
-    def __init__(self, mesh: TetMesh, *, material: Material | Mapping[int, Material], fixed: Fixed = None):
+    def __init__(
+        self,
+        mesh: TetMesh,
+        *,
+        material: Material | Mapping[int | str, Material],
+        fixed: Fixed = None,
+        loads: Loads | None = None,
+    ):
         self.mesh = mesh
         self.material = material
         self._material_rows = _material_rows(mesh, material)
+        _warn_of_locking(mesh, self._material_rows[:, 1].max())
         mask = _fixed_mask(mesh.nodes, fixed)
         mask.setflags(write=False)
         self.fixed_mask = mask
+        self.loads = loads
 
     @property
     def fixed_nodes(self) -> np.ndarray:
@@ -94,6 +113,17 @@ class Body:
     def mass(self, *, lumped: bool = False) -> scipy.sparse.csc_array:
         """Mass matrix of all dofs, (3n, 3n), kg; consistent, or lumped to the diagonal."""
         return self._csc(_native.mass(*self._element_arrays(), lumped))
+
+    def load_vector(self) -> np.ndarray:
+        """Turn the reference loads into nodal forces, (n, 3) N; what falls on a support goes straight into it.
+
+        Raises
+        ------
+        BodyError
+            A node that does not exist, or a part of the surface without faces.
+
+        """
+        return np.zeros((len(self.mesh.nodes), 3)) if self.loads is None else self.loads.nodal(self)
 
     def _csc(self, arrays: tuple[np.ndarray, np.ndarray, np.ndarray]) -> scipy.sparse.csc_array:
         start, rows, values = arrays
@@ -150,19 +180,43 @@ def _rigid_constraint_rank(nodes: np.ndarray, mask: np.ndarray) -> int:
     return int(np.linalg.matrix_rank(rows.T @ rows, tol=1e-10 * len(where)))
 
 
-def _material_rows(mesh: TetMesh, material: Material | Mapping[int, Material]) -> np.ndarray:
+def _material_rows(mesh: TetMesh, material: Material | Mapping[int | str, Material]) -> np.ndarray:
     """Young's modulus, Poisson's ratio and density of each element, (m, 3)."""
     if isinstance(material, Material):
         table = {int(region): material for region in np.unique(mesh.regions)}
     else:
-        table = dict(material)
+        table = {_region_number(mesh, region): m for region, m in material.items()}
     missing = sorted(set(np.unique(mesh.regions).tolist()) - set(table))
     if missing:
-        raise BodyError(f"region {missing[0]} of the mesh has no material; given are {sorted(table)}")
+        names = {number: name for name, number in mesh.region_names.items()}
+        region = names.get(missing[0], missing[0])
+        raise BodyError(f"region {region} of the mesh has no material; given are {', '.join(map(str, material))}")
     rows = np.empty((len(mesh.tets), 3))
     for region, m in table.items():
         rows[mesh.regions == region] = (m.youngs_modulus, m.poissons_ratio, m.density)
     return rows
+
+
+def _region_number(mesh: TetMesh, region: int | str) -> int:
+    if not isinstance(region, str):
+        return int(region)
+    if region not in mesh.region_names:
+        known = ", ".join(mesh.region_names) or "none"
+        raise BodyError(f"the mesh has no region called '{region}'; it has {known}")
+    return mesh.region_names[region]
+
+
+def _warn_of_locking(mesh: TetMesh, poissons_ratio: float) -> None:
+    count = mesh.tets.shape[1]
+    if poissons_ratio <= LOCKING[count]:
+        return
+    remedy = "10-node ones (mesh.to_quadratic()), " if count == 4 else ""
+    warnings.warn(
+        f"volumetric locking: {count}-node tetrahedra are too stiff at Poisson's ratio {poissons_ratio:g}, above "
+        f"{LOCKING[count]}; {remedy}a smaller ratio or a finer mesh help",
+        LockingWarning,
+        stacklevel=3,
+    )
 
 
 def _fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
@@ -178,7 +232,7 @@ def _fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
         for name, nodes_of_axis in fixed.items():
             if name not in AXES:
                 raise BodyError(f"unknown axis '{name}' in fixed: use 'x', 'y' or 'z'")
-            mask[_node_indices(nodes_of_axis, count), AXES[name]] = True
+            mask[node_indices(nodes_of_axis, count, "fixed"), AXES[name]] = True
         return mask
     array = np.asarray(fixed)
     if array.dtype == bool:
@@ -188,21 +242,5 @@ def _fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
             mask[array] = True
             return mask
         raise BodyError(f"a mask for fixed must have length {count}, got shape {array.shape}")
-    mask[_node_indices(array, count)] = True
+    mask[node_indices(array, count, "fixed")] = True
     return mask
-
-
-def _node_indices(values: Any, count: int) -> np.ndarray:
-    array = np.asarray(values)
-    if array.dtype == bool:
-        if array.shape != (count,):
-            raise BodyError(f"a mask for fixed must have length {count}, got shape {array.shape}")
-        return np.flatnonzero(array)
-    if array.size == 0:
-        return np.empty(0, dtype=np.int64)
-    if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
-        raise BodyError("fixed nodes must be a one-dimensional list of integers or a mask")
-    bad = array[(array < 0) | (array >= count)]
-    if bad.size:
-        raise BodyError(f"fixed node {bad[0]} does not exist: the mesh has nodes 0 to {count - 1}")
-    return array.astype(np.int64)

@@ -29,5 +29,13 @@ class ViewerError(Error):
     """The browser viewer cannot be served, or was asked for something it cannot do."""
 
 
-class MeshWarning(UserWarning):
+class PalpateWarning(UserWarning):
+    """Base of everything Palpate warns of: the answer stands, but not as well as asked."""
+
+
+class MeshWarning(PalpateWarning):
     """Something about a mesh was repaired or left out."""
+
+
+class LockingWarning(PalpateWarning):
+    """The elements are too stiff for the material: nearly incompressible, they lock."""

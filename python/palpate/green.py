@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import operator
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -92,13 +93,18 @@ class GreensFunction:
 
     @property
     def youngs_modulus(self) -> float | None:
-        """Young's modulus, Pa, if the whole body has one: then it only scales forces."""
+        """Young's modulus, Pa, if the whole body has one and no loads: then it only scales forces."""
         return self._core.youngs_modulus
 
     @property
     def description(self) -> dict[str, Any]:
         """What it was made from."""
         return json.loads(self._core.description or "{}")
+
+    @property
+    def free_displacements(self) -> np.ndarray:
+        """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
+        return self._core.free_displacements.reshape(-1, 3)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
@@ -144,47 +150,37 @@ class GreensFunction:
         Parameters
         ----------
         displacements
-            Prescribed displacement of touchable nodes, m; None leaves a component free. Fixed nodes may be named: their
-            support moves.
+            Prescribed displacement of touchable nodes from the unloaded shape, m; None leaves a component as it is:
+            free, or held by its support. Fixed nodes may be named: their support moves.
         forces
-            Forces on touchable nodes, N.
+            Forces on touchable nodes, N, besides the body's own loads; None is no force. On a support they go straight
+            into it.
         release
-            Fixed nodes on the surface whose support is taken away.
+            Fixed nodes on the surface whose support is taken away, but for components that ``displacements``
+            prescribes.
 
         Raises
         ------
         BodyError
-            A node that is not touchable, a wrong length, a number that is not finite.
+            A node that is not touchable, or in ``release`` not fixed; a wrong length; a number that is not finite;
+            a force and a displacement on the same component; released supports that leave the body free to move.
 
         """
+        forced, placed = self._by_column(forces, "forces"), self._by_column(displacements, "displacements")
+        freed = {column for node in release for column in self._released_columns(node)}
         known: dict[int, float] = {}
         switched: dict[int, float] = {}
-        released = {self._released_node(node) for node in release}
-        for node in released:
-            for axis in range(3):
-                if 3 * node + axis in self._fixed:
-                    switched[self._column(node, "release") + axis] = 0.0
-        for node, values in (forces or {}).items():
-            first = self._column(node, "forces")
-            for axis, value in enumerate(_components(values, node, "forces")):
-                if value is None or (3 * node + axis in self._fixed and node not in released):
-                    continue  # a load on a support goes straight into it and moves nothing
-                target = switched if 3 * node + axis in self._fixed else known
-                target[first + axis] = value
-        for node, values in (displacements or {}).items():
-            first = self._column(node, "displacements")
-            for axis, value in enumerate(_components(values, node, "displacements")):
-                if value is None:
-                    continue
-                column = first + axis
-                if 3 * node + axis in self._fixed:
-                    switched.pop(column, None)
-                    known[column] = value
-                elif known.get(column):
-                    raise BodyError(f"node {node} has both a force and a displacement along {'xyz'[axis]}")
-                else:
-                    known.pop(column, None)
-                    switched[column] = value
+        for column in {*forced, *placed, *freed}:
+            fixed = self._is_fixed(column)
+            if column in placed:
+                if forced.get(column) and (column in freed or not fixed):
+                    node, axis = self.touchable_nodes[column // 3], "xyz"[column % 3]
+                    raise BodyError(f"node {node} has both a force and a displacement along {axis}")
+                (known if fixed else switched)[column] = placed[column]
+            elif column in freed:
+                switched[column] = forced.get(column, 0.0)
+            elif not fixed:  # a force on a support goes straight into it and moves nothing
+                known[column] = forced[column]
         u, f, reactions = self._core.solve(sorted(known.items()), sorted(switched.items()))
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
         return Answer(u, f, self._reactions(f, reactions))
@@ -195,9 +191,9 @@ class GreensFunction:
         Parameters
         ----------
         point
-            Contact point, m; the closest point of the surface is taken.
+            Contact point, m, on the unloaded body; the closest point of the surface is taken.
         displacement
-            Weighted mean displacement of the patch, m; None leaves a component free.
+            Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
         radius
             Contact radius, m; 0 is a point contact.
 
@@ -211,8 +207,9 @@ class GreensFunction:
         return Touch(np.array(force), u.reshape(-1, 3))
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
-        """`K u` at the fixed nodes; a free component inside the body carries nothing, on the surface its load."""
-        reactions = np.zeros((len(self.fixed_nodes), 3))
+        """`K u` at the fixed nodes; a free component carries the loads on it."""
+        loads = self._core.loads.reshape(-1, 3)
+        reactions = loads[self.fixed_nodes] if len(loads) else np.zeros((len(self.fixed_nodes), 3))
         for i, node in enumerate(self.fixed_nodes):
             rank = self._surface_rank.get(int(node))
             if rank is not None:
@@ -221,18 +218,33 @@ class GreensFunction:
         reactions[rows, self.fixed_dofs % 3] = fixed_dof_forces
         return reactions
 
+    def _by_column(self, values: Mapping[int, Components] | None, argument: str) -> dict[int, float]:
+        """Given components by column of the operator."""
+        columns = {}
+        for node, components in (values or {}).items():
+            first = self._column(node, argument)
+            for axis, value in enumerate(_components(components, node, argument)):
+                if value is not None:
+                    columns[first + axis] = value
+        return columns
+
     def _column(self, node: int, argument: str) -> int:
         try:
-            return self._first_column[node]
+            return self._first_column[operator.index(node)]
         except (KeyError, TypeError):
-            raise BodyError(f"{argument}: node {node!r} is not touchable") from None
+            raise BodyError(f"{argument}: node {node} is not touchable") from None
 
-    def _released_node(self, node: int) -> int:
-        if 3 * node not in self._fixed and 3 * node + 1 not in self._fixed and 3 * node + 2 not in self._fixed:
+    def _is_fixed(self, column: int) -> bool:
+        return 3 * int(self.touchable_nodes[column // 3]) + column % 3 in self._fixed
+
+    def _released_columns(self, node: int) -> list[int]:
+        """Columns of the fixed components of a node whose support is taken away."""
+        if not isinstance(node, (int, np.integer)) or not np.isin(node, self.fixed_nodes):
             raise BodyError(f"release: node {node} is not fixed")
-        if node not in self._surface_rank:
+        if int(node) not in self._surface_rank:
             raise BodyError(f"release: fixed node {node} lies inside the body; only surface nodes can be released")
-        return int(node)
+        first = self._column(node, "release")
+        return [column for column in range(first, first + 3) if self._is_fixed(column)]
 
 
 def precompute(
@@ -248,7 +260,7 @@ def precompute(
     Parameters
     ----------
     body
-        A supported body.
+        A supported body, with its loads.
     precision
         Stored number format, ``"f32"`` or ``"f64"``; arithmetic is always double.
     touch
@@ -295,11 +307,14 @@ def problem_arrays(body: Body, touch: Sequence[int] | np.ndarray | None) -> tupl
         if inside.size:
             raise BodyError(f"touch: node {nodes[inside[0]]} is not on the surface")
     indices = [body.fixed_dofs, surface_nodes, body.mesh.surface_faces, ranks]
-    return (*body._element_arrays(), *(np.ascontiguousarray(i, dtype=np.uint32) for i in indices))
+    loads = body.load_vector().ravel()
+    loads = loads if loads.any() else np.empty(0)
+    return (*body._element_arrays(), *(np.ascontiguousarray(i, dtype=np.uint32) for i in indices), loads)
 
 
 def _describe(body: Body) -> dict[str, Any]:
     materials = body.material if isinstance(body.material, Mapping) else {"all": body.material}
+    total = body.load_vector().sum(axis=0)
     return {
         "nodes": len(body.mesh.nodes),
         "tets": len(body.mesh.tets),
@@ -307,17 +322,20 @@ def _describe(body: Body) -> dict[str, Any]:
         "surface_nodes": len(body.mesh.surface_nodes),
         "fixed_nodes": len(body.fixed_nodes),
         "materials": {str(k): [m.youngs_modulus, m.poissons_ratio, m.density] for k, m in materials.items()},
+        "load_N": total.tolist(),
     }
 
 
 def _difference(green: GreensFunction, body: Body) -> str:
     """First thing in which a store and a body are seen to differ."""
     stored, now = green.description, _describe(body)
-    for name in ("element", "nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
+    for name in ("element", "nodes", "tets", "surface_nodes", "fixed_nodes", "materials", "load_N"):
         if stored.get(name) != now[name]:
             return f"was made for another body ({name.replace('_', ' ')}: {stored.get(name)} there, {now[name]} here)"
     if not np.array_equal(green.fixed_dofs, body.fixed_dofs):
         return "was made for another body (other nodes are fixed)"
+    if not np.array_equal(green._core.loads, problem_arrays(body, None)[-1]):
+        return "was made for another body (other loads)"
     return "was made for another body (node positions or elements differ)"
 
 

@@ -13,8 +13,8 @@ from palpate.green import problem_arrays
 class Interior:
     """Finite element solution inside a body whose surface displacements are known.
 
-    No load acts inside, so ``K_II u_I = -K_IS u_S`` for any contact and any supports on the surface. One sparse solve,
-    milliseconds: for frames, not for the force loop.
+    ``K_II u_I = F_I - K_IS u_S`` for any contact and any supports on the surface; ``F`` are the body's own loads. One
+    sparse solve, milliseconds: for frames, not for the force loop.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ PRESSURE_UNITS = {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "ps
 DENSITY_UNITS = {"kg/m3": 1.0, "kg/m^3": 1.0, "g/cm3": 1e3, "g/cm^3": 1e3}
 STIFFNESS_UNITS = {"N/m": 1.0, "N/mm": 1e3}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
+ACCELERATION_UNITS = {"m/s2": 1.0, "m/s^2": 1.0}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
@@ -61,6 +62,11 @@ def stiffness(value: str | float) -> float:
 def force(value: str | float) -> float:
     """Force in N."""
     return quantity(value, FORCE_UNITS, "force")
+
+
+def acceleration(value: str | float) -> float:
+    """Acceleration in m/s^2."""
+    return quantity(value, ACCELERATION_UNITS, "acceleration")
 
 
 def time(value: str | float) -> float:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 
 import palpate
 from palpate.mesh import TetMesh
@@ -100,6 +101,21 @@ def skfem_mass(body: palpate.Body, points: int = 3):
     basis, order = skfem_basis(body.mesh, points)
     form = skfem.BilinearForm(lambda u, v, w: density[:, None] * dot(u, v))
     return form.assemble(basis).tocsc()[order][:, order]
+
+
+def direct_solve(body, prescribed: dict[int, float], loads: np.ndarray):
+    """Displacements and K u of all dofs, by SciPy on scikit-fem's matrix."""
+    K = skfem_stiffness(body)
+    dofs = np.array(sorted(prescribed))
+    free = np.setdiff1d(np.arange(K.shape[0]), dofs)
+    u = np.zeros(K.shape[0])
+    u[dofs] = [prescribed[d] for d in dofs]
+    u[free] = scipy.sparse.linalg.spsolve(K[free][:, free], loads[free] - K[free][:, dofs] @ u[dofs])
+    return u.reshape(-1, 3), (K @ u).reshape(-1, 3)
+
+
+def relative(a, b):
+    return np.abs(a - b).max() / np.abs(b).max()
 
 
 @pytest.fixture(autouse=True)

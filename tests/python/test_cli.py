@@ -186,3 +186,18 @@ def test_bench_of_the_paper(tmp_path):
     rows = rows["rows"] if isinstance(rows, dict) else rows
     assert [row["model"] for row in rows] == ["doll", "kidney", "liver"]
     assert all(row["difference"] < 1e-5 for row in rows)
+
+
+def test_precompute_with_gravity_and_a_locking_material(ball, tmp_path):
+    """A sagging store says what it carries; locking is warned of in one line."""
+    options = ("--unit", "mm", "--fix", "z < -2cm", "--nu", "0.48", "--density", "1.2g/cm3", "--gravity", "0,0,-9.81")
+    result = run("precompute", "ball.stl", *options, "-o", "ball.palpate", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, lines
+    assert "warning: volumetric locking: 4-node tetrahedra" in lines[0]
+    green = palpate.GreensFunction.load(tmp_path / "ball.palpate")
+    assert green.free_displacements[:, 2].min() < -1e-4
+    weight = 1200 * 9.81 * 4 / 3 * np.pi * 0.04**3
+    assert green.description["load_N"][2] == pytest.approx(-weight, rel=0.03)
+    refused(run("precompute", "ball.stl", "--fix", "z<0", "--gravity", "0,1", cwd=tmp_path), "gravity", "three numbers")

@@ -183,3 +183,57 @@ def test_open_surface_is_repaired_on_request(tmp_path):
     with pytest.warns(palpate.MeshWarning, match="rebuilt"):
         mesh = palpate.tetrahedralize(ball, 0.012, "mm", repair=True)
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.04**3, rel=0.03)
+
+
+def test_regions_by_shape_follow_the_centroids():
+    mesh = box_mesh(cells=(8, 6, 6))
+    c = mesh.nodes[mesh.tets].mean(axis=1)
+    marked = mesh.with_regions(
+        {
+            5: palpate.shapes.HalfSpace((0, 0, 0.02), (0, 0, 2)),
+            "bar": [palpate.shapes.Cylinder((0, 0.02, 0.03), (0.05, 0.02, 0.03), 0.01)],
+            3: lambda p: p[:, 0] > 0.07,
+            "nodule": palpate.shapes.Sphere((0.02, 0.02, 0.03), 0.01),
+        }
+    )
+    bar = (c[:, 0] <= 0.05) & (np.hypot(c[:, 1] - 0.02, c[:, 2] - 0.03) <= 0.01)
+    expected = np.where(c[:, 2] <= 0.02, 5, 0)
+    expected[bar] = 6
+    expected[c[:, 0] > 0.07] = 3
+    expected[np.linalg.norm(c - [0.02, 0.02, 0.03], axis=1) <= 0.01] = 7
+    assert marked.region_names == {"bar": 6, "nodule": 7}
+    assert np.array_equal(marked.regions, expected)
+    assert set(expected) == {0, 3, 5, 6, 7}
+    assert (mesh.regions == 0).all()
+
+
+def test_regions_by_name_from_gmsh(tmp_path):
+    mesh = box_mesh().with_regions({"skin": palpate.shapes.Box((-1, -1, 0.03), (1, 1, 1)), 4: lambda p: p[:, 0] > 0.06})
+    mesh.write(tmp_path / "named.msh")
+    read = palpate.TetMesh.read(tmp_path / "named.msh")
+    assert read.region_names == {"skin": 5}
+    assert np.array_equal(read.regions, mesh.regions)
+    soft, stiff = palpate.Material(1e3, 0.3), palpate.Material(9e3, 0.3)
+    body = palpate.Body(read, material={0: soft, "skin": stiff, 4: soft})
+    assert np.array_equal(body._material_rows[:, 0], np.where(mesh.regions == 5, 9e3, 1e3))
+    with pytest.raises(palpate.BodyError, match="no region called 'sikn'; it has skin"):
+        palpate.Body(read, material={0: soft, "sikn": stiff, 4: soft})
+    with pytest.raises(palpate.BodyError, match="region skin of the mesh has no material; given are 0, 4"):
+        palpate.Body(read, material={0: soft, 4: soft})
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda s: s.Sphere((0, 0), 1), "the centre of a sphere needs three finite numbers"),
+        (lambda s: s.Sphere((0, 0, 0), 0), "the radius of a sphere must be positive"),
+        (lambda s: s.Box((0, 0, 0), (1, 0, 1)), "from its low to its high corner"),
+        (lambda s: s.Cylinder((0, 0, 1), (0, 0, 1), 1), "must have a length"),
+        (lambda s: s.HalfSpace((0, 0, 1), (0, 0, 0)), "must have a direction"),
+        (lambda s: box_mesh().with_regions({2: s.Sphere((9, 9, 9), 1)}), "region 2: no element has its centroid"),
+        (lambda s: box_mesh().with_regions({2: lambda p: p}), "region 2: .* must return a boolean mask"),
+    ],
+)
+def test_bad_shapes_are_refused(make, message):
+    with pytest.raises(palpate.MeshError, match=message):
+        make(palpate.shapes)

@@ -4,28 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse.linalg
-from conftest import box_mesh, skfem_stiffness
+from conftest import box_mesh, direct_solve, relative, skfem_stiffness
 
 import palpate
 from palpate.interior import Interior
 
 RNG = np.random.default_rng(7)
-
-
-def direct_solve(body, prescribed: dict[int, float], loads: np.ndarray):
-    """Displacements and K u of all dofs, by SciPy on scikit-fem's matrix."""
-    K = skfem_stiffness(body)
-    dofs = np.array(sorted(prescribed))
-    free = np.setdiff1d(np.arange(K.shape[0]), dofs)
-    u = np.zeros(K.shape[0])
-    u[dofs] = [prescribed[d] for d in dofs]
-    u[free] = scipy.sparse.linalg.spsolve(K[free][:, free], loads[free] - K[free][:, dofs] @ u[dofs])
-    return u.reshape(-1, 3), (K @ u).reshape(-1, 3)
-
-
-def relative(a, b):
-    return np.abs(a - b).max() / np.abs(b).max()
 
 
 def test_stiffness_equals_scikit_fem(block):
@@ -196,6 +180,12 @@ def test_patch_touch_moves_its_weighted_mean_and_converges_to_the_point(block, b
         ({"displacements": {10**6: (0, 0, 0)}}, "node 1000000 is not touchable"),
         ({"displacements": {0: (0, 0)}}, "node 0 needs three numbers, got 2"),
         ({"forces": {0: (0, np.nan, 0)}}, "node 0 has a number that is not finite"),
+        ({"forces": {0: "abc"}}, "forces: node 0 needs three numbers"),
+        ({"displacements": {0.5: (0, 0, 0)}}, "node 0.5 is not touchable"),
+        ({"release": [10**6]}, "release: node 1000000 is not fixed"),
+        ({"release": ["a"]}, "release: node a is not fixed"),
+        ({"displacements": {79: (0, 0, 1e-3)}, "forces": {79: (0, 0, 1)}}, "node 79 has both .* along z"),
+        ({"displacements": {0: (0, 0, 1e-3)}, "forces": {0: (0, 0, 1)}, "release": [0]}, "node 0 has both .* along z"),
     ],
 )
 def test_bad_boundary_changes_are_refused_by_name(block_green, arguments, message):
@@ -203,10 +193,41 @@ def test_bad_boundary_changes_are_refused_by_name(block_green, arguments, messag
         block_green.solve(**arguments)
 
 
-def test_interior_release_and_free_release_are_refused(block, block_green):
+def test_interior_release_and_free_release_are_refused(block, block_green, tmp_path):
     free = int(np.setdiff1d(block.mesh.surface_nodes, block.fixed_nodes)[0])
     with pytest.raises(palpate.Error, match="not fixed"):
         block_green.solve(release=[free])
+    inside = int(np.setdiff1d(np.arange(len(block.mesh.nodes)), block.mesh.surface_nodes)[0])
+    body = palpate.Body(block.mesh, material=block.material, fixed=[inside, *block.fixed_nodes.tolist()])
+    touch = np.setdiff1d(block.mesh.surface_nodes, block.fixed_nodes[:1])
+    green = palpate.precompute(body, touch=touch, path=tmp_path / "inside.palpate")
+    with pytest.raises(palpate.BodyError, match=f"fixed node {inside} lies inside"):
+        green.solve(release=[inside])
+    with pytest.raises(palpate.BodyError, match="release: node 0 is not touchable"):
+        green.solve(release=block.fixed_nodes[:1])
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_releases_that_leave_the_body_floating_are_refused(block, tmp_path, precision):
+    """Two held nodes leave a hinge, three do not; a prescribed displacement serves as a support."""
+    green = palpate.precompute(block, precision=precision, path=tmp_path / "block.palpate")
+    held = block.fixed_nodes[[0, 3, 12]].tolist()
+    push = {79: (0.0, 0.0, 0.01)}
+    for kept in range(3):
+        gone = [n for n in block.fixed_nodes.tolist() if n not in held[:kept]]
+        with pytest.raises(palpate.BodyError, match="leave the body, or a part of it, free to move"):
+            green.solve(forces=push, release=gone)
+    gone = [n for n in block.fixed_nodes.tolist() if n not in held]
+    answer = green.solve(forces=push, release=gone)
+    prescribed = {3 * n + k: 0.0 for n in held for k in range(3)}
+    loads = np.zeros(3 * len(block.mesh.nodes))
+    loads[3 * 79 + 2] = 0.01
+    u, f = direct_solve(block, prescribed, loads)
+    bound = 1e-9 if precision == "f64" else 1e-3
+    assert relative(answer.displacements, u[block.mesh.surface_nodes]) <= bound
+    assert relative(answer.reactions, f[block.fixed_nodes]) <= bound
+    everything = green.solve(displacements={n: (0, 0, 0) for n in (79, 78, 64)}, release=block.fixed_nodes)
+    assert np.abs(everything.displacements).max() <= 1e-12
 
 
 @pytest.mark.parametrize(
@@ -238,6 +259,12 @@ def test_unattached_part_is_named():
 def test_impossible_materials_are_refused(e, nu):
     with pytest.raises(palpate.Error):
         palpate.Material(e, nu)
+
+
+def test_locking_is_warned_of(block):
+    with pytest.warns(palpate.LockingWarning, match=r"volumetric locking: 4-node .* ratio 0.46, above 0.45; 10-node"):
+        palpate.Body(block.mesh, material=palpate.Material(1e4, 0.46))
+    assert issubclass(palpate.LockingWarning, palpate.PalpateWarning)
 
 
 def test_interior_displacements_equal_a_direct_solve(block, block_green):

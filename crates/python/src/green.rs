@@ -23,7 +23,8 @@ pub struct GreenCore {
     pub(crate) green: Arc<GreensFunction>,
 }
 
-/// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_faces, touch)`.
+/// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_faces, touch, loads)`;
+/// `loads` (3n) in N, empty for none.
 fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
     type Arguments<'py> = (
         PyReadonlyArray2<'py, f64>,
@@ -33,8 +34,9 @@ fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
         PyReadonlyArray1<'py, u32>,
         PyReadonlyArray2<'py, u32>,
         PyReadonlyArray1<'py, u32>,
+        PyReadonlyArray1<'py, f64>,
     );
-    let (nodes, tets, material, fixed, surface_nodes, faces, touch): Arguments<'_> = arguments.extract()?;
+    let (nodes, tets, material, fixed, surface_nodes, faces, touch, loads): Arguments<'_> = arguments.extract()?;
     let build = || -> Result<Problem> {
         let mesh = TetMesh::new(vectors(&nodes)?, body::tets(&tets)?)?;
         let materials = materials(&material, mesh.tets.len())?;
@@ -46,6 +48,7 @@ fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
             surface_nodes: indices(&surface_nodes),
             surface_faces: body::faces(&faces)?,
             touch: indices(&touch),
+            loads: loads.as_array().to_vec(),
         })
     };
     build().map_err(|e| to_python(arguments.py(), e))
@@ -189,6 +192,18 @@ impl GreenCore {
     #[getter]
     fn fixed_dofs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         self.green.fixed_dofs.clone().into_pyarray(py)
+    }
+
+    /// Reference loads on all dofs (3n), N; empty for none.
+    #[getter]
+    fn loads<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.green.loads.clone().into_pyarray(py)
+    }
+
+    /// Displacements (3s) under the reference loads alone, m.
+    #[getter]
+    fn free_displacements<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.green.free_displacements().into_pyarray(py)
     }
 
     /// Stored number format.

@@ -85,6 +85,7 @@ fn cube(n: u32) -> Problem {
         materials: vec![Isotropic::new(10e3, 0.4, 1000.0).expect("a valid material"); elements],
         supports: Supports::new(dofs, fixed).expect("valid supports"),
         touch: (0..surface_nodes.len() as u32).collect(),
+        loads: Vec::new(),
         surface_nodes,
         surface_faces: triangles.into(),
     }
@@ -122,6 +123,7 @@ fn raised(linear: Problem) -> Problem {
         mesh: TetMesh::new(nodes, tets).expect("a valid mesh"),
         materials: linear.materials,
         touch: (0..surface_nodes.len() as u32).collect(),
+        loads: Vec::new(),
         surface_nodes,
         surface_faces: faces.into(),
     }

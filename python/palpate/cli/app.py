@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from palpate.body import Body
+    from palpate.body import Body, Material
+    from palpate.loads import Loads
     from palpate.mesh import TetMesh
 
 app = typer.Typer(
@@ -79,6 +80,8 @@ def precompute(
     fix: Annotated[str, typer.Option(help="Supported nodes, such as 'z < 0.01' or 'z < min + 5mm'.")],
     youngs_modulus: Annotated[str, typer.Option("-E", help="Young's modulus, such as 10kPa.")] = "10kPa",
     poissons_ratio: Annotated[float, typer.Option("--nu", help="Poisson's ratio, below 0.5.")] = 0.45,
+    density: Annotated[str, typer.Option(help="Density, for its weight, such as 1000kg/m3.")] = "1000kg/m3",
+    gravity: Annotated[str | None, typer.Option(help="Let it sag under gravity, m/s^2, such as 0,0,-9.81.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
     unit: Unit = "m",
     precision: Annotated[str, typer.Option(help="Stored number format: f32 or f64.")] = "f32",
@@ -90,12 +93,13 @@ def precompute(
     Example: palpate precompute liver.vtu --fix "z < min + 5mm" -E 10kPa --nu 0.45 -o liver.palpate
     """
     import palpate
+    from palpate import units
     from palpate.predicate import parse
-    from palpate.units import pressure
 
+    material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
+    loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
     made = _read_any(mesh, unit)
-    made = made.to_quadratic() if quadratic else made
-    body = _body(made, pressure(youngs_modulus), poissons_ratio, fix)
+    body = _body(made.to_quadratic() if quadratic else made, material, fix, loads)
     region = None
     if touch is not None:
         surface = body.mesh.surface_nodes
@@ -153,8 +157,9 @@ def info(
         scene = palpate.Scene.read(file)
         print(f"{file}: scene of {scene.name}")
         for table, entries in scene.model_dump(exclude_none=True).items():
-            for name, value in entries.items():
-                print(f"  {table}.{name} = {value}")
+            for entry in entries if isinstance(entries, list) else [entries]:
+                for name, value in entry.items():
+                    print(f"  {table}.{name} = {value}")
         print("  lengths in m, pressures in Pa, forces in N, times in s")
         return
     made = palpate.TetMesh.read(file, unit)
@@ -206,7 +211,7 @@ def _read_any(path: Path, unit: str) -> TetMesh:
     return tetrahedralize(path, None, unit) if path.suffix.lower() in SURFACE_ENDINGS else TetMesh.read(path, unit)
 
 
-def _body(mesh: TetMesh, youngs_modulus: float, poissons_ratio: float, fix: str) -> Body:
+def _body(mesh: TetMesh, material: Material, fix: str, loads: Loads | None) -> Body:
     import palpate
     from palpate.predicate import parse
 
@@ -214,7 +219,7 @@ def _body(mesh: TetMesh, youngs_modulus: float, poissons_ratio: float, fix: str)
     if not mask.any():
         low, high = mesh.bounds.round(4).tolist()
         raise palpate.BodyError(f"no node satisfies --fix '{fix}': the body reaches from {low} to {high} m")
-    return palpate.Body(mesh, material=palpate.Material(youngs_modulus, poissons_ratio), fixed=mask)
+    return palpate.Body(mesh, material=material, fixed=mask, loads=loads)
 
 
 def _mesh_line(mesh: TetMesh) -> str:

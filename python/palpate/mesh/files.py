@@ -40,18 +40,21 @@ FACE_FROM_NETGEN = {3: [0, 1, 2], 6: [0, 1, 2, 5, 3, 4]}
 REGION_NAMES = ("region", "gmsh:physical", "medit:ref")
 
 
-def read_volume(path: Path, unit: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes (n, 3) in m, tetrahedra (m, 4) or (m, 10) and regions (m,) of a file."""
+Volume = tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, int]]
+
+
+def read_volume(path: Path, unit: str) -> Volume:
+    """Nodes (n, 3) in m, tetrahedra (m, 4) or (m, 10), regions (m,) of a file, and their numbers by name."""
     scale = length_scale(unit)
     if not path.is_file():
         raise MeshError(f"{path}: no such file")
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the file is empty")
     if path.suffix == ".vol":
-        nodes, tets, regions = _read_netgen(path)
+        nodes, tets, regions, names = _read_netgen(path)
     else:
-        nodes, tets, regions = _tetrahedra(path, _read_meshio(path))
-    return nodes * scale, tets, regions
+        nodes, tets, regions, names = _tetrahedra(path, _read_meshio(path))
+    return nodes * scale, tets, regions, names
 
 
 def _read_meshio(path: Path) -> meshio.Mesh:
@@ -71,7 +74,7 @@ def _read_meshio(path: Path) -> meshio.Mesh:
         raise MeshError(f"{path}: cannot be read as a {path.suffix} file ({reason})") from None
 
 
-def _tetrahedra(path: Path, mesh: meshio.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _tetrahedra(path: Path, mesh: meshio.Mesh) -> Volume:
     blocks = [i for i, cells in enumerate(mesh.cells) if cells.type in {"tetra", "tetra10"}]
     if not blocks:
         found = ", ".join(sorted({cells.type for cells in mesh.cells})) or "nothing"
@@ -88,10 +91,13 @@ def _tetrahedra(path: Path, mesh: meshio.Mesh) -> tuple[np.ndarray, np.ndarray, 
     named = [name for name in REGION_NAMES if name in candidates]
     chosen = named[0] if named else next(iter(candidates)) if len(candidates) == 1 else None
     regions = np.zeros(len(tets), dtype=np.int64) if chosen is None else candidates[chosen].astype(np.int64)
-    return np.asarray(mesh.points, dtype=np.float64)[:, :3], tets, regions
+    # Gmsh's physical names: the number of the group and its dimension.
+    numbers = {name: np.asarray(value).ravel() for name, value in mesh.field_data.items()}
+    names = {name: int(v[0]) for name, v in numbers.items() if chosen == "gmsh:physical" and len(v) == 2 and v[1] == 3}
+    return np.asarray(mesh.points, dtype=np.float64)[:, :3], tets, regions, names
 
 
-def _read_netgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _read_netgen(path: Path) -> Volume:
     """Read the ``points`` and ``volumeelements`` sections of a Netgen mesh (1-based, negatively oriented)."""
     lines = path.read_text(errors="replace").splitlines()
     heads = {line.strip(): i for i, line in enumerate(lines) if line.strip() in {"points", "volumeelements"}}
@@ -108,7 +114,7 @@ def _read_netgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         regions = np.array([int(e[0]) for e in elements])
     except (ValueError, IndexError) as error:
         raise MeshError(f"{path}: damaged Netgen mesh ({error})") from None
-    return nodes.reshape(-1, 3), tets[:, FROM_NETGEN[count]], regions
+    return nodes.reshape(-1, 3), tets[:, FROM_NETGEN[count]], regions, {}
 
 
 def _section(lines: list[str], head: int) -> list[list[str]]:
@@ -135,7 +141,9 @@ def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
     if path.suffix in {".inp", ".vol"}:
         data = {}
     points = mesh.nodes / length_scale(unit)
-    content = meshio.Mesh(points, [("tetra10" if mesh.is_quadratic else "tetra", mesh.tets)], cell_data=data)
+    names = {name: np.array([number, 3]) for name, number in mesh.region_names.items()} if path.suffix == ".msh" else {}
+    cells = [("tetra10" if mesh.is_quadratic else "tetra", mesh.tets)]
+    content = meshio.Mesh(points, cells, cell_data=data, field_data=names)
     if path.suffix == ".vol":
         _replace(path, lambda partial: _write_netgen(partial, points, mesh))
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 from palpate import _native
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.elements import EDGES, FACES, MIRRORED, drawing_triangles, unique_edges
+from palpate.shapes import Shape, elements_inside
 
 # An element flatter than this part of the cube of its longest edge has no usable shape functions.
 DEGENERATE = 1e-12
@@ -34,6 +36,8 @@ class TetMesh:
         :class:`palpate.MeshWarning`, the others keep their order.
     regions
         (m,) integer label of each element; zeros if None.
+    region_names
+        Labels by the names that users gave their regions.
 
     Raises
     ------
@@ -44,7 +48,13 @@ class TetMesh:
 
     """
 
-    def __init__(self, nodes: np.ndarray, tets: np.ndarray, regions: np.ndarray | None = None):
+    def __init__(
+        self,
+        nodes: np.ndarray,
+        tets: np.ndarray,
+        regions: np.ndarray | None = None,
+        region_names: Mapping[str, int] | None = None,
+    ):
         nodes = np.array(nodes, dtype=np.float64, order="C", copy=True)
         tets = _index_array(tets)
         if nodes.ndim != 2 or nodes.shape[1] != 3:
@@ -57,6 +67,7 @@ class TetMesh:
         self.nodes = nodes
         self.tets = _orient(nodes, tets)
         self.regions = regions
+        self.region_names = dict(region_names or {})
         for array in (self.nodes, self.tets, self.regions):
             array.setflags(write=False)
 
@@ -141,7 +152,8 @@ class TetMesh:
 
         Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood; 10-node
         tetrahedra in all but TetGen's and Medit's. Node order is the file's. Regions come from cell data ``region``,
-        ``gmsh:physical`` or ``medit:ref``, else from the only integer cell array.
+        ``gmsh:physical`` or ``medit:ref``, else from the only integer cell array; their names from Gmsh's physical
+        names.
 
         Raises
         ------
@@ -152,6 +164,35 @@ class TetMesh:
         from palpate.mesh.files import read_volume
 
         return cls(*read_volume(Path(path), unit))
+
+    def with_regions(self, placed: Mapping[int | str, Shape | Iterable[Shape]]) -> TetMesh:
+        """Return the same mesh with solids marked as regions, later ones over earlier ones.
+
+        Parameters
+        ----------
+        placed
+            For each region, a number or a name, the solid or solids of :mod:`palpate.shapes` (or functions of (m, 3)
+            positions) that make it up. An element belongs to a solid if its centroid does. A name that is new takes the
+            lowest number above all others.
+
+        Raises
+        ------
+        MeshError
+            A solid that holds no element: it lies outside, or the elements there are too large.
+
+        """
+        regions, names = self.regions.copy(), dict(self.region_names)
+        for region, solids in placed.items():
+            number = region
+            if isinstance(region, str):
+                taken = [*regions.tolist(), *names.values(), *(r for r in placed if not isinstance(r, str))]
+                number = names.setdefault(region, max(taken) + 1)
+            for solid in [solids] if callable(solids) else solids:
+                try:
+                    regions[elements_inside(solid, self.nodes, self.tets)] = number
+                except MeshError as error:
+                    raise MeshError(f"region {region}: {error}") from None
+        return TetMesh(self.nodes, self.tets, regions, names)
 
     def write(self, path: str | os.PathLike[str], unit: str = "m") -> None:
         """Write the mesh and its regions in the format of the file's ending; replaced only when complete."""

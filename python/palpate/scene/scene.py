@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
 
-from palpate import models, units
-from palpate.body import Body, Material
+from palpate import models
+from palpate.body import Body
 from palpate.errors import Error, SceneError
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
 from palpate.predicate import parse
+from palpate.scene.loads import LoadTable, together
+from palpate.scene.regions import MaterialTable, RegionTable
+from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -29,29 +33,16 @@ else:
     import tomli as tomllib
 
 
-def _quantity(read: Callable[[Any], float]) -> BeforeValidator:
-    def convert(value: Any) -> float:
-        try:
-            return read(value)
-        except Error as error:
-            raise ValueError(str(error)) from None
-
-    return BeforeValidator(convert)
+# What pydantic adds to the place of a mistake in a value that may be of several kinds.
+UNION_MEMBERS = {"str", "int", "list[int]"}
 
 
-Length = Annotated[float, _quantity(units.length), Field(gt=0, allow_inf_nan=False)]
-Radius = Annotated[float, _quantity(units.length), Field(ge=0, allow_inf_nan=False)]
-Pressure = Annotated[float, _quantity(units.pressure), Field(gt=0, allow_inf_nan=False)]
-Density = Annotated[float, _quantity(units.density), Field(ge=0, allow_inf_nan=False)]
-Force = Annotated[float, _quantity(units.force), Field(gt=0, allow_inf_nan=False)]
-Stiffness = Annotated[float, _quantity(units.stiffness), Field(gt=0, allow_inf_nan=False)]
-Time = Annotated[float, _quantity(units.time), Field(ge=0, allow_inf_nan=False)]
+class RefineTable(Table):
+    """A ball of finer elements in a mesh made from a surface."""
 
-
-class Table(BaseModel):
-    """A table of the file: unknown keys are mistakes."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    center: Point
+    radius: Length
+    size: Length
 
 
 class BodyTable(Table):
@@ -68,6 +59,7 @@ class BodyTable(Table):
     unit: str = "m"
     max_element_size: Length | None = None
     element: Literal["linear", "quadratic"] | None = None
+    refine: list[RefineTable] = Field(default_factory=list)
     precision: str = Field("f32", pattern="^f(32|64)$")
 
     @model_validator(mode="after")
@@ -77,14 +69,6 @@ class BodyTable(Table):
         if self.model is not None and self.model not in models.NAMES:
             raise ValueError(f"unknown model '{self.model}'; there are {', '.join(models.NAMES)}")
         return self
-
-
-class MaterialTable(Table):
-    """Isotropic material of the whole body."""
-
-    youngs_modulus: Pressure = 10e3
-    poissons_ratio: float = Field(0.45, gt=-1, lt=0.5)
-    density: Density = 1000.0
 
 
 class SupportsTable(Table):
@@ -122,11 +106,14 @@ class Scene(Table):
     body: BodyTable
     supports: SupportsTable = SupportsTable()
     material: MaterialTable = MaterialTable()
+    region: list[RegionTable] = Field(default_factory=list)
+    loads: list[LoadTable] = Field(default_factory=list)
     tool: ToolTable = ToolTable()
     device: DeviceTable = DeviceTable()
     view: ViewTable = ViewTable()
 
     _folder: Path = PrivateAttr(default_factory=Path)
+    _source: tuple[Path, str] | None = PrivateAttr(None)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Scene:
@@ -151,9 +138,10 @@ class Scene(Table):
         if scene.body.mesh is not None and scene.supports.fixed is None:
             line = _line_of(text, ["supports"])
             raise SceneError(f"{path}{f':{line}' if line else ''}: the key 'supports.fixed' is missing")
-        if scene.body.store is not None and (scene.supports.fixed is not None or "material" in scene.model_fields_set):
-            raise SceneError(f"{path}: a store carries its own material and supports: leave those tables out")
-        scene._folder = path.parent
+        own = {"material", "region", "loads"} & scene.model_fields_set
+        if scene.body.store is not None and (scene.supports.fixed is not None or own):
+            raise SceneError(f"{path}: a store carries its own material, supports and loads: leave those tables out")
+        scene._folder, scene._source = path.parent, (path, text)
         return scene
 
     @classmethod
@@ -183,16 +171,35 @@ class Scene(Table):
             raise SceneError(f"{self.body.mesh} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
         if self.body.element == "quadratic":
             mesh = mesh.to_quadratic()
-        m = self.material
-        body = Body(mesh, material=Material(m.youngs_modulus, m.poissons_ratio, m.density), fixed=self._fixed(mesh))
+        labels, materials = np.zeros(len(mesh.tets), dtype=np.int64), {0: self.material.material()}
+        for rank, region in enumerate(self.region):
+            with self._blaming("region", rank):
+                labels[region.elements(mesh)] = rank + 1
+                materials[rank + 1] = region.material(self.material)
+        mesh = TetMesh(mesh.nodes, mesh.tets, labels)
+        body = Body(mesh, material=materials, fixed=self._fixed(mesh), loads=together(self.loads))
+        for rank, load in enumerate(self.loads):
+            with self._blaming("loads", rank):
+                load.check(body)
         return BuiltScene(self, body, precompute(body, precision=self.body.precision, progress=progress))
+
+    @contextlib.contextmanager
+    def _blaming(self, table: str, rank: int) -> Iterator[None]:
+        """Name the line of an entry of an array of tables in an error of the body."""
+        try:
+            yield
+        except Error as error:
+            path, text = self._source or (Path(self.name), "")
+            line = _line_of(text, [table, rank])
+            raise SceneError(f"{path}{f':{line}' if line else ''}: {table}: {error}") from None
 
     def _mesh(self) -> TetMesh:
         if self.body.model is not None:
             return models.load(self.body.model, paper=self.body.paper)
         source = self._folder / str(self.body.mesh)
         if source.suffix.lower() in SURFACE_ENDINGS:
-            return tetrahedralize(source, self.body.max_element_size, self.body.unit)
+            finer = [(ball.center, ball.radius, ball.size) for ball in self.body.refine]
+            return tetrahedralize(source, self.body.max_element_size, self.body.unit, finer)
         return TetMesh.read(source, self.body.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:
@@ -228,18 +235,19 @@ class BuiltScene:
 def _explain(path: Path, text: str, error: ValidationError) -> str:
     """First mistake of the file, with its line and the nearest known key."""
     first = error.errors()[0]
-    keys = [str(k) for k in first["loc"] if isinstance(k, str) and k not in {"str", "list[int]"}]
+    place = [k for k in first["loc"] if isinstance(k, int) or k not in UNION_MEMBERS]
+    keys = [k for k in place if isinstance(k, str)]
     where = ".".join(keys)
-    line = _line_of(text, keys)
+    line = _line_of(text, place)
     at = f"{path}:{line}" if line else str(path)
     if first["type"] == "extra_forbidden":
         known = _known_keys(keys[:-1])
         near = difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
         return f"{at}: unknown key '{where}'; {hint}"
+    if first["type"] == "missing" and isinstance(place[-1], int):
+        return f"{at}: {where} has too few entries"
     if first["type"] == "missing":
-        if isinstance(first["loc"][-1], int):
-            return f"{at}: {where}: a value is missing after the first {first['loc'][-1]}"
         return f"{at}: the key '{where}' is missing"
     message = first["msg"].removeprefix("Value error, ")
     return f"{at}: {where}: {message}" + ("" if first["type"] == "value_error" else f", got {first['input']!r}")
@@ -249,21 +257,26 @@ def _known_keys(parents: list[str]) -> list[str]:
     model: type[BaseModel] = Scene
     for key in parents:
         annotation = model.model_fields[key].annotation
+        # An array of tables is a list of its entries' model.
+        annotation = next(iter(get_args(annotation)), annotation)
         assert isinstance(annotation, type)
         model = annotation
     return list(model.model_fields)
 
 
-def _line_of(text: str, keys: list[str]) -> int | None:
-    """Line of ``[table]`` followed by ``key =``, the deepest of them that is there."""
-    table, found = "", None
+def _line_of(text: str, place: Sequence[str | int]) -> int | None:
+    """Line of ``[table]`` or the entry of ``[[table]]``, followed by ``key =``; the deepest of them that is there."""
+    keys = [k for k in place if isinstance(k, str)]
+    entry = place[1] if len(place) > 1 and isinstance(place[1], int) else 0
+    table, seen, found = "", -1, None
     for number, line in enumerate(text.splitlines(), 1):
-        head = re.match(r"\s*\[\s*([\w.-]+)\s*\]", line)
+        head = re.match(r"\s*\[\[?\s*([\w.-]+)\s*\]", line)
         if head:
             table = head[1]
-            found = number if keys[:1] == [table] else found
+            seen += table == keys[0]
+            found = number if table == keys[0] and seen == entry else found
             continue
-        entry = re.match(r"\s*([\w.-]+)\s*=", line)
-        if entry and f"{table}.{entry[1]}".strip(".") == ".".join(keys):
+        pair = re.match(r"\s*([\w.-]+)\s*=", line)
+        if pair and f"{table}.{pair[1]}".strip(".") == ".".join(keys) and (seen == entry or not table):
             return number
     return found

@@ -6,13 +6,19 @@
 //! q = Psi_SS^-1 [ vb_S - (Psi vb)_S ],      v = Psi (vb + E q) elsewhere,      v_S = q
 //! ```
 //!
-//! which is equations 3.8-3.10 of Jun, Choi and Cho with `C = -E^T Psi E`, written without the term that cancels on `S`.
+//! Reference loads `F` add their free response: `Psi vb` above becomes `v_free + Psi vb`, a prescribed dof carries `F + q`,
+//! and a released one is pushed by its own share of `F`. Without loads this
+//! is equations 3.8-3.10 of Jun, Choi and Cho with `C = -E^T Psi E`, written without the term that cancels on `S`.
 
-use faer::linalg::solvers::Solve;
+use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
 
 use crate::green::GreensFunction;
 use crate::{Error, Result};
+
+/// Relative error of an entry of `Psi` from its computation, however it is stored: the round-off of a sparse Cholesky solve
+/// at the condition numbers of usual bodies. Larger, and weakly held bodies are refused; smaller, and floating ones pass.
+const COMPUTED_ERROR: f64 = 1e-11;
 
 /// Displacements and forces after a change of boundary conditions.
 pub struct Answer {
@@ -34,7 +40,7 @@ pub struct Answer {
 /// A capacitance matrix that is singular to working precision: too much was released, or the store's precision does not
 /// carry that many neighbouring constraints.
 pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize, f64)]) -> Result<Answer> {
-    let mut response = vec![0.0; green.rows];
+    let mut response = if green.loads.is_empty() { vec![0.0; green.rows] } else { green.free_response.clone() };
     for &(column, value) in known {
         green.add_column(column, value, &mut response);
     }
@@ -49,6 +55,10 @@ pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize,
         let unknown_side = if green.row_is_fixed[row] { &mut forces } else { &mut displacements };
         unknown_side[row] = value;
     }
+    let surface = 3 * green.surface_count();
+    for row in (0..surface).filter(|&row| !green.row_is_fixed[row]) {
+        forces[row] = green.load_on_row(row);
+    }
     for &(column, value) in known {
         let row = green.row_of_column(column);
         let known_side = if green.row_is_fixed[row] { &mut displacements } else { &mut forces };
@@ -56,12 +66,12 @@ pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize,
     }
     for (&(column, value), &q) in switched.iter().zip(&unknown) {
         let row = green.row_of_column(column);
-        let (u, f) = if green.row_is_fixed[row] { (q, value) } else { (value, q) };
+        let load = green.load_on_row(row);
+        let (u, f) = if green.row_is_fixed[row] { (q, value + load) } else { (value, q + load) };
         displacements[row] = u;
         forces[row] = f;
     }
     let reactions = green.fixed_rows.iter().map(|&row| forces[row as usize]).collect();
-    let surface = 3 * green.surface_count();
     displacements.truncate(surface);
     forces.truncate(surface);
     Ok(Answer { displacements, forces, reactions })
@@ -76,17 +86,47 @@ fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response
     let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
     let n = rows.len();
     let capacitance = Mat::from_fn(n, n, |i, j| green.entry(rows[i], switched[j].0));
-    let residual = Mat::from_fn(n, 1, |i, _| switched[i].1 - response[rows[i]]);
-    let symmetric = rows.iter().all(|&row| !green.row_is_fixed[row]);
-    let unknown = match symmetric.then(|| capacitance.llt(Side::Lower)) {
-        Some(Ok(factor)) => factor.solve(&residual),
-        // A matrix that single precision has made slightly indefinite is still well solved by LU.
-        _ => capacitance.partial_piv_lu().solve(&residual),
+    // A released support answers to its share of the reference loads besides the force given.
+    let wanted = |i: usize| switched[i].1 + if green.row_is_fixed[rows[i]] { green.load_on_row(rows[i]) } else { 0.0 };
+    let residual = Mat::from_fn(n, 1, |i, _| wanted(i) - response[rows[i]]);
+    let unknown = if rows.iter().any(|&row| green.row_is_fixed[row]) {
+        solve_released(&capacitance, &residual, green.values.precision().unit_roundoff().max(COMPUTED_ERROR))?
+    } else {
+        match capacitance.llt(Side::Lower) {
+            Ok(factor) => factor.solve(&residual),
+            // A matrix that single precision has made slightly indefinite is still well solved by LU.
+            Err(_) => capacitance.partial_piv_lu().solve(&residual),
+        }
     };
     let unknown: Vec<f64> = (0..n).map(|i| unknown[(i, 0)]).collect();
-    if unknown.iter().all(|q| q.is_finite()) {
-        Ok(unknown)
-    } else {
-        Err(Error::Singular("the changed boundary conditions leave the body free to move".into()))
+    if unknown.iter().all(|q| q.is_finite()) { Ok(unknown) } else { Err(floating()) }
+}
+
+/// Solves with released supports, refusing a body that is left free to move.
+///
+/// Then `Psi_SS` is singular up to the errors of its entries, about `e |Psi_ij|` each, so that
+/// `1 / |Psi_SS^-1|_F <= e |Psi_SS|_F`; a matrix that meets this is refused, whatever made it so, for its solution would be
+/// rounding errors. Rows and columns are first scaled to a unit diagonal: compliances (m/N) and stiffnesses (N/m) meet here.
+fn solve_released(capacitance: &Mat<f64>, residual: &Mat<f64>, entry_error: f64) -> Result<Mat<f64>> {
+    let n = capacitance.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| capacitance[(i, i)].abs().sqrt().recip()).collect();
+    if !scale.iter().all(|s| s.is_finite()) {
+        return Err(floating());
     }
+    let scaled = Mat::from_fn(n, n, |i, j| scale[i] * capacitance[(i, j)] * scale[j]);
+    let inverse = scaled.partial_piv_lu().inverse();
+    let condition = scaled.norm_l2() * inverse.norm_l2();
+    if !condition.is_finite() || condition * entry_error >= 1.0 {
+        return Err(floating());
+    }
+    let unknown = &inverse * Mat::from_fn(n, 1, |i, _| scale[i] * residual[(i, 0)]);
+    Ok(Mat::from_fn(n, 1, |i, _| scale[i] * unknown[(i, 0)]))
+}
+
+fn floating() -> Error {
+    Error::Singular(
+        "the released supports leave the body, or a part of it, free to move; keep supports that hold it, \
+         or prescribe displacements that do"
+            .into(),
+    )
 }

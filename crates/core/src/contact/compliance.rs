@@ -44,8 +44,9 @@ pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
     mean + 2.0 * p * (r.acos() / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3).cos()
 }
 
-/// Presses a patch at `point` by `displacement` (m; `None` leaves a component free). Returns the force on the body (N)
-/// and the displacements of all surface dofs (m, 3s).
+/// Moves a patch at `point` of the unloaded surface to the mean displacement `displacement` (m, from the unloaded shape;
+/// `None` leaves a component free): `f = C^-1 (d - W^T u_free)`. Returns the force on the body (N) and the displacements
+/// of all surface dofs (m, 3s), those of the reference loads included.
 ///
 /// # Errors
 /// A patch with a node outside the touch region, on the support only, or with too many nodes.
@@ -70,11 +71,18 @@ pub fn touch(
         return Err(Error::Invalid(format!("node {node} under the contact is not touchable")));
     }
     let compliance = compliance_block(green, &patch, &patch).unwrap_or(DMat3::ZERO);
-    let force = constrained_force(&compliance, displacement)
+    let mut displacements = green.free_displacements();
+    let sag = patch_mean(&patch, &displacements);
+    let wanted = std::array::from_fn(|k| displacement[k].map(|d| d - sag[k]));
+    let force = constrained_force(&compliance, wanted)
         .ok_or_else(|| Error::Invalid("the contact lies on the support, which does not give".into()))?;
-    let mut displacements = vec![0.0; 3 * green.surface_count()];
     add_patch_response(green, &patch, force, &mut displacements);
     Ok((force, displacements))
+}
+
+/// `W^T u`: the weighted mean displacement of a patch, m.
+fn patch_mean(patch: &Patch, displacements: &[f64]) -> DVec3 {
+    patch.iter().map(|(node, weight)| weight * DVec3::from_slice(&displacements[3 * node..])).sum()
 }
 
 /// Adds `Psi W f` to the surface displacements (3s).

@@ -6,6 +6,7 @@ use faer::Par;
 use rayon::prelude::*;
 
 use super::factor::Factor;
+use super::free_response::free_response;
 use super::key::content_key;
 use super::operator::{GreensFunction, Precision, Values};
 use super::pruned::{Pruned, PrunedScratch};
@@ -18,7 +19,7 @@ const BLOCK: usize = 96;
 /// Columns and rows of a tile when mirroring: both ends of a copy stay in the cache.
 const TILE: usize = 64;
 
-/// The reference problem (paper 3.1): a supported body without loads.
+/// The reference problem (paper 3.1): a supported body, with its own loads if it has any.
 pub struct Problem {
     /// The body.
     pub mesh: TetMesh,
@@ -32,6 +33,8 @@ pub struct Problem {
     pub surface_faces: Faces,
     /// Touchable surface nodes as ascending ranks in `surface_nodes`.
     pub touch: Vec<u32>,
+    /// Reference loads on all dofs, N; empty for none.
+    pub loads: Vec<f64>,
 }
 
 impl Problem {
@@ -54,7 +57,11 @@ impl Problem {
         dofs
     }
 
+    /// The modulus of the whole body if it only scales forces: not under loads, for they do not scale with it.
     fn common_youngs_modulus(&self) -> Option<f64> {
+        if !self.loads.is_empty() {
+            return None;
+        }
         let first = self.materials.first()?.youngs_modulus;
         self.materials.iter().all(|m| m.youngs_modulus == first).then_some(first)
     }
@@ -118,6 +125,7 @@ pub fn precompute(
         .map(|row| row_dofs[row as usize])
         .collect();
     let supports = &problem.supports;
+    let free_response = free_response(&stiffness, &factor, supports, &problem.loads, &row_dofs)?;
     let task = ColumnTask::new(&stiffness, &factor, supports, &row_dofs, &column_dofs)?;
     let row_is_fixed: Vec<bool> = row_dofs.iter().map(|&d| supports.is_fixed(d)).collect();
     let values = match precision {
@@ -141,6 +149,8 @@ pub fn precompute(
         rows: row_dofs.len(),
         row_is_fixed,
         values,
+        loads: problem.loads.clone(),
+        free_response,
         key: problem.key(precision),
         youngs_modulus: problem.common_youngs_modulus(),
         description: String::new(),

@@ -1,6 +1,6 @@
 //! Displacements inside the body from those of its surface, for whoever wants to see or measure there.
 //!
-//! No load acts inside, so the equilibrium of the inner dofs `I` given the surface dofs `S` is `K_II u_I = -K_IS u_S`:
+//! The equilibrium of the inner dofs `I` given the surface dofs `S` and the reference loads is `K_II u_I = F_I - K_IS u_S`:
 //! the finite element solution itself, for any contact and any supports on the surface. It costs one sparse solve with
 //! a factor smaller than that of the body, far too long for the force loop, short enough for a frame.
 
@@ -21,6 +21,8 @@ pub struct Interior {
     coupling: Vec<(u32, f64)>,
     /// Inner dofs that are free, mesh numbering.
     inner: Vec<u32>,
+    /// Reference loads on the inner dofs, N.
+    loads: Vec<f64>,
     factor: Option<Factor>,
     dof_count: usize,
 }
@@ -42,6 +44,7 @@ impl Interior {
             coupling_start: vec![0],
             coupling: Vec::new(),
             inner: Vec::new(),
+            loads: Vec::new(),
             factor: None,
             dof_count,
         };
@@ -56,6 +59,10 @@ impl Interior {
             interior.coupling.extend(stiffness.column(dof as usize).filter(|&(row, _)| is_surface(row)));
             interior.coupling_start.push(interior.coupling.len());
         }
+        interior.loads = match problem.loads.is_empty() {
+            true => vec![0.0; supports.free.len()],
+            false => supports.free.iter().map(|&dof| problem.loads[dof as usize]).collect(),
+        };
         interior.inner = supports.free;
         Ok(interior)
     }
@@ -80,7 +87,11 @@ impl Interior {
         let mut load: Vec<f64> = self
             .coupling_start
             .windows(2)
-            .map(|range| -self.coupling[range[0]..range[1]].iter().map(|&(dof, k)| k * all[dof as usize]).sum::<f64>())
+            .zip(&self.loads)
+            .map(|(range, own)| {
+                let row = &self.coupling[range[0]..range[1]];
+                own - row.iter().map(|&(dof, k)| k * all[dof as usize]).sum::<f64>()
+            })
             .collect();
         let mut memory: MemBuffer = factor.solve_scratch(1);
         let rows = load.len();

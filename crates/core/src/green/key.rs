@@ -5,7 +5,7 @@ use super::{Precision, Problem};
 /// Version of the store's layout; part of the key, so that an old file is recomputed, never misread.
 pub const FORMAT_VERSION: u32 = 2;
 
-/// Hex BLAKE3 hash of mesh, materials, supports, touch region, element, precision and format version.
+/// Hex BLAKE3 hash of mesh, materials, supports, loads, touch region, element, precision and format version.
 pub fn content_key(problem: &Problem, precision: Precision) -> String {
     let element = problem.mesh.tets.element_name();
     let mut hash = blake3::Hasher::new();
@@ -23,5 +23,8 @@ pub fn content_key(problem: &Problem, precision: Precision) -> String {
     section(bytemuck::cast_slice(&problem.supports.fixed));
     section(bytemuck::cast_slice(&problem.surface_nodes));
     section(bytemuck::cast_slice(&problem.touch));
+    if !problem.loads.is_empty() {
+        section(bytemuck::cast_slice(&problem.loads));
+    }
     hash.finalize().to_hex().to_string()
 }

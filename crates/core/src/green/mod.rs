@@ -13,6 +13,7 @@
 
 mod columns;
 mod factor;
+mod free_response;
 mod interior;
 mod key;
 mod operator;

@@ -24,6 +24,14 @@ impl Precision {
         }
     }
 
+    /// Largest relative error of rounding a stored number.
+    pub fn unit_roundoff(self) -> f64 {
+        match self {
+            Precision::F32 => f64::from(f32::EPSILON) / 2.0,
+            Precision::F64 => f64::EPSILON / 2.0,
+        }
+    }
+
     /// The format called `name`.
     pub fn parse(name: &str) -> Option<Self> {
         [Precision::F32, Precision::F64].into_iter().find(|p| p.name() == name)
@@ -93,9 +101,13 @@ pub struct GreensFunction {
     pub row_is_fixed: Vec<bool>,
     /// The entries, columns contiguous.
     pub values: Values,
+    /// Reference loads on all dofs of the mesh, N; empty for none.
+    pub loads: Vec<f64>,
+    /// What the reference loads alone do, on the rows: displacements, m, and `K u` on supported rows, N; empty for none.
+    pub free_response: Vec<f64>,
     /// Content key.
     pub key: String,
-    /// Young's modulus if the whole body has one, Pa: then it only scales forces.
+    /// Young's modulus if the whole body has one and no loads, Pa: then it only scales forces.
     pub youngs_modulus: Option<f64>,
     /// What the file was made from, in JSON, for people.
     pub description: String,
@@ -133,6 +145,23 @@ impl GreensFunction {
             ValueSlice::F32(v) => add_scaled(&v[at..at + out.len()], factor, out),
             ValueSlice::F64(v) => add_scaled(&v[at..at + out.len()], factor, out),
         }
+    }
+
+    /// Reference load on the dof of surface row `row`, N.
+    pub fn load_on_row(&self, row: usize) -> f64 {
+        let dof = 3 * self.surface_nodes[row / 3] as usize + row % 3;
+        self.loads.get(dof).copied().unwrap_or(0.0)
+    }
+
+    /// Displacements of the surface dofs (3s) under the reference loads alone, m.
+    pub fn free_displacements(&self) -> Vec<f64> {
+        let mut u = vec![0.0; 3 * self.surface_count()];
+        for (row, (u, &response)) in u.iter_mut().zip(&self.free_response).enumerate() {
+            if !self.row_is_fixed[row] {
+                *u = response;
+            }
+        }
+        u
     }
 
     /// Row of the dof in column `column`.

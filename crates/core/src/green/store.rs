@@ -77,7 +77,7 @@ impl GreensFunction {
         let s = &self.surface;
         let (faces, face_nodes) = (s.faces.as_flattened(), s.faces.nodes_per_face());
         let fixed: Vec<u8> = self.row_is_fixed.iter().map(|&b| u8::from(b)).collect();
-        vec![
+        let mut tensors = vec![
             ("surface_nodes", Dtype::U32, vec![self.surface_nodes.len()], bytes(&self.surface_nodes)),
             ("surface_positions", Dtype::F64, vec![s.positions.len(), 3], bytemuck::cast_slice(&s.positions).to_vec()),
             ("surface_faces", Dtype::U32, vec![faces.len() / face_nodes, face_nodes], bytes(faces)),
@@ -85,7 +85,13 @@ impl GreensFunction {
             ("fixed_dofs", Dtype::U32, vec![self.fixed_dofs.len()], bytes(&self.fixed_dofs)),
             ("fixed_rows", Dtype::U32, vec![self.fixed_rows.len()], bytes(&self.fixed_rows)),
             ("row_is_fixed", Dtype::U8, vec![fixed.len()], fixed),
-        ]
+        ];
+        for (name, values) in [("loads", &self.loads), ("free_response", &self.free_response)] {
+            if !values.is_empty() {
+                tensors.push((name, Dtype::F64, vec![values.len()], bytemuck::cast_slice(values).to_vec()));
+            }
+        }
+        tensors
     }
 
     /// Maps a store and verifies it: format, shapes, the checksum of every block, and `expected_key` if one is given.
@@ -129,7 +135,7 @@ fn check_metadata(path: &Path, metadata: &HashMap<String, String>, expected_key:
     match expected_key {
         Some(key) if key != field("key") => Err(store_error(
             path,
-            "was made for another body (mesh, material, supports, touch region or precision differ); compute it again",
+            "was made for another body (mesh, material, supports, loads, touch region or precision differ); compute it again",
         )),
         _ => Ok(()),
     }
@@ -163,6 +169,11 @@ impl Reader<'_> {
         }
     }
 
+    /// A block that only a loaded body has.
+    fn optional(&self, name: &str) -> Result<Vec<f64>> {
+        if self.tensors.names().contains(&name) { self.numbers(name) } else { Ok(Vec::new()) }
+    }
+
     fn geometry(&self, metadata: &HashMap<String, String>) -> Result<GreensFunction> {
         let field = |name: &str| metadata.get(name).cloned().unwrap_or_default();
         let positions: Vec<[f64; 3]> = self.numbers("surface_positions")?;
@@ -184,11 +195,18 @@ impl Reader<'_> {
             rows: row_is_fixed.len(),
             row_is_fixed: row_is_fixed.into_iter().map(|b| b != 0).collect(),
             values: Values::F64(Vec::new()),
+            loads: self.optional("loads")?,
+            free_response: self.optional("free_response")?,
             key: field("key"),
             youngs_modulus: field("youngs_modulus").parse().ok(),
             description: field("description"),
             path: Some(self.path.to_owned()),
         };
+        let loaded = !green.loads.is_empty() || !green.free_response.is_empty();
+        let within = green.surface_nodes.last().is_some_and(|&n| 3 * n as usize + 2 < green.loads.len());
+        if loaded && !(within && green.free_response.len() == green.rows) {
+            return Err(self.damaged("the loads do not match the body"));
+        }
         let small = green.small_tensors();
         if small_checksum(small.iter().map(|(_, _, _, b)| b.as_slice())) != field("geometry_checksum") {
             return Err(self.damaged("the checksum of the geometry differs"));

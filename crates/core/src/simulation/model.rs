@@ -7,12 +7,16 @@ use glam::DVec3;
 use super::State;
 use crate::contact::{MAX_PATCH_NODES, Patch, PatchScratch, SurfacePoint, SurfaceQuery, patch_weights};
 use crate::green::GreensFunction;
+use crate::mesh::Surface;
 use crate::{Error, Result};
 
 /// A body's Green's function, its surface prepared for contact, and the tool.
 pub struct Model {
     pub(crate) green: Arc<GreensFunction>,
+    /// Displacements of the surface under the reference loads, m (3s): the shape that tools meet.
+    pub(crate) free: Vec<f64>,
     pub(crate) query: SurfaceQuery,
+    loaded: Surface,
     /// Radius of the tool sphere, m.
     pub tool_radius: f64,
     /// Stiffest contact rendered, N/m: near a support the body alone would be rigid, which no device can render.
@@ -36,8 +40,25 @@ impl Model {
                 return Err(Error::Invalid(format!("the {name} must be positive, got {value}")));
             }
         }
-        let query = SurfaceQuery::new(&green.surface)?;
-        Ok(Self { green, query, tool_radius, max_stiffness })
+        let free = green.free_displacements();
+        let shifts = free.chunks_exact(3).map(DVec3::from_slice);
+        let positions = green.surface.positions.iter().zip(shifts).map(|(&p, u)| p + u).collect();
+        let loaded = Surface::new(positions, green.surface.faces.clone())?;
+        let query = SurfaceQuery::new(&loaded)?;
+        Ok(Self { green, free, query, loaded, tool_radius, max_stiffness })
+    }
+
+    /// Point of the loaded surface, untouched by tools, that is closest to `point`.
+    pub(crate) fn closest(&self, point: DVec3) -> Option<SurfacePoint> {
+        self.query.closest(&self.loaded, point)
+    }
+
+    /// Where the material under a point of the loaded surface is in the unloaded body. Weights are taken there, so that
+    /// a contact carries the same nodes whatever the loads.
+    pub(crate) fn material_point(&self, loaded: &SurfacePoint) -> SurfacePoint {
+        let corners = self.green.surface.corners(loaded.triangle);
+        let position = corners.into_iter().zip(loaded.barycentric).map(|(p, n)| n * p).sum();
+        SurfacePoint { position, ..*loaded }
     }
 
     /// The Green's function behind the model.

@@ -23,10 +23,10 @@ pub struct ToolContact {
     // Written when a contact begins or ends.
     /// What the tool is doing.
     pub mode: Mode,
-    /// Penetration of the rest surface at which the next contact begins, m: zero for a tool that came from outside, and
+    /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
     /// the least reached since for one that was released inside, so that a force always starts from zero.
     pub entry_depth: f64,
-    /// Contact point on the rest surface, m.
+    /// Contact point on the untouched surface, m.
     pub point: DVec3,
     /// Unit outward normal there.
     pub normal: DVec3,
@@ -64,10 +64,10 @@ impl State {
         snapshot.clone_from(self);
     }
 
-    /// Displacements of all surface dofs (3s), m: `u = Psi W f`.
+    /// Displacements of all surface dofs (3s), m: `u = u_free + Psi W f`.
     pub fn displacements(&self, model: &Model) -> Vec<f64> {
         let green = model.green();
-        let mut displacements = vec![0.0; 3 * green.surface_count()];
+        let mut displacements = model.free.clone();
         for tool in self.tools.iter().filter(|t| t.mode != Mode::Free) {
             let force = tool.force / self.stiffness_scale;
             crate::contact::add_patch_response(green, &tool.patch, force, &mut displacements);

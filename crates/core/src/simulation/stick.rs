@@ -1,7 +1,8 @@
 //! The sticking contact law: the patch stays on the material it first touched until release.
 //!
 //! With a patch that does not move, `f = C^-1 d` is the gradient of `d^T C^-1 d / 2`: a closed path of the tool does no
-//! net work. A press lets go where it would pull; its tangential energy is then lost, never gained.
+//! net work. The anchor lies where the surface, sagged under the reference loads, was met: the way from it is the whole
+//! `d - W^T u_free`. A press lets go where it would pull; its tangential energy is then lost, never gained.
 
 use glam::DVec3;
 
@@ -40,7 +41,7 @@ pub(super) fn advance(
 }
 
 fn begin(model: &Model, contact: &mut ToolContact, scratch: &mut Scratch, tool: &ToolInput, radius: f64) -> bool {
-    let Some(closest) = model.query.closest(&model.green.surface, tool.position) else { return false };
+    let Some(closest) = model.closest(tool.position) else { return false };
     let depth = model.tool_radius - closest.signed_distance;
     contact.entry_depth = contact.entry_depth.min(depth.max(0.0));
     let reaches = if tool.grab {
@@ -48,7 +49,7 @@ fn begin(model: &Model, contact: &mut ToolContact, scratch: &mut Scratch, tool: 
     } else {
         depth > contact.entry_depth
     };
-    if !reaches || !cover(model, contact, scratch, &closest, radius) {
+    if !reaches || !cover(model, contact, scratch, &model.material_point(&closest), radius) {
         return false;
     }
     contact.mode = if tool.grab { Mode::Grab } else { Mode::Press };
@@ -82,10 +83,7 @@ pub(super) fn release_if_pulling(model: &Model, contact: &mut ToolContact) -> bo
 }
 
 fn release(model: &Model, contact: &mut ToolContact) {
-    let depth = model
-        .query
-        .closest(&model.green.surface, contact.position)
-        .map_or(0.0, |closest| model.tool_radius - closest.signed_distance);
+    let depth = model.closest(contact.position).map_or(0.0, |closest| model.tool_radius - closest.signed_distance);
     contact.entry_depth = depth.max(0.0);
     contact.mode = Mode::Free;
     contact.patch.count = 0;

@@ -1,0 +1,76 @@
+"""``[[loads]]``: what acts on the body before it is touched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import model_validator
+
+from palpate.body import Body
+from palpate.errors import BodyError
+from palpate.loads import Loads
+from palpate.predicate import parse
+from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
+
+
+class LoadTable(Table):
+    """One load: gravity (m/s^2), a pressure on a part of the surface, or a force.
+
+    ``on`` is a predicate over x, y, z that names the part of the surface; a force is spread evenly over it, or acts in
+    full on each of ``nodes``.
+    """
+
+    gravity: Acceleration | None = None
+    pressure: SignedPressure | None = None
+    force: ForceVector | None = None
+    on: str | None = None
+    nodes: list[int] | None = None
+
+    @model_validator(mode="after")
+    def _one_load(self) -> LoadTable:
+        if sum(load is not None for load in (self.gravity, self.pressure, self.force)) != 1:
+            raise ValueError("give exactly one of gravity, pressure and force")
+        if self.gravity is not None and not (self.on is None and self.nodes is None):
+            raise ValueError("gravity acts on the whole body: leave 'on' and 'nodes' out")
+        if self.pressure is not None and (self.on is None or self.nodes is not None):
+            raise ValueError("a pressure acts on a part of the surface, such as on = 'z > max - 1mm'")
+        if self.force is not None and (self.on is None) == (self.nodes is None):
+            raise ValueError(
+                "a force is spread over a part of the surface, on = '...', or acts on each of nodes = [...]"
+            )
+        if self.on is not None:
+            try:
+                parse(self.on)
+            except BodyError as error:
+                raise ValueError(str(error)) from None
+        return self
+
+    def check(self, body: Body) -> None:
+        """Refuse a load that finds nothing to act on.
+
+        Raises
+        ------
+        BodyError
+            A node that does not exist, or a predicate that holds on no face of the surface.
+
+        """
+        loads = together([self])
+        assert loads is not None
+        loads.nodal(body)
+
+
+def together(tables: Sequence[LoadTable]) -> Loads | None:
+    """Sum of the tables; None for none."""
+    if not tables:
+        return None
+    gravity = [sum(g) for g in zip((0.0, 0.0, 0.0), *(t.gravity for t in tables if t.gravity), strict=True)]
+    forces: dict[int, list[float]] = {}
+    for table in tables:
+        for node in table.nodes or ():
+            forces[node] = [a + b for a, b in zip(forces.get(node, [0.0] * 3), table.force or (), strict=True)]
+    return Loads(
+        gravity=gravity,
+        pressure=[(parse(t.on), t.pressure) for t in tables if t.on is not None and t.pressure is not None],
+        spread=[(parse(t.on), t.force) for t in tables if t.on is not None and t.force is not None],
+        forces=forces,
+    )

@@ -1,0 +1,101 @@
+"""``[[region]]``: parts of the body with a material of their own."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from palpate import shapes
+from palpate.body import Material
+from palpate.errors import MeshError
+from palpate.mesh import TetMesh
+from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table
+
+# The solid of each shape, and the keys that place it.
+SHAPES = {
+    "sphere": (shapes.Sphere, ("center", "radius")),
+    "box": (shapes.Box, ("low", "high")),
+    "cylinder": (shapes.Cylinder, ("start", "end", "radius")),
+    "half-space": (shapes.HalfSpace, ("point", "normal")),
+}
+PLACES = tuple(dict.fromkeys(key for _, keys in SHAPES.values() for key in keys))
+
+
+class MaterialTable(Table):
+    """Isotropic material of the whole body, but for its regions."""
+
+    youngs_modulus: Pressure = 10e3
+    poissons_ratio: PoissonsRatio = 0.45
+    density: Density = 1000.0
+
+    def material(self) -> Material:
+        """As the rest of the package knows it."""
+        return Material(self.youngs_modulus, self.poissons_ratio, self.density)
+
+
+class RegionTable(Table):
+    """A material for part of the body: a region of the mesh file by number or name, or what lies in a shape.
+
+    What it does not say of its material is that of ``[material]``. Later tables override earlier ones.
+    """
+
+    mesh_region: int | str | None = None
+    shape: Literal["sphere", "box", "cylinder", "half-space"] | None = None
+    center: Point | None = None
+    radius: Length | None = None
+    low: Point | None = None
+    high: Point | None = None
+    start: Point | None = None
+    end: Point | None = None
+    point: Point | None = None
+    normal: Direction | None = None
+    youngs_modulus: Pressure | None = None
+    poissons_ratio: PoissonsRatio | None = None
+    density: Density | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> RegionTable:
+        if (self.shape is None) == (self.mesh_region is None):
+            raise ValueError("give either a shape or a mesh_region")
+        needed = () if self.shape is None else SHAPES[self.shape][1]
+        for key in PLACES:
+            given = getattr(self, key) is not None
+            if given and key not in needed:
+                raise ValueError(f"'{key}' does not belong to a {self.shape or 'mesh_region'}")
+            if not given and key in needed:
+                raise ValueError(f"a {self.shape} needs {' and '.join(needed)}: '{key}' is missing")
+        if self.shape is not None:
+            self.solid()
+        return self
+
+    def solid(self) -> shapes.Shape:
+        """Solid of a shape."""
+        kind, keys = SHAPES[str(self.shape)]
+        try:
+            return kind(*(getattr(self, key) for key in keys))
+        except MeshError as error:
+            raise ValueError(str(error)) from None
+
+    def elements(self, mesh: TetMesh) -> np.ndarray:
+        """Mask of the elements (m,) of this region.
+
+        Raises
+        ------
+        MeshError
+            There are none.
+
+        """
+        if self.shape is not None:
+            return shapes.elements_inside(self.solid(), mesh.nodes, mesh.tets)
+        members = mesh.regions == mesh.region_names.get(str(self.mesh_region), self.mesh_region)
+        if not members.any():
+            known = [*map(str, sorted(set(mesh.regions.tolist()))), *mesh.region_names]
+            raise MeshError(f"the mesh has no region {self.mesh_region}; it has {', '.join(known)}")
+        return members
+
+    def material(self, base: MaterialTable) -> Material:
+        """Material, completed from that of the body."""
+        own = {name: getattr(self, name) for name in MaterialTable.model_fields}
+        return Material(**{name: getattr(base, name) if value is None else value for name, value in own.items()})

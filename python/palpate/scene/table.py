@@ -1,0 +1,47 @@
+"""What the tables of a scene file are made of: quantities with units, and no unknown keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from palpate import units
+from palpate.errors import Error
+
+
+def _quantity(read: Callable[[Any], float]) -> BeforeValidator:
+    def convert(value: Any) -> float:
+        try:
+            return read(value)
+        except Error as error:
+            raise ValueError(str(error)) from None
+
+    return BeforeValidator(convert)
+
+
+Length = Annotated[float, _quantity(units.length), Field(gt=0, allow_inf_nan=False)]
+Radius = Annotated[float, _quantity(units.length), Field(ge=0, allow_inf_nan=False)]
+Coordinate = Annotated[float, _quantity(units.length), Field(allow_inf_nan=False)]
+Pressure = Annotated[float, _quantity(units.pressure), Field(gt=0, allow_inf_nan=False)]
+SignedPressure = Annotated[float, _quantity(units.pressure), Field(allow_inf_nan=False)]
+Density = Annotated[float, _quantity(units.density), Field(ge=0, allow_inf_nan=False)]
+Force = Annotated[float, _quantity(units.force), Field(gt=0, allow_inf_nan=False)]
+SignedForce = Annotated[float, _quantity(units.force), Field(allow_inf_nan=False)]
+Stiffness = Annotated[float, _quantity(units.stiffness), Field(gt=0, allow_inf_nan=False)]
+Time = Annotated[float, _quantity(units.time), Field(ge=0, allow_inf_nan=False)]
+PoissonsRatio = Annotated[float, Field(gt=-1, lt=0.5)]
+_Acceleration = Annotated[float, _quantity(units.acceleration), Field(allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+Point = tuple[Coordinate, Coordinate, Coordinate]
+Direction = tuple[Number, Number, Number]
+Acceleration = tuple[_Acceleration, _Acceleration, _Acceleration]
+ForceVector = tuple[SignedForce, SignedForce, SignedForce]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are mistakes."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
