@@ -249,7 +249,7 @@ def _orient(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     if tets.shape[1] == 10:
         _check_middles(nodes, tets)
         least = _native.determinant_ranges(nodes, tets.astype(np.uint32)).reshape(-1, 2)[:, 0]
-        folded = np.flatnonzero(least <= 0)
+        folded = np.flatnonzero(least <= 6 * DEGENERATE * longest**3)
         if folded.size:
             raise MeshError(
                 f"{len(folded)} tetrahedra are folded over by their mid-side nodes (first: tetrahedron {folded[0]})"
