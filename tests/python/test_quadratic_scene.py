@@ -22,7 +22,7 @@ mesh = "block.vtu"
 precision = "f64"
 ELEMENT
 [material]
-poissons_ratio = 0.47
+poissons_ratio = 0.45
 [supports]
 fixed = FIXED
 [tool]
