@@ -11,6 +11,7 @@ import numpy as np
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene, Scene
+from palpate.stress import StressRecovery, SurfaceStress
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
@@ -92,6 +93,7 @@ class Simulation:
             self.green._core, self._tools, tool.radius, tool.contact_radius, device.max_stiffness, limits
         )
         self._running = False
+        self._recovery: StressRecovery | None = None
 
     def __enter__(self) -> Simulation:
         self.start()
@@ -194,6 +196,23 @@ class Simulation:
         displacements = raw["displacements"].reshape(-1, 3)
         forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
         return Frame(raw["time"], forces, positions, displacements, contacts, statistics)
+
+    def stress(self, displacements: np.ndarray) -> SurfaceStress:
+        """Stress and strain at the surface nodes, for a frame's or an answer's displacements (s, 3), m; milliseconds.
+
+        Raises
+        ------
+        SceneError
+            A body from a store, which knows only its surface.
+
+        """
+        if self._recovery is None:
+            if self.body is None:
+                raise SceneError("a body from a store knows only its surface: stress needs its elements")
+            self._recovery = StressRecovery(self.body)
+        field = self._recovery.recover(displacements)
+        # A stiffness changed while running scales stress, not strain.
+        return SurfaceStress(self._scale * field.stress, field.strain)
 
     def drain_log(self) -> np.ndarray:
         """Rows of the 1 kHz log since the last call: time, position, force, compute_us, wakeup_us."""
