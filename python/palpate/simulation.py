@@ -153,7 +153,7 @@ class Simulation:
 
     @property
     def youngs_modulus(self) -> float | None:
-        """Young's modulus now, Pa; None for a body of several materials."""
+        """Young's modulus now, Pa; None for a body of several materials, or with loads."""
         reference = self.green.youngs_modulus
         return None if reference is None else reference * self._scale
 
@@ -168,10 +168,10 @@ class Simulation:
         return low
 
     def set_youngs_modulus(self, youngs_modulus: float) -> None:
-        """Change the stiffness of a body of one material at once, Pa: it only scales the compliance."""
+        """Change the stiffness of a body of one material and no loads at once, Pa: it only scales the compliance."""
         reference = self.green.youngs_modulus
         if reference is None:
-            raise SceneError("the body has several materials: its stiffness cannot be changed while running")
+            raise SceneError("the body has several materials, or loads: its stiffness cannot be changed while running")
         if not (np.isfinite(youngs_modulus) and youngs_modulus > 0):
             raise SceneError(f"Young's modulus must be positive, got {youngs_modulus} Pa")
         self._scale = youngs_modulus / reference

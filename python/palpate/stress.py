@@ -140,8 +140,8 @@ def _strain_operator(gradients: np.ndarray, tets: np.ndarray, node_count: int) -
 def _patches(body: Body) -> tuple[scipy.sparse.csr_array, np.ndarray]:
     """Volumes of the elements in the patch of each surface node, (s, m), and the material there, (s, 3).
 
-    A patch is the elements around the node, of 4-node elements (one sample each, too few) also those around their nodes;
-    of a node between materials, those of the material that has most of the volume around it.
+    A patch is the elements around the node, of 4-node elements (one sample each, too few) also those around their
+    nodes; of a node between materials, those of the material that has most of the volume around it.
     """
     mesh = body.mesh
     count = len(mesh.tets)
