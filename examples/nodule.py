@@ -42,7 +42,7 @@ for (name, values), color in zip(stiffness.items(), ("tab:red", "0.45"), strict=
 axes.axvspan(35, 45, color="tab:red", alpha=0.1, linewidth=0, label="nodule, 5 to 15 mm deep")
 axes.set_xlabel("x [mm]")
 axes.set_ylabel("stiffness under the finger [N/m]")
-axes.set_ylim(bottom=0)
+axes.set_ylim(0, 1.15 * max(values.max() for values in stiffness.values()))
 axes.legend(loc="lower right", frameon=False)
 axes.grid(alpha=0.25)
 axes.spines[["top", "right"]].set_visible(False)

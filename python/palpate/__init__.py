@@ -24,6 +24,7 @@ from palpate.loads import Loads
 from palpate.mesh import TetMesh, tetrahedralize
 from palpate.scene import Scene
 from palpate.simulation import Contact, Frame, Simulation
+from palpate.stress import StressRecovery, SurfaceStress
 
 __version__ = version("palpate")
 
@@ -45,6 +46,8 @@ __all__ = [
     "SceneError",
     "Simulation",
     "StoreError",
+    "StressRecovery",
+    "SurfaceStress",
     "TetMesh",
     "Touch",
     "UnitError",

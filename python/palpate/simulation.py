@@ -11,6 +11,7 @@ import numpy as np
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene, Scene
+from palpate.stress import StressRecovery, SurfaceStress
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
@@ -92,6 +93,7 @@ class Simulation:
             self.green._core, self._tools, tool.radius, tool.contact_radius, device.max_stiffness, limits
         )
         self._running = False
+        self._recovery: StressRecovery | None = None
 
     def __enter__(self) -> Simulation:
         self.start()
@@ -151,7 +153,7 @@ class Simulation:
 
     @property
     def youngs_modulus(self) -> float | None:
-        """Young's modulus now, Pa; None for a body of several materials."""
+        """Young's modulus now, Pa; None for a body of several materials, or with loads."""
         reference = self.green.youngs_modulus
         return None if reference is None else reference * self._scale
 
@@ -166,10 +168,10 @@ class Simulation:
         return low
 
     def set_youngs_modulus(self, youngs_modulus: float) -> None:
-        """Change the stiffness of a body of one material at once, Pa: it only scales the compliance."""
+        """Change the stiffness of a body of one material and no loads at once, Pa: it only scales the compliance."""
         reference = self.green.youngs_modulus
         if reference is None:
-            raise SceneError("the body has several materials: its stiffness cannot be changed while running")
+            raise SceneError("the body has several materials, or loads: its stiffness cannot be changed while running")
         if not (np.isfinite(youngs_modulus) and youngs_modulus > 0):
             raise SceneError(f"Young's modulus must be positive, got {youngs_modulus} Pa")
         self._scale = youngs_modulus / reference
@@ -194,6 +196,23 @@ class Simulation:
         displacements = raw["displacements"].reshape(-1, 3)
         forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
         return Frame(raw["time"], forces, positions, displacements, contacts, statistics)
+
+    def stress(self, displacements: np.ndarray) -> SurfaceStress:
+        """Stress and strain at the surface nodes, for a frame's or an answer's displacements (s, 3), m; milliseconds.
+
+        Raises
+        ------
+        SceneError
+            A body from a store, which knows only its surface.
+
+        """
+        if self._recovery is None:
+            if self.body is None:
+                raise SceneError("a body from a store knows only its surface: stress needs its elements")
+            self._recovery = StressRecovery(self.body)
+        field = self._recovery.recover(displacements)
+        # A stiffness changed while running scales stress, not strain.
+        return SurfaceStress(self._scale * field.stress, field.strain)
 
     def drain_log(self) -> np.ndarray:
         """Rows of the 1 kHz log since the last call: time, position, force, compute_us, wakeup_us."""

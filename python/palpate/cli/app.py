@@ -159,7 +159,8 @@ def info(
         for table, entries in scene.model_dump(exclude_none=True).items():
             for entry in entries if isinstance(entries, list) else [entries]:
                 for name, value in entry.items():
-                    print(f"  {table}.{name} = {value}")
+                    if value != []:
+                        print(f"  {table}.{name} = {value}")
         print("  lengths in m, pressures in Pa, forces in N, times in s")
         return
     made = palpate.TetMesh.read(file, unit)
