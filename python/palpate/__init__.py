@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from palpate import models
 from palpate.body import Body, Material
+from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError, ViewerError
 from palpate.green import Answer, GreensFunction, Touch, precompute
 from palpate.mesh import TetMesh, tetrahedralize
@@ -20,12 +21,15 @@ __all__ = [
     "Body",
     "BodyError",
     "Contact",
+    "Energy",
     "Error",
     "Frame",
     "GreensFunction",
     "Material",
     "MeshError",
     "MeshWarning",
+    "ModalBasis",
+    "Newmark",
     "Scene",
     "SceneError",
     "Simulation",
@@ -35,6 +39,8 @@ __all__ = [
     "UnitError",
     "ViewerError",
     "models",
+    "modes",
     "precompute",
+    "rayleigh_from_ratios",
     "tetrahedralize",
 ]
