@@ -30,7 +30,7 @@ pub enum Solver {
 }
 
 enum Solved {
-    Factor(Factor),
+    Factor(Box<Factor>),
     Inverse(Vec<f64>),
 }
 
@@ -89,7 +89,7 @@ impl Direct {
         let of_stiffness = delta * dt * rayleigh.stiffness + alpha * dt * dt;
         let factor = Factor::new(&combination(&mass, of_mass, &stiffness, of_stiffness)?, &supports, Par::rayon(0))?;
         let solved = match solver {
-            Solver::Factor => Solved::Factor(factor),
+            Solver::Factor => Solved::Factor(Box::new(factor)),
             Solver::Inverse => Solved::Inverse(inverse(&factor)),
         };
         Ok(Self { stiffness, mass, supports, scheme, rayleigh, solved })

@@ -56,7 +56,7 @@ impl Account {
 
     /// Energies at a state.
     pub fn energies(&self, model: &Model, state: &State) -> Energies {
-        let elastic: Vec<Lanes> = state.q.iter().zip(&model.stiffness).map(|(q, k)| q.times(*k)).collect();
+        let elastic: Vec<Lanes> = state.q.iter().zip(&model.stiffness).map(|(q, k)| q.times(k)).collect();
         Energies {
             kinetic: 0.5 * dot(&state.v, &state.v),
             strain: 0.5 * dot(&state.q, &elastic),

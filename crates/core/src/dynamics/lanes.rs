@@ -1,6 +1,8 @@
 //! Vectors over modes in groups of eight, so that one instruction takes several modes.
 //!
 //! Sums run in eight partial sums in a fixed order: the same bits on every processor, whatever its vector width.
+//! A kernel is a struct with `call` inlined into a function compiled for the processor's vectors (`pulp`); a closure in
+//! its place may be left outside and run on the narrowest ones.
 
 /// Modes a group.
 pub const LANES: usize = 8;
@@ -13,20 +15,29 @@ pub struct Lanes(pub [f64; LANES]);
 impl Lanes {
     /// `self + a b`, each lane for itself.
     #[inline(always)]
-    pub fn plus(self, a: Lanes, b: Lanes) -> Self {
-        Lanes(std::array::from_fn(|l| self.0[l] + a.0[l] * b.0[l]))
+    pub fn plus(mut self, a: &Lanes, b: &Lanes) -> Self {
+        for l in 0..LANES {
+            self.0[l] += a.0[l] * b.0[l];
+        }
+        self
     }
 
     /// `self + s a`.
     #[inline(always)]
-    pub fn plus_scaled(self, s: f64, a: Lanes) -> Self {
-        Lanes(std::array::from_fn(|l| self.0[l] + s * a.0[l]))
+    pub fn plus_scaled(mut self, s: f64, a: &Lanes) -> Self {
+        for l in 0..LANES {
+            self.0[l] += s * a.0[l];
+        }
+        self
     }
 
     /// `a b`, each lane for itself.
     #[inline(always)]
-    pub fn times(self, b: Lanes) -> Self {
-        Lanes(std::array::from_fn(|l| self.0[l] * b.0[l]))
+    pub fn times(mut self, b: &Lanes) -> Self {
+        for l in 0..LANES {
+            self.0[l] *= b.0[l];
+        }
+        self
     }
 
     /// Sum of the lanes.
@@ -35,6 +46,16 @@ impl Lanes {
         let [a, b, c, d, e, f, g, h] = self.0;
         ((a + e) + (c + g)) + ((b + f) + (d + h))
     }
+}
+
+/// `a . b` of as many groups, in two chains of sums that hide the latency of addition.
+#[inline(always)]
+pub fn dot(a: &[Lanes], b: &[Lanes]) -> f64 {
+    let mut sums = [Lanes::default(); 2];
+    for (g, (a, b)) in a.iter().zip(b).enumerate() {
+        sums[g % 2] = sums[g % 2].plus(a, b);
+    }
+    sums[0].sum() + sums[1].sum()
 }
 
 /// `x` in groups, filled up with zeros.
@@ -51,20 +72,4 @@ pub fn grouped(x: &[f64]) -> Vec<Lanes> {
 /// The first `count` numbers of groups.
 pub fn flat(groups: &[Lanes], count: usize) -> Vec<f64> {
     groups.iter().flat_map(|g| g.0).take(count).collect()
-}
-
-/// `a . b`.
-#[inline(always)]
-pub fn dot(a: &[Lanes], b: &[Lanes]) -> f64 {
-    // Two chains of sums hide the latency of addition.
-    let mut sums = [Lanes::default(); 2];
-    let (pairs_a, pairs_b) = (a.chunks_exact(2), b.chunks_exact(2));
-    if let ([last_a], [last_b]) = (pairs_a.remainder(), pairs_b.remainder()) {
-        sums[0] = last_a.times(*last_b);
-    }
-    for (x, y) in pairs_a.zip(pairs_b) {
-        sums[0] = sums[0].plus(x[0], y[0]);
-        sums[1] = sums[1].plus(x[1], y[1]);
-    }
-    sums[0].sum() + sums[1].sum()
 }

@@ -12,6 +12,7 @@
 mod direct;
 mod energy;
 mod exponential;
+mod kernels;
 mod lanes;
 mod modal;
 mod press;

@@ -6,20 +6,10 @@
 
 use pulp::Arch;
 
-use super::lanes::{LANES, Lanes, dot, flat, grouped};
+use super::kernels::{AddRows, Correct, Dot, FreeStep, LoadStep, Predict};
+use super::lanes::{LANES, Lanes, flat, grouped};
 use super::{ModeStep, Rayleigh};
 use crate::{Error, Result};
-
-/// `ModeStep` of eight modes side by side.
-#[derive(Clone, Copy, Debug, Default)]
-struct StepLanes {
-    qq: Lanes,
-    qv: Lanes,
-    qp: Lanes,
-    vq: Lanes,
-    vv: Lanes,
-    vp: Lanes,
-}
 
 /// Modes, the rows of their shapes at the wanted dofs, and the step of each mode.
 pub struct Model {
@@ -33,10 +23,8 @@ pub struct Model {
     pub(super) stiffness: Vec<Lanes>,
     /// Damping of each mode, 1/s.
     pub(super) damping: Vec<Lanes>,
-    steps: Vec<StepLanes>,
-    /// What a unit of modal force at the step's end adds to displacement (s^2) and velocity (s).
-    pub(super) q_load: Vec<Lanes>,
-    v_load: Vec<Lanes>,
+    pub(super) free_steps: Vec<FreeStep>,
+    pub(super) load_steps: Vec<LoadStep>,
     /// Time step, s.
     pub dt: f64,
 }
@@ -85,14 +73,14 @@ impl Model {
         }
         let groups = modes.div_ceil(LANES);
         let damping: Vec<f64> = eigenvalues.iter().map(|&k| rayleigh.modal(k)).collect();
-        let mut steps = vec![StepLanes::default(); groups];
-        let (mut q_load, mut v_load) = (vec![Lanes::default(); groups], vec![Lanes::default(); groups]);
+        let mut free_steps = vec![FreeStep::default(); groups];
+        let mut load_steps = vec![LoadStep::default(); groups];
         for (i, (&k, &c)) in eigenvalues.iter().zip(&damping).enumerate() {
             let (m, g, l) = (step(k, c), i / LANES, i % LANES);
-            let to = &mut steps[g];
+            let to = &mut free_steps[g];
             (to.qq.0[l], to.qv.0[l], to.qp.0[l]) = (m.qq, m.qv, m.qp);
             (to.vq.0[l], to.vv.0[l], to.vp.0[l]) = (m.vq, m.vv, m.vp);
-            (q_load[g].0[l], v_load[g].0[l]) = (m.q_load, m.v_load);
+            (load_steps[g].q.0[l], load_steps[g].v.0[l]) = (m.q_load, m.v_load);
         }
         Ok(Self {
             arch: Arch::new(),
@@ -102,9 +90,8 @@ impl Model {
             shapes: shapes.chunks_exact(modes).flat_map(grouped).collect(),
             stiffness: grouped(eigenvalues),
             damping: grouped(&damping),
-            steps,
-            q_load,
-            v_load,
+            free_steps,
+            load_steps,
             dt,
         })
     }
@@ -159,48 +146,31 @@ impl Model {
     /// Modal force of a force at a row: `load += Phi_row^T force`.
     pub fn add_force(&self, row: u32, force: f64, load: &mut [Lanes]) {
         if (row as usize) < self.rows && force != 0.0 {
-            let shape = self.row(row as usize);
-            self.arch.dispatch(|| {
-                for (p, s) in load.iter_mut().zip(shape) {
-                    *p = p.plus_scaled(force, *s);
-                }
-            });
+            self.arch.dispatch(AddRows { load, rows: [self.row(row as usize)], forces: [force] });
         }
     }
 
     /// The step without a new force: afterwards `q`, `v` are the free motion at the step's end.
     pub fn predict(&self, state: &mut State) {
-        let State { q, v, load, .. } = state;
-        self.arch.dispatch(|| {
-            for (((step, q), v), p) in self.steps.iter().zip(q).zip(v).zip(load) {
-                let free = step.qq.times(*q).plus(step.qv, *v).plus(step.qp, *p);
-                *v = step.vq.times(*q).plus(step.vv, *v).plus(step.vp, *p);
-                *q = free;
-            }
-        });
+        self.arch.dispatch(self.prediction(state));
+    }
+
+    pub(super) fn prediction<'a>(&'a self, state: &'a mut State) -> Predict<'a> {
+        Predict { steps: &self.free_steps, q: &mut state.q, v: &mut state.v, load: &state.load }
     }
 
     /// Completes a predicted step by the modal force at its end.
     pub fn correct(&self, state: &mut State, load: &[Lanes]) {
-        let State { q, v, load: current, steps } = state;
-        self.arch.dispatch(|| {
-            let effect = self.q_load.iter().zip(&self.v_load);
-            for ((((q, v), now), p), (to_q, to_v)) in q.iter_mut().zip(v).zip(current).zip(load).zip(effect) {
-                *q = q.plus(*to_q, *p);
-                *v = v.plus(*to_v, *p);
-                *now = *p;
-            }
-        });
-        *steps += 1;
+        self.arch.dispatch(Correct { steps: &self.load_steps, q: &mut state.q, v: &mut state.v, load });
+        state.load.copy_from_slice(load);
+        state.steps += 1;
     }
 
     /// Values at rows: `Phi_row . x`, for `x` the state's `q` or `v`.
     pub fn read(&self, x: &[Lanes], rows: impl Iterator<Item = usize>, out: &mut [f64]) {
-        self.arch.dispatch(|| {
-            for (value, row) in out.iter_mut().zip(rows) {
-                *value = dot(self.row(row), x);
-            }
-        });
+        for (value, row) in out.iter_mut().zip(rows) {
+            *value = self.arch.dispatch(Dot(self.row(row), x));
+        }
     }
 
     /// Modal accelerations, `p - c v - k q`, m sqrt(kg)/s^2.

@@ -33,8 +33,7 @@ impl Press {
 
     /// Advances the body by one step with the spring's far end at `target`, m; returns the force on the body, N.
     pub fn tick(&self, model: &Model, state: &mut State, scratch: &mut Scratch, target: DVec3) -> DVec3 {
-        model.predict(state);
-        let force = self.stiffness * (target - self.projection.displacement(model, state));
+        let force = self.stiffness * (target - self.projection.predict(model, state));
         scratch.load.fill(Default::default());
         self.projection.add_force(model, force, &mut scratch.load);
         model.correct(state, &scratch.load);

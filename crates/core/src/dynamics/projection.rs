@@ -7,7 +7,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::lanes::{Lanes, dot};
+use super::kernels::{AddRows, Compliance, Dot, PredictAndRead};
+use super::lanes::Lanes;
 use super::{Model, State};
 
 /// Nodes taken at once when a patch is gathered: few enough streams for the processor to fetch ahead.
@@ -31,59 +32,47 @@ impl Projection {
         for (axis, sum) in self.axes.iter_mut().enumerate() {
             sum.fill(Lanes::default());
             for chunk in nodes.chunks(NODES_AT_ONCE) {
-                let mut shapes = [(0.0, model.row(0)); NODES_AT_ONCE];
-                for (shape, &(first, weight)) in shapes.iter_mut().zip(chunk) {
+                let mut rows = [model.row(0); NODES_AT_ONCE];
+                let mut forces = [0.0; NODES_AT_ONCE];
+                for (i, &(first, weight)) in chunk.iter().enumerate() {
                     let row = first as usize + axis;
                     if row < model.rows() {
-                        *shape = (weight, model.row(row));
+                        (rows[i], forces[i]) = (model.row(row), weight);
                     }
                 }
-                let [(wa, a), (wb, b), (wc, c), (wd, d)] = shapes;
-                model.arch.dispatch(|| {
-                    for ((((g, a), b), c), d) in sum.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-                        *g = g.plus_scaled(wa, *a).plus_scaled(wb, *b).plus_scaled(wc, *c).plus_scaled(wd, *d);
-                    }
-                });
+                model.arch.dispatch(AddRows { load: sum, rows, forces });
             }
         }
     }
 
-    /// Mean displacement (or velocity, for the state's `v`) of the patch, `G x`.
-    pub fn read(&self, model: &Model, x: &[Lanes]) -> DVec3 {
-        model.arch.dispatch(|| DVec3::from(std::array::from_fn(|axis| dot(&self.axes[axis], x))))
+    /// The step without a new force (see [`Model::predict`]) and the mean displacement of the patch in it, m.
+    pub fn predict(&self, model: &Model, state: &mut State) -> DVec3 {
+        DVec3::from(model.arch.dispatch(PredictAndRead { predict: model.prediction(state), rows: self.rows() }))
     }
 
     /// Mean displacement of the patch, m.
     pub fn displacement(&self, model: &Model, state: &State) -> DVec3 {
-        self.read(model, &state.q)
+        DVec3::from(self.rows().map(|row| model.arch.dispatch(Dot(row, &state.q))))
+    }
+
+    /// Mean velocity of the patch, m/s.
+    pub fn velocity(&self, model: &Model, state: &State) -> DVec3 {
+        DVec3::from(self.rows().map(|row| model.arch.dispatch(Dot(row, &state.v))))
     }
 
     /// Adds the modal force of a force on the patch, `load += G^T f`.
     pub fn add_force(&self, model: &Model, force: DVec3, load: &mut [Lanes]) {
-        let [x, y, z] = &self.axes;
-        model.arch.dispatch(|| {
-            for (((p, x), y), z) in load.iter_mut().zip(x).zip(y).zip(z) {
-                *p = p.plus_scaled(force.x, *x).plus_scaled(force.y, *y).plus_scaled(force.z, *z);
-            }
-        });
+        model.arch.dispatch(AddRows { load, rows: self.rows(), forces: force.to_array() });
     }
 
     /// Displacement of this patch at the step's end per unit force on `other` there, `G diag(q_load) G_other^T`, m/N.
     pub fn step_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
-        let mut columns = [[0.0; 3]; 3];
-        model.arch.dispatch(|| {
-            for (j, column) in columns.iter_mut().enumerate() {
-                let mut sums = [Lanes::default(); 3];
-                for (g, effect) in model.q_load.iter().enumerate() {
-                    let weighted = effect.times(other.axes[j][g]);
-                    for (axis, sum) in self.axes.iter().zip(&mut sums) {
-                        *sum = sum.plus(axis[g], weighted);
-                    }
-                }
-                *column = sums.map(Lanes::sum);
-            }
-        });
-        DMat3::from_cols_array_2d(&columns)
+        let kernel = Compliance { steps: &model.load_steps, left: self.rows(), right: other.rows() };
+        DMat3::from_cols_array_2d(&model.arch.dispatch(kernel))
+    }
+
+    fn rows(&self) -> [&[Lanes]; 3] {
+        self.axes.each_ref().map(Vec::as_slice)
     }
 
     /// Static part that the modes kept carry, `G diag(1/k) G_other^T` over the elastic modes, m/N.
