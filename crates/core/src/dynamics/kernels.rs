@@ -119,29 +119,23 @@ impl NullaryFnOnce for Dot<'_> {
     }
 }
 
-/// `left diag(steps.q) right^T`, by columns.
+/// `left diag(steps.q) right`, for one row `right`: three sums at a time stay in registers.
 pub struct Compliance<'a> {
     pub steps: &'a [LoadStep],
     pub left: [&'a [Lanes]; 3],
-    pub right: [&'a [Lanes]; 3],
+    pub right: &'a [Lanes],
 }
 
 impl NullaryFnOnce for Compliance<'_> {
-    type Output = [[f64; 3]; 3];
+    type Output = [f64; 3];
     #[inline(always)]
-    fn call(self) -> [[f64; 3]; 3] {
-        let groups = self.steps.len();
-        let left = self.left.map(|row| &row[..groups]);
-        let right = self.right.map(|row| &row[..groups]);
-        let mut sums = [[Lanes::default(); 3]; 3];
-        for (g, step) in self.steps.iter().enumerate() {
-            for (column, right) in sums.iter_mut().zip(right) {
-                let weighted = step.q.times(&right[g]);
-                for (sum, left) in column.iter_mut().zip(left) {
-                    *sum = sum.plus(&left[g], &weighted);
-                }
-            }
+    fn call(self) -> [f64; 3] {
+        let [x, y, z] = self.left;
+        let mut sums = [Lanes::default(); 3];
+        for ((((step, right), x), y), z) in self.steps.iter().zip(self.right).zip(x).zip(y).zip(z) {
+            let weighted = step.q.times(right);
+            sums = [sums[0].plus(x, &weighted), sums[1].plus(y, &weighted), sums[2].plus(z, &weighted)];
         }
-        sums.map(|column| column.map(Lanes::sum))
+        sums.map(Lanes::sum)
     }
 }

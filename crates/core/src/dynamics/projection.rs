@@ -12,7 +12,7 @@ use super::lanes::Lanes;
 use super::{Model, State};
 
 /// Nodes taken at once when a patch is gathered: few enough streams for the processor to fetch ahead.
-const NODES_AT_ONCE: usize = 4;
+const NODES_AT_ONCE: usize = 5;
 
 /// The rows `G` of one patch.
 #[derive(Clone, Debug)]
@@ -67,8 +67,8 @@ impl Projection {
 
     /// Displacement of this patch at the step's end per unit force on `other` there, `G diag(q_load) G_other^T`, m/N.
     pub fn step_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
-        let kernel = Compliance { steps: &model.load_steps, left: self.rows(), right: other.rows() };
-        DMat3::from_cols_array_2d(&model.arch.dispatch(kernel))
+        let (steps, left) = (&model.load_steps, self.rows());
+        DMat3::from_cols_array_2d(&other.rows().map(|right| model.arch.dispatch(Compliance { steps, left, right })))
     }
 
     fn rows(&self) -> [&[Lanes]; 3] {
