@@ -22,7 +22,7 @@ const STEPS_UNWATCHED: usize = 500;
 
 type CscArguments<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, u32>, PyReadonlyArray1<'py, f64>);
 /// Time step, alpha, delta, and the two Rayleigh factors.
-type SchemeArguments = (f64, f64, f64, f64, f64);
+pub type SchemeArguments = (f64, f64, f64, f64, f64);
 type EnergyTuple = (f64, f64, f64, f64);
 
 fn matrix(arguments: &CscArguments<'_>) -> SymmetricCsc {
@@ -35,7 +35,7 @@ fn matrix(arguments: &CscArguments<'_>) -> SymmetricCsc {
     }
 }
 
-fn scheme(arguments: SchemeArguments) -> Result<(Newmark, Rayleigh)> {
+pub fn scheme(arguments: SchemeArguments) -> Result<(Newmark, Rayleigh)> {
     let (dt, alpha, delta, mass, stiffness) = arguments;
     for (name, value) in [("mass", mass), ("stiffness", stiffness)] {
         if !(value >= 0.0 && value.is_finite()) {

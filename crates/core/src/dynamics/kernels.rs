@@ -87,6 +87,29 @@ impl NullaryFnOnce for Correct<'_> {
     }
 }
 
+/// `v . v`, `q . k q` and `w . c w` with `w = before + v`, in one pass.
+pub struct Energy<'a> {
+    pub q: &'a [Lanes],
+    pub v: &'a [Lanes],
+    pub before: &'a [Lanes],
+    pub stiffness: &'a [Lanes],
+    pub damping: &'a [Lanes],
+}
+
+impl NullaryFnOnce for Energy<'_> {
+    type Output = [f64; 3];
+    #[inline(always)]
+    fn call(self) -> [f64; 3] {
+        let mut sums = [Lanes::default(); 3];
+        let modes = self.q.iter().zip(self.v).zip(self.before).zip(self.stiffness).zip(self.damping);
+        for ((((q, v), before), k), c) in modes {
+            let twice = v.plus_scaled(1.0, before);
+            sums = [sums[0].plus(v, v), sums[1].plus(&q.times(k), q), sums[2].plus(&twice.times(c), &twice)];
+        }
+        sums.map(Lanes::sum)
+    }
+}
+
 /// `load += sum of forces times rows`.
 pub struct AddRows<'a, const N: usize> {
     pub load: &'a mut [Lanes],

@@ -6,7 +6,7 @@
 
 use pulp::Arch;
 
-use super::kernels::{AddRows, Correct, Dot, FreeStep, LoadStep, Predict};
+use super::kernels::{AddRows, Correct, Dot, Energy, FreeStep, LoadStep, Predict};
 use super::lanes::{LANES, Lanes, flat, grouped};
 use super::{ModeStep, Rayleigh};
 use crate::{Error, Result};
@@ -184,6 +184,26 @@ impl Model {
                 Lanes(std::array::from_fn(of))
             })
             .collect()
+    }
+
+    /// Kinetic and strain energy of a state, and what damping took out in the step that began with the modal velocities
+    /// `before`, J.
+    pub fn energies(&self, state: &State, before: &[Lanes]) -> (f64, f64, f64) {
+        let (stiffness, damping) = (&self.stiffness, &self.damping);
+        let [kinetic, strain, power] =
+            self.arch.dispatch(Energy { q: &state.q, v: &state.v, before, stiffness, damping });
+        (0.5 * kinetic, 0.5 * strain, 0.25 * self.dt * power)
+    }
+
+    /// Turns a modal force `p` in place into the displacement beyond what it does at rest, `q - p / k` of the elastic modes
+    /// (`q` of rigid ones).
+    pub fn beyond_static(&self, state: &State, load: &mut [Lanes]) {
+        for ((p, q), k) in load.iter_mut().zip(&state.q).zip(&self.stiffness) {
+            for l in 0..LANES {
+                let at_rest = if k.0[l] > 0.0 { p.0[l] / k.0[l] } else { 0.0 };
+                p.0[l] = q.0[l] - at_rest;
+            }
+        }
     }
 
     /// Modal numbers without the filling.

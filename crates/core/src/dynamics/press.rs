@@ -26,7 +26,7 @@ impl Press {
 
     /// Takes hold of a patch (see [`Projection::gather`]).
     pub fn hold(&mut self, model: &Model, nodes: &[(u32, f64)]) {
-        self.projection.gather(model, nodes);
+        self.projection.gather(model, nodes.iter().map(|&(first, weight)| (first as usize, weight)));
         let compliance = self.projection.step_compliance(model, &self.projection);
         self.stiffness = (compliance + DMat3::from_diagonal(DVec3::splat(1.0 / self.coupling))).inverse();
     }

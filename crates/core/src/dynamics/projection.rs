@@ -28,17 +28,15 @@ impl Projection {
 
     /// Gathers a patch: the row of each node's first component (the other two follow it) and its weight. Rows that do not
     /// exist are left out.
-    pub fn gather(&mut self, model: &Model, nodes: &[(u32, f64)]) {
+    pub fn gather(&mut self, model: &Model, nodes: impl Iterator<Item = (usize, f64)> + Clone) {
         for (axis, sum) in self.axes.iter_mut().enumerate() {
             sum.fill(Lanes::default());
-            for chunk in nodes.chunks(NODES_AT_ONCE) {
+            let mut nodes = nodes.clone().filter(|(first, _)| first + 2 < model.rows()).peekable();
+            while nodes.peek().is_some() {
                 let mut rows = [model.row(0); NODES_AT_ONCE];
                 let mut forces = [0.0; NODES_AT_ONCE];
-                for (i, &(first, weight)) in chunk.iter().enumerate() {
-                    let row = first as usize + axis;
-                    if row < model.rows() {
-                        (rows[i], forces[i]) = (model.row(row), weight);
-                    }
+                for (i, (first, weight)) in nodes.by_ref().take(NODES_AT_ONCE).enumerate() {
+                    (rows[i], forces[i]) = (model.row(first + axis), weight);
                 }
                 model.arch.dispatch(AddRows { load: sum, rows, forces });
             }
