@@ -42,6 +42,19 @@ def skfem_stiffness(body: palpate.Body):
     return form.assemble(basis).tocsc()[order][:, order]
 
 
+def skfem_mass(body: palpate.Body):
+    """Consistent mass by scikit-fem, node-major dofs."""
+    import skfem
+    from skfem.helpers import dot
+
+    mesh = skfem.MeshTet(body.mesh.nodes.T.copy(), body.mesh.tets.T.copy())
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP1()), intorder=2)
+    density = body._material_rows[:, 2][:, None]
+    form = skfem.BilinearForm(lambda u, v, _w: density * dot(u, v))
+    order = basis.nodal_dofs.T.ravel()
+    return form.assemble(basis).tocsc()[order][:, order]
+
+
 @pytest.fixture(autouse=True)
 def private_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
