@@ -141,3 +141,18 @@ def test_wrong_scene_costs_one_line(tmp_path):
 def test_damaged_store_costs_one_line(tmp_path):
     (tmp_path / "bad.palpate").write_bytes(b"not a store at all")
     refused(run("info", "bad.palpate", cwd=tmp_path), "bad.palpate", "not a Palpate store")
+
+
+def test_impulse_demo_writes_the_history_of_the_struck_node(tmp_path):
+    result = run("demo", "beam", "--paper", "--impulse", "--headless", "0.5", "--out", "results", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert sorted(os.listdir(tmp_path / "results")) == ["beam-paper-impulse.csv", "beam-paper-impulse.png"]
+    table = np.genfromtxt(tmp_path / "results" / "beam-paper-impulse.csv", delimiter=",", names=True)
+    assert len(table) == 501
+    # 10 N at the end of one step and none after it: an impulse of 0.01 N s.
+    assert np.trapezoid(table["fz_N"], table["time_s"]) == pytest.approx(0.01)
+    swing = table["uz_m"]
+    assert swing.max() > 1e-3 > -1e-3 > swing.min()
+    assert abs(table["uy_m"]).max() < 0.5 * abs(swing).max()
+    assert "10 N along z for 1 ms" in result.stdout
+    refused(run("demo", "teapot", "--impulse", cwd=tmp_path), "teapot", "beam")
