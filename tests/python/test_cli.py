@@ -201,3 +201,18 @@ def test_precompute_with_gravity_and_a_locking_material(ball, tmp_path):
     weight = 1200 * 9.81 * 4 / 3 * np.pi * 0.04**3
     assert green.description["load_N"][2] == pytest.approx(-weight, rel=0.03)
     refused(run("precompute", "ball.stl", "--fix", "z<0", "--gravity", "0,1", cwd=tmp_path), "gravity", "three numbers")
+
+
+def test_impulse_demo_writes_the_history_of_the_struck_node(tmp_path):
+    result = run("demo", "beam", "--paper", "--impulse", "--headless", "0.5", "--out", "results", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert sorted(os.listdir(tmp_path / "results")) == ["beam-paper-impulse.csv", "beam-paper-impulse.png"]
+    table = np.genfromtxt(tmp_path / "results" / "beam-paper-impulse.csv", delimiter=",", names=True)
+    assert len(table) == 501
+    # 10 N at the end of one step and none after it: an impulse of 0.01 N s.
+    assert np.trapezoid(table["fz_N"], table["time_s"]) == pytest.approx(0.01)
+    swing = table["uz_m"]
+    assert swing.max() > 1e-3 > -1e-3 > swing.min()
+    assert abs(table["uy_m"]).max() < 0.5 * abs(swing).max()
+    assert "10 N along z for 1 ms" in result.stdout
+    refused(run("demo", "teapot", "--impulse", cwd=tmp_path), "teapot", "beam")

@@ -28,6 +28,9 @@ PORT = 8642
 def demo(
     model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.")] = "liver",
     paper: Annotated[bool, typer.Option("--paper", help="The mesh in the size of the paper.")] = False,
+    impulse: Annotated[
+        bool, typer.Option("--impulse", help="No press: strike the free end with 10 N for 1 ms and let it swing.")
+    ] = False,
     headless: Headless = None,
     out: Out = Path(),
     port: Port = PORT,
@@ -36,10 +39,20 @@ def demo(
 ) -> None:
     """Press on a built-in model in the browser.
 
+    With --impulse it computes the swing after a strike (the paper's figure 5) and writes its history as CSV and a plot.
+
     Example: palpate demo kidney --paper
+
+    Example: palpate demo beam --impulse --paper --out results
     """
     from palpate import models
     from palpate.cli.catalogue import model_scene
+
+    if impulse:
+        from palpate.cli.impulse import SECONDS, impulse_history
+
+        impulse_history(model, paper, headless or SECONDS, out)
+        return
 
     scene = model_scene(model, paper)
     built = _build(scene)
