@@ -173,7 +173,7 @@ def _large_liver() -> TetMesh:
     with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:
         surface = Path(folder) / "liver.stl"
         trimesh.Trimesh(mesh.nodes, mesh.surface_triangles).export(surface)
-        return tetrahedralize(surface, 0.0036)
+        return tetrahedralize(surface, 0.0034)
 
 
 def _per_call_us(work: Callable[[], object], calls: int, rounds: int = 100) -> float:
