@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::contact_forces::solve_forces;
 use super::{MAX_TOOLS, Model};
 use crate::contact::Patch;
 
@@ -73,5 +74,24 @@ impl State {
             crate::contact::add_patch_response(green, &tool.patch, force, &mut displacements);
         }
         displacements
+    }
+
+    /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts
+    /// as they are. The answer is linear in the ways of all tools; `None` for a tool that does not touch.
+    pub fn response(&self, model: &Model, tool: usize) -> Option<[Vec<f64>; 3]> {
+        if self.tools[tool].mode == Mode::Free {
+            return None;
+        }
+        let mut moved = self.clone();
+        for contact in &mut moved.tools {
+            contact.position = contact.anchor;
+        }
+        let response = DVec3::AXES.map(|way| {
+            moved.tools[tool].position = moved.tools[tool].anchor + way;
+            solve_forces(model, &mut moved);
+            let displacements = moved.displacements(model);
+            displacements.iter().zip(&model.free).map(|(u, free)| u - free).collect()
+        });
+        Some(response)
     }
 }
