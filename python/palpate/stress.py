@@ -102,6 +102,7 @@ class StressRecovery:
         tets = mesh.tets[used]
         self._strain = _strain_operator(tetrahedron_gradients(mesh.nodes, tets, points), tets, len(mesh.nodes))
         e, nu, _ = materials.T
+        self.largest_youngs_modulus = float(e.max())
         self._lame = nu * e / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
         corners = mesh.nodes[tets[:, :4]]
         positions = np.einsum("pc,ecx->epx", points, corners).reshape(-1, 3)
