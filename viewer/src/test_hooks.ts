@@ -3,7 +3,7 @@
 import * as THREE from "three";
 
 import type { BodyView } from "./body_view";
-import type { Vec3 } from "./protocol";
+import type { FieldMessage, Vec3 } from "./protocol";
 import type { Viewport } from "./viewport";
 
 /** How many of the best candidates are tried before giving up. */
@@ -23,6 +23,10 @@ export interface ViewerState {
   ticks: number;
   toolPosition: Vec3 | null;
   depth: number | null;
+  strain: number;
+  /** Whether the tool is held back from where the pointer is. */
+  held: boolean;
+  field: FieldMessage | null;
   fault: string | null;
 }
 
