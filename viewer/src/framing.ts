@@ -39,6 +39,33 @@ export function freeRegion(canvas: HTMLElement, overlays: HTMLElement[]): Region
   return { left, top, width: right - left, height: bottom - top };
 }
 
+/** Moves a target across the line of sight until the body reaches as far to both sides of it, seen from a distance. */
+export function centreAcross(
+  surface: Surface,
+  target: THREE.Vector3,
+  towardsViewer: THREE.Vector3,
+  camera: THREE.PerspectiveCamera,
+  distance: number,
+): void {
+  const point = new THREE.Vector3();
+  for (const axis of across(camera, towardsViewer)) {
+    let [low, high] = [Infinity, -Infinity];
+    for (let i = 0; i < surface.rest.length; i += 3) {
+      point.fromArray(surface.rest, i).sub(target);
+      const seen = (point.dot(axis) * distance) / (distance - point.dot(towardsViewer));
+      low = Math.min(low, seen);
+      high = Math.max(high, seen);
+    }
+    target.addScaledVector(axis, (low + high) / 2);
+  }
+}
+
+/** Unit vectors to the right and up as seen. */
+function across(camera: THREE.Camera, towardsViewer: THREE.Vector3): [THREE.Vector3, THREE.Vector3] {
+  const right = new THREE.Vector3().crossVectors(camera.up, towardsViewer).normalize();
+  return [right, new THREE.Vector3().crossVectors(towardsViewer, right)];
+}
+
 /** Distance from the target, m, along a unit vector towards the viewer, with the target in the middle of the region. */
 export function fitDistance(
   surface: Surface,
@@ -48,8 +75,7 @@ export function fitDistance(
   region: Region,
   pictureHeight: number,
 ): number {
-  const right = new THREE.Vector3().crossVectors(camera.up, towardsViewer).normalize();
-  const up = new THREE.Vector3().crossVectors(towardsViewer, right);
+  const [right, up] = across(camera, towardsViewer);
   const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov) / 2) / (MARGIN * pictureHeight);
   const [tangentRight, tangentUp] = [tangent * region.width, tangent * region.height];
   const point = new THREE.Vector3();

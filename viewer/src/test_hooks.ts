@@ -65,7 +65,8 @@ function pickPoint(viewport: Viewport, view: BodyView): [number, number] | null 
   const ranked = Array.from({ length: count }, (_, i) => [score(i), i] as const).sort((a, b) => b[0] - a[0]);
   for (const [, i] of ranked.slice(0, CANDIDATES)) {
     point.fromArray(positions, 3 * i);
-    const [x, y] = viewport.project(point);
+    // A mouse reports whole pixels: beside a cut the next one may be on the other side.
+    const [x, y] = viewport.project(point).map(Math.round) as [number, number];
     if (document.elementFromPoint(x, y) !== viewport.canvas) continue;
     const pick = view.pick(viewport.rayThrough(x, y));
     if (pick && pick.shown.distanceTo(point) < 0.03 * size) return [x, y];

@@ -9,7 +9,7 @@ import type { Surface, SurfacePoint } from "./surface";
 
 const FORCE_COLOR = 0xffb454;
 const RING_COLOR = 0xfff3d6;
-/** Length of the arrow at the largest force, over the size of the body. */
+/** Length of the arrow at the largest force, over the size of the body; it goes with the root, for a finger's range is wide. */
 const ARROW_AT_MAX_FORCE = 0.35;
 /** Shorter arrows than this (over the size of the body) are not drawn, N below noise are not either. */
 const ARROW_LENGTH_MIN = 0.012;
@@ -92,7 +92,7 @@ export class ToolView {
     const force = new THREE.Vector3(...frame.force);
     const magnitude = force.length();
     const { size, max_force } = this.header;
-    const length = ARROW_AT_MAX_FORCE * size * Math.min(1, magnitude / max_force);
+    const length = ARROW_AT_MAX_FORCE * size * Math.sqrt(Math.min(1, magnitude / max_force));
     this.arrow.visible = frame.tool.active && length > ARROW_LENGTH_MIN * size;
     if (!this.arrow.visible) return;
     const direction = force.divideScalar(magnitude);

@@ -3,7 +3,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { fitDistance, freeRegion } from "./framing";
+import { centreAcross, fitDistance, freeRegion } from "./framing";
 import type { Region } from "./framing";
 import type { Surface } from "./surface";
 
@@ -57,6 +57,10 @@ export class Viewport {
     const offset = view ? new THREE.Vector3(...view.position).sub(target) : DEFAULT_DIRECTION.clone();
     const wanted = view ? offset.length() : 0;
     offset.normalize();
+    if (!view) {
+      // The middle of the bounds is not that of the picture: nearer parts look larger. Twice is close enough.
+      for (let i = 0; i < 2; i++) centreAcross(surface, target, offset, this.camera, this.fit(surface, target, offset));
+    }
     const distance = Math.max(wanted, this.fit(surface, target, offset));
     this.camera.near = 0.02 * size;
     this.camera.far = distance + 30 * size;
