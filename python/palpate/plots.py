@@ -1,21 +1,23 @@
-"""Plots of a session, as PNG."""
+"""Plots of sessions and measurements, as PNG."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.atomic import written_beside
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 def plot_log(log: np.ndarray, path: Path, title: str) -> None:
     """Force on the device and tick times against time; written beside and renamed."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 6), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = _figure(9, 6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     time, force = log["time"], log["force"]
     upper.plot(time, np.linalg.norm(force, axis=1), color="0.15", linewidth=1.8, label="magnitude")
@@ -30,11 +32,51 @@ def plot_log(log: np.ndarray, path: Path, title: str) -> None:
     lower.set_ylabel("time of a tick [us]")
     lower.set_xlabel("time [s]")
     lower.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, frameon=False)
-    for axes in (upper, lower):
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
+    _finish(figure, path)
+
+
+def plot_convergence(
+    series: Mapping[str, tuple[np.ndarray, np.ndarray]], orders: Mapping[str, int], path: Path
+) -> None:
+    """Relative errors against element size over the body's size, with the slopes that theory expects."""
+    figure = _figure(6.5, 4.5)
+    axes = figure.subplots()
+    for (name, (size, error)), color in zip(series.items(), COLORS, strict=False):
+        observed = np.log(error[-2] / error[-1]) / np.log(size[-2] / size[-1])
+        axes.loglog(size, error, "o-", color=color, label=f"{name}: order {observed:.2f}")
+        slope = error[-1] * (size / size[-1]) ** orders[name]
+        axes.loglog(size, slope, "--", color="0.6", linewidth=0.9, zorder=0)
+    axes.set_xlabel("element size / size of the body")
+    axes.set_ylabel("relative error of displacement, L2")
+    axes.set_title("a smooth displacement; dashed: orders 2 and 3", loc="left")
+    axes.legend(frameon=False)
+    _finish(figure, path)
+
+
+COLORS = ("tab:red", "tab:blue", "tab:green", "tab:purple")
+
+
+def _figure(width: float, height: float) -> Figure:
+    """Make a figure of so many inches that needs no screen."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _finish(figure: Figure, path: Path) -> None:
+    """Light grid, open frame; written beside and renamed."""
+    for axes in figure.axes:
+        _lighten(axes)
     with written_beside(path) as partial:
         figure.savefig(partial, format="png")
+
+
+def _lighten(axes: Axes) -> None:
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def write_log(log: np.ndarray, path: Path) -> None:
