@@ -53,6 +53,24 @@ def plot_convergence(
     _finish(figure, path)
 
 
+def plot_felt_stiffness(
+    series: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]], limit: float, path: Path
+) -> None:
+    """Stiffness, N/m, of a patch and of one node against node spacings along an edge: (name: spacings, patch, node)."""
+    figure = _figure(6.5, 4.5)
+    axes = figure.subplots()
+    axes.axhline(limit, color="0.5", linewidth=0.9, linestyle="--", label="patch, converged")
+    for (name, (nodes, patch, node)), color in zip(series.items(), COLORS, strict=False):
+        axes.plot(nodes, patch, "o-", color=color, label=f"patch, {name}")
+        axes.plot(nodes, node, "s:", color=color, markersize=4, label=f"single node, {name}")
+    axes.set_xlabel("node spacings along an edge of the cube")
+    axes.set_ylabel("felt stiffness [N/m]")
+    axes.set_ylim(bottom=0)
+    axes.set_title("only a patch has a stiffness of its own", loc="left")
+    axes.legend(frameon=False)
+    _finish(figure, path)
+
+
 COLORS = ("tab:red", "tab:blue", "tab:green", "tab:purple")
 
 

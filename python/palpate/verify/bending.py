@@ -22,7 +22,11 @@ def cantilever() -> Outcome:
     checks = []
     for nu, tolerance in ((0.3, 0.01), (0.49, 0.03)):
         target = 1e3 * _beam_deflection(nu)
-        for name, quadratic, hard in (("10 nodes", True, False), ("10 nodes, glued", True, True), ("4 nodes", False, False)):
+        for name, quadratic, hard in (
+            ("10 nodes", True, False),
+            ("10 nodes, glued", True, True),
+            ("4 nodes", False, False),
+        ):
             computed = 1e3 * _cantilever_deflection(nu, quadratic, hard)
             judged = tolerance if quadratic and not hard else None
             checks.append(Check(f"tip, nu {nu}, {name}", computed, target, BEAM, judged, "mm"))

@@ -44,7 +44,7 @@ def patch_test() -> Outcome:
 
 
 def rigid_motions() -> Outcome:
-    """A body moved or turned as a whole feels no force, and nothing else does that."""
+    """Rigid motions: a body moved or turned as a whole feels no force, and nothing else does that."""
     checks = []
     for label, mesh in _irregular_meshes():
         stiffness = Body(mesh, material=SOFT).stiffness()
@@ -55,7 +55,7 @@ def rigid_motions() -> Outcome:
         least = np.linalg.eigvalsh(stiffness.toarray())
         zero = int((least < 1e-10 * least[-1]).sum())
         checks += [
-            Check(f"{label}: force of the six, part of max K", float(force), 0.0, "statics", 1e-10),
+            Check(f"{label}: largest force over max K", float(force), 0.0, "statics", 1e-10),
             Check(f"{label}: motions without force", zero, 6, "statics", 0.0),
         ]
     return Outcome(checks)

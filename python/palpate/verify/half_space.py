@@ -44,7 +44,7 @@ def point_force() -> Outcome:
     seen = (x[:, 2] < 1e-9) & (r > 3 * largest_cell)
     exact = (1 - SOFT.poissons_ratio**2) * TOTAL / (np.pi * SOFT.youngs_modulus * r[seen])
     off = float(np.abs(u[seen, 2] / exact - 1).max())
-    return Outcome([Check("surface from 3 elements outwards, largest relative error", off, 0.0, "Boussinesq", 0.05)])
+    return Outcome([Check("surface from 3 elements off, largest error", off, 0.0, "Boussinesq", 0.05)])
 
 
 def pressed_disc() -> Outcome:
@@ -63,7 +63,7 @@ def pressed_disc() -> Outcome:
 
 
 def flat_punch() -> Outcome:
-    """A rigid flat punch without friction feels `P = 2 a E d / (1 - nu^2)`."""
+    """Under a rigid flat punch without friction, `P = 2 a E d / (1 - nu^2)`."""
     mesh, fixed = _quarter_mesh()
     depth = 1e-4
     target = 2 * RADIUS * SOFT.youngs_modulus / (1 - SOFT.poissons_ratio**2)
