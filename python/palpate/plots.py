@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,8 @@ from palpate.atomic import written_beside
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from palpate.bench.elements import Row
 
 
 def plot_log(log: np.ndarray, path: Path, title: str) -> None:
@@ -68,6 +70,25 @@ def plot_felt_stiffness(
     axes.set_ylim(bottom=0)
     axes.set_title("only a patch has a stiffness of its own", loc="left")
     axes.legend(frameon=False)
+    _finish(figure, path)
+
+
+def plot_elements(rows: Sequence[Row], path: Path) -> None:
+    """Error of the felt stiffness against the price of precomputing, one line an element and Poisson's ratio."""
+    figure = _figure(9, 4.5)
+    left, right = figure.subplots(1, 2, sharey=True)
+    for nodes, style in ((4, "o--"), (10, "s-")):
+        chosen = [row for row in rows if row.element_nodes == nodes]
+        for nu, color in zip(chosen[0].errors, COLORS, strict=False):
+            errors = [abs(100 * row.errors[nu]) for row in chosen]
+            label = f"{nodes} nodes, nu {nu}"
+            left.loglog([row.precompute_cpu_s for row in chosen], errors, style, color=color, label=label)
+            right.loglog([1e-6 * row.store_bytes for row in chosen], errors, style, color=color)
+    left.set_ylabel("error of the felt stiffness [%]")
+    left.set_xlabel("precomputing, processor time [s]")
+    right.set_xlabel("store [MB]")
+    left.set_title("a patch on a cube, all of it touchable", loc="left")
+    left.legend(frameon=False)
     _finish(figure, path)
 
 
