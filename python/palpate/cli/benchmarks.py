@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,6 +12,7 @@ from palpate.cli.app import app
 
 if TYPE_CHECKING:
     from palpate.bench import dynamics as dynamics_bench
+    from palpate.bench.elements import Row as ElementRow
     from palpate.bench.paper import Row
 
 bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
@@ -99,6 +101,49 @@ def _print_dynamics(rows: list[dynamics_bench.Row]) -> None:
     absent = [name for name in SPARSE if name not in rows[0].sparse_step_us]
     if absent:
         console.print(f"not installed: {', '.join(absent)}")
+
+
+@bench_app.command()
+def elements(
+    out: Annotated[Path | None, typer.Option(help="Folder for the plot, as PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """4-node and 10-node tetrahedra: error of the felt stiffness against the price of precomputing.
+
+    Example: palpate bench elements --out plots
+    """
+    from palpate.bench import elements as bench
+    from palpate.progress import narrated
+
+    with narrated("measuring both elements on six meshes each"):
+        rows = bench.run()
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+    else:
+        _print_elements(rows)
+    if out is not None:
+        from palpate.plots import plot_elements
+
+        out.mkdir(parents=True, exist_ok=True)
+        plot_elements(rows, out / "elements.png")
+
+
+def _print_elements(rows: list[ElementRow]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Felt stiffness of a patch on a cube")
+    for title in ("element", "nodes", "on the surface", "processor time", "store"):
+        table.add_column(title, justify="right")
+    for nu in rows[0].errors:
+        table.add_column(f"nu {nu}", justify="right")
+    for before, row in zip([rows[0], *rows], rows, strict=False):
+        if before.element_nodes != row.element_nodes:
+            table.add_section()
+        errors = (f"{100 * error:+.1f} %" for error in row.errors.values())
+        price = f"{row.precompute_cpu_s:.2f} s", f"{1e-6 * row.store_bytes:.1f} MB"
+        table.add_row(f"{row.element_nodes} nodes", f"{row.nodes}", f"{row.surface_nodes}", *price, *errors)
+    Console().print(table)
 
 
 def _print_table(rows: list[Row]) -> None:
