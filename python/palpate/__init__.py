@@ -7,9 +7,20 @@ from importlib.metadata import version
 
 from palpate import models
 from palpate.body import Body, Material
-from palpate.errors import BodyError, Error, MeshError, MeshWarning, SceneError, StoreError, UnitError, ViewerError
+from palpate.errors import (
+    BodyError,
+    Error,
+    MeshError,
+    MeshWarning,
+    SceneError,
+    StoreError,
+    StoreWarning,
+    UnitError,
+    ViewerError,
+)
 from palpate.green import Answer, GreensFunction, Touch, precompute
 from palpate.mesh import TetMesh, tetrahedralize
+from palpate.plan import Plan, plan
 from palpate.scene import Scene
 from palpate.simulation import Contact, Frame, Simulation
 
@@ -26,15 +37,18 @@ __all__ = [
     "Material",
     "MeshError",
     "MeshWarning",
+    "Plan",
     "Scene",
     "SceneError",
     "Simulation",
     "StoreError",
+    "StoreWarning",
     "TetMesh",
     "Touch",
     "UnitError",
     "ViewerError",
     "models",
+    "plan",
     "precompute",
     "tetrahedralize",
 ]

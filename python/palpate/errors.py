@@ -31,3 +31,7 @@ class ViewerError(Error):
 
 class MeshWarning(UserWarning):
     """Something about a mesh was repaired or left out."""
+
+
+class StoreWarning(UserWarning):
+    """Something in the way of a precomputed file was thrown away."""
