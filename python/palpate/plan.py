@@ -23,14 +23,10 @@ class Plan:
         Order of the matrix, and shape of the operator.
     factor_entries, factor_flops
         Numbers in the Cholesky factor, and operations to compute it.
-    column_flops
-        Operations to compute the columns by the route taken.
-    walked_flops
-        The same if no subtree of the elimination tree were condensed onto its wanted dofs.
+    sweep_flops
+        Operations to compute the columns by sweeps through the elimination tree, the route taken.
     surface_last_flops
-        Least number of operations if all touchable dofs were ordered last and their dense block inverted.
-    condensed
-        Number of condensed subtrees.
+        Least number of operations of the other route: all touchable dofs ordered last, their dense block inverted.
     block, tasks
         Columns solved together, and blocks solved at a time.
     memory
@@ -45,10 +41,8 @@ class Plan:
     rows: int
     factor_entries: int
     factor_flops: float
-    column_flops: float
-    walked_flops: float
+    sweep_flops: float
     surface_last_flops: float
-    condensed: int
     block: int
     tasks: int
     memory: int
@@ -56,10 +50,12 @@ class Plan:
 
     def __str__(self) -> str:
         """Two lines for people."""
+        factor, sweeps, other = (
+            f"{n / 1e9:.3g}" for n in (self.factor_flops, self.sweep_flops, self.surface_last_flops)
+        )
         return (
-            f"{self.columns} columns of {self.rows} rows: factor {self.factor_flops / 1e9:.3g} Gflop, columns "
-            f"{self.column_flops / 1e9:.3g} Gflop by sweeps with {self.condensed} condensed subtrees "
-            f"(surface last: at least {self.surface_last_flops / 1e9:.3g})\n"
+            f"{self.columns} columns of {self.rows} rows: factor {factor} Gflop, columns {sweeps} Gflop by sweeps "
+            f"(surface last: at least {other})\n"
             f"peak memory {self.memory / 1e9:.2f} GB, {self.tasks} tasks with {self.block} columns each, "
             f"store {self.store / 1e9:.3g} GB"
         )

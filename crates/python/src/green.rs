@@ -263,10 +263,8 @@ fn plan_dict<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> 
     dict.set_item("rows", plan.rows)?;
     dict.set_item("factor_entries", plan.factor_entries)?;
     dict.set_item("factor_flops", plan.factor_flops)?;
-    dict.set_item("column_flops", plan.column_flops)?;
-    dict.set_item("walked_flops", plan.walked_flops)?;
+    dict.set_item("sweep_flops", plan.sweep_flops)?;
     dict.set_item("surface_last_flops", plan.surface_last_flops)?;
-    dict.set_item("condensed", plan.condensed)?;
     dict.set_item("block", plan.width)?;
     dict.set_item("tasks", plan.tasks)?;
     dict.set_item("memory", plan.memory)?;

@@ -20,11 +20,11 @@ pub struct Mirror<'a, T> {
 
 /// Numbers that one task of [`Mirror::columns`] needs.
 pub fn numbers(layout: &Layout, width: usize) -> usize {
-    (2 * width + 1) * layout.line()
+    (2 * width + 1) * layout.rows()
 }
 
 impl<T: Number> Mirror<'_, T> {
-    /// Hands every column to `take`, as its index in the order of elimination and its rows in their final order, from up
+    /// Hands every column to `take`, as its place in the order and its rows in their final order, from up
     /// to `tasks` tasks at a time.
     ///
     /// # Errors
@@ -32,14 +32,14 @@ impl<T: Number> Mirror<'_, T> {
     pub fn columns(&self, tasks: usize, take: &(dyn Fn(usize, &[T]) -> Result<()> + Sync)) -> Result<()> {
         let next = AtomicUsize::new(0);
         super::precompute::in_tasks(tasks, &|| {
-            let (mut lines, mut panel, mut column) = (Vec::new(), Vec::new(), vec![T::default(); self.layout.line()]);
+            let (mut lines, mut panel, mut column) = (Vec::new(), Vec::new(), vec![T::default(); self.layout.rows()]);
             loop {
                 let block = next.fetch_add(1, Ordering::Relaxed);
                 if block >= self.blocks.len() {
                     return Ok(());
                 }
                 self.lines(block, &mut lines, &mut panel)?;
-                for (k, line) in lines.chunks_exact(self.layout.line()).enumerate() {
+                for (k, line) in lines.chunks_exact(self.layout.rows()).enumerate() {
                     for (value, &place) in column.iter_mut().zip(&self.layout.place_of_row) {
                         *value = line[place as usize];
                     }
@@ -51,7 +51,7 @@ impl<T: Number> Mirror<'_, T> {
 
     /// The columns of a block with all their rows in solving order.
     fn lines(&self, index: usize, lines: &mut Vec<T>, panel: &mut Vec<T>) -> Result<()> {
-        let (block, length) = (&self.blocks[index], self.layout.line());
+        let (block, length) = (&self.blocks[index], self.layout.rows());
         lines.resize(block.width * length, T::default());
         for (earlier_index, earlier) in self.blocks[..index].iter().enumerate() {
             // Rows of this block in the earlier one's panel are columns of this block: contiguous pieces of lines.
@@ -83,7 +83,7 @@ impl<T: Number> Mirror<'_, T> {
     /// # Errors
     /// That of reading a panel.
     pub fn diagonal(&self) -> Result<Vec<T>> {
-        let mut diagonal = Vec::with_capacity(self.layout.columns());
+        let mut diagonal = Vec::with_capacity(self.layout.columns);
         for (index, block) in self.blocks.iter().enumerate() {
             let mut square = vec![T::default(); block.width * block.width];
             self.panels.get(index, 0, &mut square)?;
@@ -92,18 +92,17 @@ impl<T: Number> Mirror<'_, T> {
         Ok(diagonal)
     }
 
-    /// Calls `see(extra row, column in the order of elimination, value)` for all rows that have no column.
+    /// Calls `see(row, column, value)` for all rows that have no column, row and column as places in the order.
     ///
     /// # Errors
     /// That of reading a panel.
-    pub fn extra(&self, see: &mut dyn FnMut(usize, usize, T)) -> Result<()> {
+    pub fn rows_without_column(&self, see: &mut dyn FnMut(usize, usize, T)) -> Result<()> {
         let mut row = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {
-            let first = block.rows - self.layout.extra.len();
             row.resize(block.width, T::default());
-            for extra in 0..self.layout.extra.len() {
-                self.panels.get(index, (first + extra) * block.width, &mut row)?;
-                row.iter().enumerate().for_each(|(k, &value)| see(extra, block.first + k, value));
+            for place in self.layout.columns..self.layout.rows() {
+                self.panels.get(index, (place - block.first) * block.width, &mut row)?;
+                row.iter().enumerate().for_each(|(k, &value)| see(place, block.first + k, value));
             }
         }
         Ok(())

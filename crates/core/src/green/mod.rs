@@ -27,6 +27,7 @@ mod precompute;
 mod scaled;
 mod store;
 mod sweep;
+mod system;
 mod tree;
 
 pub use columns::Problem;

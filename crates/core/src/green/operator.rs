@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use half::f16;
 use memmap2::Mmap;
 
 use super::scaled;
@@ -11,7 +10,7 @@ use crate::mesh::Surface;
 /// Number format of the stored values; arithmetic is always f64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// 2 bytes an entry, and a scale a dof.
+    /// 2 bytes an entry, fixed point with a scale a dof.
     F16,
     /// 4 bytes an entry.
     F32,
@@ -48,16 +47,17 @@ impl Precision {
         self.bytes().max(4)
     }
 
-    /// Bytes of the numbers that columns are computed with.
+    /// Bytes of the numbers that columns are computed with. Single precision costs a column up to 1e-5 of its largest
+    /// entry, and reactions more: enough for halves only.
     pub fn computed_bytes(self) -> usize {
-        self.panel_bytes()
+        if self == Precision::F16 { 4 } else { 8 }
     }
 }
 
 /// Where the entries live; column after column.
 pub enum Values {
-    /// In memory, half, scaled.
-    F16(Vec<f16>),
+    /// In memory, fixed point.
+    F16(Vec<i16>),
     /// In memory, single.
     F32(Vec<f32>),
     /// In memory, double.
@@ -69,8 +69,8 @@ pub enum Values {
 /// The entries as a slice.
 #[derive(Clone, Copy)]
 pub enum ValueSlice<'a> {
-    /// Half precision, to be scaled.
-    F16(&'a [f16]),
+    /// Fixed point, to be scaled.
+    F16(&'a [i16]),
     /// Single precision.
     F32(&'a [f32]),
     /// Double precision.

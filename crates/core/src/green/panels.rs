@@ -1,7 +1,7 @@
 //! Finished blocks of columns, until the operator is put together from them.
 //!
-//! A block's panel holds, for each of its columns, the rows from the block's first column on in the order of
-//! elimination, then the rows that have no column; the numbers of a row are contiguous. Everything earlier is the mirror
+//! A block's panel holds, for each of its columns, the rows from the block's first column on in solving order, those
+//! without a column last; the numbers of a row are contiguous. Everything earlier is the mirror
 //! of an earlier panel.
 
 use std::sync::OnceLock;

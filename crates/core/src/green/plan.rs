@@ -7,7 +7,8 @@ use super::factor::Symbolic;
 use super::mirror;
 use super::operator::Precision;
 use super::panels::Block;
-use super::sweep::{flops, scratch_numbers};
+use super::sweep::{loaded, scratch_numbers};
+use super::system::System;
 use super::tree::Tree;
 use crate::fem::SymmetricCsc;
 use crate::{Error, Result};
@@ -20,7 +21,6 @@ const WIDTHS: [usize; 4] = [192, 96, 48, 24];
 const FEWEST_BLOCKS: usize = 12;
 /// Bytes that the allocator, METIS and the tasks' stacks take beside what is counted, measured.
 const OVERHEAD_BYTES: usize = 24 << 20;
-
 /// The counts of a precomputation.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -34,12 +34,8 @@ pub struct Plan {
     pub factor_entries: usize,
     /// Operations of the factorisation.
     pub factor_flops: f64,
-    /// Operations of the columns as they will be solved.
-    pub column_flops: f64,
-    /// The same if no subtree were condensed.
-    pub walked_flops: f64,
-    /// Subtrees that are condensed.
-    pub condensed: usize,
+    /// Operations of the columns, by sweeps through the elimination tree.
+    pub sweep_flops: f64,
     /// At least this many operations would be needed with all touchable dofs ordered last, the trailing block of the
     /// factor being inverted: `s^3/3` each for the factor, its inverse and their product.
     pub surface_last_flops: f64,
@@ -70,8 +66,8 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Orders, counts, and chooses blocks so that the peak stays below `memory` bytes. `in_memory`: the operator itself
-    /// is to be held, too.
+    /// Orders, counts, and chooses route and blocks so that the peak stays below `memory` bytes. `in_memory`: the
+    /// operator itself is to be held, too.
     ///
     /// # Errors
     /// A bound that cannot be kept, with what would fit.
@@ -79,34 +75,38 @@ impl Prepared {
         let stiffness = crate::fem::stiffness(&problem.mesh, &problem.materials);
         let symbolic = Symbolic::new(&stiffness, &problem.supports)?;
         let layout = Layout::new(problem, &stiffness, &symbolic);
-        let supernodes = symbolic.supernodes()?;
-        let tree = Tree::new(supernodes, &layout.wanted, true);
-        let walked = Tree::new(supernodes, &layout.wanted, false);
-        let sizes = Sizes::new(&stiffness, &symbolic, &layout, &tree, precision, in_memory)?;
+        let tree = Tree::new(symbolic.supernodes()?, &layout.wanted);
+        let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
+        let sizes = Sizes::new(&system, &symbolic, &tree, precision, in_memory)?;
         let (width, tasks, peak) = sizes.choose(&layout, &tree, memory)?;
         let blocks = layout.blocks(width);
-        let count = |tree: &Tree| -> f64 {
-            let reached = |b| layout.right_hand_sides(&stiffness, &problem.supports, tree, b).1;
-            blocks.iter().map(|b| flops(tree, &reached(b))).sum()
-        };
-        let surface = (layout.columns() - layout.supported) as f64;
         let plan = Plan {
             free_dofs: problem.supports.free.len(),
-            columns: layout.columns(),
-            rows: layout.row_dofs.len(),
-            factor_entries: supernodes.len_val(),
+            columns: layout.columns,
+            rows: layout.rows(),
+            factor_entries: symbolic.supernodes()?.len_val(),
             factor_flops: symbolic.flops()?,
-            column_flops: count(&tree),
-            walked_flops: count(&walked),
-            condensed: tree.condensed_count(),
-            surface_last_flops: surface.powi(3),
+            sweep_flops: blocks.iter().map(|block| sweep_flops(&system, &tree, block)).sum(),
+            surface_last_flops: ((layout.columns - layout.supported) as f64).powi(3),
             width,
             tasks,
             memory: peak,
-            store: layout.columns() * layout.row_dofs.len() * precision.bytes(),
+            store: layout.columns * layout.rows() * precision.bytes(),
         };
         Ok(Self { stiffness, symbolic, layout, tree, blocks, plan })
     }
+}
+
+/// Operations of a block.
+fn sweep_flops(system: &System<'_>, tree: &Tree, block: &Block) -> f64 {
+    let sources = system.layout.loads(system.stiffness, system.supports, tree, block);
+    let loaded = loaded(tree, block.width, &sources);
+    let readers = system.readers(tree, block);
+    let of = |k: usize| {
+        let (size, boundary) = (tree.nodes[k].size() as f64, tree.nodes[k].boundary_size() as f64);
+        2.0 * size * ((size + boundary) * loaded[k].len() as f64 + boundary * readers[k] as f64)
+    };
+    (0..tree.nodes.len()).map(of).sum()
 }
 
 /// Bytes of everything, by stage.
@@ -120,35 +120,35 @@ struct Sizes {
     operators: usize,
     /// The operator and its panels, if they are held.
     result: usize,
-    /// Bytes of a panel's number and of a computed one.
+    /// Of a number in a panel, and of one that is computed with.
     stored: usize,
     computed: usize,
 }
 
 impl Sizes {
     fn new(
-        stiffness: &SymmetricCsc,
+        system: &System<'_>,
         symbolic: &Symbolic,
-        layout: &Layout,
         tree: &Tree,
         precision: Precision,
         in_memory: bool,
     ) -> Result<Self> {
         let supernodes = symbolic.supernodes()?;
-        let (computed, stored) = (precision.computed_bytes(), precision.panel_bytes());
+        let (layout, stored, computed) = (system.layout, precision.panel_bytes(), precision.computed_bytes());
         let factor = 8 * supernodes.len_val();
         let lower = 16 * symbolic.matrix_entries();
-        let structure = 8 * supernodes.row_idx().len() + 64 * stiffness.dimension + 4 * tree.boundaries.len();
+        let dofs = system.stiffness.dimension;
+        let structure = 8 * supernodes.row_idx().len() + 64 * dofs + 4 * tree.boundaries.len();
         let numbers: usize = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).sum();
-        let largest = tree.nodes.iter().map(|n| n.size().max(1) * (n.size() + n.boundary_size())).max().unwrap_or(0);
-        let square = layout.columns() * layout.row_dofs.len();
-        let panels = layout.columns() * (layout.columns() / 2 + layout.extra.len());
+        let largest = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).max().unwrap_or(0);
+        let panels: usize = layout.blocks(WIDTHS[0]).iter().map(Block::len).sum();
+        let held = stored * panels + precision.bytes() * layout.columns * layout.rows();
         Ok(Self {
-            matrix: 12 * stiffness.values.len() + structure + OVERHEAD_BYTES,
+            matrix: 12 * system.stiffness.values.len() + structure + OVERHEAD_BYTES,
             factorising: factor + lower + symbolic.scratch_bytes(faer::Par::rayon(0)),
             making: factor + computed * numbers + 3 * 8 * largest,
             operators: computed * numbers,
-            result: if in_memory { stored * panels + precision.bytes() * square } else { 0 },
+            result: if in_memory { held } else { 0 },
             stored,
             computed,
         })
@@ -156,19 +156,18 @@ impl Sizes {
 
     /// Peak with blocks of `width` columns in `tasks` tasks.
     fn peak(&self, layout: &Layout, tree: &Tree, width: usize, tasks: usize) -> usize {
-        let numbers = scratch_numbers(tree, width);
-        let solving = self.operators + tasks * (self.computed * numbers + self.stored * width * layout.line());
+        let panel = self.stored * width * layout.rows();
+        let solving = self.operators + tasks * (self.computed * scratch_numbers(tree, width) + panel);
         let mirroring = tasks * self.stored * mirror::numbers(layout, width);
         self.matrix + self.result + self.factorising.max(self.making).max(solving).max(mirroring)
     }
 
     /// Width, tasks and peak: as many tasks as there are threads, as wide as possible, within the bound.
     fn choose(&self, layout: &Layout, tree: &Tree, memory: Option<usize>) -> Result<(usize, usize, usize)> {
-        let threads = current_num_threads();
-        let widest = layout.columns() / FEWEST_BLOCKS;
+        let widest = (layout.columns / FEWEST_BLOCKS).max(WIDTHS[2]);
         let mut least = usize::MAX;
-        for tasks in (1..=threads).rev() {
-            for &width in WIDTHS.iter().filter(|&&w| w <= widest.max(WIDTHS[2])) {
+        for tasks in (1..=current_num_threads()).rev() {
+            for width in WIDTHS.into_iter().filter(|&width| width <= widest) {
                 let peak = self.peak(layout, tree, width, tasks);
                 least = least.min(peak);
                 if memory.is_none_or(|bound| peak <= bound) {
@@ -176,20 +175,18 @@ impl Sizes {
                 }
             }
         }
-        let (needed, bound) = (gigabytes(least), gigabytes(memory.unwrap_or(0)));
-        let factor = gigabytes(self.matrix + self.factorising);
+        let gigabytes = |bytes: usize| format!("{:.3} GB", bytes as f64 / 1e9);
         let remedy = if self.matrix + self.factorising < least {
-            "a smaller touch region needs less, and so does 'f32' or 'f16' instead of 'f64'"
+            "a smaller touch region needs less, and so does 'f16'"
         } else {
-            "only a coarser mesh needs less, the touch region and the precision change nothing here"
+            "only a coarser mesh needs less, whatever the touch region and the precision"
         };
         Err(Error::Memory(format!(
-            "the precomputation needs at least {needed} of memory, {bound} are allowed; the factor alone takes {factor}: \
-             {remedy}"
+            "the precomputation needs at least {} of memory beside what is in use, {} are left; its factor alone takes \
+             {}: {remedy}",
+            gigabytes(least),
+            gigabytes(memory.unwrap_or(0)),
+            gigabytes(self.matrix + self.factorising)
         )))
     }
-}
-
-fn gigabytes(bytes: usize) -> String {
-    format!("{:.2} GB", bytes as f64 / 1e9)
 }

@@ -6,9 +6,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use faer::Par;
-use half::f16;
 
-use super::columns::{Columns, Layout, Problem};
+use super::columns::{Layout, Problem};
 use super::key::FORMAT_VERSION;
 use super::mirror::{Mirror, task_failed};
 use super::number::Number;
@@ -20,6 +19,7 @@ use super::plan::{Plan, Prepared};
 use super::scaled::{quantise, scales};
 use super::store::StoreWriter;
 use super::sweep::{Scratch, Sweep};
+use super::system::System;
 use crate::fem::SymmetricCsc;
 use crate::{Error, Result};
 
@@ -69,15 +69,14 @@ pub fn precompute(problem: &Problem, precision: Precision, progress: Progress<'_
             Values::F64(solved.collect(&green, |_, column, out| out.copy_from_slice(column))?)
         }
         Precision::F32 => {
-            let solved = solve::<f32, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
+            let solved = solve::<f64, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
             Values::F32(solved.collect(&green, |_, column, out| out.copy_from_slice(column))?)
         }
         Precision::F16 => {
             let solved = solve::<f32, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
             green.scale = solved.scales()?;
-            let quantised = |row: usize, column: &[f32], out: &mut [f16]| {
-                quantise(column, green.scale[row], &green.scale, out);
-            };
+            let inverse: Vec<f64> = green.scale.iter().map(|scale| 1.0 / scale).collect();
+            let quantised = |row: usize, column: &[f32], out: &mut [i16]| quantise(column, inverse[row], &inverse, out);
             Values::F16(solved.collect(&green, quantised)?)
         }
     };
@@ -103,7 +102,8 @@ pub fn precompute_to(
     target.description.clone_into(&mut green.description);
     match target.precision {
         Precision::F64 => write::<f64, f64>(problem, prepared, green, target, found, progress),
-        Precision::F32 | Precision::F16 => write::<f32, f32>(problem, prepared, green, target, found, progress),
+        Precision::F32 => write::<f64, f32>(problem, prepared, green, target, found, progress),
+        Precision::F16 => write::<f32, f32>(problem, prepared, green, target, found, progress),
     }
 }
 
@@ -168,29 +168,25 @@ fn solve<C: Number, T: Number>(
     let Prepared { stiffness, symbolic, layout, tree, blocks, plan } = prepared;
     let missing: Vec<usize> = (0..blocks.len()).filter(|&k| !panels.has(k)).collect();
     let columns: usize = missing.iter().map(|&k| blocks[k].width).sum();
-    let done = AtomicUsize::new(layout.columns() - columns);
-    let go_on = |more: usize| match progress(done.fetch_add(more, Ordering::Relaxed) + more, layout.columns()) {
+    let done = AtomicUsize::new(layout.columns - columns);
+    let go_on = |more: usize| match progress(done.fetch_add(more, Ordering::Relaxed) + more, layout.columns) {
         true => Ok(()),
         false => Err(Error::Interrupted),
     };
     go_on(0)?;
     if !missing.is_empty() {
+        let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
         let factor = symbolic.factorise(Par::rayon(0))?;
         go_on(0)?;
         let operators = operators::<C>(&tree, factor.supernodal()?);
         drop(factor);
-        let solver = Columns {
-            stiffness: &stiffness,
-            supports: &problem.supports,
-            layout: &layout,
-            sweep: Sweep { tree, operators },
-        };
+        let sweep = Sweep { tree, operators };
         let next = AtomicUsize::new(0);
         in_tasks(plan.tasks, &|| {
-            let mut scratch = Scratch::new(&solver.sweep.tree, plan.width);
+            let mut scratch = Scratch::new(&sweep.tree, plan.width);
             let mut panel = Vec::new();
             while let Some(&block) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                solver.solve(&blocks[block], &mut scratch, &mut panel);
+                system.solve(&sweep, &blocks[block], &mut scratch, &mut panel);
                 panels.put(block, &panel)?;
                 go_on(blocks[block].width)?;
             }
@@ -215,7 +211,7 @@ impl<T: Number> Solved<T> {
         green: &GreensFunction,
         convert: impl Fn(usize, &[T], &mut [U]) + Sync,
     ) -> Result<Vec<U>> {
-        let mut values = vec![U::default(); self.layout.columns() * green.rows];
+        let mut values = vec![U::default(); self.layout.columns * green.rows];
         let columns: Vec<Mutex<&mut [U]>> = values.chunks_mut(green.rows).map(Mutex::new).collect();
         self.mirror().columns(self.tasks, &|place, column| {
             let row = self.layout.order[place] as usize;
@@ -230,14 +226,15 @@ impl<T: Number> Solved<T> {
     /// All columns into the store.
     fn store(&self, green: &GreensFunction, target: &Target<'_>, progress: Progress<'_>) -> Result<()> {
         let writer = StoreWriter::create(target.path, green, target.precision)?;
+        let inverse: Vec<f64> = green.scale.iter().map(|scale| 1.0 / scale).collect();
         self.mirror().columns(self.tasks, &|place, column| {
             let row = self.layout.order[place] as usize;
-            if !progress(self.layout.columns(), self.layout.columns()) {
+            if !progress(self.layout.columns, self.layout.columns) {
                 return Err(Error::Interrupted);
             }
             if target.precision == Precision::F16 {
-                let mut quantised = vec![f16::ZERO; column.len()];
-                quantise(column, green.scale[row], &green.scale, &mut quantised);
+                let mut quantised = vec![0i16; column.len()];
+                quantise(column, inverse[row], &inverse, &mut quantised);
                 return writer.put(green.column_of_row(row), bytemuck::cast_slice(&quantised));
             }
             writer.put(green.column_of_row(row), bytemuck::cast_slice(column))

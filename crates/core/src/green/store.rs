@@ -47,7 +47,7 @@ impl StoreWriter {
         let sums = length.div_ceil(CHECKSUM_BLOCK);
         let small = green.small_tensors();
         let dtype = match precision {
-            Precision::F16 => Dtype::F16,
+            Precision::F16 => Dtype::I16,
             Precision::F32 => Dtype::F32,
             Precision::F64 => Dtype::F64,
         };
@@ -319,7 +319,7 @@ impl Reader<'_> {
     ) -> Result<(usize, usize, Precision)> {
         let psi = self.tensor("psi")?;
         let precision = match psi.dtype() {
-            Dtype::F16 if green.scale.len() == green.rows => Precision::F16,
+            Dtype::I16 if green.scale.len() == green.rows => Precision::F16,
             Dtype::F32 => Precision::F32,
             Dtype::F64 => Precision::F64,
             other => return Err(self.damaged(&format!("numbers of type {other:?}"))),

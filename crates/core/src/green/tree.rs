@@ -6,7 +6,7 @@
 //! G_k = L_bk L_kk^-1,      M_k = L_kk^-T L_kk^-1
 //! ```
 //!
-//! a solve `K x = f` is two sweeps of matrix products (the block form `K = (I + G) M^-1 (I + G^T)`):
+//! a solve `K x = f` is two sweeps of matrix products and nothing else:
 //!
 //! ```text
 //! up:    f_b -= G_k f_k            from the leaves to the root
@@ -14,10 +14,8 @@
 //! ```
 //!
 //! `M_k` is the compliance of the supernode with its boundary clamped, `-G_k^T` how it follows its boundary. Only rows
-//! are kept that somebody asks for, or that a kept row below reads. The same two matrices exist for a whole subtree:
-//! `M` its compliance between the wanted dofs only, `G^T` how those follow the boundary of the subtree, its inner dofs
-//! eliminated first and the wanted ones last. Such a condensed subtree (a substructure, in the words of finite elements)
-//! is one node here. Whether to condense a subtree or to walk it is decided by counting.
+//! are kept that somebody loads or reads, or that a kept row below has in its boundary: for all others `f_k` is zero
+//! and nobody asks for `x_k`.
 
 use std::ops::Range;
 
@@ -25,9 +23,6 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
 /// No parent, no row, no column.
 pub const NONE: u32 = u32::MAX;
-/// Cost of moving one number of a boundary into place, in floating-point operations that take as long (measured: 20 to
-/// 30 for both number formats).
-const GATHER_FLOPS: f64 = 24.0;
 
 /// What is asked of the solution at one permuted position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,23 +35,17 @@ pub struct Wanted {
     pub supports: bool,
 }
 
-impl Wanted {
-    fn any(self) -> bool {
-        self.column || self.always || self.supports
-    }
-}
-
-/// A supernode, or a condensed subtree.
+/// The kept rows of a supernode.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// Its kept rows.
+    /// Them.
     pub rows: Range<usize>,
     /// Its boundary: part of [`Tree::boundaries`].
     pub boundary: Range<usize>,
     /// Node of the first boundary row, or [`NONE`].
     pub parent: u32,
-    /// The supernodes it is made of: one, or a subtree with its root last.
-    pub supernodes: Range<usize>,
+    /// The supernode.
+    pub supernode: usize,
     /// Last row in its subtree that has a column, or [`NONE`] if some row there is read by every column.
     pub last_wanted: u32,
 }
@@ -83,52 +72,29 @@ pub struct Tree {
     pub row_of_position: Vec<u32>,
     /// For each kept row its node.
     pub node_of_row: Vec<u32>,
-    /// Whether each position is needed when no subtree is condensed; the condensation itself reads these.
-    pub needed: Vec<bool>,
-}
-
-/// Sizes of a supernode and of the subtree under it, from which costs are counted.
-#[derive(Clone, Copy, Default)]
-struct Count {
-    needed: f64,
-    boundary: f64,
-    /// Wanted rows in the subtree.
-    wanted: f64,
-    /// Columns whose unit force acts in the subtree.
-    inside: f64,
-    /// Columns that read anything in the subtree.
-    readers: f64,
-    /// First supernode of the subtree, and how many it has.
-    first: usize,
-    supernodes: usize,
 }
 
 impl Tree {
-    /// Cuts the tree down to the `wanted` positions; `condense` allows subtrees to become one node.
-    pub fn new(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted], condense: bool) -> Self {
+    /// Cuts the tree down to the `wanted` positions.
+    pub fn new(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) -> Self {
         let needed = needed_rows(supernodes, wanted);
-        let (counts, parents) = count(supernodes, wanted, &needed);
-        let condensed = if condense { cheaper_condensed(&counts, &parents) } else { vec![false; counts.len()] };
         let mut tree = Self {
             nodes: Vec::new(),
             boundaries: Vec::new(),
             row_of_position: vec![NONE; wanted.len()],
             node_of_row: Vec::new(),
-            needed,
         };
-        // From the root down, so that a subtree is emitted once, at its highest condensed node; then turned round.
-        let mut covered_from = counts.len();
-        let mut emitted = Vec::new();
-        for s in (0..counts.len()).rev() {
-            if s >= covered_from || counts[s].needed == 0.0 {
-                continue;
+        for supernode in 0..supernodes.n_supernodes() {
+            let first = tree.node_of_row.len();
+            let range = supernodes.supernode_begin()[supernode]..supernodes.supernode_end()[supernode];
+            for position in range.filter(|&p| needed[p]) {
+                tree.row_of_position[position] = tree.node_of_row.len() as u32;
+                tree.node_of_row.push(tree.nodes.len() as u32);
             }
-            let first = if condensed[s] { counts[s].first } else { s };
-            covered_from = first;
-            emitted.push(first..s + 1);
-        }
-        for supernode_range in emitted.into_iter().rev() {
-            tree.emit(supernodes, wanted, supernode_range);
+            let rows = first..tree.node_of_row.len();
+            if !rows.is_empty() {
+                tree.nodes.push(Node { rows, boundary: 0..0, parent: NONE, supernode, last_wanted: 0 });
+            }
         }
         tree.link(supernodes, wanted);
         tree
@@ -144,42 +110,11 @@ impl Tree {
         &self.boundaries[node.boundary.clone()]
     }
 
-    /// Number of nodes that stand for more than a supernode.
-    pub fn condensed_count(&self) -> usize {
-        self.nodes.iter().filter(|n| n.supernodes.len() > 1).count()
-    }
-
-    fn emit(
-        &mut self,
-        supernodes: &SymbolicSupernodalCholesky<usize>,
-        wanted: &[Wanted],
-        supernode_range: Range<usize>,
-    ) {
-        let begin = supernodes.supernode_begin()[supernode_range.start];
-        let end = supernodes.supernode_end()[supernode_range.end - 1];
-        let whole = supernode_range.len() > 1;
-        let first = self.node_of_row.len();
-        for position in begin..end {
-            if if whole { wanted[position].any() } else { self.needed[position] } {
-                self.row_of_position[position] = self.node_of_row.len() as u32;
-                self.node_of_row.push(self.nodes.len() as u32);
-            }
-        }
-        self.nodes.push(Node {
-            rows: first..self.node_of_row.len(),
-            boundary: 0..0,
-            parent: NONE,
-            supernodes: supernode_range,
-            last_wanted: 0,
-        });
-    }
-
     /// Boundaries, parents and last wanted rows, once every row has its number.
     fn link(&mut self, supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) {
         for node in &mut self.nodes {
-            let root = node.supernodes.end - 1;
             let start = self.boundaries.len();
-            let pattern = supernodes.supernode(root).pattern();
+            let pattern = supernodes.supernode(node.supernode).pattern();
             self.boundaries.extend(pattern.iter().map(|&position| self.row_of_position[position]));
             node.boundary = start..self.boundaries.len();
             if let Some(&row) = self.boundaries.get(start) {
@@ -210,7 +145,7 @@ impl Tree {
 
 /// Positions that are wanted, or read by a needed supernode below.
 fn needed_rows(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) -> Vec<bool> {
-    let mut needed: Vec<bool> = wanted.iter().map(|w| w.any()).collect();
+    let mut needed: Vec<bool> = wanted.iter().map(|w| w.column || w.always || w.supports).collect();
     for s in 0..supernodes.n_supernodes() {
         if needed[supernodes.supernode_begin()[s]..supernodes.supernode_end()[s]].contains(&true) {
             for &row in supernodes.supernode(s).pattern() {
@@ -219,78 +154,4 @@ fn needed_rows(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]
         }
     }
     needed
-}
-
-fn count(
-    supernodes: &SymbolicSupernodalCholesky<usize>,
-    wanted: &[Wanted],
-    needed: &[bool],
-) -> (Vec<Count>, Vec<Option<usize>>) {
-    let supernode_count = supernodes.n_supernodes();
-    let mut supernode_of = vec![0; wanted.len()];
-    let mut counts: Vec<Count> =
-        (0..supernode_count).map(|s| Count { first: s, supernodes: 1, ..Count::default() }).collect();
-    let mut parents = vec![None; supernode_count];
-    let mut columns_so_far = 0.0;
-    let all_columns = wanted.iter().filter(|w| w.column).count() as f64;
-    for s in 0..supernode_count {
-        let range = supernodes.supernode_begin()[s]..supernodes.supernode_end()[s];
-        supernode_of[range.clone()].fill(s);
-        let number = |test: &dyn Fn(usize) -> bool| range.clone().filter(|&p| test(p)).count() as f64;
-        let own_columns = number(&|p| wanted[p].column);
-        columns_so_far += own_columns;
-        let c = &mut counts[s];
-        c.needed = number(&|p| needed[p]);
-        c.boundary = supernodes.supernode(s).pattern().len() as f64;
-        c.wanted += number(&|p| wanted[p].any());
-        c.inside += own_columns;
-        let always = range.clone().any(|p| wanted[p].always);
-        c.readers = c.readers.max(if always { all_columns } else { columns_so_far });
-    }
-    for s in 0..supernode_count {
-        if let Some(&row) = supernodes.supernode(s).pattern().first() {
-            let (parent, child) = (supernode_of[row], counts[s]);
-            parents[s] = Some(parent);
-            let p = &mut counts[parent];
-            p.wanted += child.wanted;
-            p.inside += child.inside;
-            p.readers = p.readers.max(child.readers);
-            p.first = p.first.min(child.first);
-            p.supernodes += child.supernodes;
-        }
-    }
-    (counts, parents)
-}
-
-/// For each supernode, whether its subtree is cheaper as one node.
-///
-/// A node of `n` rows with `b` boundary rows costs a column that acts inside `2 n (n + 2b)` operations and one that only
-/// reads it `2 n b`, beside moving the boundary. Condensing costs a walk of the subtree for each of its wanted and
-/// boundary rows, once.
-fn cheaper_condensed(counts: &[Count], parents: &[Option<usize>]) -> Vec<bool> {
-    let cost = |c: &Count, rows: f64| {
-        let read = 2.0 * rows * c.boundary + GATHER_FLOPS * c.boundary;
-        c.readers * read + c.inside * (read + GATHER_FLOPS * c.boundary + 2.0 * rows * rows)
-    };
-    let mut walked = vec![0.0; counts.len()];
-    let mut one_walk = vec![0.0; counts.len()];
-    let mut condensed = vec![false; counts.len()];
-    for (s, c) in counts.iter().enumerate() {
-        if c.needed > 0.0 {
-            walked[s] += cost(c, c.needed);
-            one_walk[s] += 2.0 * c.needed * (c.boundary + c.needed) + GATHER_FLOPS * c.boundary;
-            let whole = cost(c, c.wanted) + 2.0 * one_walk[s] * (c.wanted + c.boundary);
-            // A leaf is one node either way; a subtree is cut out as a range, so nothing else may stand in between.
-            let is_range = c.supernodes == s + 1 - c.first;
-            if c.first < s && is_range && whole < walked[s] {
-                (walked[s], condensed[s]) = (whole, true);
-            }
-        }
-        if let Some(parent) = parents[s] {
-            let (below, walk) = (walked[s], one_walk[s]);
-            walked[parent] += below;
-            one_walk[parent] += walk;
-        }
-    }
-    condensed
 }
