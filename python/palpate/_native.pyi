@@ -85,6 +85,17 @@ class GreenCore:
         progress: Callable[[int, int], Any] | None,
     ) -> GreenCore: ...
     @staticmethod
+    def precompute_to(
+        arguments: tuple[np.ndarray, ...],
+        precision_name: str,
+        description: str,
+        progress: Callable[[int, int], Any] | None,
+        path: Path,
+        memory: int | None = None,
+    ) -> tuple[int, bool]: ...
+    @staticmethod
+    def plan(arguments: tuple[np.ndarray, ...], precision_name: str, memory: int | None = None) -> dict[str, Any]: ...
+    @staticmethod
     def load(path: Path, expected_key: str | None = None) -> GreenCore: ...
     def save(self, path: Path) -> None: ...
     def solve(
