@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from palpate import models, shapes
 from palpate.body import Body, Material
+from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
     Error,
@@ -33,6 +34,7 @@ __all__ = [
     "Body",
     "BodyError",
     "Contact",
+    "Energy",
     "Error",
     "Frame",
     "GreensFunction",
@@ -41,6 +43,8 @@ __all__ = [
     "Material",
     "MeshError",
     "MeshWarning",
+    "ModalBasis",
+    "Newmark",
     "PalpateWarning",
     "Scene",
     "SceneError",
@@ -53,7 +57,9 @@ __all__ = [
     "UnitError",
     "ViewerError",
     "models",
+    "modes",
     "precompute",
+    "rayleigh_from_ratios",
     "shapes",
     "tetrahedralize",
 ]

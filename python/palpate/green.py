@@ -7,9 +7,10 @@ import json
 import operator
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,12 +18,16 @@ from palpate import _native
 from palpate.body import Body
 from palpate.errors import BodyError, StoreError
 from palpate.progress import progress_reporter
+from palpate.strain import Strained, SurfaceStrain
+
+if TYPE_CHECKING:
+    from palpate.gauge import StrainGauge
 
 Components = Sequence[float | None]
 
 
 @dataclass(frozen=True)
-class Answer:
+class Answer(Strained):
     """Solution of a changed boundary value problem.
 
     Attributes
@@ -39,14 +44,16 @@ class Answer:
     displacements: np.ndarray
     forces: np.ndarray
     reactions: np.ndarray
+    _source: GreensFunction = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True)
-class Touch:
+class Touch(Strained):
     """Answer to a patch contact: force on the body (3,), N, and displacements (s, 3), m."""
 
     force: np.ndarray
     displacements: np.ndarray
+    _source: GreensFunction = field(repr=False, compare=False)
 
 
 def cache_directory() -> Path:
@@ -58,11 +65,13 @@ def cache_directory() -> Path:
 class GreensFunction:
     """Compliance of a body seen from its touchable surface.
 
-    Made by :func:`precompute` or :meth:`load`; immutable.
+    Made by :func:`precompute` or :meth:`load`; immutable. ``body`` is what it was made for, None where only the store
+    is known.
     """
 
-    def __init__(self, core: _native.GreenCore):
+    def __init__(self, core: _native.GreenCore, body: Body | None = None):
         self._core = core
+        self.body = body
         self.surface_nodes = core.surface_nodes.astype(np.int64)
         self.surface_positions = core.surface_positions.reshape(-1, 3)
         faces, width = core.surface_faces
@@ -106,6 +115,16 @@ class GreensFunction:
         """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
         return self._core.free_displacements.reshape(-1, 3)
 
+    @cached_property
+    def strain_gauge(self) -> StrainGauge:
+        """What measures the largest strain of answers: by the elements of the body, of a bare store by its surface."""
+        if self.body is None:
+            return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
+        from palpate.gauge import ElementStrain
+        from palpate.stress import StressRecovery
+
+        return ElementStrain(StressRecovery(self.body))
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
         self._core.save(Path(path))
@@ -130,7 +149,7 @@ class GreensFunction:
         path = Path(path)
         if not path.exists():
             raise StoreError(f"{path}: no such file")
-        green = cls(_native.GreenCore.load(path))
+        green = cls(_native.GreenCore.load(path), body)
         if body is not None:
             touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
             expected = _native.GreenCore.content_key(problem_arrays(body, touch), green.precision)
@@ -183,7 +202,7 @@ class GreensFunction:
                 known[column] = forced[column]
         u, f, reactions = self._core.solve(sorted(known.items()), sorted(switched.items()))
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
-        return Answer(u, f, self._reactions(f, reactions))
+        return Answer(u, f, self._reactions(f, reactions), self)
 
     def touch(self, point: Sequence[float], displacement: Components, radius: float = 0.0) -> Touch:
         """Press a patch of the surface.
@@ -204,7 +223,7 @@ class GreensFunction:
         if None in target:
             raise BodyError("the touch point needs three numbers")
         force, u = self._core.touch(target, _components(displacement, None, "displacement"), float(radius))
-        return Touch(np.array(force), u.reshape(-1, 3))
+        return Touch(np.array(force), u.reshape(-1, 3), self)
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
         """`K u` at the fixed nodes; a free component carries the loads on it."""
@@ -286,11 +305,11 @@ def precompute(
         target = Path(path)
     if target.exists():
         with contextlib.suppress(StoreError):
-            return GreensFunction(_native.GreenCore.load(target, key))
+            return GreensFunction(_native.GreenCore.load(target, key), body)
     with progress_reporter("precomputing", progress) as report:
         core = _native.GreenCore.precompute(problem, precision, json.dumps(_describe(body)), report)
     core.save(target)
-    return GreensFunction(_native.GreenCore.load(target, key))
+    return GreensFunction(_native.GreenCore.load(target, key), body)
 
 
 def problem_arrays(body: Body, touch: Sequence[int] | np.ndarray | None) -> tuple[np.ndarray, ...]:

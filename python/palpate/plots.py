@@ -37,6 +37,19 @@ def plot_log(log: np.ndarray, path: Path, title: str) -> None:
     _finish(figure, path)
 
 
+def plot_history(time: np.ndarray, displacements: np.ndarray, path: Path, title: str) -> None:
+    """Displacement (t, 3), m, of one node against time, s; written beside and renamed."""
+    figure = _figure(9, 4.5)
+    axes = figure.subplots()
+    for axis, color in enumerate(("tab:red", "tab:green", "tab:blue")):
+        axes.plot(time, 1e3 * displacements[:, axis], color=color, linewidth=1.3, label="xyz"[axis])
+    axes.set_ylabel("displacement [mm]")
+    axes.set_xlabel("time [s]")
+    axes.set_title(title, loc="left")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False)
+    _finish(figure, path)
+
+
 def plot_convergence(
     series: Mapping[str, tuple[np.ndarray, np.ndarray]], orders: Mapping[str, int], path: Path
 ) -> None:
@@ -122,5 +135,10 @@ def write_log(log: np.ndarray, path: Path) -> None:
     """Write the 1 kHz log as CSV with units in the header; beside, then renamed."""
     names = ("time_s", "x_m", "y_m", "z_m", "fx_N", "fy_N", "fz_N", "compute_us", "wakeup_us")
     columns = [log["time"], *log["position"].T, *log["force"].T, log["compute_us"], log["wakeup_us"]]
+    write_columns(names, columns, path)
+
+
+def write_columns(names: Sequence[str], columns: Sequence[np.ndarray], path: Path) -> None:
+    """Write columns as CSV with a header; beside, then renamed."""
     with written_beside(path) as partial:
         np.savetxt(partial, np.column_stack(columns), delimiter=",", header=",".join(names), comments="", fmt="%.9g")

@@ -5,35 +5,93 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 
 from palpate import _native
 from palpate.errors import SceneError
+from palpate.gauge import ElementStrain, StrainGauge
 from palpate.scene import BuiltScene, Scene
-from palpate.stress import StressRecovery, SurfaceStress
+from palpate.scene.dynamics import Motion
+from palpate.strain import Strained
+from palpate.stress import SurfaceStress
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
 )
+# Ticks a second.
+RATE = 1000.0
 PERCENTILES = ("p50", "p99", "p999", "max")
 
 
 @dataclass(frozen=True)
 class Contact:
-    """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one."""
+    """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one.
+
+    ``anchor`` is where the tool carries no force: the way from there is the displacement of the patch.
+    """
 
     tool: int
     mode: str
     point: np.ndarray
     normal: np.ndarray
     force: np.ndarray
+    anchor: np.ndarray
     nodes: np.ndarray
     weights: np.ndarray
 
 
 @dataclass(frozen=True)
-class Frame:
+class MotionEnergy:
+    """Energies of a body in motion, J: a number, or an array over the ticks of a recording.
+
+    Attributes
+    ----------
+    kinetic, strain, coupling
+        Of the body's motion, of its deformation, and of the springs between tools and body.
+    dissipated, work
+        Taken out by damping, and done by tools and strikes, since the start.
+
+    """
+
+    kinetic: float | np.ndarray
+    strain: float | np.ndarray
+    coupling: float | np.ndarray
+    dissipated: float | np.ndarray
+    work: float | np.ndarray
+
+    @property
+    def total(self) -> float | np.ndarray:
+        """What the body and its couplings hold now, J."""
+        return self.kinetic + self.strain + self.coupling
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Ticks of an offline run.
+
+    Attributes
+    ----------
+    time
+        (t,) s.
+    forces
+        (t, 3) N on the device.
+    displacements
+        (t, watched nodes, 3) m.
+    energy
+        Over the ticks; None for a body that does not move.
+
+    """
+
+    time: np.ndarray
+    forces: np.ndarray
+    displacements: np.ndarray
+    energy: MotionEnergy | None
+
+
+@dataclass(frozen=True)
+class Frame(Strained):
     """The latest tick.
 
     Attributes
@@ -51,6 +109,8 @@ class Frame:
     statistics
         ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, ``fault`` (None or
         what is wrong) and ``realtime`` (priority granted, memory locked).
+    energy
+        Of a body in motion, else None.
 
     """
 
@@ -60,6 +120,8 @@ class Frame:
     displacements: np.ndarray
     contacts: list[Contact] = field(repr=False)
     statistics: dict
+    energy: MotionEnergy | None
+    _source: Simulation = field(repr=False, compare=False)
 
 
 class Simulation:
@@ -89,11 +151,17 @@ class Simulation:
         self._grab = [False] * self._tools
         limits = (device.max_force, device.max_slew, device.ramp)
         self._contact_radius = tool.contact_radius
+        self.motion = built.motion
         self._core = _native.SimulationCore(
-            self.green._core, self._tools, tool.radius, tool.contact_radius, device.max_stiffness, limits
+            self.green._core,
+            self._tools,
+            tool.radius,
+            tool.contact_radius,
+            device.max_stiffness,
+            limits,
+            None if built.motion is None else self._moving(built.motion),
         )
         self._running = False
-        self._recovery: StressRecovery | None = None
 
     def __enter__(self) -> Simulation:
         self.start()
@@ -153,9 +221,14 @@ class Simulation:
 
     @property
     def youngs_modulus(self) -> float | None:
-        """Young's modulus now, Pa; None for a body of several materials, or with loads."""
+        """Young's modulus now, Pa; None for a body of several materials, with loads, or in motion."""
         reference = self.green.youngs_modulus
-        return None if reference is None else reference * self._scale
+        return None if reference is None or self.motion is not None else reference * self._scale
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Young's modulus now over that of the Green's function."""
+        return self._scale
 
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
@@ -168,14 +241,42 @@ class Simulation:
         return low
 
     def set_youngs_modulus(self, youngs_modulus: float) -> None:
-        """Change the stiffness of a body of one material and no loads at once, Pa: it only scales the compliance."""
+        """Change the stiffness of a body of one material at rest, without loads, Pa: it only scales the compliance."""
         reference = self.green.youngs_modulus
-        if reference is None:
-            raise SceneError("the body has several materials, or loads: its stiffness cannot be changed while running")
+        if reference is None or self.motion is not None:
+            raise SceneError(
+                "the body has several materials, or loads, or moves: its stiffness cannot be changed while running"
+            )
         if not (np.isfinite(youngs_modulus) and youngs_modulus > 0):
             raise SceneError(f"Young's modulus must be positive, got {youngs_modulus} Pa")
         self._scale = youngs_modulus / reference
         self._core.configure(self._contact_radius, self._scale, False)
+
+    def strike(self, point: Sequence[float], impulse: Sequence[float]) -> None:
+        """Strike a body in motion: an impulse (3,), N s, on the patch around the surface point closest to ``point``, m.
+
+        Raises
+        ------
+        SceneError
+            A body that does not move, or numbers that are not finite.
+
+        """
+        self._require_motion("strike")
+        self._core.strike(_three(point, "a strike's point"), _three(impulse, "a strike's impulse"))
+
+    def set_time_scale(self, time_scale: float) -> None:
+        """Seconds that a body in motion advances in a second, in (0, 1]: below one is slow motion.
+
+        Raises
+        ------
+        SceneError
+            A body that does not move, or a scale outside of (0, 1].
+
+        """
+        self._require_motion("slow motion")
+        if not 0 < time_scale <= 1:
+            raise SceneError(f"the time scale must lie in (0, 1], got {time_scale}")
+        self._core.set_time_scale(float(time_scale))
 
     def reset(self) -> None:
         """Let go of everything and clear a latched fault; forces ramp in anew."""
@@ -186,16 +287,35 @@ class Simulation:
         raw = self._core.frame()
         if raw is None:
             raise SceneError("the simulation does not run: use it in a with block, or call start()")
-        contacts = [
-            Contact(tool, mode, *map(np.array, vectors), self.green.surface_nodes[nodes], np.array(weights))
-            for tool, mode, vectors, nodes, weights in raw["contacts"]
-        ]
+        contacts = [self._contact(record) for record in raw["contacts"]]
         statistics = {k: raw[k] for k in ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused")}
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         displacements = raw["displacements"].reshape(-1, 3)
         forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
-        return Frame(raw["time"], forces, positions, displacements, contacts, statistics)
+        energy = None if raw["energy"] is None else MotionEnergy(*raw["energy"])
+        return Frame(raw["time"], forces, positions, displacements, contacts, statistics, energy, self)
+
+    def contacts(self) -> list[Contact]:
+        """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
+        return [self._contact(record) for record in self._core.contacts() or []]
+
+    def contact_response(self, tool: int = 0) -> tuple[Contact, np.ndarray] | None:
+        """Contact of a tool and (3, s, 3) displacements per unit way of the tool from the anchor along x, y and z.
+
+        The surface is at `u_free` plus these times the ways, with the stiffness of contacts limited as in the force
+        loop; None for a tool that does not touch.
+        """
+        answer = self._core.contact_response(self._tool(tool))
+        if answer is None:
+            return None
+        record, fields = answer
+        return self._contact(record), np.reshape(fields, (3, -1, 3))
+
+    @property
+    def strain_gauge(self) -> StrainGauge:
+        """What measures the largest strain of frames."""
+        return self.green.strain_gauge
 
     def stress(self, displacements: np.ndarray) -> SurfaceStress:
         """Stress and strain at the surface nodes, for a frame's or an answer's displacements (s, 3), m; milliseconds.
@@ -206,11 +326,10 @@ class Simulation:
             A body from a store, which knows only its surface.
 
         """
-        if self._recovery is None:
-            if self.body is None:
-                raise SceneError("a body from a store knows only its surface: stress needs its elements")
-            self._recovery = StressRecovery(self.body)
-        field = self._recovery.recover(displacements)
+        gauge = self.strain_gauge
+        if not isinstance(gauge, ElementStrain):
+            raise SceneError("a body from a store knows only its surface: stress needs its elements")
+        field = gauge.recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
         return SurfaceStress(self._scale * field.stress, field.strain)
 
@@ -238,12 +357,69 @@ class Simulation:
         bad = np.flatnonzero(~np.isfinite(path).all(axis=1))
         if bad.size:
             raise SceneError(f"position {bad[0]} is not finite")
-        forces, fault = self._core.run(path)
+        return self.play(path).forces
+
+    def play(
+        self,
+        positions: np.ndarray,
+        strikes: Sequence[tuple[int, Sequence[float], Sequence[float]]] = (),
+        watch: Sequence[int] = (),
+    ) -> Recording:
+        """Run a script of ticks without a clock; the same script gives the same bits.
+
+        Parameters
+        ----------
+        positions
+            (t, 3) m of the tool; a row of NaN takes it out of the scene.
+        strikes
+            Blows ``(tick, point, impulse)`` for a body in motion, as of :meth:`strike`.
+        watch
+            Surface nodes whose displacements are recorded.
+
+        Raises
+        ------
+        SceneError
+            Another shape, strikes on a body that does not move, or nodes that are not on the surface.
+
+        """
+        path = np.ascontiguousarray(positions, dtype=np.float64)
+        if path.ndim != 2 or path.shape[1] != 3:
+            raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
+        if strikes:
+            self._require_motion("strike")
+        blows = [(int(k), _three(p, "a strike's point"), _three(i, "a strike's impulse")) for k, p, i in strikes]
+        nodes = np.asarray(watch, dtype=np.int64)
+        absent = np.setdiff1d(nodes, self.green.surface_nodes)
+        if absent.size:
+            raise SceneError(f"node {absent[0]} is not on the surface: it cannot be watched")
+        ranks = np.searchsorted(self.green.surface_nodes, nodes).tolist()
+        forces, energies, moved, fault = self._core.run(path, sorted(blows, key=lambda blow: blow[0]), ranks)
         if fault is not None:
             raise SceneError(fault)
-        return forces.reshape(-1, 3)
+        energy = MotionEnergy(*energies.reshape(-1, 5).T) if len(energies) else None
+        time = np.arange(1, len(path) + 1) / RATE
+        return Recording(time, forces.reshape(-1, 3), moved.reshape(len(path), len(nodes), 3), energy)
+
+    def _moving(self, motion: Motion) -> tuple:
+        shapes = motion.basis.shapes[self.green.surface_nodes].reshape(-1, len(motion.basis))
+        return motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling
+
+    def _require_motion(self, what: str) -> None:
+        if self.motion is None:
+            raise SceneError(f"{what}: the body does not move; give the scene a [dynamics] table")
+
+    def _contact(self, record: tuple[Any, ...]) -> Contact:
+        tool, mode, vectors, nodes, weights = record
+        return Contact(tool, mode, *map(np.array, vectors), self.green.surface_nodes[nodes], np.array(weights))
 
     def _tool(self, tool: int) -> int:
         if not 0 <= tool < self._tools:
             raise SceneError(f"there is no tool {tool}: the scene has {self._tools}")
         return tool
+
+
+def _three(values: Sequence[float], what: str) -> tuple[float, float, float]:
+    vector = np.asarray(values, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise SceneError(f"{what} must be three finite numbers, got {values}")
+    return tuple(vector.tolist())

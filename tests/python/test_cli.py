@@ -132,6 +132,17 @@ def test_scripted_press_leaves_a_log_and_a_plot(tmp_path):
     assert log["fz_N"][[0, -1]] == pytest.approx(0)
     assert np.median(np.diff(log["time_s"])) == pytest.approx(1e-3, rel=1e-6)
     assert (tmp_path / "results" / "block.png").read_bytes().startswith(b"\x89PNG")
+    assert "largest strain" in result.stdout and "honest" not in result.stdout
+
+
+def test_scripted_press_is_held_or_flagged(tmp_path):
+    scene = '[body]\nmodel = "kidney"\npaper = true\n'
+    (tmp_path / "held.toml").write_text(scene)
+    (tmp_path / "free.toml").write_text(scene + "[view]\nhold_strain = 0\n")
+    held = run("run", "held.toml", "--headless", "1", cwd=tmp_path).stdout
+    assert "largest strain 10.0 %, where the tool was held back" in held and "honest" not in held
+    free = run("run", "free.toml", "--headless", "1", cwd=tmp_path).stdout
+    assert "beyond 10 %, to which linear elasticity is honest" in free and "held" not in free
 
 
 def test_wrong_scene_costs_one_line(tmp_path):
@@ -201,3 +212,18 @@ def test_precompute_with_gravity_and_a_locking_material(ball, tmp_path):
     weight = 1200 * 9.81 * 4 / 3 * np.pi * 0.04**3
     assert green.description["load_N"][2] == pytest.approx(-weight, rel=0.03)
     refused(run("precompute", "ball.stl", "--fix", "z<0", "--gravity", "0,1", cwd=tmp_path), "gravity", "three numbers")
+
+
+def test_impulse_demo_writes_the_history_of_the_struck_node(tmp_path):
+    result = run("demo", "beam", "--paper", "--impulse", "--headless", "0.5", "--out", "results", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert sorted(os.listdir(tmp_path / "results")) == ["beam-paper-impulse.csv", "beam-paper-impulse.png"]
+    table = np.genfromtxt(tmp_path / "results" / "beam-paper-impulse.csv", delimiter=",", names=True)
+    assert len(table) == 501
+    # 10 N at the end of one step and none after it: an impulse of 0.01 N s.
+    assert np.trapezoid(table["fz_N"], table["time_s"]) == pytest.approx(0.01)
+    swing = table["uz_m"]
+    assert swing.max() > 1e-3 > -1e-3 > swing.min()
+    assert abs(table["uy_m"]).max() < 0.5 * abs(swing).max()
+    assert "10 N along z for 1 ms" in result.stdout
+    refused(run("demo", "teapot", "--impulse", cwd=tmp_path), "teapot", "beam")

@@ -63,6 +63,7 @@ def test_plots_of_what_was_run(monkeypatch, tmp_path):
     assert [p.name for p in Path(tmp_path / "plots").iterdir()] == ["convergence.png"]
 
 
+@pytest.mark.slow
 def test_at_equal_nodes_quadratic_elements_are_closer(monkeypatch, capsys, tmp_path):
     from palpate.bench import elements
 

@@ -1,13 +1,14 @@
 //! Finite elements, Green's functions, capacitance and contact: the numerics and physics of Palpate.
 //!
 //! The folders are the chapters of the theory, in order: [`element`], [`mesh`], [`fem`], [`green`], [`capacitance`],
-//! [`contact`], [`simulation`]. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
+//! [`contact`], [`dynamics`], [`simulation`]. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
 //!
 //! Nothing here reads a clock, starts threads of its own (rayon in the offline part apart) or touches a file other than
-//! the Green's function store.
+//! the stores of Green's functions and modes.
 
 pub mod capacitance;
 pub mod contact;
+pub mod dynamics;
 pub mod element;
 mod error;
 pub mod fem;

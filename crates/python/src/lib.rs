@@ -2,6 +2,7 @@
 //! people. The interpreter lock is released in everything long.
 
 mod body;
+mod dynamics;
 mod errors;
 mod green;
 mod simulation;
@@ -16,6 +17,14 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(body::mass, module)?)?;
     module.add_function(wrap_pyfunction!(body::determinant_ranges, module)?)?;
     module.add_function(wrap_pyfunction!(body::volumes, module)?)?;
+    module.add_function(wrap_pyfunction!(dynamics::largest_stable_dt, module)?)?;
+    module.add_function(wrap_pyfunction!(dynamics::require_stable, module)?)?;
+    module.add_function(wrap_pyfunction!(dynamics::basis_key, module)?)?;
+    module.add_function(wrap_pyfunction!(dynamics::save_basis, module)?)?;
+    module.add_function(wrap_pyfunction!(dynamics::load_basis, module)?)?;
+    module.add_class::<dynamics::SparseFactor>()?;
+    module.add_class::<dynamics::ModalMotion>()?;
+    module.add_class::<dynamics::DirectMotion>()?;
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;

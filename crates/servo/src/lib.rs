@@ -9,9 +9,9 @@ mod servo;
 mod statistics;
 mod ticker;
 
-pub use offline::run;
+pub use offline::{Recording, Script, run};
 pub use safety::{Fault, Safety, SafetyLimits};
-pub use servo::{LogRow, Published, RealtimeStatus, Servo, Settings};
+pub use servo::{LogRow, Published, RealtimeStatus, Servo, Settings, Status};
 pub use statistics::{Histogram, Summary};
 pub use ticker::{TickOutput, Ticker};
 

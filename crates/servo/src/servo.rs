@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use glam::DVec3;
-use palpate_core::simulation::{Input, MAX_TOOLS, Model, State};
+use palpate_core::simulation::{Input, MAX_TOOLS, Model, Snapshot, Strike};
 use palpate_devices::{Device, DeviceState};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::triple_buffer;
@@ -36,6 +36,12 @@ pub struct Settings {
     pub stiffness_scale: f64,
     /// Each new value lets go of everything and clears a fault.
     pub resets: u32,
+    /// Seconds that a body in motion advances in a second: below one is slow motion.
+    pub time_scale: f64,
+    /// A blow for a body in motion.
+    pub strike: Strike,
+    /// Each new value gives the blow once.
+    pub strikes: u32,
 }
 
 /// What the operating system granted.
@@ -48,8 +54,17 @@ pub struct RealtimeStatus {
 }
 
 /// The latest tick, for drawing.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Published {
+    /// What happened.
+    pub status: Status,
+    /// What is drawn.
+    pub state: Snapshot,
+}
+
+/// Numbers of the latest tick.
+#[derive(Clone, Copy, Default)]
+pub struct Status {
     /// Time since the start, s.
     pub time: f64,
     /// Ticks since the start.
@@ -58,8 +73,6 @@ pub struct Published {
     pub missed_deadlines: u64,
     /// Log rows lost because nobody drained them.
     pub dropped_rows: u64,
-    /// Contacts.
-    pub state: State,
     /// Forces on the devices, N.
     pub forces: [DVec3; MAX_TOOLS],
     /// What the devices said.
@@ -113,7 +126,8 @@ impl Servo {
     ) -> std::io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let (settings_in, settings_out) = triple_buffer(&settings);
-        let (published_in, published_out) = triple_buffer(&Published::default());
+        let (published_in, published_out) =
+            triple_buffer(&Published { status: Status::default(), state: Snapshot::new(&model) });
         let (rows, log) = RingBuffer::new(LOG_ROWS);
         let mut servo_loop = Loop {
             stop: stop.clone(),
@@ -121,8 +135,9 @@ impl Servo {
             devices,
             settings: settings_out,
             resets: settings.resets,
+            strikes: settings.strikes,
             published: published_in,
-            frame: Published::default(),
+            status: Status::default(),
             rows,
             compute: Histogram::default(),
             wakeup: Histogram::default(),
@@ -131,7 +146,7 @@ impl Servo {
         // start is seen by a running loop.
         let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
         let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(move || {
-            servo_loop.frame.realtime =
+            servo_loop.status.realtime =
                 RealtimeStatus { priority: request_realtime_priority(), locked_memory: lock_memory() };
             let _ = ready_in.send(());
             servo_loop.run();
@@ -179,8 +194,9 @@ struct Loop {
     devices: Vec<Box<dyn Device>>,
     settings: triple_buffer::Output<Settings>,
     resets: u32,
+    strikes: u32,
     published: triple_buffer::Input<Published>,
-    frame: Published,
+    status: Status,
     rows: Producer<LogRow>,
     compute: Histogram,
     wakeup: Histogram,
@@ -191,9 +207,9 @@ impl Loop {
     fn run(&mut self) {
         let outcome = catch_unwind(AssertUnwindSafe(|| self.ticks()));
         self.devices.iter_mut().for_each(|device| device.write(DVec3::ZERO));
-        self.frame.crashed = outcome.is_err();
-        self.frame.forces = Default::default();
-        self.published.write(self.frame.clone());
+        self.status.crashed = outcome.is_err();
+        self.status.forces = Default::default();
+        self.publish();
     }
 
     fn ticks(&mut self) {
@@ -207,7 +223,7 @@ impl Loop {
             self.account(woken - deadline, finished - woken);
             let (next, missed) = next_deadline(deadline, now_ns(), PERIOD_NS);
             deadline = next;
-            self.frame.missed_deadlines += missed;
+            self.status.missed_deadlines += missed;
         }
     }
 
@@ -218,37 +234,44 @@ impl Loop {
             contact_radius: settings.contact_radius,
             stiffness_scale: settings.stiffness_scale,
             reset: settings.resets != self.resets,
+            advance: settings.time_scale / RATE,
+            strike: (settings.strikes != self.strikes).then_some(settings.strike),
             ..Input::default()
         };
-        self.resets = settings.resets;
-        for (state, device) in self.frame.devices.iter_mut().zip(&mut self.devices) {
+        (self.resets, self.strikes) = (settings.resets, settings.strikes);
+        for (state, device) in self.status.devices.iter_mut().zip(&mut self.devices) {
             *state = device.read(1.0 / RATE);
         }
-        let output = self.ticker.tick(&self.frame.devices, &input, 1.0 / RATE);
+        let output = self.ticker.tick(&self.status.devices, &input, 1.0 / RATE);
         for (device, &force) in self.devices.iter_mut().zip(&output.forces) {
             device.write(force);
         }
-        (self.frame.time, self.frame.forces, self.frame.fault) = (time, output.forces, output.fault);
+        (self.status.time, self.status.forces, self.status.fault) = (time, output.forces, output.fault);
     }
 
     /// Statistics, log and hand-off, after the force is out.
     fn account(&mut self, wakeup_ns: u64, compute_ns: u64) {
         self.wakeup.record(wakeup_ns);
         self.compute.record(compute_ns);
-        self.frame.ticks += 1;
-        if self.frame.ticks % SUMMARY_TICKS == 1 {
-            (self.frame.wakeup, self.frame.compute) = (self.wakeup.summary(), self.compute.summary());
+        self.status.ticks += 1;
+        if self.status.ticks % SUMMARY_TICKS == 1 {
+            (self.status.wakeup, self.status.compute) = (self.wakeup.summary(), self.compute.summary());
         }
         let row = LogRow {
-            time: self.frame.time,
-            position: self.frame.devices[0].position,
-            force: self.frame.forces[0],
+            time: self.status.time,
+            position: self.status.devices[0].position,
+            force: self.status.forces[0],
             compute_us: compute_ns as f64 * 1e-3,
             wakeup_us: wakeup_ns as f64 * 1e-3,
         };
-        self.frame.dropped_rows += u64::from(self.rows.push(row).is_err());
-        self.frame.state.clone_from(self.ticker.state());
-        self.published.input_buffer_mut().clone_from(&self.frame);
+        self.status.dropped_rows += u64::from(self.rows.push(row).is_err());
+        self.publish();
+    }
+
+    fn publish(&mut self) {
+        let published = self.published.input_buffer_mut();
+        published.status = self.status;
+        self.ticker.snapshot_into(&mut published.state);
         self.published.publish();
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use palpate_core::simulation::{Input, MAX_TOOLS, Model, Scratch, State, step};
+use palpate_core::simulation::{Input, MAX_TOOLS, Model, Scratch, Snapshot, State, step};
 use palpate_devices::DeviceState;
 
 use crate::safety::{Fault, Safety, SafetyLimits};
@@ -56,8 +56,8 @@ impl Ticker {
         output
     }
 
-    /// The state after the last tick.
-    pub fn state(&self) -> &State {
-        &self.state
+    /// Copies what is drawn of the last tick; never allocates.
+    pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
+        self.state.snapshot_into(&self.model, snapshot);
     }
 }

@@ -7,10 +7,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
+use palpate_core::dynamics::{Model as Modes, Newmark, Rayleigh};
 use palpate_core::fem::{Isotropic, Supports};
 use palpate_core::green::{Precision, Problem, precompute};
 use palpate_core::mesh::{Faces, TetMesh, Tets};
-use palpate_core::simulation::{Input, MAX_TOOLS, Model};
+use palpate_core::simulation::{Dynamics, Input, MAX_TOOLS, Model, Snapshot, Strike};
 use palpate_devices::DeviceState;
 use palpate_servo::{SafetyLimits, Ticker};
 
@@ -135,13 +136,32 @@ fn a_tick_never_allocates_and_repeats_its_bits() {
 }
 
 #[test]
+fn a_tick_of_a_body_in_motion_never_allocates() {
+    let green = Arc::new(precompute(&cube(4), Precision::F32, &|_, _| true).expect("a solvable cube"));
+    let dofs = 3 * green.surface_count();
+    // Any shapes will do: what is counted does not depend on them.
+    let modes = 20;
+    let eigenvalues: Vec<f64> = (0..modes).map(|i| 1e3 * f64::from(i + 1)).collect();
+    let shapes: Vec<f64> = (0..dofs * modes as usize).map(|i| (0.1 * i as f64).sin()).collect();
+    let (newmark, rayleigh) = (Newmark::new(1e-3, 0.3025, 0.6).expect("valid"), Rayleigh::default());
+    let modes = Modes::new(&eigenvalues, &shapes, &rayleigh, 1e-3, |k, c| newmark.mode_step(k, c)).expect("valid");
+    let model = Model::new(green, 0.005, 5000.0).expect("a valid model");
+    let model = model.with_dynamics(Dynamics::new(modes, 500.0).expect("valid")).expect("rows that match");
+    let strike = Strike { point: DVec3::new(0.02, 0.02, 0.1), impulse: DVec3::new(0.0, 0.0, -1e-4) };
+    exercise_model(Arc::new(model), |tick| (tick % 300 == 100).then_some(strike));
+}
+
+#[test]
 fn a_tick_on_quadratic_elements_never_allocates() {
     exercise(&raised(cube(4)));
 }
 
 fn exercise(problem: &Problem) {
     let green = precompute(problem, Precision::F32, &|_, _| true).expect("a solvable cube");
-    let model = Arc::new(Model::new(Arc::new(green), 0.005, 5000.0).expect("a valid model"));
+    exercise_model(Arc::new(Model::new(Arc::new(green), 0.005, 5000.0).expect("a valid model")), |_| None);
+}
+
+fn exercise_model(model: Arc<Model>, strike: impl Fn(usize) -> Option<Strike>) {
     let settings = Input { contact_radius: 0.02, ..Input::default() };
     let path = |tick: usize| {
         let t = tick as f64 * 1e-3;
@@ -152,6 +172,7 @@ fn exercise(problem: &Problem) {
     let mut touched = 0;
     for run in &mut runs {
         let mut ticker = Ticker::new(model.clone(), SafetyLimits::default());
+        let mut snapshot = Snapshot::new(&model);
         let before = COUNT.with(Cell::get);
         for tick in 0..2000 {
             let mut devices = [DeviceState::default(); MAX_TOOLS];
@@ -159,7 +180,8 @@ fn exercise(problem: &Problem) {
             let position = if tick == 1990 { DVec3::splat(f64::NAN) } else { path(tick) };
             devices[0] = DeviceState { position, active: true, grab, ..DeviceState::default() };
             devices[1] = DeviceState { position: DVec3::new(0.07, 0.05, 0.101), active: tick > 500, ..devices[1] };
-            let output = ticker.tick(&devices, &settings, 1e-3);
+            let output = ticker.tick(&devices, &Input { strike: strike(tick), ..settings }, 1e-3);
+            ticker.snapshot_into(&mut snapshot);
             touched += usize::from(output.forces[0].z > 0.0);
             run.push(output.forces.map(|f| f.to_array().map(f64::to_bits)));
         }

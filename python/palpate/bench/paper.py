@@ -60,11 +60,15 @@ def run(report: Callable[[str], None] = lambda _: None) -> list[Row]:
 
 def as_json(rows: list[Row]) -> dict:
     """Everything as plain data, with what it was measured on."""
+    return {"machine": machine(), "rows": [asdict(row) for row in rows]}
+
+
+def machine() -> dict[str, str | int]:
+    """Return what a benchmark runs on."""
     import os
     import platform
 
-    machine = {"processor": platform.processor() or platform.machine(), "cores": len(os.sched_getaffinity(0))}
-    return {"machine": machine, "rows": [asdict(row) for row in rows]}
+    return {"processor": platform.processor() or platform.machine(), "cores": len(os.sched_getaffinity(0))}
 
 
 def _measure(name: str, report: Callable[[str], None]) -> Row:

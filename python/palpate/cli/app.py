@@ -137,7 +137,7 @@ def touch(
 
 @app.command()
 def info(
-    file: Annotated[Path, typer.Argument(help="A store, a scene file, or a volume mesh.")],
+    file: Annotated[Path, typer.Argument(help="A store, a file of modes, a scene file, or a volume mesh.")],
     unit: Unit = "m",
 ) -> None:
     """Say what a file holds.
@@ -146,6 +146,13 @@ def info(
     """
     import palpate
 
+    if file.name.endswith(".modes.palpate"):
+        basis = palpate.ModalBasis.load(file)
+        print(f"{file}: {len(basis)} modes, {basis.frequencies[0]:.4g} to {basis.frequencies[-1]:.4g} Hz")
+        for name, value in basis.description.items():
+            print(f"  {name.replace('_', ' ')}: {value}")
+        print(f"  key: {basis.key}")
+        return
     if file.suffix == ".palpate":
         green = palpate.GreensFunction.load(file)
         print(f"{file}: {_green_line(green)}")

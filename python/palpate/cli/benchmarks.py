@@ -11,16 +11,12 @@ import typer
 from palpate.cli.app import app
 
 if TYPE_CHECKING:
+    from palpate.bench import dynamics as dynamics_bench
     from palpate.bench.elements import Row as ElementRow
     from palpate.bench.paper import Row
 
 bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
 app.add_typer(bench_app, name="bench")
-
-
-@bench_app.callback()
-def bench() -> None:
-    """Keep 'paper' a command of its own: typer would merge a single command into its parent."""
 
 
 @bench_app.command()
@@ -40,6 +36,71 @@ def paper(
         print(json.dumps(bench.as_json(rows), indent=2))
         return
     _print_table(rows)
+
+
+@bench_app.command()
+def dynamics(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+    large: Annotated[bool, typer.Option("--large", help="Also a liver of 20,000 nodes; takes minutes.")] = False,
+) -> None:
+    """Table 2 of the paper: one time step by its method, by sparse solvers, and by Palpate.
+
+    CHOLMOD (scikit-sparse) and PARDISO (pypardiso) take part where they are installed.
+
+    Example: palpate bench dynamics --json > dynamics.json
+    """
+    from palpate.bench import dynamics as bench
+    from palpate.progress import narrated
+
+    with narrated("measuring beam and livers in motion"):
+        rows = bench.run(large)
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+        return
+    _print_dynamics(rows)
+
+
+def _print_dynamics(rows: list[dynamics_bench.Row]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from palpate.bench.peers import SPARSE
+
+    table = Table(title="Table 2 of the paper, and here: one step of 1 ms, in us")
+    table.add_column("")
+    for row in rows:
+        table.add_column(row.model, justify="right")
+
+    def line(title: str, cell) -> None:
+        table.add_row(title, *("-" if cell(row) is None else cell(row) for row in rows))
+
+    def number(value: float | None, digits: int = 1) -> str | None:
+        return None if value is None else f"{value:.{digits}f}"
+
+    line("nodes: paper", lambda r: number(r.paper_nodes, 0))
+    line("nodes: here", lambda r: str(r.nodes))
+    line("free dofs", lambda r: str(r.dofs))
+    line("modes", lambda r: str(r.modes))
+    table.add_section()
+    line("paper, Pentium 4", lambda r: number(r.paper_step_ms and 1e3 * r.paper_step_ms, 0))
+    line("its dense inverse here", lambda r: number(r.dense_step_us))
+    for name in SPARSE:
+        line(name, lambda r, name=name: number(r.sparse_step_us.get(name)))
+    line("Palpate, all dofs by its sparse factor", lambda r: number(r.own_sparse_step_us))
+    table.add_section()
+    line("Palpate, force tick, patch sliding", lambda r: number(r.sliding_us))
+    line("Palpate, force tick, patch held", lambda r: number(r.holding_us))
+    line("Palpate, whole surface for a frame", lambda r: number(r.surface_us))
+    line("sliding: times faster than the dense inverse", lambda r: number(r.sliding_times_dense, 0))
+    line("sliding: times faster than the best sparse", lambda r: number(r.sliding_times_sparse, 0))
+    line("held: times faster than the dense inverse", lambda r: number(r.holding_times_dense, 0))
+    line("held: times faster than the best sparse", lambda r: number(r.holding_times_sparse, 0))
+    line("difference from SuperLU after 50 steps", lambda r: f"{r.difference:.0e}")
+    console = Console()
+    console.print(table)
+    absent = [name for name in SPARSE if name not in rows[0].sparse_step_us]
+    if absent:
+        console.print(f"not installed: {', '.join(absent)}")
 
 
 @bench_app.command()

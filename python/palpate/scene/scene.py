@@ -23,9 +23,11 @@ from palpate.mesh import TetMesh, tetrahedralize
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
 from palpate.predicate import parse
+from palpate.scene.dynamics import DynamicsTable, Motion
 from palpate.scene.loads import LoadTable, together
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
+from palpate.strain import HONEST_STRAIN
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -94,10 +96,14 @@ class DeviceTable(Table):
 
 
 class ViewTable(Table):
-    """Where the camera stands and what it looks at, m; by default the whole body is seen."""
+    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that holds the tool.
+
+    Linear elasticity balloons beyond about 10 % strain; ``hold_strain = 0`` lets the pointer go on all the same.
+    """
 
     position: tuple[float, float, float] | None = None
     target: tuple[float, float, float] | None = None
+    hold_strain: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
 
 
 class Scene(Table):
@@ -110,6 +116,7 @@ class Scene(Table):
     loads: list[LoadTable] = Field(default_factory=list)
     tool: ToolTable = ToolTable()
     device: DeviceTable = DeviceTable()
+    dynamics: DynamicsTable | None = None
     view: ViewTable = ViewTable()
 
     _folder: Path = PrivateAttr(default_factory=Path)
@@ -138,9 +145,11 @@ class Scene(Table):
         if scene.body.mesh is not None and scene.supports.fixed is None:
             line = _line_of(text, ["supports"])
             raise SceneError(f"{path}{f':{line}' if line else ''}: the key 'supports.fixed' is missing")
-        own = {"material", "region", "loads"} & scene.model_fields_set
+        own = {"material", "region", "loads", "dynamics"} & scene.model_fields_set
         if scene.body.store is not None and (scene.supports.fixed is not None or own):
-            raise SceneError(f"{path}: a store carries its own material, supports and loads: leave those tables out")
+            raise SceneError(
+                f"{path}: a store carries its own material, supports and loads, and cannot move: leave those tables out"
+            )
         scene._folder, scene._source = path.parent, (path, text)
         return scene
 
@@ -181,11 +190,15 @@ class Scene(Table):
         for rank, load in enumerate(self.loads):
             with self._blaming("loads", rank):
                 load.check(body)
-        return BuiltScene(self, body, precompute(body, precision=self.body.precision, progress=progress))
+        green = precompute(body, precision=self.body.precision, progress=progress)
+        if self.dynamics is None:
+            return BuiltScene(self, body, green)
+        with self._blaming("dynamics", 0):
+            return BuiltScene(self, body, green, self.dynamics.build(body, self.device.max_stiffness, bool(progress)))
 
     @contextlib.contextmanager
     def _blaming(self, table: str, rank: int) -> Iterator[None]:
-        """Name the line of an entry of an array of tables in an error of the body."""
+        """Name the line of a table, or of an entry of an array of tables, in an error of the body."""
         try:
             yield
         except Error as error:
@@ -225,11 +238,12 @@ class Scene(Table):
 
 @dataclass(frozen=True)
 class BuiltScene:
-    """A scene with its Green's function, and its body where it was not taken from a store."""
+    """A scene with its Green's function, its body where it was not taken from a store, and its motion if it moves."""
 
     scene: Scene
     body: Body | None
     green: GreensFunction
+    motion: Motion | None = None
 
 
 def _explain(path: Path, text: str, error: ValidationError) -> str:

@@ -7,25 +7,43 @@ use crate::contact::{compliance_block, smallest_eigenvalue};
 
 const MAX_DOFS: usize = 3 * MAX_TOOLS;
 
-/// Fills row and column `tool` of the compliance between the tools in contact.
+/// Fills row and column `tool` of the compliance between the tools in contact, for one that has just begun.
 pub(super) fn update_compliance(model: &Model, state: &mut State, tool: usize) {
+    let State { tools, compliance, motion, .. } = state;
+    if let (Some(motion), Some(dynamics)) = (motion.as_mut(), &model.dynamics) {
+        motion.hold(model, &dynamics.modes, tools, tool);
+        // The way of the tool counts from where the moving patch is met, and its free motion is taken off every step.
+        tools[tool].anchor -= motion.free_displacement(&dynamics.modes, tool) + motion.left_out(tools, tool);
+    }
     for other in 0..MAX_TOOLS {
-        if state.tools[other].mode == Mode::Free {
+        if tools[other].mode == Mode::Free {
             continue;
         }
-        let (a, b) = (&state.tools[tool].patch, &state.tools[other].patch);
-        let block = compliance_block(&model.green, a, b).unwrap_or(DMat3::ZERO);
+        let block = match (motion.as_ref(), &model.dynamics) {
+            (Some(motion), Some(dynamics)) => motion.compliance(&dynamics.modes, tool, other),
+            _ => compliance_block(&model.green, &tools[tool].patch, &tools[other].patch).unwrap_or(DMat3::ZERO),
+        };
         if other == tool {
-            state.compliance[tool][tool] = 0.5 * (block + block.transpose());
+            compliance[tool][tool] = 0.5 * (block + block.transpose());
         } else {
-            state.compliance[tool][other] = block;
-            state.compliance[other][tool] = block.transpose();
+            compliance[tool][other] = block;
+            compliance[other][tool] = block.transpose();
         }
     }
 }
 
-/// `f = C^-1 d` for the tools in contact, `d` being each tool's way from its anchor. Near a support, where the body is
-/// stiffer than any device can render, `C` is raised evenly so that no direction exceeds the model's maximum stiffness.
+/// What is added to a patch's own compliance. A body in motion is coupled by a spring. Near a support, where a body at rest
+/// is stiffer than any device can render, its compliance is raised evenly so that no direction exceeds the model's maximum
+/// stiffness.
+fn softening(model: &Model, block: &DMat3) -> f64 {
+    match &model.dynamics {
+        Some(dynamics) => 1.0 / dynamics.coupling,
+        None => (1.0 / model.max_stiffness - smallest_eigenvalue(block)).max(0.0),
+    }
+}
+
+/// `f = C^-1 (d - d_free)` for the tools in contact, `d` being each tool's way from its anchor, `d_free` its patch's free
+/// motion.
 pub(super) fn solve_forces(model: &Model, state: &mut State) {
     let mut matrix = [[0.0; MAX_DOFS]; MAX_DOFS];
     let mut right = [0.0; MAX_DOFS];
@@ -39,12 +57,15 @@ pub(super) fn solve_forces(model: &Model, state: &mut State) {
         }
     }
     for (i, &a) in active[..count].iter().enumerate() {
-        let displacement = state.tools[a].position - state.tools[a].anchor;
+        let free = match (&state.motion, &model.dynamics) {
+            (Some(motion), Some(dynamics)) => motion.free_displacement(&dynamics.modes, a),
+            _ => DVec3::ZERO,
+        };
+        let displacement = state.tools[a].position - state.tools[a].anchor - free;
         for (j, &b) in active[..count].iter().enumerate() {
             let mut block = state.compliance[a][b] * (1.0 / state.stiffness_scale);
             if a == b {
-                let lift = (1.0 / model.max_stiffness - smallest_eigenvalue(&block)).max(0.0);
-                block += DMat3::from_diagonal(DVec3::splat(lift));
+                block += DMat3::from_diagonal(DVec3::splat(softening(model, &block)));
             }
             for row in 0..3 {
                 for column in 0..3 {

@@ -3,11 +3,13 @@
 
 mod contact_forces;
 mod model;
+mod motion;
 mod state;
 mod step;
 mod stick;
 
 pub use model::{Model, Scratch};
+pub use motion::{Dynamics, Energy, Motion, Strike};
 pub use state::{Mode, Snapshot, State, ToolContact};
 pub use step::step;
 
@@ -40,11 +42,22 @@ pub struct Input {
     pub stiffness_scale: f64,
     /// Let go of everything.
     pub reset: bool,
+    /// How far a body in motion advances in this tick, s.
+    pub advance: f64,
+    /// A blow for a body in motion.
+    pub strike: Option<Strike>,
 }
 
 impl Default for Input {
     fn default() -> Self {
-        Self { tools: Default::default(), contact_radius: 0.0, stiffness_scale: 1.0, reset: false }
+        Self {
+            tools: Default::default(),
+            contact_radius: 0.0,
+            stiffness_scale: 1.0,
+            reset: false,
+            advance: 1e-3,
+            strike: None,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::State;
+use super::{Dynamics, Motion, State};
 use crate::contact::{MAX_PATCH_NODES, Patch, PatchScratch, SurfacePoint, SurfaceQuery, patch_weights};
 use crate::green::GreensFunction;
 use crate::mesh::Surface;
@@ -16,7 +16,10 @@ pub struct Model {
     /// Displacements of the surface under the reference loads, m (3s): the shape that tools meet.
     pub(crate) free: Vec<f64>,
     pub(crate) query: SurfaceQuery,
-    loaded: Surface,
+    /// The surface under the reference loads.
+    pub(super) loaded: Surface,
+    /// What moves the body; none answers as if it came to rest within each tick.
+    pub(crate) dynamics: Option<Dynamics>,
     /// Radius of the tool sphere, m.
     pub tool_radius: f64,
     /// Stiffest contact rendered, N/m: near a support the body alone would be rigid, which no device can render.
@@ -45,7 +48,19 @@ impl Model {
         let positions = green.surface.positions.iter().zip(shifts).map(|(&p, u)| p + u).collect();
         let loaded = Surface::new(positions, green.surface.faces.clone())?;
         let query = SurfaceQuery::new(&loaded)?;
-        Ok(Self { green, free, query, loaded, tool_radius, max_stiffness })
+        Ok(Self { green, free, query, loaded, tool_radius, max_stiffness, dynamics: None })
+    }
+
+    /// The same body in motion.
+    ///
+    /// # Errors
+    /// Modes that are not given at every surface dof.
+    pub fn with_dynamics(self, dynamics: Dynamics) -> Result<Self> {
+        let (rows, dofs) = (dynamics.modes.rows(), self.free.len());
+        if rows != dofs {
+            return Err(Error::Invalid(format!("the modes have {rows} rows, the surface has {dofs} dofs")));
+        }
+        Ok(Self { dynamics: Some(dynamics), ..self })
     }
 
     /// Point of the loaded surface, untouched by tools, that is closest to `point`.
@@ -68,7 +83,7 @@ impl Model {
 
     /// A state at rest, nothing touched.
     pub fn state(&self) -> State {
-        State::default()
+        State { motion: self.dynamics.as_ref().map(|d| Motion::new(&d.modes)), ..State::default() }
     }
 
     /// Memory for [`super::step`].

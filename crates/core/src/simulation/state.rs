@@ -2,8 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{MAX_TOOLS, Model};
-use crate::contact::Patch;
+use super::contact_forces::{solve_forces, update_compliance};
+use super::{Energy, MAX_TOOLS, Model, Motion};
+use crate::contact::{Patch, add_patch_response, compliance_block};
+use crate::dynamics::Lanes;
 
 /// What a tool is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,29 +51,98 @@ pub struct ToolContact {
 pub struct State {
     /// The tools' contacts.
     pub tools: [ToolContact; MAX_TOOLS],
-    /// `W_i^T Psi W_j` of the tools in contact, m/N, at the Green's function's own Young's modulus.
+    /// Compliance between the tools in contact, m/N: static, at the Green's function's own Young's modulus, or of one step.
     pub compliance: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
     /// Young's modulus over the Green's function's.
     pub stiffness_scale: f64,
+    /// How the body moves, if it does.
+    pub motion: Option<Motion>,
 }
 
-/// What the frame side needs to draw a tick.
-pub type Snapshot = State;
+/// What the frame side needs to draw a tick; its memory is sized once.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    /// The tools' contacts.
+    pub tools: [ToolContact; MAX_TOOLS],
+    /// Where the energy of a body in motion is.
+    pub energy: Option<Energy>,
+    stiffness_scale: f64,
+    /// Modal displacements beyond the static ones; empty for a body at rest.
+    moving: Vec<Lanes>,
+}
 
 impl State {
-    /// Copies the state; neither side allocates.
-    pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
-        snapshot.clone_from(self);
+    /// Copies what is drawn; nothing is allocated where the snapshot is one of this model's.
+    pub fn snapshot_into(&self, model: &Model, snapshot: &mut Snapshot) {
+        snapshot.tools.clone_from(&self.tools);
+        snapshot.stiffness_scale = self.stiffness_scale;
+        if let (Some(motion), Some(dynamics)) = (&self.motion, &model.dynamics) {
+            snapshot.energy = Some(motion.energy);
+            motion.drawn_into(&dynamics.modes, &self.tools, &mut snapshot.moving);
+        }
+    }
+}
+
+impl Snapshot {
+    /// Of a body at rest.
+    pub fn new(model: &Model) -> Self {
+        let moving = model.dynamics.as_ref().map_or_else(Vec::new, |d| d.modes.state().q);
+        Self { stiffness_scale: 1.0, moving, ..Self::default() }
     }
 
-    /// Displacements of all surface dofs (3s), m: `u = u_free + Psi W f`.
+    /// Displacement of one surface node, m.
+    pub fn displacement_of(&self, model: &Model, node: usize) -> DVec3 {
+        let mut sum = DVec3::from_slice(&model.free[3 * node..3 * node + 3]);
+        for tool in self.tools.iter().filter(|t| t.mode != Mode::Free) {
+            let mut here = Patch { count: 1, ..Patch::default() };
+            (here.nodes[0], here.weights[0]) = (node as u32, 1.0);
+            let response = compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO);
+            sum += response * tool.force / self.stiffness_scale;
+        }
+        if let Some(dynamics) = &model.dynamics {
+            let mut moving = [0.0; 3];
+            dynamics.modes.read(&self.moving, 3 * node.., &mut moving);
+            sum += DVec3::from(moving);
+        }
+        sum
+    }
+
+    /// Displacements of all surface dofs (3s), m: `u = u_free + Psi W f`, and `Phi (q - p / k)` of a body in motion.
     pub fn displacements(&self, model: &Model) -> Vec<f64> {
         let green = model.green();
         let mut displacements = model.free.clone();
         for tool in self.tools.iter().filter(|t| t.mode != Mode::Free) {
             let force = tool.force / self.stiffness_scale;
-            crate::contact::add_patch_response(green, &tool.patch, force, &mut displacements);
+            add_patch_response(green, &tool.patch, force, &mut displacements);
+        }
+        if let Some(dynamics) = &model.dynamics {
+            let mut moving = vec![0.0; displacements.len()];
+            dynamics.modes.read(&self.moving, 0.., &mut moving);
+            displacements.iter_mut().zip(&moving).for_each(|(u, m)| *u += m);
         }
         displacements
+    }
+
+    /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts
+    /// as they are and a body come to rest. The answer is linear in the ways of all tools; `None` for a tool that does not
+    /// touch.
+    pub fn response(&self, model: &Model, tool: usize) -> Option<[Vec<f64>; 3]> {
+        if self.tools[tool].mode == Mode::Free {
+            return None;
+        }
+        let mut pushed = State { tools: self.tools.clone(), stiffness_scale: self.stiffness_scale, ..State::default() };
+        for other in 0..MAX_TOOLS {
+            if pushed.tools[other].mode != Mode::Free {
+                update_compliance(model, &mut pushed, other);
+            }
+            pushed.tools[other].position = pushed.tools[other].anchor;
+        }
+        Some(DVec3::AXES.map(|way| {
+            pushed.tools[tool].position = pushed.tools[tool].anchor + way;
+            solve_forces(model, &mut pushed);
+            let at_rest =
+                Self { tools: pushed.tools.clone(), stiffness_scale: self.stiffness_scale, ..Self::default() };
+            at_rest.displacements(model).iter().zip(&model.free).map(|(u, free)| u - free).collect()
+        }))
     }
 }

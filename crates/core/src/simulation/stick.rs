@@ -6,15 +6,18 @@
 
 use glam::DVec3;
 
-use super::{Input, Mode, Model, Scratch, ToolContact, ToolInput};
+use super::{Input, Mode, Model, Motion, Scratch, ToolContact, ToolInput};
 use crate::contact::{SurfacePoint, patch_weights};
 
 /// A grab reaches this many tool radii from the surface.
 const GRAB_REACH: f64 = 2.0;
+/// A tool farther than this many radii from the surface at rest meets it there: displacements are smaller than that.
+const MOVING_REACH: f64 = 4.0;
 
 /// Begins or ends a contact. Returns whether a new one began.
 pub(super) fn advance(
     model: &Model,
+    moving: Option<&Motion>,
     contact: &mut ToolContact,
     scratch: &mut Scratch,
     tool: &ToolInput,
@@ -27,9 +30,12 @@ pub(super) fn advance(
         return false;
     }
     match contact.mode {
-        Mode::Free => begin(model, contact, scratch, tool, input.contact_radius),
+        Mode::Free => {
+            let closest = meet(model, moving, tool.position);
+            closest.is_some_and(|closest| begin(model, contact, scratch, tool, &closest, input.contact_radius))
+        }
         Mode::Grab if !tool.grab => {
-            release(model, contact);
+            release(model, moving, contact);
             false
         }
         Mode::Press if tool.grab => {
@@ -40,8 +46,25 @@ pub(super) fn advance(
     }
 }
 
-fn begin(model: &Model, contact: &mut ToolContact, scratch: &mut Scratch, tool: &ToolInput, radius: f64) -> bool {
-    let Some(closest) = model.closest(tool.position) else { return false };
+/// Closest point of the surface where it is now, as a point of the loaded surface at rest.
+fn meet(model: &Model, moving: Option<&Motion>, position: DVec3) -> Option<SurfacePoint> {
+    let closest = model.closest(position)?;
+    match (moving, &model.dynamics) {
+        (Some(motion), Some(dynamics)) if closest.signed_distance.abs() < MOVING_REACH * model.tool_radius => {
+            model.closest(position - motion.displacement_at(model, &dynamics.modes, &closest))
+        }
+        _ => Some(closest),
+    }
+}
+
+fn begin(
+    model: &Model,
+    contact: &mut ToolContact,
+    scratch: &mut Scratch,
+    tool: &ToolInput,
+    closest: &SurfacePoint,
+    radius: f64,
+) -> bool {
     let depth = model.tool_radius - closest.signed_distance;
     contact.entry_depth = contact.entry_depth.min(depth.max(0.0));
     let reaches = if tool.grab {
@@ -49,7 +72,7 @@ fn begin(model: &Model, contact: &mut ToolContact, scratch: &mut Scratch, tool: 
     } else {
         depth > contact.entry_depth
     };
-    if !reaches || !cover(model, contact, scratch, &model.material_point(&closest), radius) {
+    if !reaches || !cover(model, contact, scratch, &model.material_point(closest), radius) {
         return false;
     }
     contact.mode = if tool.grab { Mode::Grab } else { Mode::Press };
@@ -74,16 +97,17 @@ fn cover(model: &Model, contact: &mut ToolContact, scratch: &mut Scratch, centre
 }
 
 /// Ends a press whose force has come to pull on the tool.
-pub(super) fn release_if_pulling(model: &Model, contact: &mut ToolContact) -> bool {
+pub(super) fn release_if_pulling(model: &Model, moving: Option<&Motion>, contact: &mut ToolContact) -> bool {
     let pulls = contact.mode == Mode::Press && contact.force.dot(contact.normal) >= 0.0;
     if pulls {
-        release(model, contact);
+        release(model, moving, contact);
     }
     pulls
 }
 
-fn release(model: &Model, contact: &mut ToolContact) {
-    let depth = model.closest(contact.position).map_or(0.0, |closest| model.tool_radius - closest.signed_distance);
+fn release(model: &Model, moving: Option<&Motion>, contact: &mut ToolContact) {
+    let closest = meet(model, moving, contact.position);
+    let depth = closest.map_or(0.0, |closest| model.tool_radius - closest.signed_distance);
     contact.entry_depth = depth.max(0.0);
     contact.mode = Mode::Free;
     contact.patch.count = 0;

@@ -1,0 +1,31 @@
+//! Chapter 7: motion by Newmark's scheme (Jun, Choi and Cho, section 4, with equation 4.4 corrected).
+//!
+//! ```text
+//! M a + B v + K u = F,   B = rayleigh.mass M + rayleigh.stiffness K
+//! v1 = v0 + dt [ (1 - delta) a0 + delta a1 ]
+//! u1 = u0 + dt v0 + dt^2 [ (1/2 - alpha) a0 + alpha a1 ]
+//! ```
+//!
+//! `direct` solves this on all dofs. `K`, `M` and `B` share eigenvectors, so `modal` carries the same motion by one
+//! recurrence of two numbers a mode: the same answer with all modes, and the cost of the modes kept with fewer.
+
+mod direct;
+mod energy;
+mod exponential;
+mod kernels;
+mod lanes;
+mod modal;
+mod press;
+mod projection;
+mod scheme;
+mod store;
+
+pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
+pub use energy::{Account, Energies};
+pub use exponential::exact_step;
+pub use lanes::{LANES, Lanes};
+pub use modal::{Model, Scratch, State};
+pub use press::Press;
+pub use projection::Projection;
+pub use scheme::{ModeStep, Newmark, Rayleigh};
+pub use store::{BASIS_VERSION, Basis, basis_key};

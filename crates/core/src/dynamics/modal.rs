@@ -1,0 +1,213 @@
+//! Motion by modes: `Model` is fixed, `State` evolves, `Scratch` is reusable memory. Nothing here allocates in a step.
+//!
+//! `u = Phi q` with `Phi^T M Phi = I` and `Phi^T K Phi = diag(k)`. A step is `predict`, the motion under no new force,
+//! then `correct` by the modal force `p = Phi^T F` at the step's end. Between both a contact may ask for the free motion
+//! and choose its force: the new displacement is `u_free + [Phi diag(q_load) Phi^T] F`.
+
+use pulp::Arch;
+
+use super::kernels::{AddRows, Correct, Dot, Energy, FreeStep, LoadStep, Predict};
+use super::lanes::{LANES, Lanes, flat, grouped};
+use super::{ModeStep, Rayleigh};
+use crate::{Error, Result};
+
+/// Modes, the rows of their shapes at the wanted dofs, and the step of each mode.
+pub struct Model {
+    pub(super) arch: Arch,
+    pub(super) groups: usize,
+    modes: usize,
+    rows: usize,
+    /// Shapes at each row, modes contiguous; 1/sqrt(kg).
+    shapes: Vec<Lanes>,
+    /// Eigenvalues `omega^2`, 1/s^2; zero where a group is filled up.
+    pub(super) stiffness: Vec<Lanes>,
+    /// Damping of each mode, 1/s.
+    pub(super) damping: Vec<Lanes>,
+    pub(super) free_steps: Vec<FreeStep>,
+    pub(super) load_steps: Vec<LoadStep>,
+    /// Time step, s.
+    pub dt: f64,
+}
+
+/// Where the motion is.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Modal displacements, m sqrt(kg).
+    pub q: Vec<Lanes>,
+    /// Modal velocities, m sqrt(kg)/s.
+    pub v: Vec<Lanes>,
+    /// Modal force at this time, N/sqrt(kg).
+    pub load: Vec<Lanes>,
+    /// Steps made.
+    pub steps: u64,
+}
+
+/// Memory of a step.
+#[derive(Clone, Debug)]
+pub struct Scratch {
+    /// Modal force under construction, N/sqrt(kg).
+    pub load: Vec<Lanes>,
+}
+
+impl Model {
+    /// Prepares the recurrences.
+    ///
+    /// `shapes` holds `rows` x modes numbers, row by row; `step(k, c)` is the step of a mode with eigenvalue `k` and
+    /// damping `c`: Newmark's or the exact one.
+    ///
+    /// # Errors
+    /// Lengths that do not match, or a number that is not finite.
+    pub fn new(
+        eigenvalues: &[f64],
+        shapes: &[f64],
+        rayleigh: &Rayleigh,
+        dt: f64,
+        step: impl Fn(f64, f64) -> ModeStep,
+    ) -> Result<Self> {
+        let modes = eigenvalues.len();
+        if modes == 0 || !shapes.len().is_multiple_of(modes) {
+            return Err(Error::Invalid(format!("{} shape values do not fit {modes} modes", shapes.len())));
+        }
+        if !eigenvalues.iter().all(|k| k.is_finite() && *k >= 0.0) || !shapes.iter().all(|s| s.is_finite()) {
+            return Err(Error::Invalid("eigenvalues must not be negative and shapes must be finite".into()));
+        }
+        let groups = modes.div_ceil(LANES);
+        let damping: Vec<f64> = eigenvalues.iter().map(|&k| rayleigh.modal(k)).collect();
+        let mut free_steps = vec![FreeStep::default(); groups];
+        let mut load_steps = vec![LoadStep::default(); groups];
+        for (i, (&k, &c)) in eigenvalues.iter().zip(&damping).enumerate() {
+            let (m, g, l) = (step(k, c), i / LANES, i % LANES);
+            let to = &mut free_steps[g];
+            (to.qq.0[l], to.qv.0[l], to.qp.0[l]) = (m.qq, m.qv, m.qp);
+            (to.vq.0[l], to.vv.0[l], to.vp.0[l]) = (m.vq, m.vv, m.vp);
+            (load_steps[g].q.0[l], load_steps[g].v.0[l]) = (m.q_load, m.v_load);
+        }
+        Ok(Self {
+            arch: Arch::new(),
+            groups,
+            modes,
+            rows: shapes.len() / modes,
+            shapes: shapes.chunks_exact(modes).flat_map(grouped).collect(),
+            stiffness: grouped(eigenvalues),
+            damping: grouped(&damping),
+            free_steps,
+            load_steps,
+            dt,
+        })
+    }
+
+    /// Number of modes.
+    pub fn modes(&self) -> usize {
+        self.modes
+    }
+
+    /// Number of rows of the shapes.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// At rest.
+    pub fn state(&self) -> State {
+        let zero = || vec![Lanes::default(); self.groups];
+        State { q: zero(), v: zero(), load: zero(), steps: 0 }
+    }
+
+    /// In motion, with modal displacements and velocities and no force.
+    ///
+    /// # Errors
+    /// A length other than the number of modes.
+    pub fn state_from(&self, q: &[f64], v: &[f64]) -> Result<State> {
+        if q.len() != self.modes || v.len() != self.modes {
+            return Err(Error::Invalid(format!("{} modal displacements and velocities are needed", self.modes)));
+        }
+        Ok(State { q: grouped(q), v: grouped(v), load: vec![Lanes::default(); self.groups], steps: 0 })
+    }
+
+    /// Memory for a step.
+    pub fn scratch(&self) -> Scratch {
+        Scratch { load: vec![Lanes::default(); self.groups] }
+    }
+
+    /// Shapes at a row.
+    pub(super) fn row(&self, row: usize) -> &[Lanes] {
+        &self.shapes[row * self.groups..(row + 1) * self.groups]
+    }
+
+    /// Advances by one step under forces `(row, N)` at the step's end; rows that do not exist are left out.
+    pub fn step(&self, state: &mut State, scratch: &mut Scratch, forces: &[(u32, f64)]) {
+        self.predict(state);
+        scratch.load.fill(Lanes::default());
+        for &(row, force) in forces {
+            self.add_force(row, force, &mut scratch.load);
+        }
+        self.correct(state, &scratch.load);
+    }
+
+    /// Modal force of a force at a row: `load += Phi_row^T force`.
+    pub fn add_force(&self, row: u32, force: f64, load: &mut [Lanes]) {
+        if (row as usize) < self.rows && force != 0.0 {
+            self.arch.dispatch(AddRows { load, rows: [self.row(row as usize)], forces: [force] });
+        }
+    }
+
+    /// The step without a new force: afterwards `q`, `v` are the free motion at the step's end.
+    pub fn predict(&self, state: &mut State) {
+        self.arch.dispatch(self.prediction(state));
+    }
+
+    pub(super) fn prediction<'a>(&'a self, state: &'a mut State) -> Predict<'a> {
+        Predict { steps: &self.free_steps, q: &mut state.q, v: &mut state.v, load: &state.load }
+    }
+
+    /// Completes a predicted step by the modal force at its end.
+    pub fn correct(&self, state: &mut State, load: &[Lanes]) {
+        self.arch.dispatch(Correct { steps: &self.load_steps, q: &mut state.q, v: &mut state.v, load });
+        state.load.copy_from_slice(load);
+        state.steps += 1;
+    }
+
+    /// Values at rows: `Phi_row . x`, for `x` the state's `q` or `v`.
+    pub fn read(&self, x: &[Lanes], rows: impl Iterator<Item = usize>, out: &mut [f64]) {
+        for (value, row) in out.iter_mut().zip(rows) {
+            *value = self.arch.dispatch(Dot(self.row(row), x));
+        }
+    }
+
+    /// Modal accelerations, `p - c v - k q`, m sqrt(kg)/s^2.
+    pub fn accelerations(&self, state: &State) -> Vec<Lanes> {
+        (0..self.groups)
+            .map(|g| {
+                let of = |l: usize| {
+                    let resisting = self.damping[g].0[l] * state.v[g].0[l] + self.stiffness[g].0[l] * state.q[g].0[l];
+                    state.load[g].0[l] - resisting
+                };
+                Lanes(std::array::from_fn(of))
+            })
+            .collect()
+    }
+
+    /// Kinetic and strain energy of a state, and what damping took out in the step that began with the modal velocities
+    /// `before`, J.
+    pub fn energies(&self, state: &State, before: &[Lanes]) -> (f64, f64, f64) {
+        let (stiffness, damping) = (&self.stiffness, &self.damping);
+        let [kinetic, strain, power] =
+            self.arch.dispatch(Energy { q: &state.q, v: &state.v, before, stiffness, damping });
+        (0.5 * kinetic, 0.5 * strain, 0.25 * self.dt * power)
+    }
+
+    /// Turns a modal force `p` in place into the displacement beyond what it does at rest, `q - p / k` of the elastic modes
+    /// (`q` of rigid ones).
+    pub fn beyond_static(&self, state: &State, load: &mut [Lanes]) {
+        for ((p, q), k) in load.iter_mut().zip(&state.q).zip(&self.stiffness) {
+            for l in 0..LANES {
+                let at_rest = if k.0[l] > 0.0 { p.0[l] / k.0[l] } else { 0.0 };
+                p.0[l] = q.0[l] - at_rest;
+            }
+        }
+    }
+
+    /// Modal numbers without the filling.
+    pub fn flat(&self, x: &[Lanes]) -> Vec<f64> {
+        flat(x, self.modes)
+    }
+}

@@ -1,0 +1,292 @@
+//! The body in motion under the same contacts: the compliance of one step in place of the static one, and a spring.
+//!
+//! A step moves a patch to `d_free + C f`, `d_free = G q` being the free motion at the step's end (`dynamics::modal`) and
+//!
+//! ```text
+//! C = G diag(q_load) G^T + R,     R = W^T Psi W - G diag(1/k) G^T
+//! ```
+//!
+//! `R` is the residual flexibility of the modes left out, which answer at once; with all modes it is zero. `C` is far
+//! below the static compliance, so that a patch tied rigidly to a tool would alternate from tick to tick for ever: tool
+//! and patch are coupled by a spring `k_c`, `(C + I/k_c) f = d - d_free`.
+
+use glam::{DMat3, DVec3};
+
+use super::{Input, MAX_TOOLS, Mode, Model, Scratch, State, ToolContact};
+use crate::contact::{Patch, SurfacePoint, compliance_block, patch_weights};
+use crate::dynamics::{Lanes, Model as Modes, Projection, State as ModalState};
+use crate::{Error, Result};
+
+/// Shortest and longest time step, s: a tick makes at most ten of the one, and feels the other.
+const TIME_STEPS: std::ops::RangeInclusive<f64> = 1e-4..=1e-2;
+
+/// What sets a body in motion: its modes at the surface dofs, and the coupling to a tool.
+pub struct Dynamics {
+    pub(crate) modes: Modes,
+    /// Spring between a patch and its tool, N/m.
+    pub coupling: f64,
+}
+
+impl Dynamics {
+    /// `modes` has a row for every surface dof.
+    ///
+    /// # Errors
+    /// A time step that ticks cannot make, or a coupling that is not positive.
+    pub fn new(modes: Modes, coupling: f64) -> Result<Self> {
+        if !TIME_STEPS.contains(&modes.dt) {
+            let (low, high) = (TIME_STEPS.start(), TIME_STEPS.end());
+            return Err(Error::Invalid(format!("the time step must lie between {low} and {high} s, got {}", modes.dt)));
+        }
+        if !(coupling > 0.0 && coupling.is_finite()) {
+            return Err(Error::Invalid(format!("the coupling must be positive, got {coupling} N/m")));
+        }
+        Ok(Self { modes, coupling })
+    }
+}
+
+/// Energies of a body in motion and its couplings, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// `v M v / 2`.
+    pub kinetic: f64,
+    /// `u K u / 2`.
+    pub strain: f64,
+    /// `f^2 / 2 k_c` of the springs between tools and patches.
+    pub coupling: f64,
+    /// Taken out by Rayleigh damping since the start.
+    pub dissipated: f64,
+    /// Done by tools and strikes since the start.
+    pub work: f64,
+}
+
+/// How the body moves.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    pub(super) modal: ModalState,
+    /// Modal velocities before the step, for the damping's account.
+    before: Vec<Lanes>,
+    /// Modal force of the step: contacts, and a strike.
+    load: Vec<Lanes>,
+    patches: [Projection; MAX_TOOLS],
+    /// A patch that is struck: where, its force at the end of this step and of the last one, N, and its displacement at the
+    /// start of this one, m.
+    struck: Projection,
+    blow: [DVec3; 2],
+    struck_at: DVec3,
+    /// `R` between the patches.
+    residual: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
+    /// Body time not yet stepped through, s.
+    due: f64,
+    /// Force on the body and tool position at the end of the last step, where in contact.
+    last: [Option<(DVec3, DVec3)>; MAX_TOOLS],
+    /// Where the energy is.
+    pub energy: Energy,
+}
+
+/// An impulse for a patch of the surface, given within one step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Strike {
+    /// Where, m; the closest surface point is struck.
+    pub point: DVec3,
+    /// Impulse on the body, N s.
+    pub impulse: DVec3,
+}
+
+impl Motion {
+    /// At rest.
+    pub(super) fn new(modes: &Modes) -> Self {
+        let modal = modes.state();
+        Self {
+            before: modal.v.clone(),
+            load: modal.load.clone(),
+            patches: std::array::from_fn(|_| Projection::new(modes)),
+            struck: Projection::new(modes),
+            blow: Default::default(),
+            struck_at: DVec3::ZERO,
+            residual: Default::default(),
+            due: 0.0,
+            last: Default::default(),
+            energy: Energy::default(),
+            modal,
+        }
+    }
+
+    /// Brings the body to rest.
+    fn rest(&mut self) {
+        for x in [&mut self.modal.q, &mut self.modal.v, &mut self.modal.load] {
+            x.fill(Lanes::default());
+        }
+        self.blow = Default::default();
+        self.energy = Energy::default();
+    }
+
+    /// The body without new forces at the step's end.
+    pub(super) fn predict(&mut self, modes: &Modes) {
+        self.before.copy_from_slice(&self.modal.v);
+        modes.predict(&mut self.modal);
+    }
+
+    /// Displacement of a surface point in the free motion, m; the residual flexibility of other contacts is left out.
+    pub(super) fn displacement_at(&self, model: &Model, modes: &Modes, at: &SurfacePoint) -> DVec3 {
+        let triangle = model.loaded.triangles[at.triangle as usize];
+        let mut sum = DVec3::ZERO;
+        for (node, share) in triangle.into_iter().zip(at.barycentric) {
+            let mut corner = [0.0; 3];
+            modes.read(&self.modal.q, 3 * node as usize.., &mut corner);
+            sum += share * DVec3::from(corner);
+        }
+        sum
+    }
+
+    /// Takes hold of a patch for a tool: its compliance within a step with every other one, m/N.
+    pub(super) fn hold(&mut self, model: &Model, modes: &Modes, tools: &[ToolContact; MAX_TOOLS], tool: usize) {
+        gather(&mut self.patches[tool], modes, &tools[tool].patch);
+        for other in 0..MAX_TOOLS {
+            if tools[other].mode == Mode::Free {
+                continue;
+            }
+            let (a, b) = (&self.patches[tool], &self.patches[other]);
+            let whole = compliance_block(&model.green, &tools[tool].patch, &tools[other].patch).unwrap_or(DMat3::ZERO);
+            let residual = whole - a.static_compliance(modes, b);
+            self.residual[tool][other] = residual;
+            self.residual[other][tool] = residual.transpose();
+        }
+        self.last[tool] = None;
+    }
+
+    /// Compliance of one step between two patches, m/N.
+    pub(super) fn compliance(&self, modes: &Modes, a: usize, b: usize) -> DMat3 {
+        self.patches[a].step_compliance(modes, &self.patches[b]) + self.residual[a][b]
+    }
+
+    /// Mean displacement of a tool's patch in the free motion, m.
+    pub(super) fn free_displacement(&self, modes: &Modes, tool: usize) -> DVec3 {
+        self.patches[tool].displacement(modes, &self.modal)
+    }
+
+    /// How far the forces that other tools already exert move a patch beyond its modes, m.
+    pub(super) fn left_out(&self, tools: &[ToolContact; MAX_TOOLS], tool: usize) -> DVec3 {
+        let others = (0..MAX_TOOLS).filter(|&other| other != tool && tools[other].mode != Mode::Free);
+        others.map(|other| self.residual[tool][other] * tools[other].force).sum()
+    }
+
+    /// Readies a strike for the next step: a force that rises to `impulse / dt` at its end and falls in the one after.
+    /// A second one before that is over is not heard.
+    pub(super) fn strike(&mut self, modes: &Modes, patch: &Patch, impulse: DVec3) {
+        if self.blow == [DVec3::ZERO; 2] {
+            gather(&mut self.struck, modes, patch);
+            self.struck_at = self.struck.displacement(modes, &self.modal);
+            self.blow[0] = impulse / modes.dt;
+        }
+    }
+
+    /// Completes the step by the forces of contacts and strike, and keeps account of the energy.
+    pub(super) fn correct(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
+        let modes = &dynamics.modes;
+        self.load.fill(Lanes::default());
+        for (contact, patch) in tools.iter().zip(&self.patches) {
+            if contact.mode != Mode::Free {
+                patch.add_force(modes, contact.force, &mut self.load);
+            }
+        }
+        if self.blow[0] != DVec3::ZERO {
+            self.struck.add_force(modes, self.blow[0], &mut self.load);
+        }
+        modes.correct(&mut self.modal, &self.load);
+        self.account_for_energy(dynamics, tools);
+        self.account_for_work(modes, tools);
+    }
+
+    fn account_for_energy(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
+        let energy = &mut self.energy;
+        let (kinetic, strain, dissipated) = dynamics.modes.energies(&self.modal, &self.before);
+        (energy.kinetic, energy.strain) = (kinetic, strain);
+        energy.dissipated += dissipated;
+        energy.coupling = 0.0;
+        let touching = || (0..MAX_TOOLS).filter(|&tool| tools[tool].mode != Mode::Free);
+        for a in touching() {
+            let force = tools[a].force;
+            energy.coupling += 0.5 * force.length_squared() / dynamics.coupling;
+            let left_out: DVec3 = touching().map(|b| self.residual[a][b] * tools[b].force).sum();
+            energy.strain += 0.5 * force.dot(left_out);
+        }
+    }
+
+    /// Forces change linearly within a step: their mean times the way of tool or struck patch.
+    fn account_for_work(&mut self, modes: &Modes, tools: &[ToolContact; MAX_TOOLS]) {
+        for (tool, contact) in tools.iter().enumerate() {
+            if let Some((force, position)) = self.last[tool] {
+                self.energy.work += 0.5 * (force + contact.force).dot(contact.position - position);
+            }
+            self.last[tool] = (contact.mode != Mode::Free).then_some((contact.force, contact.position));
+        }
+        if self.blow != [DVec3::ZERO; 2] {
+            let now = self.struck.displacement(modes, &self.modal);
+            self.energy.work += 0.5 * (self.blow[0] + self.blow[1]).dot(now - self.struck_at);
+            self.struck_at = now;
+            self.blow = [DVec3::ZERO, self.blow[0]];
+        }
+    }
+
+    /// Modal displacements of what is drawn beside `Psi W f`, so that the modes left out are there too: `q - p / k`.
+    pub(super) fn drawn_into(&self, modes: &Modes, tools: &[ToolContact; MAX_TOOLS], out: &mut [Lanes]) {
+        out.fill(Lanes::default());
+        for (contact, patch) in tools.iter().zip(&self.patches) {
+            if contact.mode != Mode::Free {
+                patch.add_force(modes, contact.force, out);
+            }
+        }
+        modes.beyond_static(&self.modal, out);
+    }
+}
+
+fn gather(projection: &mut Projection, modes: &Modes, patch: &Patch) {
+    projection.gather(modes, patch.iter().map(|(node, weight)| (3 * node, weight)));
+}
+
+/// Begins a strike where the input asks for one.
+pub(super) fn strike(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) {
+    let (Some(dynamics), Some(motion), Some(strike)) = (&model.dynamics, &mut state.motion, &input.strike) else {
+        return;
+    };
+    if !(strike.point.is_finite() && strike.impulse.is_finite()) {
+        return;
+    }
+    let Some(closest) = model.closest(strike.point) else { return };
+    let centre = model.material_point(&closest);
+    let radius = input.contact_radius;
+    let patch = &mut scratch.candidate;
+    let covered = patch_weights(&model.green.surface, &centre, radius, &mut scratch.patch, patch);
+    if covered == patch.count {
+        motion.strike(&dynamics.modes, patch, strike.impulse);
+    }
+}
+
+/// Lets body time pass; a reset brings the body to rest.
+pub(super) fn advance(state: &mut State, input: &Input) {
+    if let Some(motion) = &mut state.motion {
+        motion.due += if input.advance > 0.0 { input.advance.min(*TIME_STEPS.end()) } else { 0.0 };
+        if input.reset {
+            motion.rest();
+        }
+    }
+}
+
+/// Takes a body in motion to the end of its next step, as it would go without new forces. False if no step is due.
+pub(super) fn predict(model: &Model, state: &mut State) -> bool {
+    let (Some(dynamics), Some(motion)) = (&model.dynamics, &mut state.motion) else { return true };
+    // A thousandth of a step forgives the rounding of many small advances.
+    let due = motion.due > 0.999 * dynamics.modes.dt;
+    if due {
+        motion.due -= dynamics.modes.dt;
+        motion.predict(&dynamics.modes);
+    }
+    due
+}
+
+/// Completes a step of a body in motion. False for one that does not move: a single answer is all there is.
+pub(super) fn correct(model: &Model, state: &mut State) -> bool {
+    let (Some(dynamics), Some(motion)) = (&model.dynamics, &mut state.motion) else { return false };
+    motion.correct(dynamics, &state.tools);
+    true
+}

@@ -1,0 +1,136 @@
+//! A modal step never allocates, repeats its bits, and its parts fit together.
+#![allow(unsafe_code)] // a counting allocator
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use glam::{DMat3, DVec3};
+use palpate_core::dynamics::{Account, Lanes, Model, Newmark, Press, Projection, Rayleigh, exact_step};
+
+thread_local! {
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call is passed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|c| c.set(c.get() + 1));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        COUNT.with(|c| c.set(c.get() + 1));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const MODES: usize = 37;
+const ROWS: usize = 30;
+
+/// Modes with made-up shapes; their number fills no group of lanes.
+fn model(exact: bool) -> Model {
+    let eigenvalues: Vec<f64> = (0..MODES).map(|i| if i == 0 { 0.0 } else { 300.0 * (i * i) as f64 }).collect();
+    let shapes: Vec<f64> = (0..MODES * ROWS).map(|i| ((i * 7919 % 1000) as f64 / 500.0 - 1.0) * 3.0).collect();
+    let scheme = Newmark::new(1e-3, 0.3025, 0.6).expect("a valid scheme");
+    let rayleigh = Rayleigh { mass: 1.0, stiffness: 1e-4 };
+    let step = |k, c| if exact { exact_step(k, c, scheme.dt) } else { scheme.mode_step(k, c) };
+    Model::new(&eigenvalues, &shapes, &rayleigh, scheme.dt, step).expect("a valid model")
+}
+
+fn bits(x: &[Lanes]) -> Vec<u64> {
+    x.iter().flat_map(|g| g.0).map(f64::to_bits).collect()
+}
+
+#[test]
+fn steps_never_allocate_and_repeat_their_bits() {
+    let model = model(false);
+    let patch: Vec<(u32, f64)> = (0..7).map(|i| (3 * i, 0.2 - 0.01 * f64::from(i))).collect();
+    let mut ends = [Vec::new(), Vec::new()];
+    for end in &mut ends {
+        let (mut state, mut scratch) = (model.state(), model.scratch());
+        let (mut account, mut press) = (Account::new(&state), Press::new(&model, 400.0));
+        let mut seen = [0.0; 2];
+        let before = COUNT.with(Cell::get);
+        for tick in 0..500 {
+            let t = f64::from(tick) * 1e-3;
+            // A row that does not exist is left out, never a panic.
+            model.step(&mut state, &mut scratch, &[(4, (9.0 * t).sin()), (5, 0.1), (u32::MAX, 1.0)]);
+            account.book(&model, &state);
+            press.hold(&model, &patch);
+            press.tick(&model, &mut state, &mut scratch, DVec3::new(0.0, 1e-3, -t * 1e-2));
+            model.read(&state.q, [0, 5].into_iter(), &mut seen);
+        }
+        assert_eq!(COUNT.with(Cell::get), before, "a step allocated");
+        assert!(seen.iter().all(|x| x.is_finite() && *x != 0.0));
+        *end = bits(&state.q);
+    }
+    assert_eq!(ends[0], ends[1]);
+}
+
+#[test]
+fn bad_numbers_never_panic() {
+    let model = model(false);
+    let (mut state, mut scratch) = (model.state(), model.scratch());
+    let mut press = Press::new(&model, 400.0);
+    press.hold(&model, &[(0, f64::NAN), (u32::MAX - 2, 1.0)]);
+    assert!(press.tick(&model, &mut state, &mut scratch, DVec3::NAN).is_nan());
+    model.step(&mut state, &mut scratch, &[(0, f64::INFINITY)]);
+}
+
+/// `u_new = u_free + step_compliance f`, whichever scheme makes the coefficients; and statics for a load held long.
+#[test]
+fn a_patch_moves_by_its_free_motion_and_its_compliance() {
+    for exact in [false, true] {
+        let model = model(exact);
+        let (mut state, mut scratch) = (model.state(), model.scratch());
+        for _ in 0..20 {
+            model.step(&mut state, &mut scratch, &[(2, 0.3), (17, -0.2)]);
+        }
+        let mut patches = [Projection::new(&model), Projection::new(&model)];
+        patches[0].gather(&model, [(0, 0.5), (6, 0.3), (12, 0.2)].into_iter());
+        patches[1].gather(&model, [(15, 0.6), (18, 0.4)].into_iter());
+        let [here, there] = &patches;
+        let force = DVec3::new(0.2, -0.4, 0.7);
+        let free = here.predict(&model, &mut state);
+        assert!((free - here.displacement(&model, &state)).length() < 1e-14 * free.length());
+        scratch.load.fill(Lanes::default());
+        there.add_force(&model, force, &mut scratch.load);
+        model.correct(&mut state, &scratch.load);
+        let moved = here.displacement(&model, &state) - free;
+        let expected = here.step_compliance(&model, there) * force;
+        assert!((moved - expected).length() < 1e-12 * expected.length().max(1e-6), "{moved} {expected}");
+        let back = there.step_compliance(&model, here).transpose();
+        assert!(max_abs(here.step_compliance(&model, there) - back) < 1e-12 * max_abs(back));
+    }
+}
+
+#[test]
+fn static_compliance_is_where_a_held_force_ends() {
+    let model = model(false);
+    let mut patch = Projection::new(&model);
+    patch.gather(&model, [(0, 0.5), (6, 0.5)].into_iter());
+    let (mut state, mut scratch) = (model.state(), model.scratch());
+    let force = DVec3::new(0.0, 0.1, 0.4);
+    for _ in 0..60_000 {
+        model.predict(&mut state);
+        scratch.load.fill(Lanes::default());
+        patch.add_force(&model, force, &mut scratch.load);
+        // The first mode is rigid: it would fly away.
+        scratch.load[0].0[0] = 0.0;
+        model.correct(&mut state, &scratch.load);
+    }
+    let expected = patch.static_compliance(&model, &patch) * force;
+    let got = patch.displacement(&model, &state);
+    assert!((got - expected).length() < 1e-9 * expected.length(), "{got} {expected}");
+    assert!(patch.velocity(&model, &state).length() < 1e-9);
+}
+
+fn max_abs(m: DMat3) -> f64 {
+    m.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max)
+}

@@ -1,0 +1,261 @@
+"""Eigenmodes of a body: compute them once, keep them in a file."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from palpate import _native
+from palpate.body import Body
+from palpate.dynamics.matrices import Matrices, start_vector
+from palpate.errors import BodyError, StoreError
+from palpate.green import _describe, cache_directory
+from palpate.progress import narrated, progress_reporter
+
+# Up to so many free dofs the dense solver is quicker than Lanczos for most counts.
+DENSE_DOFS = 1500
+# All modes of more dofs are refused: the shapes alone would take gigabytes, the work hours.
+ALL_MODES_DOFS = 12_000
+# An eigenvalue below this part of the largest `K_ii / M_ii` is round-off of a rigid motion and set to zero.
+ZERO_EIGENVALUE = 1e-12
+
+
+class ModalBasis:
+    """Natural modes of a body, mass-normalised: `Phi^T M Phi = I`, `Phi^T K Phi = diag(omega^2)`.
+
+    Made by :func:`modes` or :meth:`load`; immutable.
+
+    Attributes
+    ----------
+    eigenvalues
+        `omega^2`, ascending, (m,), 1/s^2.
+    shapes
+        (n, 3, m), 1/sqrt(kg); zero at fixed dofs. The largest component of each is positive.
+    key
+        Hash of everything that determines the modes.
+
+    """
+
+    def __init__(self, eigenvalues: np.ndarray, shapes: np.ndarray, key: str, description: dict[str, Any]):
+        self.eigenvalues = eigenvalues
+        self.shapes = shapes
+        self.key = key
+        self.description = description
+        for array in (eigenvalues, shapes):
+            array.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Natural frequencies, Hz, ascending (m,); rigid motions are exactly zero."""
+        return np.sqrt(self.eigenvalues) / (2 * np.pi)
+
+    @property
+    def mass(self) -> str:
+        """Mass matrix they belong to, ``"consistent"`` or ``"lumped"``."""
+        return self.description["mass"]
+
+    def first(self, count: int) -> ModalBasis:
+        """Return the lowest modes.
+
+        Raises
+        ------
+        BodyError
+            More than there are.
+
+        """
+        if not 1 <= count <= len(self):
+            raise BodyError(f"the basis has {len(self)} modes, {count} are wanted")
+        if count == len(self):
+            return self
+        shapes = np.ascontiguousarray(self.shapes[:, :, :count])
+        return ModalBasis(self.eigenvalues[:count].copy(), shapes, self.key, self.description)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the file; an existing one is replaced only when the new one is complete."""
+        shapes = self.shapes.reshape(-1, len(self))
+        _native.save_basis(Path(path), self.key, json.dumps(self.description), self.eigenvalues, shapes)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, body: Body | None = None, mass: str | None = None) -> ModalBasis:
+        """Read a file and verify it.
+
+        Parameters
+        ----------
+        path
+            The file.
+        body
+            Refuse modes of any other body.
+        mass
+            Refuse modes of another mass matrix.
+
+        Raises
+        ------
+        StoreError
+            A damaged file, or one that does not match; the message says what differs.
+
+        """
+        path = Path(path)
+        if not path.exists():
+            raise StoreError(f"{path}: no such file")
+        key, description, eigenvalues, shapes = _native.load_basis(path)
+        basis = cls(eigenvalues, shapes.reshape(-1, 3, len(eigenvalues)), key, json.loads(description))
+        if mass is not None and basis.mass != mass:
+            raise StoreError(f"{path}: was made with the {basis.mass} mass matrix, the {mass} one is wanted")
+        if body is not None and key != basis_key(body, basis.mass):
+            raise StoreError(f"{path}: {_difference(basis, body)}; compute it again")
+        return basis
+
+
+def modes(
+    body: Body,
+    count: int | None = None,
+    *,
+    mass: str = "consistent",
+    path: str | os.PathLike[str] | None = None,
+    progress: bool | Callable[[int, int], None] = True,
+) -> ModalBasis:
+    """Lowest natural modes of a body, from their file if that matches, else computed and written there.
+
+    Small bodies go to LAPACK; large ones to shift-inverted Lanczos (ARPACK) on the sparse Cholesky factor of
+    `K - sigma M`, with sigma = 0, or negative for a body that can move freely. The same body gives the same numbers.
+
+    Parameters
+    ----------
+    body
+        Any body, also without supports: its rigid motions come first, with frequencies of exactly zero (eigenvalues
+        below 1e-12 of the largest `K_ii / M_ii` are taken for them).
+    count
+        How many; None: all, as long as there are at most 12,000 free dofs.
+    mass
+        ``"consistent"`` or ``"lumped"``.
+    path
+        File; None keeps it in the cache under its content key.
+    progress
+        True shows a bar on a terminal; a function is called with solves done and expected.
+
+    Raises
+    ------
+    BodyError
+        More modes than free dofs, all modes of a body too large for that, a node without mass.
+
+    """
+    key = basis_key(body, mass)
+    if path is None:
+        target = cache_directory() / f"{key[:32]}-{count or 'all'}.modes.palpate"
+        target.parent.mkdir(parents=True, exist_ok=True)
+    else:
+        target = Path(path)
+    free = body.fixed_mask.size - len(body.fixed_dofs)
+    wanted = free if count is None else _checked_count(count, free)
+    if target.exists():
+        with contextlib.suppress(StoreError):
+            basis = ModalBasis.load(target, body=body, mass=mass)
+            if len(basis) >= wanted:
+                return basis.first(wanted)
+    if count is None and free > ALL_MODES_DOFS:
+        size = 8e-9 * free**2
+        raise BodyError(f"all modes of {free} free dofs would take {size:.0f} GB: give a count, such as 200")
+    matrices = Matrices.of(body, mass)
+    if free <= DENSE_DOFS or 3 * wanted > free:
+        with narrated(f"computing {wanted} modes of {free} dofs"):
+            eigenvalues, vectors = _dense(matrices, wanted)
+    else:
+        with progress_reporter("computing modes", progress) as report:
+            eigenvalues, vectors = _lanczos(body, matrices, wanted, report)
+    basis = _basis(matrices, eigenvalues, vectors, key, {**_describe(body), "mass": mass, "modes": wanted})
+    basis.save(target)
+    return basis
+
+
+def _checked_count(count: int, free: int) -> int:
+    if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or not 1 <= count <= free:
+        raise BodyError(f"the number of modes must lie between 1 and {free}, got {count!r}")
+    return int(count)
+
+
+def _dense(matrices: Matrices, count: int) -> tuple[np.ndarray, np.ndarray]:
+    stiffness, mass = matrices.free_stiffness.toarray(), matrices.free_mass.toarray()
+    subset = None if count == len(stiffness) else (0, count - 1)
+    return scipy.linalg.eigh(
+        stiffness, mass, subset_by_index=subset, overwrite_a=True, overwrite_b=True, check_finite=False
+    )
+
+
+def _lanczos(
+    body: Body, matrices: Matrices, count: int, report: Callable[[int, int], None] | None
+) -> tuple[np.ndarray, np.ndarray]:
+    sigma = _shift(body)
+    factor = matrices.factor(1.0, -sigma)
+    size = len(matrices.free)
+    vectors = min(size - 1, max(2 * count, count + 40))
+    # Lanczos needs about one solve a vector, and as many again in its restarts.
+    solves, expected = 0, 2 * vectors
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        nonlocal solves
+        solves += 1
+        if report is not None and solves % 8 == 0:
+            report(solves, max(expected, solves))
+        return factor.solve(np.ascontiguousarray(right))
+
+    inverse = LinearOperator((size, size), matvec=solve, dtype=np.float64)
+    stiffness, mass = matrices.free_stiffness, matrices.free_mass
+    return eigsh(stiffness, count, mass, sigma=sigma, OPinv=inverse, v0=start_vector(size), ncv=vectors)
+
+
+def _shift(body: Body) -> float:
+    """Zero for a held body; else about minus the square of its first elastic frequency: `K - sigma M` is SPD."""
+    try:
+        body.require_supported()
+    except BodyError:
+        rows = body._material_rows
+        length = np.linalg.norm(np.ptp(body.mesh.nodes, axis=0))
+        return -float(rows[:, 0].min() / (rows[:, 2].max() * length**2))
+    return 0.0
+
+
+def _basis(
+    matrices: Matrices, eigenvalues: np.ndarray, vectors: np.ndarray, key: str, description: dict[str, Any]
+) -> ModalBasis:
+    order = np.argsort(eigenvalues, kind="stable")
+    eigenvalues, vectors = eigenvalues[order], vectors[:, order]
+    scale = (matrices.free_stiffness.diagonal() / matrices.free_mass.diagonal()).max()
+    eigenvalues = np.where(eigenvalues < ZERO_EIGENVALUE * scale, 0.0, eigenvalues)
+    largest = np.abs(vectors).argmax(axis=0)
+    vectors = vectors * np.sign(vectors[largest, np.arange(len(largest))])
+    shapes = np.zeros((matrices.stiffness.shape[0], len(eigenvalues)))
+    shapes[matrices.free] = vectors
+    return ModalBasis(eigenvalues, shapes.reshape(-1, 3, len(eigenvalues)), key, description)
+
+
+def basis_key(body: Body, mass: str) -> str:
+    """Hash of everything that determines the modes of a body."""
+    nodes, tets, materials = body._element_arrays()
+    width = np.array(tets.shape[1], dtype=np.uint32)
+    fixed = body.fixed_dofs.astype(np.uint32)
+    parts = [mass.encode(), *(np.ascontiguousarray(a).tobytes() for a in (width, nodes, tets, materials, fixed))]
+    return _native.basis_key(parts)
+
+
+def _difference(basis: ModalBasis, body: Body) -> str:
+    """First thing in which a file and a body are seen to differ."""
+    now = _describe(body)
+    for name in ("nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
+        there = basis.description.get(name)
+        if there != now[name]:
+            return f"was made for another body ({name.replace('_', ' ')}: {there} there, {now[name]} here)"
+    fixed_there = np.flatnonzero(~basis.shapes.any(axis=2).ravel())
+    if not np.array_equal(fixed_there, body.fixed_dofs):
+        return "was made for another body (other dofs are fixed)"
+    return "was made for another body (node positions or elements differ)"

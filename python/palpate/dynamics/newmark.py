@@ -1,0 +1,279 @@
+"""Newmark's scheme: a body in motion under given forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate import _native
+from palpate.body import Body
+from palpate.dynamics.basis import ModalBasis, basis_key
+from palpate.dynamics.basis import modes as compute_modes
+from palpate.dynamics.matrices import Matrices, native
+from palpate.dynamics.residual import Residual
+from palpate.errors import BodyError
+
+METHODS = ("modal", "sparse", "dense", "exponential")
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies of a motion, J.
+
+    Attributes
+    ----------
+    kinetic, strain
+        `v M v / 2` and `u K u / 2` now.
+    dissipated
+        Taken out by damping since the start.
+    work
+        Done by the forces since the start.
+
+    """
+
+    kinetic: float
+    strain: float
+    dissipated: float
+    work: float
+
+    @property
+    def total(self) -> float:
+        """Kinetic and strain energy."""
+        return self.kinetic + self.strain
+
+
+class Newmark:
+    """Motion of a body by Newmark's scheme (paper 4.1 to 4.3; its 4.4 corrected).
+
+    `M a + B v + K u = F` holds at the end of every step, with `B = a M + b K`.
+
+    Parameters
+    ----------
+    body
+        With or without supports.
+    dt
+        Time step, s.
+    alpha, delta
+        Weights of the new acceleration in displacement and velocity: (1/4, 1/2) keeps energy, (0, 1/2) is the central
+        difference method, (0.3025, 0.6) damps what is too fast for the step. Not used by ``"exponential"``.
+    rayleigh
+        a (1/s) and b (s); see :func:`palpate.rayleigh_from_ratios`.
+    mass
+        ``"consistent"`` or ``"lumped"``.
+    method
+        ``"modal"``: one recurrence a mode; with all modes the same motion as ``"sparse"`` (Cholesky factor of the
+        effective matrix) and ``"dense"`` (its stored inverse: the paper's method). ``"exponential"``: each mode
+        exactly, for forces linear in time within a step.
+    modes
+        For the modal methods: how many of the lowest, None for all, or a :class:`palpate.ModalBasis`. The static part
+        of those left out is added (residual flexibility): exact at rest, without inertia and velocity.
+    displacements, velocities
+        (n, 3) m and m/s at the start, where the force is zero; None: at rest. Fixed components are ignored; modes left
+        out stay at rest.
+    progress
+        Whether computing modes shows a bar on a terminal.
+
+    Raises
+    ------
+    BodyError
+        A step that is unstable (with the largest stable one), a weight or factor out of range, a body without mass.
+
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        dt: float = 1e-3,
+        alpha: float = 0.25,
+        delta: float = 0.5,
+        rayleigh: tuple[float, float] = (0.0, 0.0),
+        mass: str = "consistent",
+        method: str = "modal",
+        modes: int | ModalBasis | None = None,
+        *,
+        displacements: np.ndarray | None = None,
+        velocities: np.ndarray | None = None,
+        progress: bool = True,
+    ):
+        if method not in METHODS:
+            raise BodyError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+        if modes is not None and method in ("sparse", "dense"):
+            raise BodyError(f"the method '{method}' takes no modes: it moves all dofs")
+        self.dt = float(dt)
+        self._body = body
+        self._matrices = Matrices.of(body, mass)
+        a, b = (float(factor) for factor in rayleigh)
+        self._scheme = (self.dt, float(alpha), float(delta), a, b)
+        self._largest_eigenvalue: float | None = None
+        self._residual: Residual | None = None
+        u, v = self._initial(displacements, "displacements"), self._initial(velocities, "velocities")
+        self._forces = np.zeros(len(u))
+        _native.largest_stable_dt(self._scheme, 1.0)  # refuses numbers out of range before the long work
+        if method in ("modal", "exponential"):
+            basis = modes if isinstance(modes, ModalBasis) else compute_modes(body, modes, mass=mass, progress=progress)
+            self._motion = self._modal(basis, mass, method == "exponential", u, v)
+        else:
+            self._require_stable()
+            matrices = (native(self._matrices.stiffness), native(self._matrices.mass))
+            fixed = body.fixed_dofs.tolist()
+            self._motion = _native.DirectMotion(*matrices, fixed, self._scheme, method == "dense", u, v)
+
+    def step(self, forces: Mapping[int, Sequence[float]] | None = None, count: int = 1) -> None:
+        """Advance.
+
+        Parameters
+        ----------
+        forces
+            Node to force, N, at the end of each of the steps; nodes not named are free of force.
+        count
+            Number of steps.
+
+        Raises
+        ------
+        BodyError
+            A node that does not exist, not three numbers, a number that is not finite.
+
+        """
+        if not isinstance(count, (int, np.integer)) or count < 0:
+            raise BodyError(f"the number of steps must be a whole number, got {count!r}")
+        load = np.zeros_like(self._forces)
+        for node, force in (forces or {}).items():
+            first = 3 * self._node(node)
+            load[first : first + 3] += self._vector(node, force)
+        load[self._body.fixed_dofs] = 0.0
+        if count:
+            loaded = np.flatnonzero(load)
+            self._motion.step(list(zip(loaded.tolist(), load[loaded].tolist(), strict=True)), int(count))
+            self._forces = load
+
+    def play(self, nodes: Sequence[int], forces: np.ndarray, watch: Sequence[int] | None = None) -> np.ndarray:
+        """Advance through a history of forces.
+
+        Parameters
+        ----------
+        nodes
+            (k,) loaded nodes, each once.
+        forces
+            (steps, k, 3) N, each row at the end of its step.
+        watch
+            (w,) nodes to be seen; None: the loaded ones.
+
+        Returns
+        -------
+        numpy.ndarray
+            (steps, w, 3) displacements of the watched nodes after each step, m.
+
+        """
+        loaded = [self._node(node) for node in nodes]
+        seen = loaded if watch is None else [self._node(node) for node in watch]
+        history = np.array(forces, dtype=float)
+        if history.ndim != 3 or history.shape[1:] != (len(loaded), 3) or len(set(loaded)) != len(loaded):
+            raise BodyError(f"forces must have shape (steps, {len(loaded)}, 3) for as many different nodes")
+        if not np.isfinite(history).all():
+            raise BodyError("forces hold a number that is not finite")
+        rows, columns = _dofs(loaded), _dofs(seen)
+        history = np.where(np.isin(rows, self._body.fixed_dofs), 0.0, history.reshape(len(history), -1))
+        moved = self._motion.play(rows.tolist(), history, columns.tolist())
+        if len(history):
+            self._forces = np.zeros_like(self._forces)
+            self._forces[rows] = history[-1]
+        if self._residual is not None:
+            for i in np.flatnonzero(history.any(axis=0)):
+                unit = np.zeros_like(self._forces)
+                unit[rows[i]] = 1.0
+                moved += np.outer(history[:, i], self._residual.answer(unit)[columns])
+        return moved.reshape(len(history), len(seen), 3)
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return self._motion.steps * self.dt
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(n, 3) m."""
+        return (self._motion.at(None, 0) + self._left_out()).reshape(-1, 3)
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """(n, 3) m/s."""
+        return self._motion.at(None, 1).reshape(-1, 3)
+
+    @property
+    def accelerations(self) -> np.ndarray:
+        """(n, 3) m/s^2."""
+        return self._motion.at(None, 2).reshape(-1, 3)
+
+    @property
+    def energy(self) -> Energy:
+        """Energies now, and what went in and out since the start."""
+        kinetic, strain, dissipated, work = self._motion.energies()
+        # The part left out follows the load statically: its strain energy is the work done on it.
+        stored = 0.5 * float(self._forces @ self._left_out())
+        return Energy(kinetic, strain + stored, dissipated, work + stored)
+
+    @property
+    def largest_eigenvalue(self) -> float:
+        """Largest `omega^2` of the motion, 1/s^2: of the modes kept, or of the whole body, by Lanczos."""
+        if self._largest_eigenvalue is None:
+            self._largest_eigenvalue = self._matrices.largest_eigenvalue()
+        return self._largest_eigenvalue
+
+    @property
+    def largest_stable_dt(self) -> float:
+        """Largest stable time step with these weights, s; infinite where every step is."""
+        if 2 * self._scheme[1] >= self._scheme[2]:
+            return np.inf
+        return _native.largest_stable_dt(self._scheme, self.largest_eigenvalue)
+
+    def _modal(self, basis: ModalBasis, mass: str, exact: bool, u: np.ndarray, v: np.ndarray) -> _native.ModalMotion:
+        if basis.key != basis_key(self._body, mass):
+            raise BodyError(f"the modes are not those of this body with its {mass} mass matrix")
+        self._largest_eigenvalue = float(basis.eigenvalues[-1])
+        if not exact:
+            self._require_stable()
+        if len(basis) < len(self._matrices.free):
+            self._residual = Residual(self._matrices, basis)
+        shapes = basis.shapes.reshape(-1, len(basis))
+        q, p = (shapes.T @ (self._matrices.mass @ x) for x in (u, v))
+        return _native.ModalMotion(basis.eigenvalues, shapes, self._scheme, exact, q, p)
+
+    def _require_stable(self) -> None:
+        if 2 * self._scheme[1] < self._scheme[2]:
+            _native.require_stable(self._scheme, self.largest_eigenvalue)
+
+    def _left_out(self) -> np.ndarray:
+        """Displacements of the modes left out, (3n), m."""
+        if self._residual is None or not self._forces.any():
+            return np.zeros_like(self._forces)
+        return self._residual.answer(self._forces)
+
+    def _initial(self, values: np.ndarray | None, name: str) -> np.ndarray:
+        shape = self._body.mesh.nodes.shape
+        array = np.zeros(shape) if values is None else np.array(values, dtype=float)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise BodyError(f"the initial {name} must be {shape} finite numbers, got shape {array.shape}")
+        array[self._body.fixed_mask] = 0.0
+        return array.ravel()
+
+    def _node(self, node: int) -> int:
+        count = len(self._body.mesh.nodes)
+        if not isinstance(node, (int, np.integer)) or not 0 <= node < count:
+            raise BodyError(f"forces: node {node!r} does not exist: the mesh has nodes 0 to {count - 1}")
+        return int(node)
+
+    @staticmethod
+    def _vector(node: int, force: Sequence[float]) -> np.ndarray:
+        try:
+            vector = np.array(force, dtype=float)
+        except (TypeError, ValueError):
+            raise BodyError(f"forces: node {node} needs three numbers") from None
+        if vector.shape != (3,) or not np.isfinite(vector).all():
+            raise BodyError(f"forces: node {node} needs three finite numbers")
+        return vector
+
+
+def _dofs(nodes: Sequence[int]) -> np.ndarray:
+    return (3 * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(3)).ravel()

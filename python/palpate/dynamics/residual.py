@@ -1,0 +1,60 @@
+"""Residual flexibility: what a truncated basis leaves out, answered at once.
+
+`R = Psi - Phi diag(1/omega^2) Phi^T` over the elastic modes kept, `Psi` being the static compliance. Its modes are so
+fast against the load that they follow it statically; with it, a load held for ever ends at the static solution for any
+number of modes. For a body that can move freely, `Psi` is the compliance to self-balanced loads, seen without rigid
+motion: the load is balanced by the inertia of the rigid motions first, and their share is removed from the answer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from palpate import _native
+from palpate.dynamics.basis import ModalBasis
+from palpate.dynamics.matrices import Matrices, native
+from palpate.errors import BodyError
+
+
+class Residual:
+    """Residual flexibility of a basis.
+
+    Raises
+    ------
+    BodyError
+        A body that can move freely, and a basis without all of its rigid motions.
+
+    """
+
+    def __init__(self, matrices: Matrices, basis: ModalBasis):
+        self._free = matrices.free
+        self._shapes = basis.shapes.reshape(-1, len(basis))[matrices.free]
+        self._eigenvalues = basis.eigenvalues
+        rigid = basis.eigenvalues == 0.0
+        self._rigid = self._shapes[:, rigid]
+        self._mass_rigid = matrices.free_mass @ self._rigid
+        # As many dofs are held as there are rigid motions, those that determine them best (pivoted QR).
+        held = scipy.linalg.qr(self._rigid.T, mode="r", pivoting=True)[1][: self._rigid.shape[1]] if rigid.any() else []
+        self._kept = np.setdiff1d(np.arange(len(self._free)), held)
+        fixed = np.union1d(matrices.fixed, self._free[np.asarray(held, dtype=int)])
+        try:
+            self._factor = _native.SparseFactor(native(matrices.stiffness), fixed.tolist())
+        except BodyError:
+            raise BodyError(
+                f"a truncated basis needs all rigid motions of the body; the first {len(basis)} modes lack some"
+            ) from None
+
+    def answer(self, forces: np.ndarray) -> np.ndarray:
+        """Displacements (3n), m, that the modes leave out under forces (3n), N."""
+        load = forces[self._free]
+        balanced = load - self._mass_rigid @ (self._rigid.T @ load)
+        answer = np.zeros(len(self._free))
+        answer[self._kept] = self._factor.solve(balanced[self._kept])
+        answer -= self._rigid @ (self._mass_rigid.T @ answer)
+        modal = self._shapes.T @ load
+        elastic = self._eigenvalues > 0.0
+        answer -= self._shapes[:, elastic] @ (modal[elastic] / self._eigenvalues[elastic])
+        everywhere = np.zeros(len(forces))
+        everywhere[self._free] = answer
+        return everywhere

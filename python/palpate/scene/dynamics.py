@@ -1,0 +1,106 @@
+"""The `[dynamics]` table: a body that moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from palpate import _native
+from palpate.dynamics import ModalBasis, modes, rayleigh_from_ratios
+from palpate.errors import SceneError
+from palpate.scene.table import Stiffness, Table, Time
+
+if TYPE_CHECKING:
+    from palpate.body import Body
+
+# All modes of so many free dofs are quick to compute and to step; larger bodies take the lowest ones.
+ALL_MODES_DOFS = 3000
+LOWEST_MODES = 200
+# The second damping ratio is that of this mode, or of the last one.
+SECOND_DAMPED_MODE = 10
+
+Ratio = Annotated[float, Field(ge=0, lt=1)]
+Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class DynamicsTable(Table):
+    """Motion by modes: Newmark's scheme, or the exact step of each mode.
+
+    ``delta`` above 1/2 damps what is too fast for the time step; ``alpha`` is ``(delta + 1/2)^2 / 4`` unless given.
+    ``damping_ratios`` are those of the first and the tenth mode; or ``rayleigh`` gives the factors
+    of mass and stiffness.
+    """
+
+    scheme: Literal["newmark", "exact"] = "newmark"
+    dt: Annotated[Time, Field(ge=1e-4, le=1e-2)] = 1e-3
+    delta: Annotated[float, Field(ge=0.5, allow_inf_nan=False)] = 0.6
+    alpha: Factor | None = None
+    modes: Annotated[int, Field(gt=0)] | Literal["all"] | None = None
+    mass: Literal["consistent", "lumped"] = "consistent"
+    damping_ratios: tuple[Ratio, Ratio] = (0.05, 0.05)
+    rayleigh: tuple[Factor, Factor] | None = None
+    coupling: Stiffness | None = None
+
+    @model_validator(mode="after")
+    def _one_damping(self) -> DynamicsTable:
+        if self.rayleigh is not None and "damping_ratios" in self.model_fields_set:
+            raise ValueError("give damping_ratios or rayleigh, not both")
+        return self
+
+    def build(self, body: Body, max_stiffness: float, progress: bool = True) -> Motion:
+        """Modes and coefficients for a body.
+
+        Raises
+        ------
+        Error
+            A coupling stiffer than the device renders, an unstable scheme, more modes than there are.
+
+        """
+        coupling = max_stiffness if self.coupling is None else self.coupling
+        if coupling > max_stiffness:
+            raise SceneError(
+                f"dynamics.coupling = {coupling:g} N/m is stiffer than device.max_stiffness = {max_stiffness:g} N/m"
+            )
+        free = body.fixed_mask.size - len(body.fixed_dofs)
+        count = self.modes or ("all" if free <= ALL_MODES_DOFS else LOWEST_MODES)
+        basis = modes(body, None if count == "all" else min(count, free), mass=self.mass, progress=progress)
+        alpha = (self.delta + 0.5) ** 2 / 4 if self.alpha is None else self.alpha
+        scheme = (self.dt, alpha, self.delta, *self._rayleigh(basis))
+        if self.scheme == "newmark":
+            _native.require_stable(scheme, float(basis.eigenvalues[-1]))
+        return Motion(basis, scheme, self.scheme == "exact", coupling)
+
+    def _rayleigh(self, basis: ModalBasis) -> tuple[float, float]:
+        if self.rayleigh is not None:
+            return self.rayleigh
+        distinct = np.unique(basis.frequencies)
+        first, second = distinct[0], distinct[min(SECOND_DAMPED_MODE, len(distinct)) - 1]
+        if first == second:
+            return 4 * np.pi * first * self.damping_ratios[0], 0.0
+        return rayleigh_from_ratios(self.damping_ratios[0], first, self.damping_ratios[1], second)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What sets a body of a scene in motion.
+
+    Attributes
+    ----------
+    basis
+        Its modes.
+    scheme
+        Time step (s), alpha, delta, and the Rayleigh factors of mass (1/s) and stiffness (s).
+    exact
+        Whether each mode takes its exact step instead of Newmark's.
+    coupling
+        Spring between a patch and its tool, N/m.
+
+    """
+
+    basis: ModalBasis
+    scheme: tuple[float, float, float, float, float]
+    exact: bool
+    coupling: float

@@ -1,0 +1,178 @@
+"""Contacts on a body that moves: held, struck and let go, against static answers, natural frequencies and energy."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+import scipy.linalg
+from conftest import box_mesh, skfem_stiffness
+
+import palpate
+
+SIZE = (0.12, 0.03, 0.03)
+RADIUS, CONTACT_RADIUS, COUPLING = 0.006, 0.008, 500.0
+TOP = np.array([0.10, 0.015, 0.03])
+FREE_LIMITS = "[device]\nmax_force = '1kN'\nmax_slew = 1e9\nramp = 0\n"
+
+
+def scene(folder, dynamics: str, fixed: str = "x < 1e-6") -> palpate.Scene:
+    """Scene of a bar of soft rubber, a cantilever unless it is held elsewhere."""
+    box_mesh(cells=(10, 3, 3), size=SIZE, jitter=0).write(folder / "beam.vtu")
+    text = (
+        f"[body]\nmesh = 'beam.vtu'\nprecision = 'f64'\n"
+        "[material]\nyoungs_modulus = '50kPa'\npoissons_ratio = 0.4\ndensity = 1000\n"
+        f"[supports]\nfixed = '{fixed}'\n"
+        f"[tool]\nradius = {RADIUS}\ncontact_radius = {CONTACT_RADIUS}\n"
+        f"{FREE_LIMITS}[dynamics]\ncoupling = {COUPLING}\n{dynamics}"
+    )
+    (folder / "beam.toml").write_text(text)
+    return palpate.Scene.read(folder / "beam.toml")
+
+
+def approach_and_hold(depth: float, ticks: int, speed: float = 0.1) -> np.ndarray:
+    """Tool positions: down at a speed from 1 mm above, held when it is so deep."""
+    way = np.minimum(speed * 1e-3 * np.arange(ticks), 1e-3 + depth) - 1e-3
+    return TOP + np.array([0, 0, RADIUS]) - np.outer(way, [0, 0, 1])
+
+
+def static_force(green: palpate.GreensFunction, way: np.ndarray) -> np.ndarray:
+    """Force on the device of the body at rest, pushed through the coupling."""
+    stiffness = np.column_stack([green.touch(TOP, unit, CONTACT_RADIUS).force for unit in np.eye(3)])
+    return -np.linalg.solve(np.linalg.inv(stiffness) + np.eye(3) / COUPLING, way)
+
+
+@pytest.mark.parametrize("weights", ["", "delta = 0.5\nalpha = 0.25\n", "scheme = 'exact'\n"])
+@pytest.mark.parametrize("modes", ["'all'", "1", "20", "200"])
+def test_a_held_press_comes_to_the_static_answer(tmp_path, weights, modes):
+    """On a bar lying on a table; a cantilever would bounce off the tool that stops, and stick to it elsewhere."""
+    simulation = palpate.Simulation(scene(tmp_path, f"modes = {modes}\n{weights}", fixed="z < 1e-6"))
+    forces = simulation.run(approach_and_hold(0.003, 12_000))
+    expected = static_force(simulation.green, np.array([0, 0, -0.003]))
+    assert forces[-1] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.linalg.norm(expected))
+    # The force must not alternate from tick to tick.
+    assert np.abs(np.diff(forces[-100:], axis=0)).max() < 1e-3 * np.linalg.norm(expected)
+
+
+def test_a_held_press_on_a_single_precision_store(tmp_path):
+    scene(tmp_path, "modes = 20\n", fixed="z < 1e-6")
+    (tmp_path / "beam.toml").write_text((tmp_path / "beam.toml").read_text().replace("'f64'", "'f32'"))
+    simulation = palpate.Simulation(palpate.Scene.read(tmp_path / "beam.toml"))
+    assert simulation.green.precision == "f32"
+    force = simulation.run(approach_and_hold(0.003, 12_000))[-1]
+    expected = static_force(simulation.green, np.array([0, 0, -0.003]))
+    assert force == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.linalg.norm(expected))
+
+
+def test_a_struck_body_rings_at_its_first_frequency(tmp_path):
+    simulation = palpate.Simulation(scene(tmp_path, "damping_ratios = [0.01, 0.05]\n"))
+    body = simulation.body
+    tip = int(
+        body.mesh.surface_nodes[np.argmin(np.linalg.norm(body.mesh.nodes[body.mesh.surface_nodes] - TOP, axis=1))]
+    )
+    away = np.full((6000, 3), np.nan)
+    played = simulation.play(away, strikes=[(10, TOP, (0, 0, -2e-3))], watch=[tip])
+    height = played.displacements[200:, 0, 2]
+    crossings = np.flatnonzero(np.diff(np.sign(height)) > 0)
+    frequency = 1e3 * (len(crossings) - 1) / (crossings[-1] - crossings[0])
+    free = np.setdiff1d(np.arange(3 * len(body.mesh.nodes)), body.fixed_dofs)
+    K, M = (m.tocsc()[free][:, free].toarray() for m in (skfem_stiffness(body), body.mass()))
+    first = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True, subset_by_index=(0, 3))) / (2 * np.pi)
+    assert frequency == pytest.approx(first[np.argmin(np.abs(first - frequency))], rel=0.02)
+    assert frequency < 1.05 * first[1]
+    assert np.abs(played.displacements[:10]).max() == 0
+
+
+@pytest.mark.parametrize("weights", ["", "delta = 0.5\nalpha = 0.25\n"])
+@pytest.mark.parametrize("modes", ["'all'", "20"])
+def test_energy_never_exceeds_the_work_of_the_hand(tmp_path, weights, modes):
+    simulation = palpate.Simulation(scene(tmp_path, f"modes = {modes}\nrayleigh = [0, 0]\n{weights}"))
+    t = np.arange(4000) * 1e-3
+    depth = 0.006 * np.sin(2 * np.pi * 0.7 * t) * np.sin(2 * np.pi * 3.1 * t)
+    path = TOP + np.array([0, 0, RADIUS]) - np.outer(depth, [0, 0, 1])
+    played = simulation.play(path, strikes=[(3000, TOP, (1e-3, 0, -1e-3))])
+    total, work = played.energy.total, played.energy.work
+    peak = total.max()
+    assert peak > 1e-5
+    assert (total - work).max() < 1e-3 * peak
+    touched = np.flatnonzero(np.linalg.norm(played.forces, axis=1) > 0)
+    assert 500 < len(touched) < 3500
+
+
+def test_undamped_average_acceleration_keeps_the_energy_of_a_blow(tmp_path):
+    simulation = palpate.Simulation(scene(tmp_path, "rayleigh = [0, 0]\ndelta = 0.5\nalpha = 0.25\n"))
+    played = simulation.play(np.full((5000, 3), np.nan), strikes=[(0, TOP, (0, 0, -1e-3))])
+    total = played.energy.total[5:]
+    assert total == pytest.approx(played.energy.work[-1], rel=1e-9)
+    assert np.ptp(played.energy.work[5:]) == 0
+
+
+def test_the_tool_meets_the_body_where_it_is(tmp_path):
+    """A body swinging up against a tool that waits above it pushes it; at rest they would not touch."""
+    simulation = palpate.Simulation(scene(tmp_path, ""))
+    waiting = np.tile(TOP + [0, 0, RADIUS + 5e-4], (1500, 1))
+    assert np.abs(simulation.run(waiting)).max() == 0
+    forces = simulation.play(waiting, strikes=[(100, TOP, (0, 0, 1.2e-3))]).forces
+    first = int(np.argmax(np.linalg.norm(forces, axis=1) > 0))
+    assert 101 < first < 160
+    assert (forces[:, 2] >= 0).all()
+
+
+def test_slow_motion_and_the_running_loop(tmp_path):
+    simulation = palpate.Simulation(scene(tmp_path, ""))
+    away = np.full((800, 3), np.nan)
+    again = [simulation.play(away, strikes=[(5, TOP, (0, 0, -2e-3))]).energy.total for _ in range(2)]
+    assert np.array_equal(*again)
+    with simulation:
+        simulation.set_time_scale(0.5)
+        simulation.strike(TOP, (0, 0, -2e-3))
+        time.sleep(0.4)
+        frame = simulation.frame()
+        assert frame.energy.work == pytest.approx(
+            simulation.play(away, strikes=[(5, TOP, (0, 0, -2e-3))]).energy.work[-1]
+        )
+        assert 0 < frame.energy.total <= frame.energy.work
+        assert np.abs(frame.displacements).max() > 0
+        simulation.reset()
+        time.sleep(0.1)
+        assert simulation.frame().energy.total == 0
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "message"),
+    [
+        ("alpha = 0.1\n", r"dynamics: a step of .* is unstable .* the largest stable dt is"),
+        ("modes = 5000\nalpha = 0.1", "unstable|modes"),
+        ("dt = '2s'\n", r"beam.toml:\d+: dynamics.dt"),
+        ("delta = 0.4\n", r"beam.toml:\d+: dynamics.delta"),
+        ("rayleigh = [0, 0]\ndamping_ratios = [0, 0]\n", "give damping_ratios or rayleigh, not both"),
+        ("dampning_ratios = [0, 0]\n", "unknown key 'dynamics.dampning_ratios'; did you mean 'damping_ratios'"),
+        ("modes = 'few'\n", r"beam.toml:\d+: dynamics.modes"),
+    ],
+)
+def test_mistakes_in_the_dynamics_table(tmp_path, dynamics, message):
+    with pytest.raises(palpate.Error, match=message):
+        scene(tmp_path, dynamics).build()
+
+
+def test_a_coupling_beyond_the_device_is_refused(tmp_path):
+    made = scene(tmp_path, "")
+    (tmp_path / "beam.toml").write_text((tmp_path / "beam.toml").read_text().replace("500.0", "'9N/mm'"))
+    assert made.dynamics.coupling == 500
+    with pytest.raises(
+        palpate.SceneError, match=r"beam.toml:\d+: dynamics: .*coupling = 9000 N/m is stiffer than device"
+    ):
+        palpate.Scene.read(tmp_path / "beam.toml").build()
+
+
+def test_a_body_at_rest_cannot_be_struck(block, block_green):
+    simulation = palpate.Simulation(palpate.Scene.of_store(block_green.path))
+    with pytest.raises(
+        palpate.SceneError, match=r"strike: the body does not move; give the scene a \[dynamics\] table"
+    ):
+        simulation.strike((0, 0, 0), (0, 0, 1))
+    with pytest.raises(palpate.SceneError, match="does not move"):
+        simulation.set_time_scale(0.5)
+    with pytest.raises(palpate.SceneError, match="does not move"):
+        simulation.play(np.zeros((3, 3)), strikes=[(0, (0, 0, 0), (0, 0, 1))])
