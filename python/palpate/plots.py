@@ -91,7 +91,7 @@ def plot_elements(rows: Sequence[Row], path: Path) -> None:
     figure = _figure(9, 4.5)
     left, right = figure.subplots(1, 2, sharey=True)
     for nodes, style in ((4, "o--"), (10, "s-")):
-        chosen = [row for row in rows if row.element_nodes == nodes]
+        chosen = [row for row in rows if row.body == "cube" and row.element_nodes == nodes]
         for nu, color in zip(chosen[0].errors, COLORS, strict=False):
             errors = [abs(100 * row.errors[nu]) for row in chosen]
             label = f"{nodes} nodes, nu {nu}"

@@ -115,7 +115,7 @@ def elements(
     from palpate.bench import elements as bench
     from palpate.progress import narrated
 
-    with narrated("measuring both elements on six meshes each"):
+    with narrated("measuring both elements on a cube and on the liver"):
         rows = bench.run()
     if as_json:
         print(json.dumps(bench.as_json(rows), indent=2))
@@ -132,17 +132,18 @@ def _print_elements(rows: list[ElementRow]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title="Felt stiffness of a patch on a cube")
-    for title in ("element", "nodes", "on the surface", "processor time", "store"):
+    table = Table(title="Price of precomputing, and error of the stiffness felt by a patch")
+    table.add_column("body")
+    for title in ("element", "nodes", "surface", "time [s]", "store [MB]"):
         table.add_column(title, justify="right")
     for nu in rows[0].errors:
-        table.add_column(f"nu {nu}", justify="right")
+        table.add_column(f"nu {nu}", justify="right", no_wrap=True)
     for before, row in zip([rows[0], *rows], rows, strict=False):
-        if before.element_nodes != row.element_nodes:
+        if (before.body, before.element_nodes) != (row.body, row.element_nodes):
             table.add_section()
         errors = (f"{100 * error:+.1f} %" for error in row.errors.values())
-        price = f"{row.precompute_cpu_s:.2f} s", f"{1e-6 * row.store_bytes:.1f} MB"
-        table.add_row(f"{row.element_nodes} nodes", f"{row.nodes}", f"{row.surface_nodes}", *price, *errors)
+        size = str(row.element_nodes), str(row.nodes), str(row.surface_nodes)
+        table.add_row(row.body, *size, f"{row.precompute_cpu_s:.2f}", f"{1e-6 * row.store_bytes:.1f}", *errors)
     Console().print(table)
 
 

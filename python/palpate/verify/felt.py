@@ -24,7 +24,7 @@ CELLS = {False: (8, 12, 16, 24), True: (4, 6, 8, 12)}
 
 
 def felt_stiffness() -> Outcome:
-    """Felt stiffness on ever finer meshes; both elements have the same nodes on the n-th mesh."""
+    """Felt stiffness on ever finer meshes; both elements have the same nodes on each."""
     limit = reference_stiffness(NU)
     checks, series = [], {}
     for quadratic, counts in CELLS.items():
