@@ -100,7 +100,7 @@ export class Viewer {
       },
       onContactRadius: (radius) => this.setContactRadius(radius),
       onReset: () => this.reset(),
-      onResetView: () => this.viewport.reframe(this.body?.data.header.size ?? 1),
+      onResetView: () => this.viewport.reframe(),
       onScreenshot: () => void this.saveScreenshot(),
     });
   }
@@ -109,7 +109,7 @@ export class Viewer {
     const panel = this.panel;
     listenToKeys({
       r: () => this.reset(),
-      v: () => this.viewport.reframe(this.body?.data.header.size ?? 1),
+      v: () => this.viewport.reframe(),
       w: () => panel.toggle("wireframe"),
       c: () => panel.toggle("colors"),
       x: () => panel.toggle("cutaway"),
@@ -170,7 +170,7 @@ export class Viewer {
     this.body = new BodyView(data, this.field);
     this.tool = new ToolView(header, this.body.surface);
     this.viewport.scene.add(this.body.group, this.tool.group);
-    this.viewport.frame(this.body.surface, header.size, header.view);
+    this.viewport.frame(this.body.surface, header);
     this.plots.log.clear();
     this.panel.setScene(header);
     this.legend.setTissue(tissueColor(header.name).getStyle());
