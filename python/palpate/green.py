@@ -279,7 +279,8 @@ def precompute(
 ) -> GreensFunction:
     """Green's function of a body, from its file if that matches, else computed and written there.
 
-    An interrupted computation leaves what it finished in ``<path>.partial``; the next one goes on from there.
+    An interrupted computation leaves what it finished in ``<path>.partial``; the next one with the same arguments goes
+    on from there, to the same bits.
 
     Parameters
     ----------

@@ -68,7 +68,10 @@ impl Symbolic {
 
     /// Permuted position of each free dof.
     pub fn positions(&self) -> Vec<u32> {
-        positions(&self.structure)
+        match self.structure.perm() {
+            Some(perm) => perm.arrays().1.iter().map(|&p| p as u32).collect(),
+            None => (0..self.structure.nrows() as u32).collect(),
+        }
     }
 
     /// Entries of the matrix's lower triangle.
@@ -158,21 +161,9 @@ impl Factor {
         }
     }
 
-    /// Permuted position of each free dof.
-    pub fn positions(&self) -> Vec<u32> {
-        positions(&self.symbolic)
-    }
-
     /// Scratch for [`Factor::solve_in_place`] with `columns` right-hand sides.
     pub fn solve_scratch(&self, columns: usize) -> MemBuffer {
         MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq))
-    }
-}
-
-fn positions(symbolic: &SymbolicCholesky<usize>) -> Vec<u32> {
-    match symbolic.perm() {
-        Some(perm) => perm.arrays().1.iter().map(|&p| p as u32).collect(),
-        None => (0..symbolic.nrows() as u32).collect(),
     }
 }
 

@@ -83,3 +83,44 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
     }
     result
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of 9 x 8 vertices.
+    fn grid() -> (Vec<usize>, Vec<u32>) {
+        let (mut start, mut adjacency) = (vec![0], Vec::new());
+        for i in 0..72i32 {
+            let (x, y) = (i % 9, i / 9);
+            let neighbours = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
+            let inside = neighbours.into_iter().filter(|&(a, b)| (0..9).contains(&a) && (0..8).contains(&b));
+            adjacency.extend(inside.map(|(a, b)| (9 * b + a) as u32));
+            start.push(adjacency.len());
+        }
+        (start, adjacency)
+    }
+
+    #[test]
+    fn order_is_a_permutation_in_which_subtrees_are_consecutive() {
+        let (start, adjacency) = grid();
+        let order = nested_dissection(&start, &adjacency);
+        let mut rank = vec![u32::MAX; 72];
+        for (place, &vertex) in order.iter().enumerate() {
+            rank[vertex as usize] = place as u32;
+        }
+        assert!(rank.iter().all(|&r| r != u32::MAX));
+        let parent = elimination_parents(&order, &rank, &start, &adjacency);
+        let mut first: Vec<u32> = (0..72).collect();
+        let mut size = vec![1; 72];
+        for place in 0..72 {
+            assert_eq!(first[place] as usize, place + 1 - size[place], "subtree of {place}");
+            let above = parent[place] as usize;
+            if above != place {
+                assert!(above > place);
+                first[above] = first[above].min(first[place]);
+                size[above] += size[place];
+            }
+        }
+    }
+}

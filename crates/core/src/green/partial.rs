@@ -126,3 +126,29 @@ impl Partial {
         file.read_exact(bytes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torn_and_foreign_blocks_are_not_believed() {
+        let path = std::env::temp_dir().join(format!("palpate-{}.partial", std::process::id()));
+        let blocks = [Block { first: 0, width: 2, rows: 3 }, Block { first: 2, width: 1, rows: 1 }];
+        let open = |what: &str| Partial::open(&path, what, &blocks, 4).expect("a writable folder");
+        let (partial, discarded) = open("one");
+        assert!(!discarded && !partial.has(0) && !partial.has(1));
+        partial.put(0, &[7; 24]).expect("a writable file");
+        partial.put(1, &[8; 4]).expect("a writable file");
+        // The sum of the second block is there, its numbers are not.
+        partial.write(partial.starts[1], &[9; 4]).expect("a writable file");
+        let (resumed, discarded) = open("one");
+        assert!(!discarded && resumed.has(0) && !resumed.has(1));
+        let mut bytes = [0; 3];
+        resumed.get(0, 5, &mut bytes).expect("a readable file");
+        assert_eq!(bytes, [7; 3]);
+        let (other, discarded) = open("two");
+        assert!(discarded && !other.has(0));
+        fs::remove_file(&path).expect("the file");
+    }
+}

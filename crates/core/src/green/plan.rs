@@ -18,7 +18,7 @@ use crate::{Error, Result};
 const WIDTHS: [usize; 4] = [192, 96, 48, 24];
 /// Fewer blocks than this are shared badly among tasks: a smaller body takes narrower ones. It does not depend on the
 /// number of threads, so that the bits do not either.
-const FEWEST_BLOCKS: usize = 12;
+const FEWEST_BLOCKS: usize = 24;
 /// Bytes that the allocator, METIS and the tasks' stacks take beside what is counted, measured.
 const OVERHEAD_BYTES: usize = 24 << 20;
 /// The counts of a precomputation.
