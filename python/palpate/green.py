@@ -6,23 +6,30 @@ import contextlib
 import json
 import operator
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate import _native
 from palpate.body import Body
-from palpate.errors import BodyError, StoreError
+from palpate.errors import BodyError, StoreError, StoreWarning
+from palpate.memory import allowed_memory
 from palpate.progress import progress_reporter
+from palpate.strain import Strained, SurfaceStrain
+
+if TYPE_CHECKING:
+    from palpate.gauge import StrainGauge
 
 Components = Sequence[float | None]
 
 
 @dataclass(frozen=True)
-class Answer:
+class Answer(Strained):
     """Solution of a changed boundary value problem.
 
     Attributes
@@ -39,14 +46,16 @@ class Answer:
     displacements: np.ndarray
     forces: np.ndarray
     reactions: np.ndarray
+    _source: GreensFunction = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True)
-class Touch:
+class Touch(Strained):
     """Answer to a patch contact: force on the body (3,), N, and displacements (s, 3), m."""
 
     force: np.ndarray
     displacements: np.ndarray
+    _source: GreensFunction = field(repr=False, compare=False)
 
 
 def cache_directory() -> Path:
@@ -58,11 +67,13 @@ def cache_directory() -> Path:
 class GreensFunction:
     """Compliance of a body seen from its touchable surface.
 
-    Made by :func:`precompute` or :meth:`load`; immutable.
+    Made by :func:`precompute` or :meth:`load`; immutable. ``body`` is what it was made for, None where only the store
+    is known.
     """
 
-    def __init__(self, core: _native.GreenCore):
+    def __init__(self, core: _native.GreenCore, body: Body | None = None):
         self._core = core
+        self.body = body
         self.surface_nodes = core.surface_nodes.astype(np.int64)
         self.surface_positions = core.surface_positions.reshape(-1, 3)
         faces, width = core.surface_faces
@@ -78,7 +89,7 @@ class GreensFunction:
 
     @property
     def precision(self) -> str:
-        """Stored number format, ``"f32"`` or ``"f64"``."""
+        """Stored number format, ``"f16"``, ``"f32"`` or ``"f64"``."""
         return self._core.precision
 
     @property
@@ -106,6 +117,16 @@ class GreensFunction:
         """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
         return self._core.free_displacements.reshape(-1, 3)
 
+    @cached_property
+    def strain_gauge(self) -> StrainGauge:
+        """What measures the largest strain of answers: by the elements of the body, of a bare store by its surface."""
+        if self.body is None:
+            return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
+        from palpate.gauge import ElementStrain
+        from palpate.stress import StressRecovery
+
+        return ElementStrain(StressRecovery(self.body))
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
         self._core.save(Path(path))
@@ -130,7 +151,7 @@ class GreensFunction:
         path = Path(path)
         if not path.exists():
             raise StoreError(f"{path}: no such file")
-        green = cls(_native.GreenCore.load(path))
+        green = cls(_native.GreenCore.load(path), body)
         if body is not None:
             touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
             expected = _native.GreenCore.content_key(problem_arrays(body, touch), green.precision)
@@ -183,7 +204,7 @@ class GreensFunction:
                 known[column] = forced[column]
         u, f, reactions = self._core.solve(sorted(known.items()), sorted(switched.items()))
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
-        return Answer(u, f, self._reactions(f, reactions))
+        return Answer(u, f, self._reactions(f, reactions), self)
 
     def touch(self, point: Sequence[float], displacement: Components, radius: float = 0.0) -> Touch:
         """Press a patch of the surface.
@@ -204,7 +225,7 @@ class GreensFunction:
         if None in target:
             raise BodyError("the touch point needs three numbers")
         force, u = self._core.touch(target, _components(displacement, None, "displacement"), float(radius))
-        return Touch(np.array(force), u.reshape(-1, 3))
+        return Touch(np.array(force), u.reshape(-1, 3), self)
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
         """`K u` at the fixed nodes; a free component carries the loads on it."""
@@ -253,27 +274,36 @@ def precompute(
     precision: str = "f32",
     touch: Sequence[int] | np.ndarray | None = None,
     path: str | os.PathLike[str] | None = None,
+    memory: int | str | None = None,
     progress: bool | Callable[[int, int], None] = True,
 ) -> GreensFunction:
     """Green's function of a body, from its file if that matches, else computed and written there.
+
+    An interrupted computation leaves what it finished in ``<path>.partial``; the next one with the same arguments goes
+    on from there, to the same bits.
 
     Parameters
     ----------
     body
         A supported body, with its loads.
     precision
-        Stored number format, ``"f32"`` or ``"f64"``; arithmetic is always double.
+        Stored number format: ``"f64"``; ``"f32"`` (right to about 2e-6 of a column's largest entry); or ``"f16"``
+        (5e-4), a quarter of the size of ``"f64"``. Answers are computed in double from what is stored.
     touch
         Surface nodes that may be touched; None: all.
     path
         File; None keeps it in the cache under its content key.
+    memory
+        Bytes that the process may take at its peak, or text such as ``"8GB"``; None: as many as are useful. The
+        operator itself is written as it is computed, and takes none.
     progress
         True shows a bar on a terminal; a function is called with columns done and in all.
 
     Raises
     ------
     BodyError
-        A body that its supports do not hold, or a touch node that is not on the surface.
+        A body that its supports do not hold, a touch node that is not on the surface, or a bound of memory that
+        cannot be kept.
 
     """
     body.require_supported()
@@ -286,11 +316,17 @@ def precompute(
         target = Path(path)
     if target.exists():
         with contextlib.suppress(StoreError):
-            return GreensFunction(_native.GreenCore.load(target, key))
+            return GreensFunction(_native.GreenCore.load(target, key), body)
+    allowed = None if memory is None else allowed_memory(memory)
     with progress_reporter("precomputing", progress) as report:
-        core = _native.GreenCore.precompute(problem, precision, json.dumps(_describe(body)), report)
-    core.save(target)
-    return GreensFunction(_native.GreenCore.load(target, key))
+        _, discarded = _native.GreenCore.precompute_to(
+            problem, precision, json.dumps(_describe(body)), report, target, allowed
+        )
+    if discarded:
+        warnings.warn(
+            f"{target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
+        )
+    return GreensFunction(_native.GreenCore.load(target, key), body)
 
 
 def problem_arrays(body: Body, touch: Sequence[int] | np.ndarray | None) -> tuple[np.ndarray, ...]:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 
 from palpate import _native
 from palpate.errors import SceneError
+from palpate.gauge import ElementStrain, StrainGauge
 from palpate.scene import BuiltScene, Scene
 from palpate.scene.dynamics import Motion
-from palpate.stress import StressRecovery, SurfaceStress
+from palpate.strain import Strained
+from palpate.stress import SurfaceStress
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
@@ -24,13 +27,17 @@ PERCENTILES = ("p50", "p99", "p999", "max")
 
 @dataclass(frozen=True)
 class Contact:
-    """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one."""
+    """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one.
+
+    ``anchor`` is where the tool carries no force: the way from there is the displacement of the patch.
+    """
 
     tool: int
     mode: str
     point: np.ndarray
     normal: np.ndarray
     force: np.ndarray
+    anchor: np.ndarray
     nodes: np.ndarray
     weights: np.ndarray
 
@@ -84,7 +91,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Frame:
+class Frame(Strained):
     """The latest tick.
 
     Attributes
@@ -113,7 +120,8 @@ class Frame:
     displacements: np.ndarray
     contacts: list[Contact] = field(repr=False)
     statistics: dict
-    energy: MotionEnergy | None = None
+    energy: MotionEnergy | None
+    _source: Simulation = field(repr=False, compare=False)
 
 
 class Simulation:
@@ -154,7 +162,6 @@ class Simulation:
             None if built.motion is None else self._moving(built.motion),
         )
         self._running = False
-        self._recovery: StressRecovery | None = None
 
     def __enter__(self) -> Simulation:
         self.start()
@@ -218,6 +225,11 @@ class Simulation:
         reference = self.green.youngs_modulus
         return None if reference is None or self.motion is not None else reference * self._scale
 
+    @property
+    def stiffness_scale(self) -> float:
+        """Young's modulus now over that of the Green's function."""
+        return self._scale
+
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
         low, high = 0.0, limit
@@ -275,17 +287,35 @@ class Simulation:
         raw = self._core.frame()
         if raw is None:
             raise SceneError("the simulation does not run: use it in a with block, or call start()")
-        contacts = [
-            Contact(tool, mode, *map(np.array, vectors), self.green.surface_nodes[nodes], np.array(weights))
-            for tool, mode, vectors, nodes, weights in raw["contacts"]
-        ]
+        contacts = [self._contact(record) for record in raw["contacts"]]
         statistics = {k: raw[k] for k in ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused")}
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         displacements = raw["displacements"].reshape(-1, 3)
         forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
         energy = None if raw["energy"] is None else MotionEnergy(*raw["energy"])
-        return Frame(raw["time"], forces, positions, displacements, contacts, statistics, energy)
+        return Frame(raw["time"], forces, positions, displacements, contacts, statistics, energy, self)
+
+    def contacts(self) -> list[Contact]:
+        """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
+        return [self._contact(record) for record in self._core.contacts() or []]
+
+    def contact_response(self, tool: int = 0) -> tuple[Contact, np.ndarray] | None:
+        """Contact of a tool and (3, s, 3) displacements per unit way of the tool from the anchor along x, y and z.
+
+        The surface is at `u_free` plus these times the ways, with the stiffness of contacts limited as in the force
+        loop; None for a tool that does not touch.
+        """
+        answer = self._core.contact_response(self._tool(tool))
+        if answer is None:
+            return None
+        record, fields = answer
+        return self._contact(record), np.reshape(fields, (3, -1, 3))
+
+    @property
+    def strain_gauge(self) -> StrainGauge:
+        """What measures the largest strain of frames."""
+        return self.green.strain_gauge
 
     def stress(self, displacements: np.ndarray) -> SurfaceStress:
         """Stress and strain at the surface nodes, for a frame's or an answer's displacements (s, 3), m; milliseconds.
@@ -296,11 +326,10 @@ class Simulation:
             A body from a store, which knows only its surface.
 
         """
-        if self._recovery is None:
-            if self.body is None:
-                raise SceneError("a body from a store knows only its surface: stress needs its elements")
-            self._recovery = StressRecovery(self.body)
-        field = self._recovery.recover(displacements)
+        gauge = self.strain_gauge
+        if not isinstance(gauge, ElementStrain):
+            raise SceneError("a body from a store knows only its surface: stress needs its elements")
+        field = gauge.recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
         return SurfaceStress(self._scale * field.stress, field.strain)
 
@@ -378,6 +407,10 @@ class Simulation:
     def _require_motion(self, what: str) -> None:
         if self.motion is None:
             raise SceneError(f"{what}: the body does not move; give the scene a [dynamics] table")
+
+    def _contact(self, record: tuple[Any, ...]) -> Contact:
+        tool, mode, vectors, nodes, weights = record
+        return Contact(tool, mode, *map(np.array, vectors), self.green.surface_nodes[nodes], np.array(weights))
 
     def _tool(self, tool: int) -> int:
         if not 0 <= tool < self._tools:

@@ -2,10 +2,30 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Any
+
 import numpy as np
 
 # Linear elasticity is honest to about this strain; beyond it a pose is reported.
 HONEST_STRAIN = 0.1
+
+
+class Strained:
+    """A pose that knows its largest strain; ``_source`` is what has its strain gauge."""
+
+    displacements: np.ndarray
+    _source: Any
+
+    @cached_property
+    def largest_strain(self) -> float:
+        """Largest principal strain in magnitude over the surface (:mod:`palpate.gauge`); milliseconds, when read."""
+        return self._source.strain_gauge.largest(self.displacements)
+
+    @property
+    def within_linear_range(self) -> bool:
+        """Whether the largest strain is within the 10 % to which linear elasticity is honest."""
+        return self.largest_strain <= HONEST_STRAIN
 
 
 # Derivatives along the edges from corner 0 to corners 1 and 2 of the shape functions of a face, (places, nodes, 2), by
@@ -61,9 +81,26 @@ class SurfaceStrain:
         # R = [[length, along], [0, across]] is upper triangular: its inverse is written out.
         self._inverse = (1.0 / length, -along / (length * across), 1.0 / across)
 
+    def sample(self, displacements: np.ndarray) -> np.ndarray:
+        """Tangents ``D`` of the deformed faces, (2, k, places, 3), for displacements (s, 3), m."""
+        return np.stack(self._tangents(self._positions + displacements))
+
+    def magnitudes(self, sample: np.ndarray) -> np.ndarray:
+        """Largest principal strain in magnitude, of each flat triangle or at each node of 6-node faces."""
+        strain = self._at_places(sample)
+        return self._averaged(strain) if len(self._slopes) > 1 else strain[:, 0]
+
+    def at_nodes(self, displacements: np.ndarray) -> np.ndarray:
+        """Mean of the faces around each node, (s,): to be drawn."""
+        return self._averaged(self._at_places(self.sample(displacements)))
+
     def largest(self, displacements: np.ndarray) -> float:
         """Largest principal strain, in magnitude, for displacements (s, 3) m."""
-        first, second = self._tangents(self._positions + displacements)
+        return float(self.magnitudes(self.sample(displacements)).max())
+
+    def _at_places(self, tangents: np.ndarray) -> np.ndarray:
+        """Largest principal strain in magnitude at the places of each face, (k, places)."""
+        first, second = tangents
         a, b, c = self._inverse
         g1 = a[..., None] * first
         g2 = b[..., None] * first + c[..., None] * second
@@ -71,11 +108,12 @@ class SurfaceStrain:
         eyy = 0.5 * (np.einsum("...i,...i->...", g2, g2) - 1.0)
         exy = 0.5 * np.einsum("...i,...i->...", g1, g2)
         mean, radius = 0.5 * (exx + eyy), np.hypot(0.5 * (exx - eyy), exy)
-        magnitude = np.abs(mean) + radius
-        if len(self._slopes) > 1:
-            sums = np.bincount(self._faces.ravel(), magnitude.ravel(), minlength=len(self._positions))
-            magnitude = sums / self._faces_around
-        return float(magnitude.max())
+        return np.abs(mean) + radius
+
+    def _averaged(self, at_places: np.ndarray) -> np.ndarray:
+        """Means over the faces around each node; a flat triangle counts alike at its corners."""
+        values = np.broadcast_to(at_places, self._faces.shape)
+        return np.bincount(self._faces.ravel(), values.ravel(), minlength=len(self._positions)) / self._faces_around
 
     def _tangents(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tangents along both edges from corner 0, (k, places, 3) each."""

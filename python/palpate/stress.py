@@ -41,7 +41,7 @@ TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 @dataclass(frozen=True)
 class SurfaceStress:
-    """Stress and strain at the surface nodes.
+    """Stress and strain at the surface nodes, or at those that the recovery was asked for.
 
     Attributes
     ----------
@@ -85,23 +85,29 @@ class StressRecovery:
     ----------
     body
         A supported body.
+    nodes
+        Nodes at which they are recovered instead, inner ones too: a cut-away view shows them.
+    interior
+        Of the body, if it is there already: its factor is the dearest part.
 
     """
 
-    def __init__(self, body: Body):
+    def __init__(self, body: Body, nodes: np.ndarray | None = None, interior: Interior | None = None):
         mesh = body.mesh
-        self._interior = Interior(body)
-        patches, materials = _patches(body)
+        nodes = mesh.surface_nodes if nodes is None else nodes
+        self.interior = interior or Interior(body)
+        patches, materials = _patches(body, nodes)
         used = np.unique(patches.indices)
         points = SAMPLES[mesh.tets.shape[1]]
         tets = mesh.tets[used]
         self._strain = _strain_operator(tetrahedron_gradients(mesh.nodes, tets, points), tets, len(mesh.nodes))
         e, nu, _ = materials.T
+        self.largest_youngs_modulus = float(e.max())
         self._lame = nu * e / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
         corners = mesh.nodes[tets[:, :4]]
         positions = np.einsum("pc,ecx->epx", points, corners).reshape(-1, 3)
         weights = scipy.sparse.kron(patches[:, used], np.ones((1, len(points))), format="csr")
-        self._fit = _linear_fit(weights, positions, mesh.nodes[mesh.surface_nodes])
+        self._fit = _linear_fit(weights, positions, mesh.nodes[nodes])
 
     def recover(self, displacements: np.ndarray) -> SurfaceStress:
         """Stress and strain for displacements of the surface nodes, (s, 3) m.
@@ -112,7 +118,10 @@ class StressRecovery:
             Displacements that are not finite or of another shape.
 
         """
-        everywhere = self._interior.extend(displacements)
+        return self.recover_inside(self.interior.extend(displacements))
+
+    def recover_inside(self, everywhere: np.ndarray) -> SurfaceStress:
+        """Stress and strain for displacements of all nodes, (n, 3) m, as the interior extends them."""
         strain = self._fit @ (self._strain @ everywhere.ravel()).reshape(-1, 6)
         lam, mu = self._lame
         stress = 2 * mu[:, None] * strain
@@ -137,8 +146,8 @@ def _strain_operator(gradients: np.ndarray, tets: np.ndarray, node_count: int) -
     return scipy.sparse.coo_array((data, places), shape=size).tocsr()
 
 
-def _patches(body: Body) -> tuple[scipy.sparse.csr_array, np.ndarray]:
-    """Volumes of the elements in the patch of each surface node, (s, m), and the material there, (s, 3).
+def _patches(body: Body, nodes: np.ndarray) -> tuple[scipy.sparse.csr_array, np.ndarray]:
+    """Volumes of the elements in the patch of each of the nodes, (s, m), and the material there, (s, 3).
 
     A patch is the elements around the node, of 4-node elements (one sample each, too few) also those around their
     nodes; of a node between materials, those of the material that has most of the volume around it.
@@ -147,7 +156,7 @@ def _patches(body: Body) -> tuple[scipy.sparse.csr_array, np.ndarray]:
     count = len(mesh.tets)
     flat = (np.repeat(np.arange(count), mesh.tets.shape[1]), mesh.tets.ravel())
     incidence = scipy.sparse.coo_array((np.ones(mesh.tets.size), flat), shape=(count, len(mesh.nodes))).tocsr()
-    around = incidence.T.tocsr()[mesh.surface_nodes]
+    around = incidence.T.tocsr()[nodes]
     kinds, kind = np.unique(body._material_rows, axis=0, return_inverse=True)
     volume_by_kind = np.zeros((count, kind.max() + 1))
     volume_by_kind[np.arange(count), kind.ravel()] = mesh.volumes

@@ -132,6 +132,17 @@ def test_scripted_press_leaves_a_log_and_a_plot(tmp_path):
     assert log["fz_N"][[0, -1]] == pytest.approx(0)
     assert np.median(np.diff(log["time_s"])) == pytest.approx(1e-3, rel=1e-6)
     assert (tmp_path / "results" / "block.png").read_bytes().startswith(b"\x89PNG")
+    assert "largest strain" in result.stdout and "honest" not in result.stdout
+
+
+def test_scripted_press_is_held_or_flagged(tmp_path):
+    scene = '[body]\nmodel = "kidney"\npaper = true\n'
+    (tmp_path / "held.toml").write_text(scene)
+    (tmp_path / "free.toml").write_text(scene + "[view]\nhold_strain = 0\n")
+    held = run("run", "held.toml", "--headless", "1", cwd=tmp_path).stdout
+    assert "largest strain 10.0 %, where the tool was held back" in held and "honest" not in held
+    free = run("run", "free.toml", "--headless", "1", cwd=tmp_path).stdout
+    assert "beyond 10 %, to which linear elasticity is honest" in free and "held" not in free
 
 
 def test_wrong_scene_costs_one_line(tmp_path):

@@ -44,7 +44,7 @@ def static_force(green: palpate.GreensFunction, way: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("weights", ["", "delta = 0.5\nalpha = 0.25\n", "scheme = 'exact'\n"])
-@pytest.mark.parametrize("modes", ["'all'", "1", "20"])
+@pytest.mark.parametrize("modes", ["'all'", "1", "20", "200"])
 def test_a_held_press_comes_to_the_static_answer(tmp_path, weights, modes):
     """On a bar lying on a table; a cantilever would bounce off the tool that stops, and stick to it elsewhere."""
     simulation = palpate.Simulation(scene(tmp_path, f"modes = {modes}\n{weights}", fixed="z < 1e-6"))
@@ -86,6 +86,16 @@ def test_a_held_press_is_the_body_with_the_spring_built_in(tmp_path):
         a = inverse @ (COUPLING * patch @ target - damping @ v - stiff @ u)
         u, v = u + alpha * dt**2 * a, v + delta * dt * a
         assert force == pytest.approx(-COUPLING * (target - patch.T @ u), rel=1e-6, abs=1e-9)
+
+
+def test_a_held_press_on_a_single_precision_store(tmp_path):
+    scene(tmp_path, "modes = 20\n", fixed="z < 1e-6")
+    (tmp_path / "beam.toml").write_text((tmp_path / "beam.toml").read_text().replace("'f64'", "'f32'"))
+    simulation = palpate.Simulation(palpate.Scene.read(tmp_path / "beam.toml"))
+    assert simulation.green.precision == "f32"
+    force = simulation.run(approach_and_hold(0.003, 12_000))[-1]
+    expected = static_force(simulation.green, np.array([0, 0, -0.003]))
+    assert force == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.linalg.norm(expected))
 
 
 def test_a_struck_body_rings_at_its_first_frequency(tmp_path):

@@ -7,7 +7,8 @@ import pytest
 from conftest import box_mesh
 
 import palpate
-from palpate.shape_functions import TETRAHEDRON_EDGES, tetrahedron_gradients
+from palpate.mesh.elements import EDGES
+from palpate.shape_functions import tetrahedron_gradients
 from palpate.stress import SAMPLES, StressRecovery
 
 E, NU = 7e3, 0.35
@@ -101,7 +102,7 @@ def test_thick_cylinder_converges_to_lame():
 def test_quadratic_elements_differentiate_quadratic_fields_exactly():
     rng = np.random.default_rng(5)
     corners = np.eye(4, 3) + 0.2 * rng.normal(size=(4, 3))
-    nodes = np.vstack([corners, corners[TETRAHEDRON_EDGES].mean(axis=1)])
+    nodes = np.vstack([corners, corners[EDGES].mean(axis=1)])
     A, b = rng.normal(size=(3, 3)), rng.normal(size=3)
     A = A + A.T
     values = np.einsum("ni,ij,nj->n", nodes, A, nodes) / 2 + nodes @ b

@@ -154,13 +154,52 @@ def test_a_press_is_felt_shown_and_released(page, capsys):
 
 
 def test_the_wheel_deepens_a_press(page):
-    press(page)
+    press(page, 4)
     first = settled_force(page)
     for _ in range(5):
         page.mouse.wheel(0, 100)
         time.sleep(0.05)
     deeper = settled_force(page)
     assert np.linalg.norm(first) != pytest.approx(np.linalg.norm(deeper), rel=0.01)
+    page.mouse.up()
+
+
+def choose_field(page, name: str) -> dict:
+    page.get_by_test_id("field-select").select_option(name)
+    return until(page, lambda s: s["field"] and s["field"]["name"] == name)["field"]
+
+
+def test_a_press_is_held_at_ten_per_cent(page):
+    notice, strain = page.get_by_test_id("hold-notice"), page.get_by_test_id("strain-value")
+    assert notice.is_hidden()
+    x, y = page.evaluate("window.palpate.pickPoint()")
+    press(page, 100)
+    until(page, lambda s: s["held"] and s["strain"] > 0.099)
+    first = settled_force(page)
+    assert notice.inner_text() == "Held at 10 % strain"
+    assert 9.5 <= float(strain.inner_text()) <= 10.5
+    wanted = state(page)["depth"]
+    page.mouse.move(x, y + 160)
+    until(page, lambda s: s["depth"] > wanted + 0.005)
+    assert np.linalg.norm(settled_force(page) - first) < 0.02 * np.linalg.norm(first)
+    assert state(page)["strain"] <= 0.105
+    page.mouse.up()
+    until(page, lambda s: not s["held"] and s["contacts"] == 0)
+    assert notice.is_hidden()
+
+
+def test_fields_have_a_legend(page):
+    press(page, 8)
+    for name, title, unit in (
+        ("von_mises", "Von Mises stress", "Pa"),
+        ("principal_stress", "First principal stress", "Pa"),
+        ("strain", "Largest principal strain", "%"),
+        ("displacement", "Displacement", "mm"),
+    ):
+        field = choose_field(page, name)
+        legend = page.locator("#legend-field").inner_text()
+        assert title in legend and unit in legend
+        assert field["signed"] == ("\u2212" in legend)
     page.mouse.up()
 
 
@@ -194,15 +233,19 @@ def test_stiffness_scales_the_force_at_once(page):
 
 
 def test_cut_away_and_another_model(page):
+    choose_field(page, "von_mises")
     page.locator("#show-cutaway").click()
     time.sleep(0.5)
     press(page, 20)
     page.mouse.up()
     page.locator("#show-cutaway").click()
     page.get_by_test_id("model-select").select_option("beam")
-    until(page, lambda s: s["scene"] == "beam", 60)
+    # The beam is cut along its middle, where its highest points are; the field is kept.
+    until(page, lambda s: s["scene"] == "beam" and s["field"]["name"] == "von_mises", 60)
+    page.locator("#show-cutaway").click()
     press(page, 10)
     page.mouse.up()
+    page.locator("#show-cutaway").click()
     page.get_by_test_id("model-select").select_option("liver")
     until(page, lambda s: s["scene"] == "liver", 60)
 

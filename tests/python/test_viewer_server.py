@@ -176,6 +176,102 @@ def test_a_silent_controller_lets_go(built, monkeypatch):
     asyncio.run(session())
 
 
+async def settled(client, condition=lambda header: True):
+    """Frame once the hand has arrived: the force stands still."""
+    force = None
+    for _ in range(200):
+        header, arrays = await client.receive("frame")
+        if header["contacts"] and header["force"] == force and condition(header):
+            return header, arrays
+        force = header["force"]
+    raise AssertionError(f"the force does not settle; the last frame was {header}")
+
+
+def test_fields_are_those_of_the_recovery(built):
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            names = [field["name"] for field in scene["fields"]]
+            assert names == ["displacement", "strain", "von_mises", "principal_stress"]
+            await client.say(type="press", position=[TOP[0], TOP[1], TOP[2] + scene["tool_radius"] - 1e-3], grab=False)
+            await client.say(type="set", youngs_modulus=20e3)
+            header, arrays = await settled(client, lambda h: h["time"] > 0.5)
+            pose = arrays["displacements"].astype(float)
+            recovered = palpate.StressRecovery(built.body).recover(pose)
+            strain = np.abs(recovered.principal_strains).max(axis=1)
+            assert header["strain"] == pytest.approx(strain.max(), rel=1e-4)
+            # Stress scales with the stiffness, which was doubled; strain does not.
+            expected = {
+                "displacement": 1e3 * np.linalg.norm(pose, axis=1),
+                "strain": 100 * strain,
+                "von_mises": 2 * recovered.von_mises,
+                "principal_stress": 2 * recovered.principal_stresses[:, 0],
+            }
+            for name, values in expected.items():
+                await client.say(type="field", name=name)
+                header, arrays = await client.frame_where(lambda h, name=name: h["field"]["name"] == name)
+                field = header["field"]
+                zero, steps = (127.5, 127.5) if field["signed"] else (0.0, 255.0)
+                assert field["max"] == pytest.approx(np.abs(values).max(), rel=1e-3)
+                assert np.abs(zero + steps * values / field["max"] - arrays["scalar"]).max() < 0.7
+            await client.say(type="cutaway", on=True)
+            header, arrays = await client.frame_where(lambda h: h["interior"])
+            assert len(arrays["scalar"]) == scene["nodes"]
+            on_surface = arrays["scalar"][built.green.surface_nodes].astype(float)
+            assert np.abs(127.5 + 127.5 * values / header["field"]["max"] - on_surface).max() < 0.7
+            await client.say(type="field", name=5)
+            assert "name" in (await client.receive("error"))[0]["text"]
+
+    asyncio.run(session())
+
+
+def test_a_bare_store_offers_what_its_surface_knows(built, tmp_path):
+    built.green.save(tmp_path / "block.palpate")
+    bare = palpate.Scene.of_store(tmp_path / "block.palpate").build()
+
+    async def session():
+        async with serving(bare) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            assert [field["name"] for field in scene["fields"]] == ["displacement", "strain"]
+            await client.say(type="field", name="strain")
+            await client.say(type="cutaway", on=True)  # there is no inside: the surface goes on
+            await client.say(type="press", position=[TOP[0], TOP[1], TOP[2] - 0.01], grab=False)
+            header, arrays = await settled(client, lambda h: h["tool"]["wanted"] is not None and h["time"] > 0.5)
+            assert header["strain"] == pytest.approx(0.1, rel=0.01)
+            assert header["field"]["name"] == "strain" and not header["interior"]
+            # Means over the faces around a node do not go beyond the largest of them.
+            assert len(arrays["scalar"]) == scene["surface_nodes"]
+            assert 5.0 < header["field"]["max"] * arrays["scalar"].max() / 255 < 10.1
+
+    asyncio.run(session())
+
+
+def test_the_tool_is_held_back(built):
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            assert scene["hold_strain"] == 0.1
+            over = np.array([TOP[0], TOP[1], TOP[2] + scene["tool_radius"]])
+            readings = []
+            for depth in (0.002, 0.012, 0.024):
+                await client.say(type="press", position=(over - [0, 0, depth]).tolist(), grab=False)
+                deep = depth > 0.01
+                header, _ = await settled(
+                    client, lambda h, deep=deep: h["time"] > 0.5 and bool(h["tool"]["wanted"]) == deep
+                )
+                readings.append(header)
+            shallow, deep, deeper = readings
+            assert shallow["strain"] < 0.1 and 0.0995 < deep["strain"] <= 0.1
+            assert deeper["force"] == pytest.approx(deep["force"], rel=1e-2, abs=1e-3)
+            assert deeper["tool"]["wanted"] == pytest.approx((over - [0, 0, 0.024]).tolist())
+            assert deeper["tool"]["position"][2] > over[2] - 0.01
+            await client.say(type="release")
+            header, _ = await client.frame_where(lambda h: h["contacts"] == [])
+            assert header["tool"]["wanted"] is None
+
+    asyncio.run(session())
+
+
 @pytest.mark.parametrize("token", ["wrong", "", None, 5])
 def test_without_the_token_nobody_gets_in(built, token):
     async def session():

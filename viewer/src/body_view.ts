@@ -6,16 +6,12 @@ import { CutPlane } from "./cut_plane";
 import { CutawayView } from "./cutaway_view";
 import { tissueColor } from "./field_material";
 import type { FieldUniforms } from "./field_material";
-import type { FrameArrays, FrameData, SceneData } from "./protocol";
+import type { FrameArrays, FrameData, SceneData, Vec3 } from "./protocol";
 import { createGroundShadow } from "./ground_shadow";
 import { SolidView } from "./solid_view";
 import { SupportsView } from "./supports_view";
 import { Surface } from "./surface";
 import { WireframeView } from "./wireframe_view";
-
-/** Below the first of these displacements, over the size, there is no field to show; above the second all of it. */
-const FIELD_FADE_START = 1e-4;
-const FIELD_FADE_END = 1e-3;
 
 export interface Shown {
   wireframe: boolean;
@@ -30,14 +26,14 @@ export class BodyView {
   readonly bounds = new THREE.Box3();
   readonly cutPlane: CutPlane;
   private readonly solid: SolidView;
+  /** The solid as picking sees it: where a ray leaves the body tells what it has passed. */
+  private readonly bothSides: THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
   private readonly wireframe: WireframeView;
   private readonly supports: SupportsView;
   private readonly shadow: THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial>;
   /** Made on first use: a large mesh has many tetrahedra, and most people never cut. */
   private cutaway: CutawayView | null = null;
   private cutawayShown = false;
-  private colorsShown = false;
-  private fieldStrength = 0;
   private drawn: FrameArrays | null = null;
 
   constructor(readonly data: SceneData, private readonly uniforms: FieldUniforms) {
@@ -46,6 +42,7 @@ export class BodyView {
     this.bounds.setFromArray(this.surface.rest);
     this.cutPlane = new CutPlane(this.bounds);
     this.solid = new SolidView(this.surface, tissueColor(header.name), header.size, uniforms);
+    this.bothSides = new THREE.Mesh(this.solid.mesh.geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
     this.wireframe = new WireframeView(this.surface);
     this.supports = new SupportsView(arrays, header.size);
     this.shadow = createGroundShadow(this.bounds, header.size);
@@ -53,8 +50,7 @@ export class BodyView {
   }
 
   show(shown: Shown): void {
-    this.colorsShown = shown.colors;
-    this.uniforms.fieldShown.value = shown.colors ? this.fieldStrength : 0;
+    this.uniforms.fieldShown.value = shown.colors ? 1 : 0;
     this.wireframe.lines.visible = shown.wireframe;
     this.supports.markers.visible = shown.supports;
     this.cutawayShown = shown.cutaway;
@@ -76,31 +72,34 @@ export class BodyView {
   /** Moves to a frame and tells whether the picture changes; a frame that belongs to another mesh is left out. */
   update(frame: FrameData): boolean {
     const { displacements, scalar } = frame.arrays;
-    const { arrays, header } = this.data;
-    const { interior, field } = frame.header;
+    const { arrays } = this.data;
+    const { interior } = frame.header;
     const expected = interior ? arrays.nodes.length : arrays.surface_nodes.length * 3;
-    if (displacements.length !== expected) return false;
+    if (displacements.length !== expected || displacements.length !== 3 * scalar.length) return false;
     if (this.drawn && same(this.drawn.displacements, displacements) && same(this.drawn.scalar, scalar)) return false;
     this.drawn = frame.arrays;
     this.surface.displace(displacements, interior ? arrays.surface_nodes : null);
+    if (frame.header.contacts.length === 0) this.surface.keepAsUntouched();
     this.solid.update(scalar);
-    const max = field.unit === "mm" ? field.max / 1000 : field.max;
-    this.fieldStrength = THREE.MathUtils.smoothstep(max / header.size, FIELD_FADE_START, FIELD_FADE_END);
-    this.uniforms.fieldShown.value = this.colorsShown ? this.fieldStrength : 0;
-    if (this.cutawayShown) this.cutaway?.displaceAll(displacements, interior ? null : arrays.surface_nodes, max);
+    if (this.cutawayShown) this.cutaway?.displaceAll(displacements, scalar, interior ? null : arrays.surface_nodes);
     return true;
   }
 
-  /** First visible point of the drawn surface along a ray. */
+  /** The point of the surface that is seen along a ray; null beside the body, and on the inside that a cut shows. */
   pick(raycaster: THREE.Raycaster): Pick | null {
-    for (const hit of raycaster.intersectObject(this.solid.mesh, false)) {
-      if (hit.faceIndex === null || hit.faceIndex === undefined || !hit.barycoord) continue;
-      const { x, y, z } = hit.barycoord;
-      const place = { corners: this.surface.cornersOf(hit.faceIndex), weights: [x, y, z] as [number, number, number] };
-      const rest = new THREE.Vector3(...this.surface.at(this.surface.rest, place));
-      if (this.cutawayShown && this.cutPlane.removes(rest)) continue;
-      const normal = new THREE.Vector3(...this.surface.at(this.surface.restNormals, place)).normalize();
-      return { shown: hit.point.clone(), rest, normal };
+    const cutaway = this.cutawayShown ? this.cutaway : null;
+    for (const { faceIndex, face, barycoord, point } of raycaster.intersectObject(this.bothSides, false)) {
+      if (faceIndex == null || !face || !barycoord) continue;
+      const entering = face.normal.dot(raycaster.ray.direction) < 0;
+      const removed = cutaway?.removes(faceIndex) ?? false;
+      // A ray that comes out of what is left, and went in where the surface is gone, met a face of the cut between.
+      if (!entering && !removed) return null;
+      if (!entering || removed) continue;
+      const { x, y, z } = barycoord;
+      const place = { corners: this.surface.cornersOf(faceIndex), weights: [x, y, z] as Vec3 };
+      const untouched = new THREE.Vector3(...this.surface.at(this.surface.untouched, place));
+      const normal = new THREE.Vector3(...this.surface.at(this.surface.untouchedNormals, place)).normalize();
+      return { shown: point.clone(), untouched, normal };
     }
     return null;
   }
@@ -108,6 +107,7 @@ export class BodyView {
   dispose(): void {
     this.group.removeFromParent();
     this.solid.dispose();
+    this.bothSides.material.dispose();
     this.wireframe.dispose();
     this.supports.dispose();
     this.cutaway?.dispose();
@@ -117,10 +117,10 @@ export class BodyView {
   }
 }
 
-/** A touched point: where it is seen, where it is at rest, and the outward normal there at rest. */
+/** A touched point: where it is seen, where it is while nothing is touched, and the outward normal there then. */
 export interface Pick {
   shown: THREE.Vector3;
-  rest: THREE.Vector3;
+  untouched: THREE.Vector3;
   normal: THREE.Vector3;
 }
 

@@ -1,4 +1,4 @@
-// The place of the rest surface that is closest to a point. Every triangle is tried: it runs once for each contact.
+// The place of the untouched surface that is closest to a point. Every triangle is tried: it runs once for each contact.
 
 import * as THREE from "three";
 
@@ -13,7 +13,7 @@ export function closestSurfacePoint(surface: Surface, point: Vec3): SurfacePoint
   let best = 0;
   let bestDistance = Infinity;
   for (let i = 0; i < surface.triangles.length / 3; i++) {
-    loadRest(triangle, surface, i);
+    load(triangle, surface, i);
     triangle.closestPointToPoint(target, closest);
     const distance = closest.distanceToSquared(target);
     if (distance < bestDistance) {
@@ -22,15 +22,15 @@ export function closestSurfacePoint(surface: Surface, point: Vec3): SurfacePoint
       found.copy(closest);
     }
   }
-  const weights = loadRest(triangle, surface, best).getBarycoord(found, new THREE.Vector3());
+  const weights = load(triangle, surface, best).getBarycoord(found, new THREE.Vector3());
   // A triangle without area has no barycentric coordinates: its first corner stands for it.
   return { corners: surface.cornersOf(best), weights: weights ? weights.toArray() : [1, 0, 0] };
 }
 
-function loadRest(triangle: THREE.Triangle, surface: Surface, index: number): THREE.Triangle {
+function load(triangle: THREE.Triangle, surface: Surface, index: number): THREE.Triangle {
   const [a, b, c] = surface.cornersOf(index);
-  triangle.a.fromArray(surface.rest, 3 * a);
-  triangle.b.fromArray(surface.rest, 3 * b);
-  triangle.c.fromArray(surface.rest, 3 * c);
+  triangle.a.fromArray(surface.untouched, 3 * a);
+  triangle.b.fromArray(surface.untouched, 3 * b);
+  triangle.c.fromArray(surface.untouched, 3 * c);
   return triangle;
 }

@@ -19,10 +19,6 @@ export class CutPlane {
     const [near, far] = sign > 0 ? [this.bounds.max, this.bounds.min] : [this.bounds.min, this.bounds.max];
     this.offset = sign * (near[axis] + share * (far[axis] - near[axis]));
   }
-
-  removes(restPoint: THREE.Vector3): boolean {
-    return this.normal.dot(restPoint) > this.offset;
-  }
 }
 
 /** The horizontal axis that looks most towards the viewer. */

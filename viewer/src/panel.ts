@@ -18,6 +18,7 @@ const AXES: Axis[] = ["x", "y", "z"];
 export interface PanelHandlers {
   send(message: ClientMessage): void;
   onShown(shown: Shown & { plots: boolean }): void;
+  onField(name: string): void;
   onCutaway(on: boolean): void;
   onCut(axis: Axis, share: number): void;
   onContactRadius(radius: number): void;
@@ -34,6 +35,7 @@ export class Panel {
   private modulusRange: [number, number] | null = null;
   private changedMs = -Infinity;
   private readonly model = byId<HTMLSelectElement>("model");
+  private readonly field = byId<HTMLSelectElement>("field");
   private readonly stiffness = byId<HTMLInputElement>("stiffness");
   private readonly radius = byId<HTMLInputElement>("radius");
   private readonly cutShare = byId<HTMLInputElement>("cut-share");
@@ -50,6 +52,7 @@ export class Panel {
     for (const name of ["colors", "wireframe", "supports", "cutaway", "plots"] as const) {
       byId(`show-${name}`).onclick = () => this.toggle(name);
     }
+    this.field.onchange = () => this.chooseField(this.field.value);
     byId("grab").onclick = () => this.toggleGrab();
     for (const axis of AXES) byId(`cut-${axis}`).onclick = () => this.cutAcross(axis);
     this.cutShare.oninput = () => handlers.onCut(this.cutAxis, this.cutShare.valueAsNumber);
@@ -72,6 +75,10 @@ export class Panel {
 
   setScene(scene: SceneMessage): void {
     this.model.value = scene.name;
+    const chosen = this.field.value;
+    this.field.replaceChildren(...scene.fields.map(({ name, title }) => new Option(title, name)));
+    // The field of the body before, if this one has it too.
+    if (scene.fields.some(({ name }) => name === chosen)) this.field.value = chosen;
     this.radius.max = String(scene.max_contact_radius);
     this.radius.step = String(scene.max_contact_radius / 200);
     const modulus = scene.youngs_modulus;
@@ -79,6 +86,10 @@ export class Panel {
     if (modulus === null) this.modulusRange = null;
     else this.modulusRange = usual ? [TISSUE_MIN, TISSUE_MAX] : [modulus / 10, modulus * 10];
     this.changedMs = -Infinity;
+    // A bare store has no tetrahedra to be shown.
+    const solid = scene.tets > 0;
+    if (!solid && this.shown.cutaway) this.toggle("cutaway");
+    byId<HTMLButtonElement>("show-cutaway").disabled = !solid;
     this.setSettings(modulus, scene.contact_radius);
     this.enable();
   }
@@ -95,6 +106,7 @@ export class Panel {
   }
 
   toggle(name: keyof Panel["shown"]): void {
+    if (byId<HTMLButtonElement>(`show-${name}`).disabled && !this.shown[name]) return;
     this.shown[name] = !this.shown[name];
     byId(`show-${name}`).setAttribute("aria-pressed", String(this.shown[name]));
     if (name === "cutaway") {
@@ -103,6 +115,12 @@ export class Panel {
     }
     if (name === "plots") byId("plots").hidden = !this.shown.plots;
     this.handlers.onShown(this.shown);
+  }
+
+  /** The next field, after the last one the first. */
+  nextField(): void {
+    const { options } = this.field;
+    if (options.length > 0) this.chooseField(options[(this.field.selectedIndex + 1) % options.length]!.value);
   }
 
   toggleGrab(): void {
@@ -116,6 +134,13 @@ export class Panel {
     this.cutAxis = axis;
     for (const other of AXES) byId(`cut-${other}`).setAttribute("aria-pressed", String(other === axis));
     this.handlers.onCut(axis, this.cutShare.valueAsNumber);
+  }
+
+  /** A field that is chosen wants to be seen. */
+  private chooseField(name: string): void {
+    this.field.value = name;
+    if (!this.shown.colors) this.toggle("colors");
+    this.handlers.onField(name);
   }
 
   private listenToSliders(): void {

@@ -63,9 +63,10 @@ export class Press {
     return this.gesture?.grab ?? false;
   }
 
-  /** Depth of the press or length of the pull, m; null when nothing is held. */
-  get depth(): number | null {
-    return this.gesture ? this.gesture.depth() : null;
+  /** Depth of the press or length of the pull with the tool at a place, or where the pointer wants it, m. */
+  depthOf(tool: Vec3 | null): number | null {
+    if (!this.gesture) return null;
+    return this.gesture.depthOf(tool ? new THREE.Vector3(...tool) : this.gesture.centre());
   }
 
   release(): void {

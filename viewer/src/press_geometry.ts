@@ -27,11 +27,11 @@ export interface Gesture {
   wheel(inward: number): void;
   /** Centre of the tool. */
   centre(): THREE.Vector3;
-  /** Depth of a press, length of a pull. */
-  depth(): number;
+  /** Depth of a press, length of a pull, with the tool's centre at a place. */
+  depthOf(centre: THREE.Vector3): number;
 }
 
-/** Down pushes into the body along its rest normal, up lifts, left and right shear along the surface. */
+/** Down pushes into the body along its normal, up lifts, left and right shear along the surface. */
 export class PressGesture implements Gesture {
   readonly grab = false;
   private pushed: number;
@@ -59,14 +59,14 @@ export class PressGesture implements Gesture {
   }
 
   centre(): THREE.Vector3 {
-    return this.pick.rest
+    return this.pick.untouched
       .clone()
       .addScaledVector(this.pick.normal, this.toolRadius - this.pushed)
       .addScaledVector(this.tangent, this.sheared);
   }
 
-  depth(): number {
-    return this.pushed;
+  depthOf(centre: THREE.Vector3): number {
+    return this.toolRadius - centre.clone().sub(this.pick.untouched).dot(this.pick.normal);
   }
 }
 
@@ -92,10 +92,10 @@ export class GrabGesture implements Gesture {
 
   // The tool takes hold where its centre is when the grab begins, so that is the touched point itself.
   centre(): THREE.Vector3 {
-    return this.pick.rest.clone().add(this.pull);
+    return this.pick.untouched.clone().add(this.pull);
   }
 
-  depth(): number {
-    return this.pull.length();
+  depthOf(centre: THREE.Vector3): number {
+    return centre.distanceTo(this.pick.untouched);
   }
 }

@@ -1,8 +1,8 @@
-// Messages of the websocket, version 1. Lengths in m, forces in N, times in s unless a name says otherwise.
+// Messages of the websocket, version 2. Lengths in m, forces in N, times in s unless a name says otherwise.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy.
 
-export const PROTOCOL_VERSION = 1;
+export const PROTOCOL_VERSION = 2;
 
 export type Vec3 = [number, number, number];
 export type Role = "control" | "watch";
@@ -29,6 +29,9 @@ export interface SceneMessage {
   tool_radius: number;
   max_force: number;
   size: number;
+  /** A tool is held back where the body would be strained more; 0 for never. */
+  hold_strain: number;
+  fields: { name: string; title: string }[];
   view: { position: Vec3; target: Vec3 } | null;
 }
 
@@ -49,11 +52,21 @@ export interface ContactMessage {
   force: Vec3;
 }
 
+/** What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa. */
+export interface FieldMessage {
+  name: string;
+  title: string;
+  unit: "mm" | "%" | "Pa";
+  max: number;
+  signed: boolean;
+}
+
 export interface FrameMessage {
   type: "frame";
   frame: number;
   time: number;
-  tool: { position: Vec3; active: boolean };
+  /** wanted is where the pointer is while the tool is held back. */
+  tool: { position: Vec3; active: boolean; wanted: Vec3 | null };
   /** On the device. */
   force: Vec3;
   contacts: ContactMessage[];
@@ -64,10 +77,11 @@ export interface FrameMessage {
   fault: string | null;
   realtime: boolean;
   strain: number;
-  field: { name: string; unit: string; max: number };
+  field: FieldMessage;
   interior: boolean;
 }
 
+/** A row of displacements and scalar is a surface node, or any node if the inside is shown. */
 export interface FrameArrays {
   displacements: Float32Array;
   scalar: Uint8Array;
@@ -100,6 +114,7 @@ export type ClientMessage =
   | { type: "reset" }
   | { type: "model"; name: string }
   | { type: "cutaway"; on: boolean }
+  | { type: "field"; name: string }
   | { type: "ack"; frame: number };
 
 interface ArrayEntry {

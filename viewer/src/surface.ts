@@ -1,4 +1,4 @@
-// The touchable surface: rest and deformed positions of its nodes, and what a pick on the drawn surface means at rest.
+// The touchable surface: positions of its nodes at rest, untouched and deformed, and values at any point of it.
 
 import type { SceneArrays, Vec3 } from "./protocol";
 
@@ -15,7 +15,9 @@ export class Surface {
   readonly positions: Float32Array;
   /** Unit normals of the deformed surface (s, 3). */
   readonly normals: Float32Array;
-  readonly restNormals: Float32Array;
+  /** Positions and normals while no tool touches: where the body's own loads have put it. */
+  readonly untouched: Float32Array;
+  readonly untouchedNormals: Float32Array;
   /** Corners of the triangles (k, 3) as rows of the arrays above. */
   readonly triangles: Uint32Array;
   readonly count: number;
@@ -30,9 +32,10 @@ export class Surface {
     });
     this.triangles = arrays.surface_triangles.map((node) => rankOfNode[node]!);
     this.positions = this.rest.slice();
-    this.restNormals = new Float32Array(3 * this.count);
-    vertexNormals(this.rest, this.triangles, this.restNormals);
-    this.normals = this.restNormals.slice();
+    this.normals = new Float32Array(3 * this.count);
+    vertexNormals(this.rest, this.triangles, this.normals);
+    this.untouched = this.rest.slice();
+    this.untouchedNormals = this.normals.slice();
   }
 
   /** Displaces the surface; rowOf gives the row of a surface node in the displacements. */
@@ -45,6 +48,12 @@ export class Surface {
       positions[3 * i + 2] = rest[3 * i + 2]! + displacements[row + 2]!;
     }
     vertexNormals(positions, this.triangles, this.normals);
+  }
+
+  /** Takes the shape now for that of the untouched body. */
+  keepAsUntouched(): void {
+    this.untouched.set(this.positions);
+    this.untouchedNormals.set(this.normals);
   }
 
   /** Interpolates one of the arrays above. */

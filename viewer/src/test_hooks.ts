@@ -3,7 +3,7 @@
 import * as THREE from "three";
 
 import type { BodyView } from "./body_view";
-import type { Vec3 } from "./protocol";
+import type { FieldMessage, Vec3 } from "./protocol";
 import type { Viewport } from "./viewport";
 
 /** How many of the best candidates are tried before giving up. */
@@ -23,6 +23,10 @@ export interface ViewerState {
   ticks: number;
   toolPosition: Vec3 | null;
   depth: number | null;
+  strain: number;
+  /** Whether the tool is held back from where the pointer is. */
+  held: boolean;
+  field: FieldMessage | null;
   fault: string | null;
 }
 
@@ -61,7 +65,8 @@ function pickPoint(viewport: Viewport, view: BodyView): [number, number] | null 
   const ranked = Array.from({ length: count }, (_, i) => [score(i), i] as const).sort((a, b) => b[0] - a[0]);
   for (const [, i] of ranked.slice(0, CANDIDATES)) {
     point.fromArray(positions, 3 * i);
-    const [x, y] = viewport.project(point);
+    // A mouse reports whole pixels: beside a cut the next one may be on the other side.
+    const [x, y] = viewport.project(point).map(Math.round) as [number, number];
     if (document.elementFromPoint(x, y) !== viewport.canvas) continue;
     const pick = view.pick(viewport.rayThrough(x, y));
     if (pick && pick.shown.distanceTo(point) < 0.03 * size) return [x, y];

@@ -3,12 +3,13 @@
 import * as THREE from "three";
 
 import { closestSurfacePoint } from "./closest_point";
+import { HoldView } from "./hold_view";
 import type { ContactMessage, FrameMessage, SceneMessage, Vec3 } from "./protocol";
 import type { Surface, SurfacePoint } from "./surface";
 
 const FORCE_COLOR = 0xffb454;
 const RING_COLOR = 0xfff3d6;
-/** Length of the arrow at the largest force, over the size of the body. */
+/** Length of the arrow at the largest force, over the size of the body; it goes with the root, for a finger's range is wide. */
 const ARROW_AT_MAX_FORCE = 0.35;
 /** Shorter arrows than this (over the size of the body) are not drawn, N below noise are not either. */
 const ARROW_LENGTH_MIN = 0.012;
@@ -23,6 +24,7 @@ export class ToolView {
   private readonly arrow = new THREE.Group();
   private readonly shaft: THREE.Mesh<THREE.CylinderGeometry, THREE.MeshBasicMaterial>;
   private readonly head: THREE.Mesh<THREE.ConeGeometry, THREE.MeshBasicMaterial>;
+  private readonly hold: HoldView;
   private drawnState = "";
   /** Where the current contact sits; found once when it begins, for it sticks to the material. */
   private touched: { point: Vec3; place: SurfacePoint } | null = null;
@@ -50,7 +52,8 @@ export class ToolView {
     this.shaft.geometry.translate(0, 0.5, 0);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(0.0115 * size, 0.036 * size, 24), material);
     this.arrow.add(this.shaft, this.head);
-    this.group.add(this.sphere, this.ring, this.arrow);
+    this.hold = new HoldView(tool_radius);
+    this.group.add(this.sphere, this.ring, this.arrow, this.hold.group);
     this.group.visible = false;
   }
 
@@ -61,6 +64,7 @@ export class ToolView {
     this.drawnState = state;
     this.group.visible = frame.tool.active;
     this.sphere.position.set(...frame.tool.position);
+    this.hold.update(frame.tool.position, frame.tool.wanted);
     this.updateRing(frame.contacts[0]);
     this.updateArrow(frame);
     return true;
@@ -75,7 +79,7 @@ export class ToolView {
     if (!this.touched || !samePoint(this.touched.point, contact.point)) {
       this.touched = { point: contact.point, place: closestSurfacePoint(this.surface, contact.point) };
     }
-    // The contact names its place on the rest surface; it is drawn where that place has moved to.
+    // The contact names its place on the untouched surface; it is drawn where that place has moved to.
     const { place } = this.touched;
     this.ring.position.set(...this.surface.at(this.surface.positions, place));
     const normal = new THREE.Vector3(...this.surface.at(this.surface.normals, place)).normalize();
@@ -88,7 +92,7 @@ export class ToolView {
     const force = new THREE.Vector3(...frame.force);
     const magnitude = force.length();
     const { size, max_force } = this.header;
-    const length = ARROW_AT_MAX_FORCE * size * Math.min(1, magnitude / max_force);
+    const length = ARROW_AT_MAX_FORCE * size * Math.sqrt(Math.min(1, magnitude / max_force));
     this.arrow.visible = frame.tool.active && length > ARROW_LENGTH_MIN * size;
     if (!this.arrow.visible) return;
     const direction = force.divideScalar(magnitude);
@@ -101,6 +105,7 @@ export class ToolView {
 
   dispose(): void {
     this.group.removeFromParent();
+    this.hold.dispose();
     for (const mesh of [this.sphere, this.ring, this.shaft, this.head]) {
       mesh.geometry.dispose();
       mesh.material.dispose();

@@ -1,7 +1,7 @@
 // The page: what arrives is kept until the next drawing, drawn, and acknowledged; what the user does is sent.
 
 import { BodyView } from "./body_view";
-import { createColorMapTexture } from "./color_map";
+import { ColorMap } from "./color_map";
 import { Connection } from "./connection";
 import type { ConnectionState } from "./connection";
 import { facingAxis } from "./cut_plane";
@@ -9,12 +9,13 @@ import { byId } from "./dom";
 import { tissueColor } from "./field_material";
 import { showHint } from "./hint";
 import { listenToKeys } from "./keyboard";
+import { Legend } from "./legend";
 import { showConnection, showFault, showNotice, showRole, showStatus } from "./notices";
 import { Panel } from "./panel";
 import { Plots } from "./plots";
 import { Press } from "./press";
 import type { FrameData, FrameMessage, Role, SceneData, TextMessage } from "./protocol";
-import { Legend, Readout } from "./readout";
+import { Readout } from "./readout";
 import { download } from "./screenshot";
 import { Statistics } from "./statistics";
 import { installTestHooks } from "./test_hooks";
@@ -31,9 +32,11 @@ export class Viewer {
   private drawn: number[] = [];
   private frame: FrameMessage | null = null;
   private framesApplied = 0;
-  private readonly field = { colorMap: { value: createColorMapTexture() }, fieldShown: { value: 1 } };
+  private readonly field = { colorMap: { value: ColorMap.sequential.texture }, fieldShown: { value: 1 } };
+  private fieldName: string | null = null;
   private readonly viewport = new Viewport(
     byId<HTMLCanvasElement>("canvas"),
+    ["readout", "legend", "hint"].map((id) => byId(id)),
     () => this.takeFrames(),
     () => this.acknowledge(),
   );
@@ -60,7 +63,6 @@ export class Viewer {
       grabWanted: () => this.panel.grab,
       onPress: (position, grab) => {
         this.connection.send({ type: "press", position, grab });
-        this.readout.updateDepth(this.press.depth, this.press.grabbing);
       },
       onRelease: () => {
         this.connection.send({ type: "release" });
@@ -83,6 +85,10 @@ export class Viewer {
         this.plots.shown = shown.plots;
         this.applyShown();
       },
+      onField: (name) => {
+        this.fieldName = name;
+        this.connection.send({ type: "field", name });
+      },
       onCutaway: (on) => {
         this.connection.send({ type: "cutaway", on });
         if (on) this.panel.cutAcross(facingAxis(this.viewport.towardsViewer()));
@@ -94,7 +100,7 @@ export class Viewer {
       },
       onContactRadius: (radius) => this.setContactRadius(radius),
       onReset: () => this.reset(),
-      onResetView: () => this.viewport.reframe(this.body?.data.header.size ?? 1),
+      onResetView: () => this.viewport.reframe(),
       onScreenshot: () => void this.saveScreenshot(),
     });
   }
@@ -103,11 +109,12 @@ export class Viewer {
     const panel = this.panel;
     listenToKeys({
       r: () => this.reset(),
-      v: () => this.viewport.reframe(this.body?.data.header.size ?? 1),
+      v: () => this.viewport.reframe(),
       w: () => panel.toggle("wireframe"),
       c: () => panel.toggle("colors"),
       x: () => panel.toggle("cutaway"),
       s: () => panel.toggle("supports"),
+      f: () => panel.nextField(),
       p: () => panel.toggle("plots"),
       g: () => panel.toggleGrab(),
       Escape: () => this.press.release(),
@@ -117,7 +124,11 @@ export class Viewer {
   private setConnection(state: ConnectionState): void {
     this.connectionState = state;
     showConnection(state);
-    if (state === "open" && this.panel.shown.cutaway) this.connection.send({ type: "cutaway", on: true });
+    if (state === "open") {
+      // What this page looks at, told again after a connection was lost.
+      if (this.panel.shown.cutaway) this.connection.send({ type: "cutaway", on: true });
+      if (this.fieldName !== null) this.connection.send({ type: "field", name: this.fieldName });
+    }
     if (state === "lost" || state === "refused") {
       this.press.release();
       this.pending = [];
@@ -159,7 +170,7 @@ export class Viewer {
     this.body = new BodyView(data, this.field);
     this.tool = new ToolView(header, this.body.surface);
     this.viewport.scene.add(this.body.group, this.tool.group);
-    this.viewport.frame(this.body.surface, header.size, header.view);
+    this.viewport.frame(this.body.surface, header);
     this.plots.log.clear();
     this.panel.setScene(header);
     this.legend.setTissue(tissueColor(header.name).getStyle());
@@ -183,13 +194,21 @@ export class Viewer {
     const toolMoved = this.tool?.update(header) ?? false;
     this.frame = header;
     this.framesApplied += 1;
-    this.readout.update(header.force, header.strain);
-    this.legend.update(header.field);
+    this.showNumbers(header);
     this.statistics.countFrame();
     this.statistics.update(header);
     this.plots.refresh();
     showFault(header.fault);
     return bodyMoved || toolMoved;
+  }
+
+  private showNumbers(frame: FrameMessage): void {
+    const { wanted, position } = frame.tool;
+    this.readout.update(frame.force, frame.strain, wanted ? (this.body?.data.header.hold_strain ?? null) : null);
+    // While the tool is held back, its own depth is told, not that of the pointer.
+    this.readout.updateDepth(this.press.depthOf(wanted ? position : null), this.press.grabbing);
+    this.legend.update(frame.field);
+    this.field.colorMap.value = (frame.field.signed ? ColorMap.diverging : ColorMap.sequential).texture;
   }
 
   private acknowledgeSoon(frames: FrameData[]): void {
@@ -238,7 +257,10 @@ export class Viewer {
       pointerEvents: this.press.pointerEvents,
       ticks: frame?.ticks ?? 0,
       toolPosition: frame?.tool.position ?? null,
-      depth: this.press.depth,
+      depth: this.press.depthOf(null),
+      strain: frame?.strain ?? 0,
+      held: frame?.tool.wanted != null,
+      field: frame?.field ?? null,
       fault: frame?.fault ?? null,
     };
   }

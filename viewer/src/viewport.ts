@@ -3,7 +3,9 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { fitDistance } from "./framing";
+import { centreAcross, fitDistance, freeRegion } from "./framing";
+import type { Region } from "./framing";
+import type { SceneMessage } from "./protocol";
 import type { Surface } from "./surface";
 
 const FIELD_OF_VIEW_DEG = 35;
@@ -21,11 +23,13 @@ export class Viewport {
   readonly controls: OrbitControls;
   private readonly renderer: THREE.WebGLRenderer;
   private dirty = true;
-  private framed: { surface: Surface; view: View | null } | null = null;
+  private framed: { surface: Surface; header: SceneMessage } | null = null;
+  private region: Region = { left: 0, top: 0, width: 1, height: 1 };
 
-  /** beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
+  /** The body is framed beside the overlays; beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
   constructor(
     readonly canvas: HTMLCanvasElement,
+    private readonly overlays: HTMLElement[],
     private readonly beforeDraw: () => boolean,
     private readonly afterDraw: () => void,
   ) {
@@ -46,14 +50,20 @@ export class Viewport {
   }
 
   /** Looks at a body: from the view of its scene if it has one, never closer than where all of it is seen. */
-  frame(surface: Surface, size: number, view: View | null): void {
-    this.framed = { surface, view };
+  frame(surface: Surface, header: SceneMessage): void {
+    const { size, view } = header;
+    this.framed = { surface, header };
+    this.centreInFreeRegion();
     const centre = new THREE.Box3().setFromArray(surface.rest).getCenter(new THREE.Vector3());
     const target = view ? new THREE.Vector3(...view.target) : centre;
     const offset = view ? new THREE.Vector3(...view.position).sub(target) : DEFAULT_DIRECTION.clone();
     const wanted = view ? offset.length() : 0;
     offset.normalize();
-    const distance = Math.max(wanted, fitDistance(surface, target, offset, this.camera));
+    if (!view) {
+      // The middle of the bounds is not that of the picture: nearer parts look larger. Twice is close enough.
+      for (let i = 0; i < 2; i++) centreAcross(surface, target, offset, this.camera, this.fit(target, offset));
+    }
+    const distance = Math.max(wanted, this.fit(target, offset));
     this.camera.near = 0.02 * size;
     this.camera.far = distance + 30 * size;
     this.camera.position.copy(target).addScaledVector(offset, distance);
@@ -65,8 +75,8 @@ export class Viewport {
     this.invalidate();
   }
 
-  reframe(size: number): void {
-    if (this.framed) this.frame(this.framed.surface, size, this.framed.view);
+  reframe(): void {
+    if (this.framed) this.frame(this.framed.surface, this.framed.header);
   }
 
   /** Unit vector from what is looked at to the viewer. */
@@ -130,7 +140,7 @@ export class Viewport {
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, PIXEL_RATIO_MAX, affordable));
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
-    this.camera.updateProjectionMatrix();
+    this.centreInFreeRegion();
     // The body keeps its share of the window, whatever the user's own view.
     const { target } = this.controls;
     if (fitBefore > 0) {
@@ -141,8 +151,23 @@ export class Viewport {
   }
 
   private fitHere(): number {
+    return this.fit(this.controls.target, this.towardsViewer());
+  }
+
+  private fit(target: THREE.Vector3, towardsViewer: THREE.Vector3): number {
     if (!this.framed) return 0;
-    return fitDistance(this.framed.surface, this.controls.target, this.towardsViewer(), this.camera);
+    const { surface, header } = this.framed;
+    const { camera, region, canvas } = this;
+    return fitDistance(surface, target, towardsViewer, camera, 2 * header.tool_radius, region, canvas.clientHeight);
+  }
+
+  /** What the camera looks at stands in the middle of the region that nothing is written over. */
+  private centreInFreeRegion(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.region = freeRegion(this.canvas, this.overlays);
+    const { left, top } = this.region;
+    const [x, y] = [left + this.region.width / 2 - width / 2, top + this.region.height / 2 - height / 2];
+    this.camera.setViewOffset(width, height, -x, -y, width, height);
   }
 
   /** Key and fill travel with the camera, so that a dent shades the same from every side. */
@@ -159,11 +184,6 @@ export class Viewport {
     }
     this.scene.add(this.camera, sky);
   }
-}
-
-interface View {
-  position: [number, number, number];
-  target: [number, number, number];
 }
 
 function drawsInSoftware(): boolean {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{Model as Modes, exact_step};
-use palpate_core::simulation::{Dynamics, Energy, Input, Mode, Model, Strike};
+use palpate_core::simulation::{Dynamics, Energy, Input, Mode, Model, Snapshot, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{Handle, Target, simulated};
 use palpate_servo::{Published, SafetyLimits, Script, Servo, Settings};
@@ -160,14 +160,7 @@ impl SimulationCore {
         frame.set_item("forces", tick.forces[..tools].iter().map(|f| f.to_array()).collect::<Vec<_>>())?;
         frame.set_item("positions", tick.devices[..tools].iter().map(|d| d.position.to_array()).collect::<Vec<_>>())?;
         frame.set_item("displacements", displacements.into_pyarray(py))?;
-        let mut contacts = Vec::new();
-        for (tool, contact) in state.tools.iter().enumerate().filter(|(_, c)| c.mode != Mode::Free) {
-            let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
-            let (nodes, weights): (Vec<usize>, Vec<f64>) = contact.patch.iter().unzip();
-            let vectors = (contact.point.to_array(), contact.normal.to_array(), contact.force.to_array());
-            contacts.push((tool, mode, vectors, nodes, weights));
-        }
-        frame.set_item("contacts", contacts)?;
+        frame.set_item("contacts", contact_records(state))?;
         frame.set_item("refused", state.tools[..tools].iter().map(|c| c.refused).collect::<Vec<_>>())?;
         let summary = |s: palpate_servo::Summary| [s.p50, s.p99, s.p999, s.max];
         frame.set_item("compute_us", summary(tick.compute))?;
@@ -181,6 +174,26 @@ impl SimulationCore {
         frame.set_item("energy", energy)?;
         frame.set_item("realtime", (tick.realtime.priority, tick.realtime.locked_memory))?;
         Ok(Some(frame))
+    }
+
+    /// Contacts of the latest tick, as in `frame` but without the rest of it; None if the loop does not run.
+    fn contacts(&mut self) -> Option<Vec<ContactRecord>> {
+        self.servo().as_mut().map(|servo| contact_records(&servo.latest().state))
+    }
+
+    /// The contact of a tool at the latest tick, and displacements (3s) per unit way of the tool from its anchor along x,
+    /// y and z, m/m; None for a tool that does not touch.
+    #[allow(clippy::type_complexity)] // a record and three arrays; naming them would need a class nobody else uses
+    fn contact_response<'py>(
+        &mut self,
+        py: Python<'py>,
+        tool: usize,
+    ) -> Option<(ContactRecord, Vec<Bound<'py, PyArray1<f64>>>)> {
+        let model = self.model.clone();
+        let state = self.servo().as_mut()?.latest().state.clone();
+        let fields = py.detach(|| state.response(&model, tool))?;
+        let record = contact_records(&state).into_iter().find(|record| record.0 == tool)?;
+        Some((record, fields.map(|field| field.into_pyarray(py)).into()))
     }
 
     /// Rows (9 a tick) of the log since the last call: time, position, force, computing time, wake-up delay.
@@ -232,6 +245,21 @@ impl SimulationCore {
 /// Kinetic, strain, coupling, dissipated, work; J.
 fn energy_array(e: &Energy) -> [f64; 5] {
     [e.kinetic, e.strain, e.coupling, e.dissipated, e.work]
+}
+
+/// Tool, mode, (point, normal, force, anchor), nodes and weights of a contact.
+type ContactRecord = (usize, &'static str, [[f64; 3]; 4], Vec<usize>, Vec<f64>);
+
+fn contact_records(state: &Snapshot) -> Vec<ContactRecord> {
+    let touching = state.tools.iter().enumerate().filter(|(_, contact)| contact.mode != Mode::Free);
+    touching
+        .map(|(tool, contact)| {
+            let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
+            let (nodes, weights) = contact.patch.iter().unzip();
+            let vectors = [contact.point, contact.normal, contact.force, contact.anchor].map(|v| v.to_array());
+            (tool, mode, vectors, nodes, weights)
+        })
+        .collect()
 }
 
 impl SimulationCore {

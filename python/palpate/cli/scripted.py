@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
 from palpate.errors import SceneError
+from palpate.hold import HeldTool
 from palpate.scene import BuiltScene
-from palpate.simulation import Simulation
+from palpate.simulation import Frame, Simulation
 
 # Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
 POINTER_RATE = 120.0
@@ -16,8 +18,18 @@ POINTER_RATE = 120.0
 DEPTH = 0.03
 
 
-def scripted_press(built: BuiltScene, seconds: float) -> tuple[np.ndarray, dict]:
-    """Log of the 1 kHz loop and its statistics."""
+@dataclass(frozen=True)
+class PressRecord:
+    """Log of the 1 kHz loop, the frame that was pressed hardest, the last one, and whether the tool was held back."""
+
+    log: np.ndarray
+    hardest: Frame
+    last: Frame
+    held: bool
+
+
+def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
+    """Press for so many seconds, held back at the scene's strain."""
     green = built.green
     nodes = green.surface_positions
     free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
@@ -29,15 +41,19 @@ def scripted_press(built: BuiltScene, seconds: float) -> tuple[np.ndarray, dict]
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
     depth = DEPTH * size
     rest = top + [0, 0, built.scene.tool.radius]
-    logs = []
+    logs, held = [], False
     with Simulation(built) as simulation:
+        tool, hardest = HeldTool(simulation, built.scene.view.hold_strain), simulation.frame()
         start = time.monotonic()
         while (elapsed := time.monotonic() - start) < seconds:
             phase = elapsed / seconds
             push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
-            simulation.move(rest - [0, 0, push])
+            tool.move(rest - [0, 0, push])
+            held |= tool.held
             time.sleep(1.0 / POINTER_RATE)
             logs.append(simulation.drain_log())
-        statistics = simulation.frame().statistics
+            # The press is along a line: the largest force has the largest strain.
+            hardest = max(hardest, simulation.frame(), key=lambda frame: np.linalg.norm(frame.forces[0]))
+        last = simulation.frame()
         logs.append(simulation.drain_log())
-    return np.concatenate(logs), statistics
+    return PressRecord(np.concatenate(logs), hardest, last, held)

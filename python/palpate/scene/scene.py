@@ -27,6 +27,7 @@ from palpate.scene.dynamics import DynamicsTable, Motion
 from palpate.scene.loads import LoadTable, together
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
+from palpate.strain import HONEST_STRAIN
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -61,7 +62,7 @@ class BodyTable(Table):
     max_element_size: Length | None = None
     element: Literal["linear", "quadratic"] | None = None
     refine: list[RefineTable] = Field(default_factory=list)
-    precision: str = Field("f32", pattern="^f(32|64)$")
+    precision: str = Field("f32", pattern="^f(16|32|64)$")
 
     @model_validator(mode="after")
     def _one_source(self) -> BodyTable:
@@ -95,10 +96,14 @@ class DeviceTable(Table):
 
 
 class ViewTable(Table):
-    """Where the camera stands and what it looks at, m; by default the whole body is seen."""
+    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that holds the tool.
+
+    Linear elasticity balloons beyond about 10 % strain; ``hold_strain = 0`` lets the pointer go on all the same.
+    """
 
     position: tuple[float, float, float] | None = None
     target: tuple[float, float, float] | None = None
+    hold_strain: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
 
 
 class Scene(Table):

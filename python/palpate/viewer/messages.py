@@ -15,7 +15,9 @@ import numpy as np
 
 from palpate.errors import ViewerError
 
-VERSION = 1
+VERSION = 2
+# Longest name in a client's message.
+LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
 
 
@@ -80,6 +82,14 @@ def vector(message: Mapping[str, Any], key: str) -> tuple[float, float, float]:
         raise ViewerError(f"{message['type']}: {key} must be three numbers")
     x, y, z = (number({"type": message["type"], key: v}, key) for v in values)
     return x, y, z
+
+
+def word(message: Mapping[str, Any], key: str) -> str:
+    """Take a short text of a client's message."""
+    value = message.get(key)
+    if not isinstance(value, str) or len(value) > LONGEST_WORD:
+        raise ViewerError(f"{message['type']}: {key} must be a name")
+    return value
 
 
 def _refuse(name: str) -> float:

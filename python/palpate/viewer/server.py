@@ -9,7 +9,7 @@ import json
 import secrets
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from websockets.asyncio.server import Server, ServerConnection, serve
@@ -22,7 +22,7 @@ from palpate.errors import Error, ViewerError
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
 from palpate.viewer.pages import headers, host_is_ours, load_pages
-from palpate.viewer.session import Session, choices
+from palpate.viewer.session import Session, Wants, choices
 
 DEFAULT_PORT = 8642
 FRAME_RATE = 60.0
@@ -42,7 +42,7 @@ class Client:
 
     connection: ServerConnection
     shown: Session | None = None
-    cutaway: bool = False
+    wants: Wants = field(default_factory=Wants)
     sent: int = 0
     log_seen: int = 0
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
@@ -211,7 +211,9 @@ class ViewerServer:
                 if message.get("frame") == client.sent:
                     client.may_send.set()
             elif message["type"] == "cutaway":
-                client.cutaway = message.get("on") is True
+                client.wants = replace(client.wants, cutaway=message.get("on") is True)
+            elif message["type"] == "field":
+                client.wants = replace(client.wants, field=messages.word(message, "name"))
             elif client is not self._controller:
                 raise ViewerError("another viewer has control; this one watches")
             elif message["type"] == "model":
@@ -234,7 +236,7 @@ class ViewerServer:
                     client.may_send.set()
                     continue
                 client.sent += 1
-                message, client.log_seen = session.frame_message(client.sent, client.log_seen, client.cutaway)
+                message, client.log_seen = session.frame_message(client.sent, client.log_seen, client.wants)
                 await client.connection.send(message)
                 await asyncio.sleep(1.0 / FRAME_RATE)
 

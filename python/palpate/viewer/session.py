@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import ViewerError
-from palpate.interior import Interior
+from palpate.hold import HeldTool
 from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltScene
 from palpate.simulation import Frame, Simulation
-from palpate.strain import SurfaceStrain
+from palpate.viewer.fields import Fields
 from palpate.viewer.messages import encode, number, vector
 
 # The contact radius slider ends at this part of the body's longest side.
@@ -23,10 +24,16 @@ REACH = 10.0
 # Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
 LOG_KEPT = 4000
 LOG_SENT = 64
-# The colour scale never spans less than this part of the body's size: rest is not noise blown up.
-LEAST_FIELD = 0.005
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
+
+
+@dataclass(frozen=True)
+class Wants:
+    """What a client looks at: a field by name, and whether it sees the inside."""
+
+    field: str = ""
+    cutaway: bool = False
 
 
 class Session:
@@ -44,11 +51,11 @@ class Session:
         green = built.green
         self._positions = green.surface_positions
         self._triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
-        self._strain = SurfaceStrain(self._positions, np.searchsorted(green.surface_nodes, green.surface_faces))
-        self._interior: Interior | None = None
         self._low, self._high = self._positions.min(axis=0), self._positions.max(axis=0)
         self.size = float((self._high - self._low).max())
         self.simulation = Simulation(built)
+        self._fields = Fields(self.simulation, self.size)
+        self._tool = HeldTool(self.simulation, built.scene.view.hold_strain)
         self._max_radius = max(
             self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size), built.scene.tool.contact_radius
         )
@@ -74,7 +81,7 @@ class Session:
     def release(self) -> None:
         """Take the tool out of the scene."""
         if self.active:
-            self.simulation.remove()
+            self._tool.remove()
             self.active = False
 
     def handle(self, message: Mapping[str, Any]) -> bool:
@@ -123,6 +130,8 @@ class Session:
             "tool_radius": scene.tool.radius,
             "max_force": scene.device.max_force,
             "size": self.size,
+            "hold_strain": view.hold_strain,
+            "fields": [{"name": field.name, "title": field.title} for field in self._fields.offered],
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
         }
         arrays = {
@@ -134,19 +143,22 @@ class Session:
         }
         return encode(header, arrays)
 
-    def frame_message(self, number: int, log_seen: int, cutaway: bool) -> tuple[bytes, int]:
+    def frame_message(self, number: int, log_seen: int, wants: Wants) -> tuple[bytes, int]:
         """Binary message of the latest tick, and up to where it carries the log."""
         frame = self._latest()
-        u = frame.displacements
-        magnitude = np.sqrt(np.einsum("ij,ij->i", u, u))
-        largest = max(float(magnitude.max()), LEAST_FIELD * self.size)
-        interior = cutaway and self.built.body is not None
+        picture = self._fields.picture(wants.field, frame.displacements, wants.cutaway)
+        wanted, held = self._tool.wanted, self._tool.held
         log, seen = self._log_since(log_seen)
         header = {
             "type": "frame",
             "frame": number,
             "time": frame.time,
-            "tool": {"position": frame.positions[0].tolist(), "active": self.active},
+            "tool": {
+                "position": frame.positions[0].tolist(),
+                "active": self.active,
+                # Where the pointer is, while the tool is held back.
+                "wanted": wanted.tolist() if held and wanted is not None else None,
+            },
             "force": frame.forces[0].tolist(),
             "contacts": [
                 {
@@ -160,13 +172,13 @@ class Session:
             **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
             "realtime": all(frame.statistics["realtime"]),
             "refused": bool(frame.statistics["refused"][0]),
-            "strain": self._strain.largest(u),
-            "field": {"name": "displacement", "unit": "mm", "max": 1e3 * largest},
-            "interior": interior,
+            "strain": self._fields.largest_strain(frame.displacements),
+            "field": picture.header,
+            "interior": picture.interior,
         }
         arrays = {
-            "displacements": ("f4", self._extended(u) if interior else u),
-            "scalar": ("u1", np.rint(255.0 * magnitude / largest)),
+            "displacements": ("f4", picture.displacements),
+            "scalar": ("u1", picture.scalar),
             "log": ("f4", log),
         }
         return encode(header, arrays), seen
@@ -178,7 +190,7 @@ class Session:
             raise ViewerError("press: grab must be true or false")
         if np.abs(position - 0.5 * (self._low + self._high)).max() > REACH * self.size:
             raise ViewerError("press: the position is far away from the body")
-        self.simulation.move(position)
+        self._tool.move(position)
         self.simulation.grab(grab)
         self.active = True
         return False
@@ -213,6 +225,8 @@ class Session:
     def _latest(self) -> Frame:
         now = time.monotonic()
         if self._frame is None or now - self._frame_time > FRAME_AGE:
+            # A contact that has begun since the pointer moved is held from here on.
+            self._tool.update()
             self._frame, self._frame_time = self.simulation.frame(), now
             rows = self.simulation.drain_log()
             force = np.sqrt(np.einsum("ij,ij->i", rows["force"], rows["force"]))
@@ -229,12 +243,6 @@ class Session:
         if stride > 1 and len(rows):
             thin[:, 2] = np.maximum.reduceat(rows[:, 2], np.arange(0, len(rows), stride))
         return thin, self._log_end
-
-    def _extended(self, u: np.ndarray) -> np.ndarray:
-        if self._interior is None:
-            assert self.built.body is not None
-            self._interior = Interior(self.built.body)
-        return self._interior.extend(u)
 
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:

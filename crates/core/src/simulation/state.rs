@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::contact_forces::{solve_forces, update_compliance};
 use super::{Energy, MAX_TOOLS, Model, Motion};
 use crate::contact::{Patch, add_patch_response, compliance_block};
 use crate::dynamics::{Lanes, Projection};
@@ -137,6 +138,7 @@ impl Snapshot {
         displacements
     }
 
+<<<<<<< HEAD
     fn touching(&self) -> impl Iterator<Item = &ToolContact> {
         self.tools.iter().filter(|tool| tool.mode != Mode::Free)
     }
@@ -152,5 +154,28 @@ impl Snapshot {
             projection.take_static(modes, tool.force, &mut moving);
         }
         moving
+=======
+    /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts
+    /// as they are and a body come to rest. The answer is linear in the ways of all tools; `None` for a tool that does not
+    /// touch.
+    pub fn response(&self, model: &Model, tool: usize) -> Option<[Vec<f64>; 3]> {
+        if self.tools[tool].mode == Mode::Free {
+            return None;
+        }
+        let mut pushed = State { tools: self.tools.clone(), stiffness_scale: self.stiffness_scale, ..State::default() };
+        for other in 0..MAX_TOOLS {
+            if pushed.tools[other].mode != Mode::Free {
+                update_compliance(model, &mut pushed, other);
+            }
+            pushed.tools[other].position = pushed.tools[other].anchor;
+        }
+        Some(DVec3::AXES.map(|way| {
+            pushed.tools[tool].position = pushed.tools[tool].anchor + way;
+            solve_forces(model, &mut pushed);
+            let at_rest =
+                Self { tools: pushed.tools.clone(), stiffness_scale: self.stiffness_scale, ..Self::default() };
+            at_rest.displacements(model).iter().zip(&model.free).map(|(u, free)| u - free).collect()
+        }))
+>>>>>>> origin/main
     }
 }

@@ -1,0 +1,165 @@
+"""Scalar fields over the body as the page draws them, with ranges that do not flicker."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.gauge import ElementStrain
+from palpate.interior import Interior
+from palpate.principal import extreme_values, largest_magnitude
+from palpate.simulation import Simulation
+from palpate.strain import SurfaceStrain
+from palpate.stress import StressRecovery, SurfaceStress
+
+# A range never spans less than this part of the body's size, as a strain, or of Young's modulus: rest is not noise
+# blown up.
+LEAST = 0.005
+# A range grows at once, so that no colour is cut off, and comes down with this time constant, s.
+DECAY = 0.8
+
+
+@dataclass(frozen=True)
+class Field:
+    """What the page may show: its name in messages, its title, its unit; a signed field is zero in the middle."""
+
+    name: str
+    title: str
+    unit: str
+    signed: bool = False
+
+
+DISPLACEMENT = Field("displacement", "Displacement", "mm")
+STRAIN = Field("strain", "Largest principal strain", "%")
+SURFACE_STRAIN = Field("strain", "Strain in the surface", "%")
+VON_MISES = Field("von_mises", "Von Mises stress", "Pa")
+PRINCIPAL = Field("principal_stress", "First principal stress", "Pa", signed=True)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A field over a pose: displacements in m and values from 0 to 255 at the surface nodes, or at all (interior)."""
+
+    header: dict[str, Any]
+    displacements: np.ndarray
+    scalar: np.ndarray
+    interior: bool
+
+
+class Fields:
+    """Fields of one running body; each pose is recovered once for all clients.
+
+    Parameters
+    ----------
+    simulation
+        Where displacements come from.
+    size
+        Of the body, m.
+
+    """
+
+    def __init__(self, simulation: Simulation, size: float):
+        self._simulation, self._size = simulation, size
+        gauge = simulation.strain_gauge
+        self._surface = gauge if isinstance(gauge, SurfaceStrain) else None
+        self._recovery = gauge.recovery if isinstance(gauge, ElementStrain) else None
+        self.offered = [DISPLACEMENT, SURFACE_STRAIN] if self._recovery is None else [DISPLACEMENT, STRAIN]
+        if self._recovery is not None:
+            self.offered += [VON_MISES, PRINCIPAL]
+        self._ranges: dict[str, tuple[float, float]] = {}
+        self._pose = _Pose(np.full((1, 3), np.nan))
+        self._inside: StressRecovery | None = None
+
+    def largest_strain(self, displacements: np.ndarray) -> float:
+        """Largest strain of a pose (s, 3), m, as :mod:`palpate.gauge` has it."""
+        pose = self._of(displacements)
+        if self._recovery is None:
+            return pose.once("largest", lambda: self._simulation.strain_gauge.largest(displacements))
+        return float(largest_magnitude(self._stress(pose).strain).max())
+
+    def picture(self, name: str, displacements: np.ndarray, interior: bool) -> Picture:
+        """Field of a pose; a name that this body does not offer gives the first field."""
+        field = next((f for f in self.offered if f.name == name), self.offered[0])
+        inside = interior and self._recovery is not None
+        pose = self._of(displacements)
+        shown = self._extended(pose) if inside else displacements
+        values = self._values(field, pose, shown, inside)
+        largest = self._range(field, float(np.abs(values).max()))
+        scaled = 127.5 + 127.5 * values / largest if field.signed else 255.0 * values / largest
+        header = {"name": field.name, "title": field.title, "unit": field.unit, "max": largest, "signed": field.signed}
+        return Picture(header, shown, np.rint(np.clip(scaled, 0.0, 255.0)), inside)
+
+    def _values(self, field: Field, pose: _Pose, displacements: np.ndarray, inside: bool) -> np.ndarray:
+        """Values in the field's unit at the nodes that are drawn."""
+        if field is DISPLACEMENT:
+            return 1e3 * np.sqrt(np.einsum("ij,ij->i", displacements, displacements))
+        if field is SURFACE_STRAIN:
+            assert self._surface is not None
+            return 100.0 * self._surface.at_nodes(displacements)
+        found = self._stress_inside(pose) if inside else self._stress(pose)
+        if field is STRAIN:
+            return 100.0 * largest_magnitude(found.strain)
+        # A stiffness changed while running scales stress, not strain.
+        scale = self._simulation.stiffness_scale
+        return scale * (found.von_mises if field is VON_MISES else extreme_values(found.stress)[0])
+
+    def _range(self, field: Field, largest: float) -> float:
+        now = time.monotonic()
+        before, then = self._ranges.get(field.name, (0.0, now))
+        decayed = largest + (before - largest) * math.exp((then - now) / DECAY)
+        span = max(largest, decayed, self._least(field))
+        self._ranges[field.name] = span, now
+        return span
+
+    def _least(self, field: Field) -> float:
+        if field.unit == "mm":
+            return 1e3 * LEAST * self._size
+        if field.unit == "%":
+            return 100.0 * LEAST
+        assert self._recovery is not None
+        return LEAST * self._recovery.largest_youngs_modulus * self._simulation.stiffness_scale
+
+    def _of(self, displacements: np.ndarray) -> _Pose:
+        """Keep what is known already of a pose that is the one before."""
+        if not np.array_equal(self._pose.displacements, displacements):
+            self._pose = _Pose(displacements)
+        return self._pose
+
+    def _extended(self, pose: _Pose) -> np.ndarray:
+        return pose.once("extended", lambda: self._interior.extend(pose.displacements))
+
+    def _stress(self, pose: _Pose) -> SurfaceStress:
+        assert self._recovery is not None
+        recover = self._recovery.recover_inside
+        return pose.once("surface", lambda: recover(self._extended(pose)))
+
+    def _stress_inside(self, pose: _Pose) -> SurfaceStress:
+        if self._inside is None:  # most people never cut
+            body = self._simulation.body
+            assert body is not None
+            self._inside = StressRecovery(body, np.arange(len(body.mesh.nodes)), self._interior)
+        recover = self._inside.recover_inside
+        return pose.once("inside", lambda: recover(self._extended(pose)))
+
+    @property
+    def _interior(self) -> Interior:
+        assert self._recovery is not None
+        return self._recovery.interior
+
+
+class _Pose:
+    """Displacements, and what was computed from them."""
+
+    def __init__(self, displacements: np.ndarray):
+        self.displacements = displacements
+        self._known: dict[str, Any] = {}
+
+    def once(self, name: str, compute: Callable[[], Any]) -> Any:
+        if name not in self._known:
+            self._known[name] = compute()
+        return self._known[name]

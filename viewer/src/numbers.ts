@@ -1,0 +1,15 @@
+// Numbers as people read them.
+
+export const MINUS = "\u2212";
+
+/** With its sign, two places: +0.42. */
+export function signed(value: number): string {
+  const text = Math.abs(value).toFixed(2);
+  if (Number(text) === 0) return text;
+  return (value < 0 ? MINUS : "+") + text;
+}
+
+/** Three digits where the number has them: 0.42, 3.14, 12.5. */
+export function threeDigits(value: number): string {
+  return value.toFixed(value >= 9.995 ? 1 : 2);
+}
