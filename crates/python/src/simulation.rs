@@ -80,6 +80,7 @@ impl SimulationCore {
                 time_scale: 1.0,
                 strike: Strike::default(),
                 strikes: 0,
+                watch: 0,
             },
             handles: Vec::new(),
             targets: vec![Target::default(); tools],
@@ -143,6 +144,12 @@ impl SimulationCore {
         self.tell();
     }
 
+    /// Surface node (rank) whose displacement is logged.
+    fn watch(&mut self, rank: u32) {
+        self.settings.watch = rank;
+        self.tell();
+    }
+
     /// Whether contacts of this radius (m) can be weighed everywhere on the surface.
     fn accepts_contact_radius(&self, py: Python<'_>, radius: f64) -> bool {
         py.detach(|| self.model.check_contact_radius(radius).is_ok())
@@ -196,7 +203,8 @@ impl SimulationCore {
         Some((record, fields.map(|field| field.into_pyarray(py)).into()))
     }
 
-    /// Rows (9 a tick) of the log since the last call: time, position, force, computing time, wake-up delay.
+    /// Rows (18 a tick) of the log since the last call: time, position, force, computing time, wake-up delay, displacement
+    /// of the watched node, body time, energies.
     fn drain_log<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
         if let Some(servo) = self.servo() {
@@ -205,6 +213,9 @@ impl SimulationCore {
                 rows.extend(row.position.to_array());
                 rows.extend(row.force.to_array());
                 rows.extend([row.compute_us, row.wakeup_us]);
+                rows.extend(row.watched.to_array());
+                rows.push(row.body_time);
+                rows.extend(energy_array(&row.energy));
             });
         }
         rows.into_pyarray(py)

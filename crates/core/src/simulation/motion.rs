@@ -77,6 +77,8 @@ pub struct Motion {
     residual: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
     /// Body time not yet stepped through, s.
     due: f64,
+    /// Body time since the start, s.
+    pub time: f64,
     /// Force on the body and tool position at the end of the last step, where in contact.
     last: [Option<(DVec3, DVec3)>; MAX_TOOLS],
     /// Where the energy is.
@@ -105,6 +107,7 @@ impl Motion {
             struck_at: DVec3::ZERO,
             residual: Default::default(),
             due: 0.0,
+            time: 0.0,
             last: Default::default(),
             energy: Energy::default(),
             modal,
@@ -279,6 +282,7 @@ pub(super) fn predict(model: &Model, state: &mut State) -> bool {
     let due = motion.due > 0.999 * dynamics.modes.dt;
     if due {
         motion.due -= dynamics.modes.dt;
+        motion.time += dynamics.modes.dt;
         motion.predict(&dynamics.modes);
     }
     due

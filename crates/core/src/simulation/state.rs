@@ -66,6 +66,8 @@ pub struct Snapshot {
     pub tools: [ToolContact; MAX_TOOLS],
     /// Where the energy of a body in motion is.
     pub energy: Option<Energy>,
+    /// Time that a body in motion has gone through since the start, s.
+    pub body_time: f64,
     stiffness_scale: f64,
     /// Modal displacements beyond the static ones; empty for a body at rest.
     moving: Vec<Lanes>,
@@ -77,7 +79,7 @@ impl State {
         snapshot.tools.clone_from(&self.tools);
         snapshot.stiffness_scale = self.stiffness_scale;
         if let (Some(motion), Some(dynamics)) = (&self.motion, &model.dynamics) {
-            snapshot.energy = Some(motion.energy);
+            (snapshot.energy, snapshot.body_time) = (Some(motion.energy), motion.time);
             motion.drawn_into(&dynamics.modes, &self.tools, &mut snapshot.moving);
         }
     }
