@@ -254,8 +254,10 @@ class Simulation:
         self._scale = youngs_modulus / reference
         self._core.configure(self._contact_radius, self._scale, False)
 
-    def strike(self, point: Sequence[float], impulse: Sequence[float]) -> None:
+    def strike(self, point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> None:
         """Strike a body in motion: an impulse (3,), N s, on the patch around the surface point closest to ``point``, m.
+
+        The force is half a wave of ``duration``, s; it takes one time step at least and a thousand at most.
 
         Raises
         ------
@@ -264,7 +266,7 @@ class Simulation:
 
         """
         self._require_motion("strike")
-        self._core.strike(_three(point, "a strike's point"), _three(impulse, "a strike's impulse"))
+        self._core.strike(*_blow(point, impulse, duration))
 
     def set_time_scale(self, time_scale: float) -> None:
         """Seconds that a body in motion advances in a second, in (0, 1]: below one is slow motion.
@@ -379,7 +381,7 @@ class Simulation:
     def play(
         self,
         positions: np.ndarray,
-        strikes: Sequence[tuple[int, Sequence[float], Sequence[float]]] = (),
+        strikes: Sequence[tuple] = (),
         watch: Sequence[int] = (),
     ) -> Recording:
         """Run a script of ticks without a clock; the same script gives the same bits.
@@ -389,7 +391,7 @@ class Simulation:
         positions
             (t, 3) m of the tool; a row of NaN takes it out of the scene.
         strikes
-            Blows ``(tick, point, impulse)`` for a body in motion, as of :meth:`strike`.
+            Blows ``(tick, point, impulse)`` or ``(tick, point, impulse, duration)``, as of :meth:`strike`.
         watch
             Surface nodes whose displacements are recorded.
 
@@ -404,7 +406,7 @@ class Simulation:
             raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
         if strikes:
             self._require_motion("strike")
-        blows = [(int(k), _three(p, "a strike's point"), _three(i, "a strike's impulse")) for k, p, i in strikes]
+        blows = [(int(tick), *_blow(*blow)) for tick, *blow in strikes]
         ranks = self._ranks_of(watch)
         forces, energies, moved, fault = self._core.run(path, sorted(blows, key=lambda blow: blow[0]), ranks.tolist())
         if fault is not None:
@@ -436,6 +438,12 @@ class Simulation:
         if not 0 <= tool < self._tools:
             raise SceneError(f"there is no tool {tool}: the scene has {self._tools}")
         return tool
+
+
+def _blow(point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> tuple:
+    if not (np.isfinite(duration) and duration >= 0):
+        raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
+    return _three(point, "a strike's point"), _three(impulse, "a strike's impulse"), float(duration)
 
 
 def _three(values: Sequence[float], what: str) -> tuple[float, float, float]:

@@ -137,9 +137,9 @@ impl SimulationCore {
         self.tell();
     }
 
-    /// Gives the surface point closest to `point` (m) an impulse, N s.
-    fn strike(&mut self, point: [f64; 3], impulse: [f64; 3]) {
-        self.settings.strike = Strike { point: point.into(), impulse: impulse.into() };
+    /// Gives the surface point closest to `point` (m) an impulse, N s, within a duration, s.
+    fn strike(&mut self, point: [f64; 3], impulse: [f64; 3], duration: f64) {
+        self.settings.strike = Strike { point: point.into(), impulse: impulse.into(), duration };
         self.settings.strikes = self.settings.strikes.wrapping_add(1);
         self.tell();
     }
@@ -222,21 +222,23 @@ impl SimulationCore {
     }
 
     /// Moves the first tool through (t, 3) positions offline, NaN where it is out of the scene, with blows `(tick, point,
-    /// impulse)` in order of time: forces on the device (3t), energies (5t; empty for a body that does not move),
+    /// impulse, duration)` in order of time: forces on the device (3t), energies (5t; empty for a body that does not move),
     /// displacements of the watched surface ranks (3 a node and tick), and the fault, if one latched.
     #[allow(clippy::type_complexity)] // four arrays read once
     fn run<'py>(
         &self,
         py: Python<'py>,
         positions: PyReadonlyArray2<'py, f64>,
-        strikes: Vec<(usize, [f64; 3], [f64; 3])>,
+        strikes: Vec<(usize, [f64; 3], [f64; 3], f64)>,
         watch: Vec<u32>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Option<&'static str>)>
     {
         let positions = vectors(&positions).map_err(|e| to_python(py, e))?;
         let strikes: Vec<_> = strikes
             .into_iter()
-            .map(|(tick, point, impulse)| (tick, Strike { point: point.into(), impulse: impulse.into() }))
+            .map(|(tick, point, impulse, duration)| {
+                (tick, Strike { point: point.into(), impulse: impulse.into(), duration })
+            })
             .collect();
         let input = Input {
             contact_radius: self.settings.contact_radius,

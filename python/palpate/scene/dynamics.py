@@ -28,10 +28,11 @@ Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class StrikeTable(Table):
-    """A blow on the surface point closest to a point; ``impulse`` is in N s."""
+    """A blow on the surface point closest to a point; ``impulse`` is in N s, ``duration`` 0 is a single time step."""
 
     point: Point
     impulse: Direction
+    duration: Time = 0.0
 
 
 class DynamicsTable(Table):

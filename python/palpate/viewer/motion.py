@@ -11,6 +11,7 @@ import numpy as np
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
 from palpate.scene import BuiltScene
+from palpate.scene.dynamics import StrikeTable
 from palpate.selection import free_end
 from palpate.simulation import Contact, Simulation
 from palpate.strain import HONEST_STRAIN
@@ -22,10 +23,14 @@ LISTED_MODES = 20
 SHOWN_HZ = 1.0
 # A mode shape swings by this part of the body's size, unless that would strain the body beyond what is honest.
 MODE_SWING = 0.08
-# Strain that the default blow leaves room for, and the instants (s) at which the first period is looked at.
-DEFAULT_STRAIN, FIRST_INSTANT, INSTANTS = 0.8 * HONEST_STRAIN, 2e-3, 40
+# A blow lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
+BLOW_PERIODS = 0.06
+# Strain that the default blow leads to, instants of the first period that are looked at, and parts the blow is cut into.
+DEFAULT_STRAIN, INSTANTS, BLOW_PARTS = 0.8 * HONEST_STRAIN, 40, 9
 # Blows go up to this many times the default.
 STRONGEST = 10.0
+# Slow motion that the page offers, and the fastest swing that an eye follows.
+TIME_SCALES, FOLLOWED_HZ = (1.0, 0.25, 0.1), 4.0
 # The history shows the first of these spans (s) that holds so many periods of the first mode.
 SPANS, PERIODS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0), 10
 # Columns of the history: body time, displacement of the watched node, kinetic, strain, total energy, work.
@@ -52,7 +57,7 @@ class MovingBody:
         self._green, self._motion = built.green, built.motion
         self._first_strike = built.scene.dynamics.strike
         self._patch_radius = built.scene.tool.contact_radius
-        self.time_scale = 1.0
+        self._duration = BLOW_PERIODS / float(built.motion.basis.frequencies[0])
         self.watched = self._closest_node(self._first_strike.point) if self._first_strike else free_end(built.body)
         self.impulse = self._default_impulse(self.watched)
         given = 0.0 if self._first_strike is None else float(np.linalg.norm(self._first_strike.impulse))
@@ -61,6 +66,7 @@ class MovingBody:
         self._mode: _ShownMode | None = None
         self._touched: np.ndarray | None = None
         simulation.watch(self.watched)
+        self.set_time_scale(self._first_time_scale())
 
     def header(self) -> dict[str, Any]:
         """Return the part of the scene message that tells of the motion."""
@@ -90,9 +96,18 @@ class MovingBody:
             raise ViewerError("strike: the point is far away from the body")
         if not 0.0 < size <= self.max_impulse:
             raise ViewerError(f"strike: the impulse must lie between 0 and {self.max_impulse:.3g} N s on this body")
+        self._give(StrikeTable(point=tuple(point), impulse=tuple(impulse), duration=self._duration), now)
+
+    def repeat(self, now: float) -> None:
+        """Give the scene's own blow at the body time ``now``."""
+        if self._first_strike is None:
+            raise ViewerError("repeat: the scene has no strike of its own")
+        self._give(self._first_strike, now)
+
+    def _give(self, blow: StrikeTable, now: float) -> None:
         self.end_mode()
-        self._watch(self._closest_node(point))
-        self._simulation.strike(point, impulse)
+        self._watch(self._closest_node(blow.point))
+        self._simulation.strike(blow.point, blow.impulse, blow.duration)
         self.struck_at = now
 
     def set_time_scale(self, time_scale: float) -> None:
@@ -127,6 +142,13 @@ class MovingBody:
             self._watch(int(contact.nodes[np.argmax(contact.weights)]))
         self._touched = None if contact is None else contact.point
 
+    def _first_time_scale(self) -> float:
+        """Slow enough for the scene's own blow to be followed by eye; a body without one moves at its own pace."""
+        if self._first_strike is None:
+            return 1.0
+        frequency = self._motion.basis.frequencies[0]
+        return next((scale for scale in TIME_SCALES if scale * frequency <= FOLLOWED_HZ), TIME_SCALES[-1])
+
     def _watch(self, node: int) -> None:
         self.watched = node
         self._simulation.watch(node)
@@ -150,8 +172,8 @@ class MovingBody:
     def _default_impulse(self, node: int) -> float:
         """Blow on a patch around a node, along its motion in the first mode, that stays within honest strain, N s.
 
-        From rest a blow `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from then on
-        it swings freely. The strain is proportional to the blow.
+        From rest a short blow `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from
+        then on it swings freely; a longer one is a row of short ones. The strain is proportional to the blow.
         """
         basis = self._motion.basis
         positions, shapes = self._green.surface_positions, basis.shapes[self._green.surface_nodes]
@@ -161,8 +183,15 @@ class MovingBody:
         weights[rank] = 1.0
         patch = np.tensordot(weights / weights.sum(), shapes, axes=1)
         direction = shapes[rank, :, 0] / np.linalg.norm(shapes[rank, :, 0])
-        instants = np.geomspace(FIRST_INSTANT, max(1.0 / basis.frequencies[0], 2 * FIRST_INSTANT), INSTANTS)
-        poses = shapes.reshape(-1, len(basis)) @ _ringing(basis, self._motion.scheme, direction @ patch, instants)
+        instants = np.geomspace(0.2 * self._duration, 1.0 / basis.frequencies[0], INSTANTS)
+        parts = (np.arange(BLOW_PARTS) + 1) / (BLOW_PARTS + 1)
+        shares = np.sin(np.pi * parts) / np.sin(np.pi * parts).sum()
+        swings = np.zeros((len(basis), INSTANTS))
+        for part, share in zip(parts, shares, strict=True):
+            since = instants - part * self._duration
+            after = since > 0
+            swings[:, after] += share * _ringing(basis, self._motion.scheme, direction @ patch, since[after])
+        poses = shapes.reshape(-1, len(basis)) @ swings
         largest = max(self._strain_of(pose.reshape(-1, 3)) for pose in poses.T)
         return DEFAULT_STRAIN / largest
 

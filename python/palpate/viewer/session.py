@@ -102,6 +102,7 @@ class Session:
             "set": self._set,
             "reset": self._reset,
             "strike": self._strike,
+            "repeat": self._repeat,
             "mode": self._mode,
         }
         handler = handlers.get(message["type"])
@@ -202,6 +203,7 @@ class Session:
             raise ViewerError("press: the position is far away from the body")
         if self._moving is not None:
             self._moving.end_mode()
+            self._moving.struck_at = None
         self._tool.move(position)
         self.simulation.grab(grab)
         self.active = True
@@ -264,10 +266,17 @@ class Session:
 
     def _strike(self, message: Mapping[str, Any]) -> bool:
         moving = self._in_motion("strike")
-        # Up to this moment, so that the blow is dated right.
-        self._keep_log()
-        moving.strike(message, REACH * self.size, self._centre, self._body_time)
+        moving.strike(message, REACH * self.size, self._centre, self._now())
         return False
+
+    def _repeat(self, _message: Mapping[str, Any]) -> bool:
+        self._in_motion("repeat").repeat(self._now())
+        return False
+
+    def _now(self) -> float:
+        """Body time up to this moment."""
+        self._keep_log()
+        return self._body_time
 
     def _mode(self, message: Mapping[str, Any]) -> bool:
         moving = self._in_motion("mode")
