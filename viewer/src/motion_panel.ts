@@ -55,6 +55,7 @@ export class MotionPanel {
     if (!scene) return;
     this.impulseSlider.valueAsNumber = 1 - Math.log(scene.impulse / scene.max_impulse) / Math.log(WEAKEST);
     setText(byId("impulse-value"), newtonSeconds(this.impulse));
+    this.setTimeScale(scene.time_scale);
     setText(byId("mode-count"), `the first ${scene.frequencies.length} of ${scene.modes}`);
     this.modeList.replaceChildren(...scene.frequencies.map((frequency, i) => this.modeButton(i + 1, frequency)));
     this.enable();
@@ -101,6 +102,8 @@ export class MotionPanel {
     for (const other of TABS) byId(`tab-${other}`).setAttribute("aria-pressed", String(other === tab));
     byId("modes").hidden = tab !== "modes";
     byId("plot-pairs").hidden = tab === "modes";
+    // Room for what belongs to the motion; the loop's timing stands below the loop's plots.
+    byId("statistics").hidden = tab !== "loop";
     if (tab !== "modes") this.handlers.onPlots(tab);
   }
 

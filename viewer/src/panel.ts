@@ -88,7 +88,7 @@ export class Panel {
     if (modulus === null) this.modulusRange = null;
     else this.modulusRange = usual ? [TISSUE_MIN, TISSUE_MAX] : [modulus / 10, modulus * 10];
     const moving = scene.motion?.youngs_modulus;
-    this.fixedModulus = moving == null ? "several materials" : `${pascals(moving)}, fixed in motion`;
+    this.fixedModulus = moving == null ? "several materials" : `${pascals(moving)}, fixed`;
     byId("stiffness-field").title = scene.motion ? "The modes of a body in motion belong to its stiffness" : "";
     this.changedMs = -Infinity;
     // A bare store has no tetrahedra to be shown.

@@ -10,6 +10,8 @@ import { LogWindow, WINDOW_S } from "./log_window";
 /** The eye does not follow faster, and every redraw costs the page time. */
 const REDRAW_INTERVAL_MS = 80;
 const HEIGHT_PX = 112;
+/** Above these stands what their lines mean. */
+const MOTION_HEIGHT_PX = 102;
 // Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
 const FONT = "11px system-ui, sans-serif";
 const TEXT_COLOR = "#9aa5b4";
@@ -84,9 +86,11 @@ export class Plots {
   }
 
   private resize(): void {
-    for (const plot of Object.values(this.plots)) {
+    const { force, compute, displacement, energy } = this.plots;
+    for (const plot of [force, compute, displacement, energy]) {
       const width = plot.root.parentElement!.clientWidth;
-      if (width > 0 && width !== plot.width) plot.setSize({ width, height: HEIGHT_PX });
+      const height = plot === force || plot === compute ? HEIGHT_PX : MOTION_HEIGHT_PX;
+      if (width > 0 && width !== plot.width) plot.setSize({ width, height });
     }
   }
 }
@@ -111,9 +115,9 @@ function createPlot(id: string, time: TimeAxis, label: string, colors: string[],
   const box = byId(id);
   const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
   const options: uPlot.Options = {
-    width: box.clientWidth || 268,
+    width: 0,
     height: HEIGHT_PX,
-    padding: [8, 6, 0, 0],
+    padding: [8, 10, 0, 0],
     legend: { show: false },
     cursor: { show: false },
     scales: { x: { time: false, range: () => time.range() }, y: { range } },
@@ -127,7 +131,7 @@ function createPlot(id: string, time: TimeAxis, label: string, colors: string[],
         splits: () => fifths(...time.range()),
         values: (_plot, splits) => splits.map((split) => String(Number(Math.abs(split).toPrecision(3)))),
       },
-      { ...axis, size: 38, space: 24, label, labelSize: 14, labelGap: 0 },
+      { ...axis, size: 38, space: 20, label, labelSize: 14, labelGap: 0 },
     ],
     series: [{}, ...colors.map((stroke) => ({ stroke, width: 1.25, points: { show: false } }))],
     hooks: { drawClear: [(plot) => void (plot.axes[0]!.label = time.label())] },

@@ -42,6 +42,8 @@ export interface MotionScene {
   frequencies: number[];
   /** How many modes there are. */
   modes: number;
+  /** Seconds that it moves in a second. */
+  time_scale: number;
   /** A blow that the body stands well, and the strongest that is taken, N s. */
   impulse: number;
   max_impulse: number;

@@ -25,14 +25,17 @@ SHOWN_HZ = 1.0
 MODE_SWING = 0.08
 # A blow lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
 BLOW_PERIODS = 0.06
-# Strain that the default blow leads to, instants of the first period that are looked at, and parts the blow is cut into.
-DEFAULT_STRAIN, INSTANTS, BLOW_PARTS = 0.8 * HONEST_STRAIN, 40, 9
+# Strain that the default blow is seen to lead to at instants of the first period (peaks between them are higher, and so
+# are those of other places), how many, and parts the blow is cut into.
+DEFAULT_STRAIN, INSTANTS, BLOW_PARTS = 0.5 * HONEST_STRAIN, 24, 9
+# It is tried where so large a part of the surface follows the first mode less, on at least so many nodes.
+FOLLOWING, NEIGHBOURS = 0.9, 6
 # Blows go up to this many times the default.
 STRONGEST = 10.0
 # Slow motion that the page offers, and the fastest swing that an eye follows.
 TIME_SCALES, FOLLOWED_HZ = (1.0, 0.25, 0.1), 4.0
 # The history shows the first of these spans (s) that holds so many periods of the first mode.
-SPANS, PERIODS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0), 10
+SPANS, PERIODS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0), 6
 # Columns of the history: body time, displacement of the watched node, kinetic, strain, total energy, work.
 HISTORY_COLUMNS = 8
 
@@ -59,7 +62,7 @@ class MovingBody:
         self._patch_radius = built.scene.tool.contact_radius
         self._duration = BLOW_PERIODS / float(built.motion.basis.frequencies[0])
         self.watched = self._closest_node(self._first_strike.point) if self._first_strike else free_end(built.body)
-        self.impulse = self._default_impulse(self.watched)
+        self.impulse = self._default_impulse()
         given = 0.0 if self._first_strike is None else float(np.linalg.norm(self._first_strike.impulse))
         self.max_impulse = max(STRONGEST * self.impulse, given)
         self.struck_at: float | None = None
@@ -71,13 +74,15 @@ class MovingBody:
     def header(self) -> dict[str, Any]:
         """Return the part of the scene message that tells of the motion."""
         basis, strike = self._motion.basis, self._first_strike
-        first = 1.0 / basis.frequencies[0]
+        # After the scene's own blow there is nothing before it to be seen.
+        shown = (PERIODS if strike is None else 2 * PERIODS) / basis.frequencies[0]
         return {
             "frequencies": basis.frequencies[:LISTED_MODES].tolist(),
             "modes": len(basis),
+            "time_scale": self.time_scale,
             "impulse": self.impulse,
             "max_impulse": self.max_impulse,
-            "span": next((span for span in SPANS if span >= PERIODS * first), SPANS[-1]),
+            "span": next((span for span in SPANS if span >= shown), SPANS[-1]),
             "youngs_modulus": self._green.youngs_modulus,
             "strike": None if strike is None else {"point": strike.point, "impulse": strike.impulse},
         }
@@ -169,20 +174,17 @@ class MovingBody:
         gauge, free = self._simulation.strain_gauge, self._green.free_displacements
         return float(gauge.magnitudes(gauge.sample(free + displacements) - gauge.sample(free)).max())
 
-    def _default_impulse(self, node: int) -> float:
-        """Blow on a patch around a node, along its motion in the first mode, that stays within honest strain, N s.
+    def _default_impulse(self) -> float:
+        """Blow along the normal, where the surface follows the first mode well, that stays within honest strain, N s.
 
         From rest a short blow `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from
         then on it swings freely; a longer one is a row of short ones. The strain is proportional to the blow.
         """
-        basis = self._motion.basis
-        positions, shapes = self._green.surface_positions, basis.shapes[self._green.surface_nodes]
-        rank = int(np.searchsorted(self._green.surface_nodes, node))
-        distance = np.linalg.norm(positions - positions[rank], axis=1)
-        weights = np.where(distance < self._patch_radius, (1 - (distance / max(self._patch_radius, 1e-12)) ** 2) ** 2, 0)
-        weights[rank] = 1.0
-        patch = np.tensordot(weights / weights.sum(), shapes, axes=1)
-        direction = shapes[rank, :, 0] / np.linalg.norm(shapes[rank, :, 0])
+        basis, surface = self._motion.basis, self._green.surface_nodes
+        shapes, normals = basis.shapes[surface], self._normals()
+        follows = np.abs(np.einsum("ij,ij->i", shapes[:, :, 0], normals))
+        node = int(np.argsort(follows)[int(FOLLOWING * (len(surface) - 1))])
+        blow = normals[node] @ np.tensordot(self._patch_around(node), shapes, axes=1)
         instants = np.geomspace(0.2 * self._duration, 1.0 / basis.frequencies[0], INSTANTS)
         parts = (np.arange(BLOW_PARTS) + 1) / (BLOW_PARTS + 1)
         shares = np.sin(np.pi * parts) / np.sin(np.pi * parts).sum()
@@ -190,10 +192,27 @@ class MovingBody:
         for part, share in zip(parts, shares, strict=True):
             since = instants - part * self._duration
             after = since > 0
-            swings[:, after] += share * _ringing(basis, self._motion.scheme, direction @ patch, since[after])
+            swings[:, after] += share * _ringing(basis, self._motion.scheme, blow, since[after])
         poses = shapes.reshape(-1, len(basis)) @ swings
-        largest = max(self._strain_of(pose.reshape(-1, 3)) for pose in poses.T)
-        return DEFAULT_STRAIN / largest
+        return DEFAULT_STRAIN / max(self._strain_of(pose.reshape(-1, 3)) for pose in poses.T)
+
+    def _patch_around(self, node: int) -> np.ndarray:
+        """Weights (s,) about as a contact there has them: its radius, or on a coarse mesh the nearest neighbours."""
+        positions = self._green.surface_positions
+        distance = np.linalg.norm(positions - positions[node], axis=1)
+        radius = max(self._patch_radius, 1.01 * np.partition(distance, NEIGHBOURS)[NEIGHBOURS])
+        weights = np.where(distance < radius, (1 - (distance / radius) ** 2) ** 2, 0.0)
+        return weights / weights.sum()
+
+    def _normals(self) -> np.ndarray:
+        """Unit normals (s, 3) at the surface nodes, each triangle by its area."""
+        positions = self._green.surface_positions
+        corners = np.searchsorted(self._green.surface_nodes, self._green.surface_triangles)
+        a, b, c = (positions[corners[:, k]] for k in range(3))
+        normals, areas = np.zeros_like(positions), np.cross(b - a, c - a)
+        for k in range(3):
+            np.add.at(normals, corners[:, k], areas)
+        return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 class _ShownMode:
