@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.errors import BodyError
+
+if TYPE_CHECKING:
+    from palpate.body import Body
 
 Selection = Sequence[int] | np.ndarray | Callable[[np.ndarray], np.ndarray]
 
@@ -43,3 +46,12 @@ def selected_nodes(selection: Selection, nodes: np.ndarray, what: str) -> np.nda
         if selection.dtype != bool:
             raise BodyError(f"the function for {what} must return a boolean mask of length {len(nodes)}")
     return node_indices(selection, len(nodes), what)
+
+
+def free_end(body: Body) -> int:
+    """Free surface node farthest from the supports; the highest of several."""
+    free = np.setdiff1d(body.mesh.surface_nodes, body.fixed_nodes)
+    nodes, held = body.mesh.nodes[free], body.mesh.nodes[body.fixed_nodes].mean(axis=0)
+    # To the micrometre: nodes that symmetry puts equally far must not be told apart by round-off.
+    distance = np.linalg.norm(nodes - held, axis=1).round(6)
+    return int(free[np.lexsort((nodes[:, 2], distance))[-1]])

@@ -19,6 +19,8 @@ from palpate.stress import SurfaceStress
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
+    + [("watched", "f8", 3), ("body_time", "f8")]
+    + [(name, "f8") for name in ("kinetic", "strain", "coupling", "dissipated", "work")]
 )
 # Ticks a second.
 RATE = 1000.0
@@ -252,8 +254,10 @@ class Simulation:
         self._scale = youngs_modulus / reference
         self._core.configure(self._contact_radius, self._scale, False)
 
-    def strike(self, point: Sequence[float], impulse: Sequence[float]) -> None:
+    def strike(self, point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> None:
         """Strike a body in motion: an impulse (3,), N s, on the patch around the surface point closest to ``point``, m.
+
+        The force is half a wave of ``duration``, s; it takes one time step at least and a thousand at most.
 
         Raises
         ------
@@ -262,7 +266,7 @@ class Simulation:
 
         """
         self._require_motion("strike")
-        self._core.strike(_three(point, "a strike's point"), _three(impulse, "a strike's impulse"))
+        self._core.strike(*_blow(point, impulse, duration))
 
     def set_time_scale(self, time_scale: float) -> None:
         """Seconds that a body in motion advances in a second, in (0, 1]: below one is slow motion.
@@ -277,6 +281,17 @@ class Simulation:
         if not 0 < time_scale <= 1:
             raise SceneError(f"the time scale must lie in (0, 1], got {time_scale}")
         self._core.set_time_scale(float(time_scale))
+
+    def watch(self, node: int) -> None:
+        """Log the displacement of a surface node (mesh index) from now on; at first it is the lowest one's.
+
+        Raises
+        ------
+        SceneError
+            A node that is not on the surface.
+
+        """
+        self._core.watch(int(self._ranks_of([node])[0]))
 
     def reset(self) -> None:
         """Let go of everything and clear a latched fault; forces ramp in anew."""
@@ -334,7 +349,11 @@ class Simulation:
         return SurfaceStress(self._scale * field.stress, field.strain)
 
     def drain_log(self) -> np.ndarray:
-        """Rows of the 1 kHz log since the last call: time, position, force, compute_us, wakeup_us."""
+        """Rows of the 1 kHz log since the last call.
+
+        ``time``, ``position``, ``force``, ``compute_us``, ``wakeup_us``; ``watched``, the displacement of the node of
+        :meth:`watch`, m; and of a body in motion ``body_time``, s, and its energies, J, as in :class:`MotionEnergy`.
+        """
         return np.ascontiguousarray(self._core.drain_log()).view(LOG_DTYPE)
 
     def run(self, positions: np.ndarray) -> np.ndarray:
@@ -362,7 +381,7 @@ class Simulation:
     def play(
         self,
         positions: np.ndarray,
-        strikes: Sequence[tuple[int, Sequence[float], Sequence[float]]] = (),
+        strikes: Sequence[tuple] = (),
         watch: Sequence[int] = (),
     ) -> Recording:
         """Run a script of ticks without a clock; the same script gives the same bits.
@@ -372,7 +391,7 @@ class Simulation:
         positions
             (t, 3) m of the tool; a row of NaN takes it out of the scene.
         strikes
-            Blows ``(tick, point, impulse)`` for a body in motion, as of :meth:`strike`.
+            Blows ``(tick, point, impulse)`` or ``(tick, point, impulse, duration)``, as of :meth:`strike`.
         watch
             Surface nodes whose displacements are recorded.
 
@@ -387,22 +406,25 @@ class Simulation:
             raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
         if strikes:
             self._require_motion("strike")
-        blows = [(int(k), _three(p, "a strike's point"), _three(i, "a strike's impulse")) for k, p, i in strikes]
-        nodes = np.asarray(watch, dtype=np.int64)
-        absent = np.setdiff1d(nodes, self.green.surface_nodes)
-        if absent.size:
-            raise SceneError(f"node {absent[0]} is not on the surface: it cannot be watched")
-        ranks = np.searchsorted(self.green.surface_nodes, nodes).tolist()
-        forces, energies, moved, fault = self._core.run(path, sorted(blows, key=lambda blow: blow[0]), ranks)
+        blows = [(int(tick), *_blow(*blow)) for tick, *blow in strikes]
+        ranks = self._ranks_of(watch)
+        forces, energies, moved, fault = self._core.run(path, sorted(blows, key=lambda blow: blow[0]), ranks.tolist())
         if fault is not None:
             raise SceneError(fault)
         energy = MotionEnergy(*energies.reshape(-1, 5).T) if len(energies) else None
         time = np.arange(1, len(path) + 1) / RATE
-        return Recording(time, forces.reshape(-1, 3), moved.reshape(len(path), len(nodes), 3), energy)
+        return Recording(time, forces.reshape(-1, 3), moved.reshape(len(path), len(ranks), 3), energy)
 
     def _moving(self, motion: Motion) -> tuple:
         shapes = motion.basis.shapes[self.green.surface_nodes].reshape(-1, len(motion.basis))
         return motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling
+
+    def _ranks_of(self, nodes: Sequence[int]) -> np.ndarray:
+        watched = np.asarray(nodes, dtype=np.int64)
+        absent = np.setdiff1d(watched, self.green.surface_nodes)
+        if absent.size:
+            raise SceneError(f"node {absent[0]} is not on the surface: it cannot be watched")
+        return np.searchsorted(self.green.surface_nodes, watched)
 
     def _require_motion(self, what: str) -> None:
         if self.motion is None:
@@ -416,6 +438,12 @@ class Simulation:
         if not 0 <= tool < self._tools:
             raise SceneError(f"there is no tool {tool}: the scene has {self._tools}")
         return tool
+
+
+def _blow(point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> tuple:
+    if not (np.isfinite(duration) and duration >= 0):
+        raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
+    return _three(point, "a strike's point"), _three(impulse, "a strike's impulse"), float(duration)
 
 
 def _three(values: Sequence[float], what: str) -> tuple[float, float, float]:

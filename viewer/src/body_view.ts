@@ -79,7 +79,9 @@ export class BodyView {
     if (this.drawn && same(this.drawn.displacements, displacements) && same(this.drawn.scalar, scalar)) return false;
     this.drawn = frame.arrays;
     this.surface.displace(displacements, interior ? arrays.surface_nodes : null);
-    if (frame.header.contacts.length === 0) this.surface.keepAsUntouched();
+    // A mode shape is only shown: a tool meets the body at rest.
+    if (frame.header.motion?.mode) this.surface.settle();
+    else if (frame.header.contacts.length === 0) this.surface.keepAsUntouched();
     this.solid.update(scalar);
     if (this.cutawayShown) this.cutaway?.displaceAll(displacements, scalar, interior ? null : arrays.surface_nodes);
     return true;
@@ -99,7 +101,8 @@ export class BodyView {
       const place = { corners: this.surface.cornersOf(faceIndex), weights: [x, y, z] as Vec3 };
       const untouched = new THREE.Vector3(...this.surface.at(this.surface.untouched, place));
       const normal = new THREE.Vector3(...this.surface.at(this.surface.untouchedNormals, place)).normalize();
-      return { shown: point.clone(), untouched, normal };
+      const settled = new THREE.Vector3(...this.surface.at(this.surface.settled, place));
+      return { shown: point.clone(), untouched, settled, normal };
     }
     return null;
   }
@@ -117,10 +120,11 @@ export class BodyView {
   }
 }
 
-/** A touched point: where it is seen, where it is while nothing is touched, and the outward normal there then. */
+/** A touched point: where it is seen, while nothing is touched, at rest; and the outward normal while nothing is. */
 export interface Pick {
   shown: THREE.Vector3;
   untouched: THREE.Vector3;
+  settled: THREE.Vector3;
   normal: THREE.Vector3;
 }
 

@@ -13,3 +13,13 @@ export function signed(value: number): string {
 export function threeDigits(value: number): string {
   return value.toFixed(value >= 9.995 ? 1 : 2);
 }
+
+/** A frequency, with its unit. */
+export function hertz(value: number): string {
+  return `${value >= 999.5 ? value.toFixed(0) : value.toPrecision(3)} Hz`;
+}
+
+/** An impulse, with its unit. */
+export function newtonSeconds(value: number): string {
+  return value >= 0.9995e-3 ? `${(1e3 * value).toPrecision(3)} mN s` : `${(1e6 * value).toPrecision(3)} µN s`;
+}

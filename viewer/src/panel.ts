@@ -32,6 +32,8 @@ export class Panel {
   grab = false;
   private cutAxis: Axis = "y";
   private role: Role = "watch";
+  /** What is told in place of a stiffness that cannot be changed. */
+  private fixedModulus = "several materials";
   private modulusRange: [number, number] | null = null;
   private changedMs = -Infinity;
   private readonly model = byId<HTMLSelectElement>("model");
@@ -85,6 +87,9 @@ export class Panel {
     const usual = modulus !== null && modulus >= TISSUE_MIN && modulus <= TISSUE_MAX;
     if (modulus === null) this.modulusRange = null;
     else this.modulusRange = usual ? [TISSUE_MIN, TISSUE_MAX] : [modulus / 10, modulus * 10];
+    const moving = scene.motion?.youngs_modulus;
+    this.fixedModulus = moving == null ? "several materials" : `${pascals(moving)}, fixed`;
+    byId("stiffness-field").title = scene.motion ? "The modes of a body in motion belong to its stiffness" : "";
     this.changedMs = -Infinity;
     // A bare store has no tetrahedra to be shown.
     const solid = scene.tets > 0;
@@ -101,7 +106,7 @@ export class Panel {
       this.stiffness.valueAsNumber = Math.log(modulus / low) / Math.log(high / low);
     }
     this.radius.valueAsNumber = contactRadius;
-    setText(byId("stiffness-value"), modulus === null ? "several materials" : pascals(modulus));
+    setText(byId("stiffness-value"), modulus === null ? this.fixedModulus : pascals(modulus));
     setText(byId("radius-value"), millimetres(contactRadius));
   }
 

@@ -1,32 +1,67 @@
-// Force and computing time against time, live.
+// Live plots against time: force and computing time of the loop; displacement and energy of a body in motion.
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
+import { byId } from "./dom";
+import { HistoryLog } from "./history_log";
 import { LogWindow, WINDOW_S } from "./log_window";
 
 /** The eye does not follow faster, and every redraw costs the page time. */
 const REDRAW_INTERVAL_MS = 80;
 const HEIGHT_PX = 112;
+/** Above these stands what their lines mean. */
+const MOTION_HEIGHT_PX = 102;
 // Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
 const FONT = "11px system-ui, sans-serif";
 const TEXT_COLOR = "#9aa5b4";
 const GRID = { stroke: "#2a303a", width: 1 };
-/** Spans below these are noise, and would only dance: N, and us. */
+/** Spans below these are noise, and would only dance: N, us, mm. */
 const FORCE_SPAN_MIN = 0.5;
 const COMPUTE_SPAN_MIN = 50;
+const DISPLACEMENT_SPAN_MIN = 0.02;
+/** Energies of soft bodies are small. */
+const ENERGY_UNITS: [unit: string, joules: number][] = [
+  ["J", 1],
+  ["mJ", 1e-3],
+  ["µJ", 1e-6],
+  ["nJ", 1e-9],
+];
+
+export type PlotPair = "loop" | "motion";
 
 export class Plots {
   readonly log = new LogWindow();
+  readonly history = new HistoryLog();
   shown = true;
-  private readonly force: uPlot;
-  private readonly compute: uPlot;
+  /** Body time shown of a motion, s, and where it begins; null for what has just been. */
+  span = 1;
+  origin: number | null = null;
+  private pair: PlotPair = "loop";
+  private readonly plots: Record<"force" | "compute" | "displacement" | "energy", uPlot>;
   private drawnMs = 0;
 
-  constructor(private readonly forceBox: HTMLElement, private readonly computeBox: HTMLElement) {
-    this.force = createPlot(forceBox, "force (N)", "#ffb454", FORCE_SPAN_MIN);
-    this.compute = createPlot(computeBox, "per tick (µs)", "#6fc3ff", COMPUTE_SPAN_MIN);
-    new ResizeObserver(() => this.resize()).observe(forceBox);
+  constructor() {
+    const recent = { range: (): [number, number] => [-WINDOW_S, 0], label: () => "time before now (s)" };
+    const moved = {
+      range: (): [number, number] => (this.origin === null ? [-this.span, 0] : [0, this.span]),
+      label: () => (this.origin === null ? "body time before now (s)" : "body time since the blow (s)"),
+    };
+    this.plots = {
+      force: createPlot("plot-force", recent, "force (N)", ["#ffb454"], above(FORCE_SPAN_MIN)),
+      compute: createPlot("plot-compute", recent, "per tick (µs)", ["#6fc3ff"], above(COMPUTE_SPAN_MIN)),
+      displacement: createPlot("plot-displacement", moved, "moved (mm)", ["#ff8f80", "#7ddc9a", "#6fc3ff"], around),
+      energy: createPlot("plot-energy", moved, "energy (µJ)", ["#8d97a6", "#c9a2ff", "#6fc3ff", "#ffb454"], above(0)),
+    };
+    new ResizeObserver(() => this.resize()).observe(byId("plots"));
+  }
+
+  show(pair: PlotPair): void {
+    this.pair = pair;
+    byId("plots-loop").hidden = pair !== "loop";
+    byId("plots-motion").hidden = pair !== "motion";
+    this.resize();
+    this.refresh(true);
   }
 
   /** Draws what has arrived, if it is time. */
@@ -34,46 +69,77 @@ export class Plots {
     const nowMs = performance.now();
     if (!this.shown || (!force && nowMs - this.drawnMs < REDRAW_INTERVAL_MS)) return;
     this.drawnMs = nowMs;
+    if (this.pair === "motion") return this.drawMotion();
     const { time, force: newtons, compute } = this.log.read();
-    this.force.setData([time, newtons]);
-    this.compute.setData([time, compute]);
+    this.plots.force.setData([time, newtons]);
+    this.plots.compute.setData([time, compute]);
+  }
+
+  private drawMotion(): void {
+    const { time, displacement, kinetic, strain, total, supplied } = this.history.read(this.span, this.origin);
+    this.plots.displacement.setData([time, ...displacement]);
+    const largest = Math.max(1e-9, supplied.reduce((a, b) => Math.max(a, b), 0), total.reduce((a, b) => Math.max(a, b), 0));
+    const [unit, joules] = ENERGY_UNITS.find(([, size]) => largest >= size) ?? ENERGY_UNITS.at(-1)!;
+    this.plots.energy.axes[1]!.label = `energy (${unit})`;
+    const energies = [supplied, kinetic, strain, total].map((column) => column.map((value) => value / joules));
+    this.plots.energy.setData([time, ...energies]);
   }
 
   private resize(): void {
-    for (const [plot, box] of [
-      [this.force, this.forceBox],
-      [this.compute, this.computeBox],
-    ] as const) {
-      if (box.clientWidth > 0) plot.setSize({ width: box.clientWidth, height: HEIGHT_PX });
+    const { force, compute, displacement, energy } = this.plots;
+    for (const plot of [force, compute, displacement, energy]) {
+      const width = plot.root.parentElement!.clientWidth;
+      const height = plot === force || plot === compute ? HEIGHT_PX : MOTION_HEIGHT_PX;
+      if (width > 0 && width !== plot.width) plot.setSize({ width, height });
     }
   }
 }
 
-function createPlot(box: HTMLElement, label: string, color: string, spanMin: number): uPlot {
+/** From zero up. */
+function above(spanMin: number): uPlot.Scale.Range {
+  return (_plot, _low, high) => [0, Math.max(spanMin, 1.15 * (high ?? 0)) || 1];
+}
+
+/** To both sides of zero. */
+const around: uPlot.Scale.Range = (_plot, low, high) => {
+  const largest = Math.max(DISPLACEMENT_SPAN_MIN, Math.abs(low ?? 0), Math.abs(high ?? 0));
+  return [-1.15 * largest, 1.15 * largest];
+};
+
+interface TimeAxis {
+  range(): [number, number];
+  label(): string;
+}
+
+function createPlot(id: string, time: TimeAxis, label: string, colors: string[], range: uPlot.Scale.Range): uPlot {
+  const box = byId(id);
   const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
   const options: uPlot.Options = {
-    width: box.clientWidth || 268,
+    width: 0,
     height: HEIGHT_PX,
-    padding: [8, 6, 0, 0],
+    padding: [8, 10, 0, 0],
     legend: { show: false },
     cursor: { show: false },
-    scales: {
-      x: { time: false, range: () => [-WINDOW_S, 0] },
-      y: { range: (_plot, _low, high) => [0, Math.max(spanMin, 1.15 * (high ?? 0))] },
-    },
+    scales: { x: { time: false, range: () => time.range() }, y: { range } },
     axes: [
       {
         ...axis,
         size: 17,
-        label: "time before now (s)",
+        label: time.label(),
         labelSize: 13,
         labelGap: 0,
-        splits: () => [-10, -8, -6, -4, -2, 0],
-        values: (_plot, splits) => splits.map((split) => String(-split)),
+        splits: () => fifths(...time.range()),
+        values: (_plot, splits) => splits.map((split) => String(Number(Math.abs(split).toPrecision(3)))),
       },
-      { ...axis, size: 38, space: 24, label, labelSize: 14, labelGap: 0 },
+      { ...axis, size: 38, space: 20, label, labelSize: 14, labelGap: 0 },
     ],
-    series: [{}, { stroke: color, width: 1.25, points: { show: false } }],
+    series: [{}, ...colors.map((stroke) => ({ stroke, width: 1.25, points: { show: false } }))],
+    hooks: { drawClear: [(plot) => void (plot.axes[0]!.label = time.label())] },
   };
-  return new uPlot(options, [[], []], box);
+  const nothing = [[], ...colors.map(() => [])] as unknown as uPlot.AlignedData;
+  return new uPlot(options, nothing, box);
+}
+
+function fifths(low: number, high: number): number[] {
+  return Array.from({ length: 6 }, (_, i) => low + ((high - low) * i) / 5);
 }

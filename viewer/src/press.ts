@@ -2,7 +2,7 @@
 
 import * as THREE from "three";
 
-import type { BodyView } from "./body_view";
+import type { BodyView, Pick } from "./body_view";
 import { GrabGesture, PressGesture } from "./press_geometry";
 import type { CameraAxes, Gesture } from "./press_geometry";
 import type { Vec3 } from "./protocol";
@@ -14,6 +14,8 @@ const SEND_INTERVAL_MS = 4;
 /** One notch of a wheel is 100 pixels; it moves the tool by this share of the size of the body. */
 const WHEEL_STEP = 0.002;
 const WHEEL_NOTCH_PX = 100;
+/** A click may slip so far; more is a drag. */
+const CLICK_PX = 8;
 /** Larger bodies are not searched under every hovering pointer, it would slow the page. */
 const HOVER_TRIANGLES_MAX = 30_000;
 
@@ -21,6 +23,9 @@ export interface PressHandlers {
   /** Whether this page may press, and on what. */
   body(): BodyView | null;
   grabWanted(): boolean;
+  /** Whether a click strikes, as it does with Alt. */
+  strikeWanted(): boolean;
+  onStrike(pick: Pick): void;
   onPress(centre: Vec3, grab: boolean): void;
   onRelease(): void;
 }
@@ -34,6 +39,8 @@ export class Press {
   private size = 1;
   private readonly limit = new RateLimit(SEND_INTERVAL_MS, () => this.send());
   private handedOver = false;
+  /** Where a click began that strikes if the pointer does not move. */
+  private aim: PointerEvent | null = null;
 
   constructor(private readonly viewport: Viewport, private readonly handlers: PressHandlers) {
     const { canvas } = viewport;
@@ -46,6 +53,7 @@ export class Press {
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
       canvas.addEventListener(name, (event) => {
         if (event.pointerId === this.down?.pointerId) this.release();
+        if (event.pointerId === this.aim?.pointerId) this.finishAim(event);
       });
     }
     canvas.addEventListener("wheel", (event) => this.onWheel(event), { capture: true, passive: false });
@@ -82,6 +90,8 @@ export class Press {
   }
 
   private onDown(event: PointerEvent): void {
+    // A second finger means the camera.
+    this.aim = null;
     if (this.handedOver) return;
     if (this.gesture) {
       if (event.pointerType === "touch" && this.down?.pointerType === "touch") this.handOver(this.down);
@@ -91,6 +101,11 @@ export class Press {
     // A second finger while the first one orbits belongs to the camera.
     if (event.button !== 0 || event.ctrlKey || event.metaKey || !event.isPrimary) return;
     const body = this.handlers.body();
+    if (body?.data.header.motion && (event.altKey || this.handlers.strikeWanted())) {
+      // The camera's controls see it too: a drag turns.
+      this.aim = event;
+      return;
+    }
     const pick = body?.pick(this.viewport.rayThrough(event.clientX, event.clientY));
     if (!body || !pick) return;
     event.stopImmediatePropagation();
@@ -106,6 +121,15 @@ export class Press {
       ? new GrabGesture(pick, this.cameraAxes(), header.size)
       : new PressGesture(pick, this.cameraAxes(), header.size, header.tool_radius);
     this.limit.request();
+  }
+
+  private finishAim(event: PointerEvent): void {
+    const { aim } = this;
+    this.aim = null;
+    if (!aim || event.type !== "pointerup") return;
+    if (Math.hypot(event.clientX - aim.clientX, event.clientY - aim.clientY) > CLICK_PX) return;
+    const pick = this.handlers.body()?.pick(this.viewport.rayThrough(event.clientX, event.clientY));
+    if (pick) this.handlers.onStrike(pick);
   }
 
   private onMove(event: PointerEvent): void {
@@ -133,8 +157,12 @@ export class Press {
     const body = this.handlers.body();
     const small = body !== null && body.surface.triangles.length / 3 <= HOVER_TRIANGLES_MAX;
     const over = small && body.pick(this.viewport.rayThrough(event.clientX, event.clientY)) !== null;
-    const cursor = over ? (event.shiftKey || this.handlers.grabWanted() ? "grab" : "crosshair") : "";
-    this.viewport.canvas.style.cursor = cursor;
+    this.viewport.canvas.style.cursor = over ? this.cursor(event) : "";
+  }
+
+  private cursor(event: PointerEvent): string {
+    if (event.altKey || this.handlers.strikeWanted()) return "pointer";
+    return event.shiftKey || this.handlers.grabWanted() ? "grab" : "crosshair";
   }
 
   /** Two fingers are for the camera: it is told of the first one, which it never saw, before it sees the second. */

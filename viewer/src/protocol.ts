@@ -1,8 +1,8 @@
-// Messages of the websocket, version 2. Lengths in m, forces in N, times in s unless a name says otherwise.
+// Messages of the websocket, version 3. Lengths in m, forces in N, times in s unless a name says otherwise.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy.
 
-export const PROTOCOL_VERSION = 2;
+export const PROTOCOL_VERSION = 3;
 
 export type Vec3 = [number, number, number];
 export type Role = "control" | "watch";
@@ -32,7 +32,26 @@ export interface SceneMessage {
   /** A tool is held back where the body would be strained more; 0 for never. */
   hold_strain: number;
   fields: { name: string; title: string }[];
+  motion: MotionScene | null;
   view: { position: Vec3; target: Vec3 } | null;
+}
+
+/** Of a body that moves. */
+export interface MotionScene {
+  /** Hz, of the lowest modes. */
+  frequencies: number[];
+  /** How many modes there are. */
+  modes: number;
+  /** Seconds that it moves in a second. */
+  time_scale: number;
+  /** A blow that the body stands well, and the strongest that is taken, N s. */
+  impulse: number;
+  max_impulse: number;
+  /** Body time that the plots of the motion show, s. */
+  span: number;
+  youngs_modulus: number | null;
+  /** The scene's own blow, N s. */
+  strike: { point: Vec3; impulse: Vec3 } | null;
 }
 
 export interface SceneArrays {
@@ -41,6 +60,8 @@ export interface SceneArrays {
   surface_triangles: Uint32Array;
   surface_nodes: Uint32Array;
   fixed_nodes: Uint32Array;
+  /** Displacements of the surface under the body's own loads, a row for each surface node. */
+  free: Float32Array;
 }
 
 export interface ContactMessage {
@@ -61,6 +82,22 @@ export interface FieldMessage {
   signed: boolean;
 }
 
+/** A mode shape that is drawn in place of the motion, counted from 1; amplitude is its largest displacement. */
+export interface ModeMessage {
+  number: number;
+  frequency: number;
+  shown_hz: number;
+  amplitude: number;
+}
+
+export interface MotionFrame {
+  /** Surface node, by its row, whose displacement is in the history. */
+  watched: number;
+  /** Body time of the last blow, until something else touches the body. */
+  struck_at: number | null;
+  mode: ModeMessage | null;
+}
+
 export interface FrameMessage {
   type: "frame";
   frame: number;
@@ -77,6 +114,7 @@ export interface FrameMessage {
   fault: string | null;
   realtime: boolean;
   strain: number;
+  motion: MotionFrame | null;
   field: FieldMessage;
   interior: boolean;
 }
@@ -86,6 +124,8 @@ export interface FrameArrays {
   displacements: Float32Array;
   scalar: Uint8Array;
   log: Float32Array;
+  /** Body time, displacement of the watched node, kinetic, strain and total energy in J, work on the body since the start. */
+  history: Float32Array;
 }
 
 export interface SceneData {
@@ -101,7 +141,7 @@ export interface FrameData {
 export type TextMessage =
   | { type: "welcome"; role: Role; version: string; models: { name: string; title: string }[] }
   | { type: "role"; role: Role }
-  | { type: "settings"; youngs_modulus: number | null; contact_radius: number }
+  | { type: "settings"; youngs_modulus: number | null; contact_radius: number; time_scale: number | null }
   | { type: "status"; text: string; progress: number | null; left_s: number | null }
   | { type: "error"; text: string };
 
@@ -111,7 +151,11 @@ export type ClientMessage =
   | { type: "release" }
   | { type: "set"; youngs_modulus: number }
   | { type: "set"; contact_radius: number }
+  | { type: "set"; time_scale: number }
   | { type: "reset" }
+  | { type: "strike"; point: Vec3; impulse: Vec3 }
+  | { type: "repeat" }
+  | { type: "mode"; number: number }
   | { type: "model"; name: string }
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string }

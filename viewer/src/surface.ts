@@ -18,6 +18,9 @@ export class Surface {
   /** Positions and normals while no tool touches: where the body's own loads have put it. */
   readonly untouched: Float32Array;
   readonly untouchedNormals: Float32Array;
+  /** Positions and normals of the body at rest under its own loads. */
+  readonly settled: Float32Array;
+  private readonly settledNormals: Float32Array;
   /** Corners of the triangles (k, 3) as rows of the arrays above. */
   readonly triangles: Uint32Array;
   readonly count: number;
@@ -34,8 +37,11 @@ export class Surface {
     this.positions = this.rest.slice();
     this.normals = new Float32Array(3 * this.count);
     vertexNormals(this.rest, this.triangles, this.normals);
-    this.untouched = this.rest.slice();
-    this.untouchedNormals = this.normals.slice();
+    this.settled = this.rest.map((x, i) => x + arrays.free[i]!);
+    this.settledNormals = new Float32Array(3 * this.count);
+    vertexNormals(this.settled, this.triangles, this.settledNormals);
+    this.untouched = this.settled.slice();
+    this.untouchedNormals = this.settledNormals.slice();
   }
 
   /** Displaces the surface; rowOf gives the row of a surface node in the displacements. */
@@ -54,6 +60,12 @@ export class Surface {
   keepAsUntouched(): void {
     this.untouched.set(this.positions);
     this.untouchedNormals.set(this.normals);
+  }
+
+  /** Takes the body at rest for the untouched one. */
+  settle(): void {
+    this.untouched.set(this.settled);
+    this.untouchedNormals.set(this.settledNormals);
   }
 
   /** Interpolates one of the arrays above. */

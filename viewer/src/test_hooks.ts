@@ -3,7 +3,8 @@
 import * as THREE from "three";
 
 import type { BodyView } from "./body_view";
-import type { FieldMessage, Vec3 } from "./protocol";
+import type { HistoryLog } from "./history_log";
+import type { FieldMessage, MotionFrame, Vec3 } from "./protocol";
 import type { Viewport } from "./viewport";
 
 /** How many of the best candidates are tried before giving up. */
@@ -28,6 +29,8 @@ export interface ViewerState {
   held: boolean;
   field: FieldMessage | null;
   fault: string | null;
+  /** Of a body in motion, with the newest row of its history. */
+  motion: (MotionFrame & ReturnType<HistoryLog["latest"]>) | null;
 }
 
 declare global {

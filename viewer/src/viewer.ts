@@ -10,11 +10,12 @@ import { tissueColor } from "./field_material";
 import { showHint } from "./hint";
 import { listenToKeys } from "./keyboard";
 import { Legend } from "./legend";
+import { MotionPanel } from "./motion_panel";
 import { showConnection, showFault, showNotice, showRole, showStatus } from "./notices";
 import { Panel } from "./panel";
 import { Plots } from "./plots";
 import { Press } from "./press";
-import type { FrameData, FrameMessage, Role, SceneData, TextMessage } from "./protocol";
+import type { FrameData, FrameMessage, MotionScene, Role, SceneData, TextMessage } from "./protocol";
 import { Readout } from "./readout";
 import { download } from "./screenshot";
 import { Statistics } from "./statistics";
@@ -22,10 +23,15 @@ import { installTestHooks } from "./test_hooks";
 import type { ViewerState } from "./test_hooks";
 import { ToolView } from "./tool_view";
 import { Viewport } from "./viewport";
+import { WatchedView } from "./watched_view";
+
+/** The scene's own blow waits until the body has been seen at rest. */
+const FIRST_BLOW_MS = 800;
 
 export class Viewer {
   private body: BodyView | null = null;
   private tool: ToolView | null = null;
+  private watched: WatchedView | null = null;
   private role: Role = "watch";
   private connectionState: ConnectionState = "connecting";
   private pending: FrameData[] = [];
@@ -43,9 +49,11 @@ export class Viewer {
   private readonly readout = new Readout();
   private readonly legend = new Legend();
   private readonly statistics = new Statistics();
-  private readonly plots = new Plots(byId("plot-force"), byId("plot-compute"));
+  private readonly plots = new Plots();
   private readonly connection: Connection;
   private readonly panel: Panel;
+  private readonly motion: MotionPanel;
+  private firstBlow = 0;
   private readonly press: Press;
 
   constructor(token: string) {
@@ -58,9 +66,18 @@ export class Viewer {
       onUnreadable: (reason) => showNotice(`A message could not be read: ${reason}`),
     });
     this.panel = this.createPanel();
+    this.motion = new MotionPanel({
+      send: (message) => this.connection.send(message),
+      onPlots: (pair) => this.plots.show(pair),
+    });
     this.press = new Press(this.viewport, {
       body: () => (this.role === "control" && this.connectionState === "open" ? this.body : null),
       grabWanted: () => this.panel.grab,
+      strikeWanted: () => this.motion.strike,
+      onStrike: ({ settled, normal }) => {
+        const impulse = normal.clone().multiplyScalar(-this.motion.impulse);
+        this.connection.send({ type: "strike", point: settled.toArray(), impulse: impulse.toArray() });
+      },
       onPress: (position, grab) => {
         this.connection.send({ type: "press", position, grab });
       },
@@ -117,7 +134,11 @@ export class Viewer {
       f: () => panel.nextField(),
       p: () => panel.toggle("plots"),
       g: () => panel.toggleGrab(),
-      Escape: () => this.press.release(),
+      k: () => this.motion.toggleStrike(),
+      Escape: () => {
+        this.press.release();
+        this.motion.endMode();
+      },
     });
   }
 
@@ -145,6 +166,7 @@ export class Viewer {
         return this.setRole(message.role);
       case "settings":
         this.panel.setSettings(message.youngs_modulus, message.contact_radius);
+        this.motion.setTimeScale(message.time_scale);
         return this.setContactRadius(message.contact_radius);
       case "status":
         return showStatus(message);
@@ -157,6 +179,7 @@ export class Viewer {
     this.role = role;
     if (role === "watch") this.press.release();
     this.panel.setRole(role);
+    this.motion.setRole(role);
     showRole(role);
   }
 
@@ -169,10 +192,15 @@ export class Viewer {
     const { header } = data;
     this.body = new BodyView(data, this.field);
     this.tool = new ToolView(header, this.body.surface);
-    this.viewport.scene.add(this.body.group, this.tool.group);
+    this.watched?.dispose();
+    this.watched = new WatchedView(this.body.surface, header.size);
+    this.viewport.scene.add(this.body.group, this.tool.group, this.watched.dot);
     this.viewport.frame(this.body.surface, header);
     this.plots.log.clear();
+    this.plots.history.clear();
+    this.plots.span = header.motion?.span ?? 1;
     this.panel.setScene(header);
+    this.setMotion(header.motion);
     this.legend.setTissue(tissueColor(header.name).getStyle());
     if (this.panel.shown.cutaway) this.panel.cutAcross(facingAxis(this.viewport.towardsViewer()));
     this.applyShown();
@@ -187,7 +215,10 @@ export class Viewer {
     const frames = this.pending.splice(0);
     const newest = frames.at(-1);
     if (!newest) return false;
-    for (const frame of frames) this.plots.log.append(frame.arrays.log);
+    for (const { arrays } of frames) {
+      this.plots.log.append(arrays.log);
+      this.plots.history.append(arrays.history);
+    }
     this.acknowledgeSoon(frames);
     const { header } = newest;
     const bodyMoved = this.body?.update(newest) ?? false;
@@ -195,6 +226,7 @@ export class Viewer {
     this.frame = header;
     this.framesApplied += 1;
     this.showNumbers(header);
+    this.showMotion(header);
     this.statistics.countFrame();
     this.statistics.update(header);
     this.plots.refresh();
@@ -209,6 +241,23 @@ export class Viewer {
     this.readout.updateDepth(this.press.depthOf(wanted ? position : null), this.press.grabbing);
     this.legend.update(frame.field);
     this.field.colorMap.value = (frame.field.signed ? ColorMap.diverging : ColorMap.sequential).texture;
+  }
+
+  private setMotion(motion: MotionScene | null): void {
+    this.motion.setScene(motion);
+    window.clearTimeout(this.firstBlow);
+    if (!motion?.strike) return;
+    this.firstBlow = window.setTimeout(() => {
+      if (this.role === "control") this.connection.send({ type: "repeat" });
+    }, FIRST_BLOW_MS);
+  }
+
+  private showMotion({ motion, tool }: FrameMessage): void {
+    this.motion.showMode(motion?.mode ?? null);
+    // The tool would hide the dot.
+    this.watched?.update(motion && !tool.active ? motion.watched : null);
+    const own = this.body?.data.header.motion?.strike;
+    this.plots.origin = own ? (motion?.struck_at ?? null) : null;
   }
 
   private acknowledgeSoon(frames: FrameData[]): void {
@@ -262,6 +311,7 @@ export class Viewer {
       held: frame?.tool.wanted != null,
       field: frame?.field ?? null,
       fault: frame?.fault ?? null,
+      motion: frame?.motion ? { ...frame.motion, ...this.plots.history.latest() } : null,
     };
   }
 }

@@ -80,6 +80,7 @@ impl SimulationCore {
                 time_scale: 1.0,
                 strike: Strike::default(),
                 strikes: 0,
+                watch: 0,
             },
             handles: Vec::new(),
             targets: vec![Target::default(); tools],
@@ -136,10 +137,16 @@ impl SimulationCore {
         self.tell();
     }
 
-    /// Gives the surface point closest to `point` (m) an impulse, N s.
-    fn strike(&mut self, point: [f64; 3], impulse: [f64; 3]) {
-        self.settings.strike = Strike { point: point.into(), impulse: impulse.into() };
+    /// Gives the surface point closest to `point` (m) an impulse, N s, within a duration, s.
+    fn strike(&mut self, point: [f64; 3], impulse: [f64; 3], duration: f64) {
+        self.settings.strike = Strike { point: point.into(), impulse: impulse.into(), duration };
         self.settings.strikes = self.settings.strikes.wrapping_add(1);
+        self.tell();
+    }
+
+    /// Surface node (rank) whose displacement is logged.
+    fn watch(&mut self, rank: u32) {
+        self.settings.watch = rank;
         self.tell();
     }
 
@@ -196,7 +203,8 @@ impl SimulationCore {
         Some((record, fields.map(|field| field.into_pyarray(py)).into()))
     }
 
-    /// Rows (9 a tick) of the log since the last call: time, position, force, computing time, wake-up delay.
+    /// Rows (18 a tick) of the log since the last call: time, position, force, computing time, wake-up delay, displacement
+    /// of the watched node, body time, energies.
     fn drain_log<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
         if let Some(servo) = self.servo() {
@@ -205,27 +213,32 @@ impl SimulationCore {
                 rows.extend(row.position.to_array());
                 rows.extend(row.force.to_array());
                 rows.extend([row.compute_us, row.wakeup_us]);
+                rows.extend(row.watched.to_array());
+                rows.push(row.body_time);
+                rows.extend(energy_array(&row.energy));
             });
         }
         rows.into_pyarray(py)
     }
 
     /// Moves the first tool through (t, 3) positions offline, NaN where it is out of the scene, with blows `(tick, point,
-    /// impulse)` in order of time: forces on the device (3t), energies (5t; empty for a body that does not move),
+    /// impulse, duration)` in order of time: forces on the device (3t), energies (5t; empty for a body that does not move),
     /// displacements of the watched surface ranks (3 a node and tick), and the fault, if one latched.
     #[allow(clippy::type_complexity)] // four arrays read once
     fn run<'py>(
         &self,
         py: Python<'py>,
         positions: PyReadonlyArray2<'py, f64>,
-        strikes: Vec<(usize, [f64; 3], [f64; 3])>,
+        strikes: Vec<(usize, [f64; 3], [f64; 3], f64)>,
         watch: Vec<u32>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Option<&'static str>)>
     {
         let positions = vectors(&positions).map_err(|e| to_python(py, e))?;
         let strikes: Vec<_> = strikes
             .into_iter()
-            .map(|(tick, point, impulse)| (tick, Strike { point: point.into(), impulse: impulse.into() }))
+            .map(|(tick, point, impulse, duration)| {
+                (tick, Strike { point: point.into(), impulse: impulse.into(), duration })
+            })
             .collect();
         let input = Input {
             contact_radius: self.settings.contact_radius,

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use glam::DVec3;
-use palpate_core::simulation::{Input, MAX_TOOLS, Model, Snapshot, Strike};
+use palpate_core::simulation::{Energy, Input, MAX_TOOLS, Model, Snapshot, Strike};
 use palpate_devices::{Device, DeviceState};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::triple_buffer;
@@ -42,6 +42,8 @@ pub struct Settings {
     pub strike: Strike,
     /// Each new value gives the blow once.
     pub strikes: u32,
+    /// Surface node (rank) whose displacement is logged.
+    pub watch: u32,
 }
 
 /// What the operating system granted.
@@ -102,6 +104,12 @@ pub struct LogRow {
     pub compute_us: f64,
     /// Delay between deadline and waking up, us.
     pub wakeup_us: f64,
+    /// Displacement of the watched node, m.
+    pub watched: DVec3,
+    /// Time that a body in motion has gone through, s.
+    pub body_time: f64,
+    /// Its energies.
+    pub energy: Energy,
 }
 
 /// A running loop.
@@ -131,11 +139,12 @@ impl Servo {
         let (rows, log) = RingBuffer::new(LOG_ROWS);
         let mut servo_loop = Loop {
             stop: stop.clone(),
-            ticker: Ticker::new(model, limits),
+            ticker: Ticker::new(model.clone(), limits),
             devices,
             settings: settings_out,
             resets: settings.resets,
             strikes: settings.strikes,
+            watch: settings.watch,
             published: published_in,
             status: Status::default(),
             rows,
@@ -195,6 +204,7 @@ struct Loop {
     settings: triple_buffer::Output<Settings>,
     resets: u32,
     strikes: u32,
+    watch: u32,
     published: triple_buffer::Input<Published>,
     status: Status,
     rows: Producer<LogRow>,
@@ -209,7 +219,9 @@ impl Loop {
         self.devices.iter_mut().for_each(|device| device.write(DVec3::ZERO));
         self.status.crashed = outcome.is_err();
         self.status.forces = Default::default();
-        self.publish();
+        self.published.input_buffer_mut().status = self.status;
+        self.ticker.snapshot_into(&mut self.published.input_buffer_mut().state);
+        self.published.publish();
     }
 
     fn ticks(&mut self) {
@@ -238,7 +250,7 @@ impl Loop {
             strike: (settings.strikes != self.strikes).then_some(settings.strike),
             ..Input::default()
         };
-        (self.resets, self.strikes) = (settings.resets, settings.strikes);
+        (self.resets, self.strikes, self.watch) = (settings.resets, settings.strikes, settings.watch);
         for (state, device) in self.status.devices.iter_mut().zip(&mut self.devices) {
             *state = device.read(1.0 / RATE);
         }
@@ -249,7 +261,7 @@ impl Loop {
         (self.status.time, self.status.forces, self.status.fault) = (time, output.forces, output.fault);
     }
 
-    /// Statistics, log and hand-off, after the force is out.
+    /// Statistics, hand-off and log, after the force is out.
     fn account(&mut self, wakeup_ns: u64, compute_ns: u64) {
         self.wakeup.record(wakeup_ns);
         self.compute.record(compute_ns);
@@ -257,21 +269,21 @@ impl Loop {
         if self.status.ticks % SUMMARY_TICKS == 1 {
             (self.status.wakeup, self.status.compute) = (self.wakeup.summary(), self.compute.summary());
         }
+        let published = self.published.input_buffer_mut();
+        self.ticker.snapshot_into(&mut published.state);
+        let drawn = &published.state;
         let row = LogRow {
             time: self.status.time,
             position: self.status.devices[0].position,
             force: self.status.forces[0],
             compute_us: compute_ns as f64 * 1e-3,
             wakeup_us: wakeup_ns as f64 * 1e-3,
+            watched: self.ticker.displacement_of(self.watch as usize),
+            body_time: drawn.body_time,
+            energy: drawn.energy.unwrap_or_default(),
         };
         self.status.dropped_rows += u64::from(self.rows.push(row).is_err());
-        self.publish();
-    }
-
-    fn publish(&mut self) {
-        let published = self.published.input_buffer_mut();
         published.status = self.status;
-        self.ticker.snapshot_into(&mut published.state);
         self.published.publish();
     }
 }

@@ -61,6 +61,11 @@ impl Ticker {
         self.state.motion.as_ref().map(|motion| motion.energy)
     }
 
+    /// Displacement of one surface node after the last tick, m; never allocates.
+    pub fn displacement_of(&mut self, node: usize) -> DVec3 {
+        self.state.displacement_of(&self.model, node)
+    }
+
     /// Copies what is drawn of the last tick; never allocates.
     pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
         self.state.snapshot_into(snapshot);

@@ -147,7 +147,7 @@ fn a_tick_of_a_body_in_motion_never_allocates() {
     let modes = Modes::new(&eigenvalues, &shapes, &rayleigh, 1e-3, |k, c| newmark.mode_step(k, c)).expect("valid");
     let model = Model::new(green, 0.005, 5000.0).expect("a valid model");
     let model = model.with_dynamics(Dynamics::new(modes, 500.0).expect("valid")).expect("rows that match");
-    let strike = Strike { point: DVec3::new(0.02, 0.02, 0.1), impulse: DVec3::new(0.0, 0.0, -1e-4) };
+    let strike = Strike { point: DVec3::new(0.02, 0.02, 0.1), impulse: DVec3::new(0.0, 0.0, -1e-4), duration: 3e-3 };
     exercise_model(Arc::new(model), |tick| (tick % 300 == 100).then_some(strike));
 }
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from palpate import models
 from palpate.body import Body, Material
+from palpate.cli.catalogue import MODES, TOOLS
 from palpate.dynamics import Newmark, rayleigh_from_ratios
 from palpate.errors import SceneError
 from palpate.plots import plot_history, write_columns
 from palpate.progress import narrated
+from palpate.scene import Scene
+from palpate.selection import free_end
 from palpate.strain import HONEST_STRAIN, SurfaceStrain
 
 # Force of the strike, N, along z, and the step at whose end it acts. The force rises and falls linearly over one step
@@ -35,11 +39,8 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
         No model of that name.
 
     """
-    if model not in models.NAMES:
-        raise SceneError(f"there is no model '{model}'; there are {', '.join(models.NAMES)}")
-    mesh = models.load(model, paper=paper)
-    body = Body(mesh, material=MATERIAL, fixed=models.fixed(model, mesh))
-    node = _free_end(body)
+    body = _body(model, paper)
+    mesh, node = body.mesh, free_end(body)
     with narrated(f"{model}: {seconds:g} s of motion"):
         forces, surface = _strike(body, node, seconds)
     moved = surface[:, np.searchsorted(mesh.surface_nodes, node)]
@@ -61,13 +62,36 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
         )
 
 
-def _free_end(body: Body) -> int:
-    """Free surface node farthest from the supports; the highest of several."""
-    free = np.setdiff1d(body.mesh.surface_nodes, body.fixed_nodes)
-    nodes, held = body.mesh.nodes[free], body.mesh.nodes[body.fixed_nodes].mean(axis=0)
-    # To the micrometre: nodes that symmetry puts equally far must not be told apart by round-off.
-    distance = np.linalg.norm(nodes - held, axis=1).round(6)
-    return int(free[np.lexsort((nodes[:, 2], distance))[-1]])
+def impulse_scene(model: str, paper: bool) -> Scene:
+    """Scene of the same body and blow, for the viewer: on the node itself, by average acceleration as in the paper.
+
+    Raises
+    ------
+    SceneError
+        No model of that name.
+
+    """
+    body = _body(model, paper)
+    xi1, f1, xi2, f2 = DAMPING
+    return Scene(
+        body={"model": model, "paper": paper},
+        material=asdict(MATERIAL),
+        tool={"radius": TOOLS[model], "contact_radius": 0.0},
+        dynamics={
+            **MODES[paper],
+            "dt": STEP,
+            "delta": 0.5,
+            "rayleigh": rayleigh_from_ratios(xi1, f1, xi2, f2),
+            "strike": {"point": body.mesh.nodes[free_end(body)].tolist(), "impulse": (0, 0, FORCE * STEP)},
+        },
+    )
+
+
+def _body(model: str, paper: bool) -> Body:
+    if model not in models.NAMES:
+        raise SceneError(f"there is no model '{model}'; there are {', '.join(models.NAMES)}")
+    mesh = models.load(model, paper=paper)
+    return Body(mesh, material=MATERIAL, fixed=models.fixed(model, mesh))
 
 
 def _strike(body: Body, node: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -29,38 +29,44 @@ PORT = 8642
 def demo(
     model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.")] = "liver",
     paper: Annotated[bool, typer.Option("--paper", help="The mesh in the size of the paper.")] = False,
+    motion: Annotated[
+        bool, typer.Option("--motion", help="The body moves: strike it, slow it down, see modes.")
+    ] = False,
     impulse: Annotated[
-        bool, typer.Option("--impulse", help="No press: strike the free end with 10 N for 1 ms and let it swing.")
+        bool, typer.Option("--impulse", help="A moving body of hard rubber, struck at its free end with 10 N for 1 ms.")
     ] = False,
     headless: Headless = None,
-    out: Out = Path(),
+    out: Annotated[Path | None, typer.Option(help="Folder for the CSV and PNG of --headless and --impulse.")] = None,
     port: Port = PORT,
     host: Host = "127.0.0.1",
     browser: Browser = True,
 ) -> None:
     """Press on a built-in model in the browser.
 
-    With --impulse it computes the swing after a strike (the paper's figure 5) and writes its history as CSV and a plot.
+    With --motion the body moves: strike it, slow it down, look at its natural modes. With --impulse it is struck once
+    (the paper's figure 5); --headless or --out then write the history as CSV and a plot instead.
 
     Example: palpate demo kidney --paper
+
+    Example: palpate demo beam --motion
 
     Example: palpate demo beam --impulse --paper --out results
     """
     from palpate import models
     from palpate.cli.catalogue import model_scene
+    from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
 
-    if impulse:
-        from palpate.cli.impulse import SECONDS, impulse_history
+    def scene_of(name: str) -> Scene:
+        return impulse_scene(name, paper) if impulse else model_scene(name, paper, motion)
 
-        impulse_history(model, paper, headless or SECONDS, out)
+    if impulse and (headless is not None or out is not None):
+        impulse_history(model, paper, headless or SECONDS, out or Path())
         return
-
-    scene = model_scene(model, paper)
-    built = _build(scene)
+    built = _build(scene_of(model))
     if headless is not None:
-        _scripted(built, f"{model}-paper" if paper else model, headless, out)
+        _scripted(built, f"{model}-paper" if paper else model, headless, out or Path())
         return
-    _view(built, host, port, browser, models.NAMES, lambda name: model_scene(name, paper))
+    _view(built, host, port, browser, models.NAMES, scene_of)
 
 
 @app.command()

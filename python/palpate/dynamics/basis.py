@@ -168,6 +168,8 @@ def modes(
         raise BodyError(f"all modes of {free} free dofs would take {size:.0f} GB: give a count, such as 200")
     matrices = Matrices.of(body, mass)
     if free <= DENSE_DOFS or 3 * wanted > free:
+        if callable(progress):
+            progress(0, 1)  # LAPACK does not say how far it is
         with narrated(f"computing {wanted} modes of {free} dofs"):
             eigenvalues, vectors = _dense(matrices, wanted)
     else:

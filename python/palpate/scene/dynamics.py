@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,7 +12,7 @@ from pydantic import Field, model_validator
 from palpate import _native
 from palpate.dynamics import ModalBasis, modes, rayleigh_from_ratios
 from palpate.errors import SceneError
-from palpate.scene.table import Stiffness, Table, Time
+from palpate.scene.table import Direction, Point, Stiffness, Table, Time
 
 if TYPE_CHECKING:
     from palpate.body import Body
@@ -26,12 +27,20 @@ Ratio = Annotated[float, Field(ge=0, lt=1)]
 Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
+class StrikeTable(Table):
+    """A blow on the surface point closest to a point; ``impulse`` is in N s, ``duration`` 0 is a single time step."""
+
+    point: Point
+    impulse: Direction
+    duration: Time = 0.0
+
+
 class DynamicsTable(Table):
     """Motion by modes: Newmark's scheme, or the exact step of each mode.
 
     ``delta`` above 1/2 damps what is too fast for the time step; ``alpha`` is ``(delta + 1/2)^2 / 4`` unless given.
     ``damping_ratios`` are those of the first and the tenth mode; or ``rayleigh`` gives the factors
-    of mass and stiffness.
+    of mass and stiffness. ``strike`` is the blow that the viewer gives when its page opens.
     """
 
     scheme: Literal["newmark", "exact"] = "newmark"
@@ -43,6 +52,7 @@ class DynamicsTable(Table):
     damping_ratios: tuple[Ratio, Ratio] = (0.05, 0.05)
     rayleigh: tuple[Factor, Factor] | None = None
     coupling: Stiffness | None = None
+    strike: StrikeTable | None = None
 
     @model_validator(mode="after")
     def _one_damping(self) -> DynamicsTable:
@@ -50,7 +60,7 @@ class DynamicsTable(Table):
             raise ValueError("give damping_ratios or rayleigh, not both")
         return self
 
-    def build(self, body: Body, max_stiffness: float, progress: bool = True) -> Motion:
+    def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> Motion:
         """Modes and coefficients for a body.
 
         Raises

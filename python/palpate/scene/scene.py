@@ -164,8 +164,14 @@ class Scene(Table):
         body = self.body
         return body.model or Path(body.mesh or body.store or "").stem
 
-    def build(self, progress: bool | Callable[[int, int], None] = True) -> BuiltScene:
-        """Mesh if need be, and precompute, or take both from the cache.
+    def build(
+        self,
+        progress: bool | Callable[[int, int], None] = True,
+        modes_progress: bool | Callable[[int, int], None] | None = None,
+    ) -> BuiltScene:
+        """Mesh if need be, precompute, and find the modes of a body that moves, or take it all from the cache.
+
+        ``progress`` is shown, or told of done and expected; of modes ``modes_progress`` is, unless it is None.
 
         Raises
         ------
@@ -194,7 +200,8 @@ class Scene(Table):
         if self.dynamics is None:
             return BuiltScene(self, body, green)
         with self._blaming("dynamics", 0):
-            return BuiltScene(self, body, green, self.dynamics.build(body, self.device.max_stiffness, bool(progress)))
+            report = progress if modes_progress is None else modes_progress
+            return BuiltScene(self, body, green, self.dynamics.build(body, self.device.max_stiffness, report))
 
     @contextlib.contextmanager
     def _blaming(self, table: str, rank: int) -> Iterator[None]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.errors import ViewerError
 
-VERSION = 2
+VERSION = 3
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
@@ -73,6 +73,14 @@ def number(message: Mapping[str, Any], key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
         raise ViewerError(f"{message['type']}: {key} must be a finite number")
     return float(value)
+
+
+def whole(message: Mapping[str, Any], key: str, low: int, high: int) -> int:
+    """Take a whole number within bounds of a client's message."""
+    value = message.get(key)
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ViewerError(f"{message['type']}: {key} must be a whole number from {low} to {high}")
+    return value
 
 
 def vector(message: Mapping[str, Any], key: str) -> tuple[float, float, float]:

@@ -44,7 +44,7 @@ class Client:
     shown: Session | None = None
     wants: Wants = field(default_factory=Wants)
     sent: int = 0
-    log_seen: int = 0
+    log_seen: tuple[int, int] = (0, 0)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
     heard: float = field(default_factory=time.monotonic)
     allowance: float = MAX_RATE
@@ -231,7 +231,7 @@ class ViewerServer:
                 client.may_send.clear()
                 session = self._session
                 if client.shown is not session:
-                    client.shown, client.log_seen = session, 0
+                    client.shown, client.log_seen = session, (0, 0)
                     await client.connection.send(session.scene_message())
                     client.may_send.set()
                     continue
@@ -270,18 +270,12 @@ class ViewerServer:
         self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name)))
 
     async def _switch(self, name: str, scene: Scene) -> None:
-        loop, started = asyncio.get_running_loop(), time.monotonic()
-
-        def report(done: int, total: int) -> None:
-            part = done / max(total, 1)
-            left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None
-            status = {"type": "status", "text": f"Solving the {name}", "progress": part, "left_s": left}
-            loop.call_soon_threadsafe(lambda: loop.create_task(self._tell_all(status)))
+        solving, modes = self._reporter(f"Solving the {name}"), self._reporter(f"Computing the modes of the {name}")
 
         try:
             await self._tell_all({"type": "status", "text": f"Loading the {name}", "progress": None, "left_s": None})
             self._session.release()
-            built = await asyncio.to_thread(scene.build, report)
+            built = await asyncio.to_thread(scene.build, solving, modes)
             session = await asyncio.to_thread(Session, built)
             old, self._session = self._session, session
             old.close()
@@ -290,6 +284,20 @@ class ViewerServer:
         finally:
             self._building = False
             await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
+
+    def _reporter(self, text: str) -> Callable[[int, int], None]:
+        """Tell all pages how far a long work is, from any thread; it begins with the first call."""
+        loop, started = asyncio.get_running_loop(), None
+
+        def report(done: int, total: int) -> None:
+            nonlocal started
+            started = started or time.monotonic()
+            part = done / max(total, 1)
+            left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None
+            status = {"type": "status", "text": text, "progress": part, "left_s": left}
+            loop.call_soon_threadsafe(lambda: loop.create_task(self._tell_all(status)))
+
+        return report
 
 
 def _answer(status: int, kind: str, content: bytes, host: str) -> Response:

@@ -20,6 +20,9 @@ use crate::{Error, Result};
 /// Shortest and longest time step, s: a tick makes at most ten of the one, and feels the other.
 const TIME_STEPS: std::ops::RangeInclusive<f64> = 1e-4..=1e-2;
 
+/// A blow takes no more steps than this: a second at the usual time step.
+const BLOW_STEPS_MAX: f64 = 1000.0;
+
 /// What sets a body in motion: its modes at the surface dofs, and the coupling to a tool.
 pub struct Dynamics {
     pub(crate) modes: Modes,
@@ -70,24 +73,32 @@ pub struct Motion {
     /// start of this one, m.
     struck: Projection,
     blow: [DVec3; 2],
+    /// The node that is watched.
+    watched: Projection,
+    /// What is left of the blow: its impulse over the sum of its shape, N, its length and the next instant, in steps.
+    blow_shape: (DVec3, u32, u32),
     struck_at: DVec3,
     /// `R` between the patches.
     residual: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
     /// Body time not yet stepped through, s.
     due: f64,
+    /// Body time since the start, s.
+    pub time: f64,
     /// Force on the body and tool position at the end of the last step, where in contact.
     last: [Option<(DVec3, DVec3)>; MAX_TOOLS],
     /// Where the energy is.
     pub energy: Energy,
 }
 
-/// An impulse for a patch of the surface, given within one step.
+/// An impulse for a patch of the surface.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Strike {
     /// Where, m; the closest surface point is struck.
     pub point: DVec3,
     /// Impulse on the body, N s.
     pub impulse: DVec3,
+    /// How long it takes, s of the body's time: the force is half a wave, and lasts one step at least.
+    pub duration: f64,
 }
 
 impl Motion {
@@ -98,10 +109,13 @@ impl Motion {
             free: Default::default(),
             patches: std::array::from_fn(|_| Projection::new(modes)),
             struck: Projection::new(modes),
+            watched: Projection::new(modes),
             blow: Default::default(),
+            blow_shape: Default::default(),
             struck_at: DVec3::ZERO,
             residual: Default::default(),
             due: 0.0,
+            time: 0.0,
             last: Default::default(),
             energy: Energy::default(),
         }
@@ -113,7 +127,7 @@ impl Motion {
         for x in [q, v, free_q, free_v] {
             x.fill(Lanes::default());
         }
-        (self.free, self.blow, self.last) = Default::default();
+        (self.free, self.blow, self.blow_shape, self.last) = Default::default();
         self.due = modes.dt;
         self.energy = Energy::default();
     }
@@ -121,6 +135,18 @@ impl Motion {
     /// Modal displacements now.
     pub(super) fn modal_displacements(&self) -> &[Lanes] {
         &self.modal.q
+    }
+
+    /// Displacement of a surface node by the modes, less what tools do to it at rest, m: `q - p / k` at its rows.
+    pub(super) fn beyond_static(&mut self, modes: &Modes, tools: &[ToolContact; MAX_TOOLS], node: usize) -> DVec3 {
+        self.watched.gather(modes, std::iter::once((3 * node, 1.0)));
+        let mut moved = self.watched.read(modes, &self.modal.q);
+        for (contact, patch) in tools.iter().zip(&self.patches) {
+            if contact.mode != Mode::Free {
+                moved -= self.watched.static_compliance(modes, patch) * contact.force;
+            }
+        }
+        moved
     }
 
     /// Displacement of a surface point in the free motion, m; the residual flexibility of other contacts is left out.
@@ -168,18 +194,33 @@ impl Motion {
         others.map(|other| self.residual[tool][other] * tools[other].force).sum()
     }
 
-    /// Readies a strike for the next step: a force that rises to `impulse / dt` at its end and falls in the one after.
-    /// A second one before that is over is not heard.
-    pub(super) fn strike(&mut self, modes: &Modes, patch: &Patch, impulse: DVec3) {
-        if self.blow == [DVec3::ZERO; 2] {
+    /// Readies a strike from the next step on: forces `a sin(pi k / (n + 1))` at the ends of `n` steps, `dt` times their sum
+    /// being the impulse. With `n = 1` it rises to `impulse / dt` and falls in the step after. A second one before that is
+    /// over is not heard.
+    pub(super) fn strike(&mut self, modes: &Modes, patch: &Patch, impulse: DVec3, duration: f64) {
+        if self.blow == [DVec3::ZERO; 2] && self.blow_shape.2 == 0 {
             gather(&mut self.struck, modes, patch);
             self.struck_at = self.struck.read(modes, &self.modal.q);
-            self.blow[0] = impulse / modes.dt;
+            let steps = (duration / modes.dt).round().clamp(1.0, BLOW_STEPS_MAX) as u32;
+            // The sum of sin(pi k / (n + 1)) over k = 1..n is the cotangent of pi / (2 (n + 1)).
+            let sum = 1.0 / (std::f64::consts::FRAC_PI_2 / f64::from(steps + 1)).tan();
+            self.blow_shape = (impulse / (modes.dt * sum), steps, 1);
         }
+    }
+
+    /// Force of the blow at the end of this step, N.
+    fn next_of_blow(&mut self) -> DVec3 {
+        let (size, steps, instant) = self.blow_shape;
+        if instant == 0 {
+            return DVec3::ZERO;
+        }
+        self.blow_shape.2 = if instant == steps { 0 } else { instant + 1 };
+        size * (std::f64::consts::PI * f64::from(instant) / f64::from(steps + 1)).sin()
     }
 
     /// Ends the step by the forces of contacts and strike, predicts the next, and keeps account of the energy.
     pub(super) fn advance(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
+        self.blow[0] = self.next_of_blow();
         let mut held = [Held::new(&self.struck, self.blow[0]); MAX_TOOLS + 1];
         let mut holders = [0; MAX_TOOLS];
         let mut count = 0;
@@ -226,7 +267,7 @@ impl Motion {
             let now = self.struck.read(modes, &self.modal.q);
             self.energy.work += 0.5 * (self.blow[0] + self.blow[1]).dot(now - self.struck_at);
             self.struck_at = now;
-            self.blow = [DVec3::ZERO, self.blow[0]];
+            self.blow[1] = self.blow[0];
         }
     }
 }
@@ -249,7 +290,7 @@ pub(super) fn strike(model: &Model, state: &mut State, scratch: &mut Scratch, in
     let patch = &mut scratch.candidate;
     let covered = patch_weights(&model.green.surface, &centre, radius, &mut scratch.patch, patch);
     if covered == patch.count {
-        motion.strike(&dynamics.modes, patch, strike.impulse);
+        motion.strike(&dynamics.modes, patch, strike.impulse, strike.duration);
     }
 }
 
@@ -270,6 +311,7 @@ pub(super) fn begin_step(model: &Model, state: &mut State) -> bool {
     let due = motion.due > 0.999 * dynamics.modes.dt;
     if due {
         motion.due -= dynamics.modes.dt;
+        motion.time += dynamics.modes.dt;
     }
     due
 }

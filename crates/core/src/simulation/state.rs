@@ -75,6 +75,8 @@ pub struct Snapshot {
     pub tools: [ToolContact; MAX_TOOLS],
     /// Where the energy of a body in motion is.
     pub energy: Option<Energy>,
+    /// Time that a body in motion has gone through since the start, s.
+    pub body_time: f64,
     stiffness_scale: f64,
     /// Modal displacements; empty for a body at rest.
     modal: Vec<Lanes>,
@@ -86,10 +88,29 @@ impl State {
         snapshot.tools.clone_from(&self.tools);
         snapshot.stiffness_scale = self.stiffness_scale;
         if let Some(motion) = &self.motion {
-            snapshot.energy = Some(motion.energy);
+            (snapshot.energy, snapshot.body_time) = (Some(motion.energy), motion.time);
             snapshot.modal.copy_from_slice(motion.modal_displacements());
         }
     }
+
+    /// Displacement of one surface node, m; never allocates.
+    pub fn displacement_of(&mut self, model: &Model, node: usize) -> DVec3 {
+        let mut sum = DVec3::from_slice(&model.free[3 * node..3 * node + 3]);
+        for tool in self.tools.iter().filter(|tool| tool.mode != Mode::Free) {
+            sum += response_of(model, node, tool) / self.stiffness_scale;
+        }
+        if let (Some(motion), Some(dynamics)) = (&mut self.motion, &model.dynamics) {
+            sum += motion.beyond_static(&dynamics.modes, &self.tools, node);
+        }
+        sum
+    }
+}
+
+/// Static displacement of a surface node under the force of a tool, m.
+fn response_of(model: &Model, node: usize, tool: &ToolContact) -> DVec3 {
+    let mut here = Patch { count: 1, ..Patch::default() };
+    (here.nodes[0], here.weights[0]) = (node as u32, 1.0);
+    compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO) * tool.force
 }
 
 impl Snapshot {
@@ -108,11 +129,8 @@ impl Snapshot {
     fn displacement_of(&self, model: &Model, moving: &[Lanes], node: u32) -> DVec3 {
         let first = 3 * node as usize;
         let mut sum = DVec3::from_slice(&model.free[first..first + 3]);
-        let mut here = Patch { count: 1, ..Patch::default() };
-        (here.nodes[0], here.weights[0]) = (node, 1.0);
         for tool in self.touching() {
-            let response = compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO);
-            sum += response * tool.force / self.stiffness_scale;
+            sum += response_of(model, node as usize, tool) / self.stiffness_scale;
         }
         if let Some(dynamics) = &model.dynamics {
             let mut moved = [0.0; 3];
@@ -138,7 +156,6 @@ impl Snapshot {
         displacements
     }
 
-<<<<<<< HEAD
     fn touching(&self) -> impl Iterator<Item = &ToolContact> {
         self.tools.iter().filter(|tool| tool.mode != Mode::Free)
     }
@@ -154,7 +171,8 @@ impl Snapshot {
             projection.take_static(modes, tool.force, &mut moving);
         }
         moving
-=======
+    }
+
     /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts
     /// as they are and a body come to rest. The answer is linear in the ways of all tools; `None` for a tool that does not
     /// touch.
@@ -176,6 +194,5 @@ impl Snapshot {
                 Self { tools: pushed.tools.clone(), stiffness_scale: self.stiffness_scale, ..Self::default() };
             at_rest.displacements(model).iter().zip(&model.free).map(|(u, free)| u - free).collect()
         }))
->>>>>>> origin/main
     }
 }

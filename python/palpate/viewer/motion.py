@@ -1,0 +1,247 @@
+"""What the viewer does with a body in motion: blows, slow motion, the watched node, mode shapes one by one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from palpate.dynamics import ModalBasis
+from palpate.errors import ViewerError
+from palpate.scene import BuiltScene
+from palpate.scene.dynamics import StrikeTable
+from palpate.selection import free_end
+from palpate.simulation import Contact, Simulation
+from palpate.strain import HONEST_STRAIN
+from palpate.viewer.messages import vector, whole
+
+# So many of the lowest modes are offered.
+LISTED_MODES = 20
+# Oscillations of a mode shape in a second of the person's time.
+SHOWN_HZ = 1.0
+# A mode shape swings by this part of the body's size, unless that would strain the body beyond what is honest.
+MODE_SWING = 0.08
+# A blow lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
+BLOW_PERIODS = 0.06
+# Strain that the default blow is seen to lead to at instants of the first period (peaks between them are higher, and so
+# are those of other places), how many, and parts the blow is cut into.
+DEFAULT_STRAIN, INSTANTS, BLOW_PARTS = 0.5 * HONEST_STRAIN, 24, 9
+# It is tried where so large a part of the surface follows the first mode less, on at least so many nodes.
+FOLLOWING, NEIGHBOURS = 0.9, 6
+# Blows go up to this many times the default.
+STRONGEST = 10.0
+# Slow motion that the page offers, and the fastest swing that an eye follows.
+TIME_SCALES, FOLLOWED_HZ = (1.0, 0.25, 0.1), 4.0
+# The history shows the first of these spans (s) that holds so many periods of the first mode.
+SPANS, PERIODS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0), 6
+# Columns of the history: body time, displacement of the watched node, kinetic, strain, total energy, work.
+HISTORY_COLUMNS = 8
+
+
+class MovingBody:
+    """The moving side of a session.
+
+    Parameters
+    ----------
+    simulation
+        The running loop.
+    built
+        Its scene, with a motion and a body.
+    size
+        Of the body, m.
+
+    """
+
+    def __init__(self, simulation: Simulation, built: BuiltScene, size: float):
+        assert built.motion is not None and built.body is not None and built.scene.dynamics is not None
+        self._simulation, self._size = simulation, size
+        self._green, self._motion = built.green, built.motion
+        self._first_strike = built.scene.dynamics.strike
+        self._patch_radius = built.scene.tool.contact_radius
+        self._duration = BLOW_PERIODS / float(built.motion.basis.frequencies[0])
+        self.watched = self._closest_node(self._first_strike.point) if self._first_strike else free_end(built.body)
+        self.impulse = self._default_impulse()
+        given = 0.0 if self._first_strike is None else float(np.linalg.norm(self._first_strike.impulse))
+        self.max_impulse = max(STRONGEST * self.impulse, given)
+        self.struck_at: float | None = None
+        self._mode: _ShownMode | None = None
+        self._touched: np.ndarray | None = None
+        simulation.watch(self.watched)
+        self.set_time_scale(self._first_time_scale())
+
+    def header(self) -> dict[str, Any]:
+        """Return the part of the scene message that tells of the motion."""
+        basis, strike = self._motion.basis, self._first_strike
+        # After the scene's own blow there is nothing before it to be seen.
+        shown = (PERIODS if strike is None else 2 * PERIODS) / basis.frequencies[0]
+        return {
+            "frequencies": basis.frequencies[:LISTED_MODES].tolist(),
+            "modes": len(basis),
+            "time_scale": self.time_scale,
+            "impulse": self.impulse,
+            "max_impulse": self.max_impulse,
+            "span": next((span for span in SPANS if span >= shown), SPANS[-1]),
+            "youngs_modulus": self._green.youngs_modulus,
+            "strike": None if strike is None else {"point": strike.point, "impulse": strike.impulse},
+        }
+
+    def frame_header(self) -> dict[str, Any]:
+        """Return the part of a frame message that tells of the motion."""
+        rank = int(np.searchsorted(self._green.surface_nodes, self.watched))
+        mode = None if self._mode is None else self._mode.header
+        return {"watched": rank, "struck_at": self.struck_at, "mode": mode}
+
+    def strike(self, message: Mapping[str, Any], reach: float, centre: np.ndarray, now: float) -> None:
+        """Give the blow of a message at the body time ``now``; it ends a mode that is shown."""
+        point, impulse = np.array(vector(message, "point")), np.array(vector(message, "impulse"))
+        size = float(np.linalg.norm(impulse))
+        if np.abs(point - centre).max() > reach:
+            raise ViewerError("strike: the point is far away from the body")
+        if not 0.0 < size <= self.max_impulse:
+            raise ViewerError(f"strike: the impulse must lie between 0 and {self.max_impulse:.3g} N s on this body")
+        self._give(StrikeTable(point=tuple(point), impulse=tuple(impulse), duration=self._duration), now)
+
+    def repeat(self, now: float) -> None:
+        """Give the scene's own blow at the body time ``now``."""
+        if self._first_strike is None:
+            raise ViewerError("repeat: the scene has no strike of its own")
+        self._give(self._first_strike, now)
+
+    def _give(self, blow: StrikeTable, now: float) -> None:
+        self.end_mode()
+        self._watch(self._closest_node(blow.point))
+        self._simulation.strike(blow.point, blow.impulse, blow.duration)
+        self.struck_at = now
+
+    def set_time_scale(self, time_scale: float) -> None:
+        """Slow motion."""
+        self._simulation.set_time_scale(time_scale)
+        self.time_scale = time_scale
+
+    def show_mode(self, message: Mapping[str, Any]) -> None:
+        """Show a mode of the list, counted from 1; 0 ends that."""
+        chosen = whole(message, "number", 0, min(LISTED_MODES, len(self._motion.basis)))
+        self._mode = None if chosen == 0 else self._prepare_mode(chosen)
+
+    def end_mode(self) -> None:
+        """Show the body itself again."""
+        self._mode = None
+
+    def pose(self, displacements: np.ndarray) -> np.ndarray:
+        """Displacements to be drawn (s, 3), m: those of the mode that is shown, or the body's own."""
+        if self._mode is None:
+            return displacements
+        return self._green.free_displacements + self._mode.displacements(time.monotonic())
+
+    @property
+    def shows_mode(self) -> bool:
+        """Whether a mode shape is drawn in place of the body's motion."""
+        return self._mode is not None
+
+    def follow(self, contacts: list[Contact]) -> None:
+        """Watch the node in the middle of a contact that has begun."""
+        contact = contacts[0] if contacts else None
+        if contact is not None and not np.array_equal(contact.point, self._touched):
+            self._watch(int(contact.nodes[np.argmax(contact.weights)]))
+        self._touched = None if contact is None else contact.point
+
+    def _first_time_scale(self) -> float:
+        """Slow enough for the scene's own blow to be followed by eye; a body without one moves at its own pace."""
+        if self._first_strike is None:
+            return 1.0
+        frequency = self._motion.basis.frequencies[0]
+        return next((scale for scale in TIME_SCALES if scale * frequency <= FOLLOWED_HZ), TIME_SCALES[-1])
+
+    def _watch(self, node: int) -> None:
+        self.watched = node
+        self._simulation.watch(node)
+
+    def _closest_node(self, point: Any) -> int:
+        positions = self._green.surface_positions + self._green.free_displacements
+        return int(self._green.surface_nodes[np.argmin(np.linalg.norm(positions - np.array(point), axis=1))])
+
+    def _prepare_mode(self, chosen: int) -> _ShownMode:
+        basis = self._motion.basis
+        shape = basis.shapes[self._green.surface_nodes, :, chosen - 1]
+        largest = float(np.linalg.norm(shape, axis=1).max())
+        swing = min(MODE_SWING * self._size / largest, HONEST_STRAIN / self._strain_of(shape))
+        return _ShownMode(chosen, float(basis.frequencies[chosen - 1]), swing * shape, swing * largest)
+
+    def _strain_of(self, displacements: np.ndarray) -> float:
+        """Largest strain of displacements alone, without that of the body's own loads."""
+        gauge, free = self._simulation.strain_gauge, self._green.free_displacements
+        return float(gauge.magnitudes(gauge.sample(free + displacements) - gauge.sample(free)).max())
+
+    def _default_impulse(self) -> float:
+        """Blow along the normal, where the surface follows the first mode well, that stays within honest strain, N s.
+
+        From rest a short blow `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from
+        then on it swings freely; a longer one is a row of short ones. The strain is proportional to the blow.
+        """
+        basis, surface = self._motion.basis, self._green.surface_nodes
+        shapes, normals = basis.shapes[surface], self._normals()
+        follows = np.abs(np.einsum("ij,ij->i", shapes[:, :, 0], normals))
+        node = int(np.argsort(follows)[int(FOLLOWING * (len(surface) - 1))])
+        blow = normals[node] @ np.tensordot(self._patch_around(node), shapes, axes=1)
+        instants = np.geomspace(0.2 * self._duration, 1.0 / basis.frequencies[0], INSTANTS)
+        parts = (np.arange(BLOW_PARTS) + 1) / (BLOW_PARTS + 1)
+        shares = np.sin(np.pi * parts) / np.sin(np.pi * parts).sum()
+        swings = np.zeros((len(basis), INSTANTS))
+        for part, share in zip(parts, shares, strict=True):
+            since = instants - part * self._duration
+            after = since > 0
+            swings[:, after] += share * _ringing(basis, self._motion.scheme, blow, since[after])
+        poses = shapes.reshape(-1, len(basis)) @ swings
+        return DEFAULT_STRAIN / max(self._strain_of(pose.reshape(-1, 3)) for pose in poses.T)
+
+    def _patch_around(self, node: int) -> np.ndarray:
+        """Weights (s,) about as a contact there has them: its radius, or on a coarse mesh the nearest neighbours."""
+        positions = self._green.surface_positions
+        distance = np.linalg.norm(positions - positions[node], axis=1)
+        radius = max(self._patch_radius, 1.01 * np.partition(distance, NEIGHBOURS)[NEIGHBOURS])
+        weights = np.where(distance < radius, (1 - (distance / radius) ** 2) ** 2, 0.0)
+        return weights / weights.sum()
+
+    def _normals(self) -> np.ndarray:
+        """Unit normals (s, 3) at the surface nodes, each triangle by its area."""
+        positions = self._green.surface_positions
+        corners = np.searchsorted(self._green.surface_nodes, self._green.surface_triangles)
+        a, b, c = (positions[corners[:, k]] for k in range(3))
+        normals, areas = np.zeros_like(positions), np.cross(b - a, c - a)
+        for k in range(3):
+            np.add.at(normals, corners[:, k], areas)
+        return normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+class _ShownMode:
+    """A mode shape swinging at :data:`SHOWN_HZ` from the moment it is made."""
+
+    def __init__(self, chosen: int, frequency: float, swing: np.ndarray, largest: float):
+        self._swing, self._started = swing, time.monotonic()
+        self.header = {"number": chosen, "frequency": frequency, "shown_hz": SHOWN_HZ, "amplitude": largest}
+
+    def displacements(self, now: float) -> np.ndarray:
+        return np.sin(2 * np.pi * SHOWN_HZ * (now - self._started)) * self._swing
+
+
+def _ringing(basis: ModalBasis, scheme: tuple[float, ...], velocities: np.ndarray, instants: np.ndarray) -> np.ndarray:
+    """Modal displacements (m, t) of free modes that start from zero with velocities (m,).
+
+    `q = v (e^(s1 t) - e^(s2 t)) / (s1 - s2)` with the roots `s = -xi w +- w sqrt(xi^2 - 1)`, also for modes damped
+    beyond the critical.
+    """
+    a, b = scheme[3:]
+    decay = (a + b * basis.eigenvalues) / 2
+    # Two equal roots are told apart by a part that round-off hides.
+    root = np.sqrt((decay**2 - basis.eigenvalues * (1 + 1e-9)).astype(complex))
+    s1, s2 = (-decay + root)[:, None], (-decay - root)[:, None]
+    return (velocities[:, None] * (np.exp(s1 * instants) - np.exp(s2 * instants)) / (s1 - s2)).real
+
+
+def history(rows: np.ndarray, since: float) -> np.ndarray:
+    """Rows of the log as the page plots them, see HISTORY_COLUMNS: one for each step of the body after a body time."""
+    rows = rows[np.flatnonzero(np.diff(rows["body_time"], prepend=since) > 0)]
+    total = rows["kinetic"] + rows["strain"] + rows["coupling"]
+    return np.column_stack([rows["body_time"], rows["watched"], rows["kinetic"], rows["strain"], total, rows["work"]])
