@@ -60,9 +60,7 @@ class DynamicsTable(Table):
             raise ValueError("give damping_ratios or rayleigh, not both")
         return self
 
-    def build(
-        self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True
-    ) -> Motion:
+    def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> Motion:
         """Modes and coefficients for a body.
 
         Raises

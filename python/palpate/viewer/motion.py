@@ -15,7 +15,7 @@ from palpate.scene.dynamics import StrikeTable
 from palpate.selection import free_end
 from palpate.simulation import Contact, Simulation
 from palpate.strain import HONEST_STRAIN
-from palpate.viewer.messages import number, vector, whole
+from palpate.viewer.messages import vector, whole
 
 # So many of the lowest modes are offered.
 LISTED_MODES = 20
@@ -205,7 +205,7 @@ class MovingBody:
         return weights / weights.sum()
 
     def _normals(self) -> np.ndarray:
-        """Unit normals (s, 3) at the surface nodes, each triangle by its area."""
+        """Average the unit normals (s, 3) at the surface nodes, each triangle by its area."""
         positions = self._green.surface_positions
         corners = np.searchsorted(self._green.surface_nodes, self._green.surface_triangles)
         a, b, c = (positions[corners[:, k]] for k in range(3))

@@ -285,7 +285,6 @@ class ViewerServer:
             self._building = False
             await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
 
-
     def _reporter(self, text: str) -> Callable[[int, int], None]:
         """Tell all pages how far a long work is, from any thread; it begins with the first call."""
         loop, started = asyncio.get_running_loop(), None
