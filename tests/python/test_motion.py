@@ -152,6 +152,24 @@ def test_the_tool_meets_the_body_where_it_is(tmp_path):
     assert (forces[:, 2] >= 0).all()
 
 
+def test_a_long_blow_is_a_row_of_short_ones(tmp_path):
+    """Half a wave in time: the motion is linear, so shifted and weighted answers to a blow of one step add up to it."""
+    simulation = palpate.Simulation(scene(tmp_path, ""))
+    away, watch = np.full((300, 3), np.nan), simulation.green.surface_nodes[::7]
+
+    def after(*blow):
+        return simulation.play(away, strikes=[(0, TOP, (0, 3e-4, -1e-3), *blow)], watch=watch).displacements
+
+    short, steps = after(), 20
+    assert np.array_equal(short, after(5e-4))
+    shares = np.sin(np.pi * np.arange(1, steps + 1) / (steps + 1))
+    shares /= shares.sum()
+    expected = sum(s * np.concatenate([np.zeros_like(short[:k]), short[: 300 - k]]) for k, s in enumerate(shares))
+    assert after(0.02) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    with pytest.raises(palpate.SceneError, match="duration must be a time of at least 0 s"):
+        after(-1.0)
+
+
 def test_slow_motion_and_the_running_loop(tmp_path):
     simulation = palpate.Simulation(scene(tmp_path, ""))
     away = np.full((800, 3), np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.server
 import os
 import re
@@ -76,8 +77,16 @@ def chromium():
         browser.close()
 
 
-@pytest.fixture
-def page(chromium, program):
+@pytest.fixture(scope="module")
+def struck(cache):
+    """The paper's beam in motion, struck by itself when a page opens."""
+    started = Program(cache, "beam", "--paper", "--impulse")
+    yield started
+    assert started.stop() == 0
+
+
+@contextlib.contextmanager
+def opened(chromium, program):
     """The page with a scene on it; anything on its console is a failure."""
     context = chromium.new_context(viewport={"width": 1280, "height": 720})
     page = context.new_page()
@@ -92,6 +101,18 @@ def page(chromium, program):
     context.close()
     # Software rendering tells of its own slowness; that is the test machine's affair.
     assert [text for text in complaints if "GPU stall" not in text] == []
+
+
+@pytest.fixture
+def page(chromium, program):
+    with opened(chromium, program) as page:
+        yield page
+
+
+@pytest.fixture
+def moving_page(chromium, struck):
+    with opened(chromium, struck) as page:
+        yield page
 
 
 def state(page) -> dict:
@@ -258,6 +279,81 @@ def test_a_screenshot_is_a_picture(page, tmp_path):
     download.value.save_as(tmp_path / "shot.png")
     pixels = np.asarray(Image.open(tmp_path / "shot.png").convert("RGB"), dtype=float)
     assert pixels.std() > 5
+
+
+def swings(page, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Height of the marked node, m, and total energy, J, as often as the page can be asked."""
+    end, seen = time.monotonic() + seconds, []
+    while time.monotonic() < end:
+        motion = state(page)["motion"]
+        seen.append((motion["bodyTime"], motion["displacement"][2], motion["total"]))
+    rows = np.unique(np.array(seen), axis=0)
+    return rows[:, 1], rows[:, 2]
+
+
+def test_the_impulse_is_given_and_repeated(moving_page):
+    page = moving_page
+    # Slowed down so that an eye follows 30 Hz.
+    assert page.locator("#speed-10").get_attribute("aria-pressed") == "true"
+    first = until(page, lambda s: s["motion"]["struck_at"] is not None and s["motion"]["total"] > 1e-4)["motion"]
+    height, energy = swings(page, 1.5)
+    crossings = np.count_nonzero(np.diff(np.sign(height)))
+    assert crossings >= 3 and np.abs(height).max() > 1e-4
+    assert 0 < energy[-1] < 0.7 * energy.max()
+    # 10 N for a millisecond: what the node's neighbourhood takes up by it.
+    work = state(page)["motion"]["work"]
+    page.get_by_test_id("repeat").click()
+    again = until(page, lambda s: s["motion"]["struck_at"] > first["struck_at"] and s["motion"]["work"] > 1.5 * work)
+    assert again["motion"]["watched"] == first["watched"]
+    page.get_by_test_id("speed-4").click()
+    until(page, lambda s: page.locator("#speed-4").get_attribute("aria-pressed") == "true")
+
+
+def test_a_click_strikes_in_motion(moving_page):
+    page = moving_page
+    until(page, lambda s: s["motion"]["struck_at"] is not None)
+    before = state(page)["motion"]
+    x, y = page.evaluate("window.palpate.pickPoint()")
+    page.get_by_test_id("strike").click()
+    # A drag turns the camera, a click strikes, and neither presses.
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 30, y, steps=4)
+    page.mouse.up()
+    assert state(page)["motion"]["struck_at"] == before["struck_at"]
+    page.mouse.click(*page.evaluate("window.palpate.pickPoint()"))
+    after = until(page, lambda s: s["motion"]["struck_at"] != before["struck_at"] and s["strain"] > 1e-3)
+    assert after["contacts"] == 0 and after["motion"]["watched"] != before["watched"]
+    page.get_by_test_id("strike").click()
+    page.keyboard.down("Alt")
+    page.mouse.click(*page.evaluate("window.palpate.pickPoint()"))
+    page.keyboard.up("Alt")
+    until(page, lambda s: s["motion"]["struck_at"] > after["motion"]["struck_at"])
+
+
+def test_modes_swing_one_by_one(moving_page):
+    page = moving_page
+    assert page.get_by_test_id("stiffness").is_disabled()
+    assert "fixed" in page.locator("#stiffness-value").inner_text()
+    page.get_by_test_id("tab-modes").click()
+    third = page.get_by_test_id("mode-list").locator("button").nth(2)
+    third.click()
+    mode = until(page, lambda s: s["motion"]["mode"] is not None and s["strain"] > 0.01)["motion"]["mode"]
+    assert mode["number"] == 3
+    frequency = f"{mode['frequency']:.3g} Hz"
+    assert frequency in third.inner_text()
+    banner = page.get_by_test_id("mode-banner")
+    assert f"Mode 3: {frequency}, shown slowed" in banner.inner_text()
+    # Once a second, here; the body itself rests.
+    strains = []
+    for _ in range(40):
+        strains.append(state(page)["strain"])
+        time.sleep(0.025)
+    assert max(strains) > 2 * min(strains) and max(strains) <= 0.1 + 1e-6
+    press(page, 10)
+    page.mouse.up()
+    until(page, lambda s: s["motion"]["mode"] is None)
+    assert not banner.is_visible()
 
 
 def test_leaving_the_page_lets_go(chromium, program, page):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import re
 import socket
 import urllib.request
 from urllib.error import HTTPError
@@ -13,6 +12,7 @@ from urllib.error import HTTPError
 import numpy as np
 import pytest
 import websockets
+from viewer_client import page, serving
 from websockets.asyncio.client import connect
 
 import palpate
@@ -27,69 +27,6 @@ TOP = [0.04, 0.025, 0.05]
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
     return BuiltScene(palpate.Scene.of_store("block.palpate"), block, block_green)
-
-
-@pytest.fixture(scope="module")
-def moving(block, block_green) -> BuiltScene:
-    """The block in motion, with a blow of its own."""
-    blow = {"point": TOP, "impulse": [0, 0, -1e-3]}
-    scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": blow})
-    motion = scene.dynamics.build(block, scene.device.max_stiffness, progress=False)
-    return BuiltScene(scene, block, block_green, motion)
-
-
-class Page:
-    """A client that speaks the page's protocol."""
-
-    def __init__(self, server: ViewerServer, socket):
-        self.server, self.socket = server, socket
-        self.texts: list[dict] = []
-
-    async def say(self, **message):
-        await self.socket.send(json.dumps(message))
-
-    async def receive(self, kind: str, limit: float = 5.0):
-        """Next message of a kind; binary frames are acknowledged as a page would."""
-
-        async def wait():
-            while True:
-                raw = await self.socket.recv()
-                if isinstance(raw, bytes):
-                    header, arrays = messages.decode(raw)
-                    if header["type"] == "frame":
-                        await self.say(type="ack", frame=header["frame"])
-                else:
-                    header, arrays = json.loads(raw), {}
-                if header["type"] == kind:
-                    return header, arrays
-
-        return await asyncio.wait_for(wait(), limit)
-
-    async def frame_where(self, condition):
-        for _ in range(400):
-            header, arrays = await self.receive("frame")
-            if condition(header):
-                return header, arrays
-        raise AssertionError(f"no such frame came; the last was {header}")
-
-
-@contextlib.asynccontextmanager
-async def serving(built, **options):
-    server = ViewerServer(built, port=0, **options)
-    await server.start()
-    try:
-        yield server
-    finally:
-        await server.stop()
-
-
-@contextlib.asynccontextmanager
-async def page(server, *, token=None, origin=None):
-    base = f"127.0.0.1:{server.port}"
-    async with connect(f"ws://{base}/socket", origin=origin or f"http://{base}", proxy=None, max_size=None) as socket:
-        client = Page(server, socket)
-        await client.say(type="hello", token=token or server.token, version=messages.VERSION)
-        yield client
 
 
 def get(server, path="/", host=None):
@@ -448,105 +385,5 @@ def test_another_model_is_shown_when_it_is_ready(built):
             assert scene["name"] == "beam"
             _, arrays = await client.receive("frame")
             assert len(arrays["displacements"]) == scene["surface_nodes"]
-
-    asyncio.run(session())
-
-
-def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
-    async def session():
-        async with serving(moving) as server, page(server) as client, page(server) as watcher:
-            scene, arrays = await client.receive("scene")
-            told = scene["motion"]
-            assert told["frequencies"] == pytest.approx(moving.motion.basis.frequencies[:20].tolist())
-            assert scene["youngs_modulus"] is None and told["youngs_modulus"] == pytest.approx(10e3)
-            assert 0 < told["impulse"] < told["max_impulse"]
-            assert not arrays["free"].any()
-            await client.say(type="set", time_scale=0.25)
-            settings, _ = await watcher.receive("settings")
-            assert settings["time_scale"] == 0.25
-            await client.say(type="strike", point=TOP, impulse=[0, 0, -told["impulse"]])
-            _, arrays = await watcher.frame_where(lambda h: h["motion"]["struck_at"] is not None and h["strain"] > 1e-3)
-            header, arrays = await client.frame_where(lambda h: h["motion"]["struck_at"] is not None)
-            top = np.argmin(np.linalg.norm(moving.green.surface_positions - TOP, axis=1))
-            assert header["motion"]["watched"] == top
-            while not len(arrays["history"]):
-                _, arrays = await client.receive("frame")
-            time, energy = arrays["history"][-1, 0], arrays["history"][-1, 4:]
-            assert time > 0 and 0 < energy[2] <= energy[3] * (1 + 1e-4)
-            # A mode is drawn in place of the motion, at a pace of its own; the body is at rest under it.
-            await client.say(type="mode", number=3)
-            swung = lambda h: h["motion"]["mode"] and h["strain"] > 0.05  # noqa: E731
-            header, arrays = await watcher.frame_where(swung)
-            assert header["motion"]["mode"]["frequency"] == pytest.approx(moving.motion.basis.frequencies[2])
-            assert header["strain"] <= 0.1 + 1e-6
-            shape = moving.motion.basis.shapes[moving.green.surface_nodes, :, 2]
-            alike = abs((shape * arrays["displacements"]).sum()) / np.linalg.norm(shape)
-            assert alike == pytest.approx(np.linalg.norm(arrays["displacements"]), rel=1e-5)
-            assert np.abs(server._session.simulation.frame().displacements).max() == 0
-            # Its own blow ends that.
-            await client.say(type="repeat")
-            await watcher.frame_where(lambda h: h["motion"]["mode"] is None and h["motion"]["struck_at"] is not None)
-            await client.say(type="mode", number=1)
-            await watcher.frame_where(lambda h: h["motion"]["mode"] is not None)
-            await client.say(type="press", position=[*TOP[:2], 0.054], grab=False)
-            await watcher.frame_where(lambda h: h["motion"]["mode"] is None and len(h["contacts"]) == 1)
-            await client.say(type="reset")
-            await watcher.frame_where(lambda h: h["contacts"] == [] and h["strain"] < 1e-6)
-
-    asyncio.run(session())
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ('{"type": "strike", "point": [0, 0, 0], "impulse": [0, 0, 1e9]}', "the impulse must lie between"),
-        ('{"type": "strike", "point": [0, 0, 0], "impulse": [0, 0, 0]}', "the impulse must lie between"),
-        ('{"type": "strike", "point": [9, 0, 0], "impulse": [0, 0, 1e-6]}', "far away"),
-        ('{"type": "strike", "point": [0, 0, NaN], "impulse": [0, 0, 1e-6]}', "not JSON"),
-        ('{"type": "strike", "point": [0, 0, 0], "impulse": 1e-6}', "three numbers"),
-        ('{"type": "mode"}', "whole number from 0 to 20"),
-        ('{"type": "mode", "number": 21}', "whole number from 0 to 20"),
-        ('{"type": "mode", "number": 1.5}', "whole number"),
-        ('{"type": "mode", "number": true}', "whole number"),
-        ('{"type": "set", "time_scale": 0}', r"\(0, 1\]"),
-        ('{"type": "set", "time_scale": 2}', r"\(0, 1\]"),
-        ('{"type": "set", "youngs_modulus": 1e4}', "moves"),
-    ],
-)
-def test_motion_messages_are_bounded(moving, text, reason):
-    async def session():
-        async with serving(moving) as server, page(server) as client, page(server) as watcher:
-            await client.receive("scene")
-            await client.socket.send(text)
-            error, _ = await client.receive("error")
-            assert re.search(reason, error["text"])
-            await watcher.receive("scene")
-            await watcher.socket.send(text.replace("NaN", "0"))
-            error, _ = await watcher.receive("error")
-            assert "another viewer has control" in error["text"]
-            assert server._session.simulation.frame().energy.work == 0
-
-    asyncio.run(session())
-
-
-@pytest.mark.parametrize(
-    "message",
-    [
-        {"type": "strike", "point": TOP, "impulse": [0, 0, -1e-6]},
-        {"type": "repeat"},
-        {"type": "mode", "number": 1},
-        {"type": "set", "time_scale": 0.5},
-    ],
-)
-def test_a_body_at_rest_takes_no_motion_messages(built, message):
-    async def session():
-        async with serving(built) as server, page(server) as client:
-            scene, _ = await client.receive("scene")
-            assert scene["motion"] is None
-            await client.say(**message)
-            error, _ = await client.receive("error")
-            assert "does not move" in error["text"]
-            header, arrays = await client.receive("frame")
-            assert header["motion"] is None and len(arrays["history"]) == 0
 
     asyncio.run(session())

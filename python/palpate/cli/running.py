@@ -29,9 +29,7 @@ PORT = 8642
 def demo(
     model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.")] = "liver",
     paper: Annotated[bool, typer.Option("--paper", help="The mesh in the size of the paper.")] = False,
-    motion: Annotated[
-        bool, typer.Option("--motion", help="The body moves: strike it, slow it down, see modes.")
-    ] = False,
+    motion: Annotated[bool, typer.Option("--motion", help="The body moves: strike it, slow it, see modes.")] = False,
     impulse: Annotated[
         bool, typer.Option("--impulse", help="A moving body of hard rubber, struck at its free end with 10 N for 1 ms.")
     ] = False,

@@ -205,7 +205,7 @@ class MovingBody:
         return weights / weights.sum()
 
     def _normals(self) -> np.ndarray:
-        """Unit normals (s, 3) at the surface nodes, each triangle by its area."""
+        """Average the unit normals (s, 3) at the surface nodes, each triangle by its area."""
         positions = self._green.surface_positions
         corners = np.searchsorted(self._green.surface_nodes, self._green.surface_triangles)
         a, b, c = (positions[corners[:, k]] for k in range(3))
