@@ -138,7 +138,6 @@ impl Snapshot {
         displacements
     }
 
-<<<<<<< HEAD
     fn touching(&self) -> impl Iterator<Item = &ToolContact> {
         self.tools.iter().filter(|tool| tool.mode != Mode::Free)
     }
@@ -154,7 +153,8 @@ impl Snapshot {
             projection.take_static(modes, tool.force, &mut moving);
         }
         moving
-=======
+    }
+
     /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts
     /// as they are and a body come to rest. The answer is linear in the ways of all tools; `None` for a tool that does not
     /// touch.
@@ -176,6 +176,5 @@ impl Snapshot {
                 Self { tools: pushed.tools.clone(), stiffness_scale: self.stiffness_scale, ..Self::default() };
             at_rest.displacements(model).iter().zip(&model.free).map(|(u, free)| u - free).collect()
         }))
->>>>>>> origin/main
     }
 }
