@@ -232,6 +232,25 @@ def test_slow_motion_and_the_running_loop(tmp_path):
         assert simulation.frame().energy.total == 0
 
 
+def test_a_reset_in_slow_motion_lets_go_at_once(tmp_path):
+    """A step comes due once in a hundred ticks; a reset does not wait for it, nor get lost between two."""
+    simulation = palpate.Simulation(scene(tmp_path, "", fixed="z < 1e-6"))
+    with simulation:
+        simulation.move(TOP + [0, 0, RADIUS + 0.02])
+        time.sleep(0.1)
+        simulation.move(TOP + [0, 0, RADIUS - 0.003])
+        time.sleep(0.5)
+        assert len(simulation.frame().contacts) == 1
+        simulation.set_time_scale(1e-3)
+        simulation.remove()
+        simulation.reset()
+        time.sleep(0.1)
+        frame = simulation.frame()
+        assert frame.contacts == []
+        assert np.abs(frame.forces).max() == 0
+        assert frame.energy.total == frame.energy.work == 0
+
+
 @pytest.mark.parametrize(
     ("dynamics", "message"),
     [
