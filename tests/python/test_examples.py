@@ -18,6 +18,16 @@ def test_example(example, tmp_path):
     assert result.returncode == 0, result.stderr
 
 
+CHUNKS = [text.split("```")[0] for text in (ROOT / "docs" / "dynamics.md").read_text().split("```python\n")[1:]]
+
+
+@pytest.mark.parametrize("code", CHUNKS, ids=["scene", "newmark"])
+def test_the_examples_of_the_page_on_motion(code):
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    assert "kinetic=" in result.stdout
+
+
 def test_the_example_of_the_readme():
     code = (ROOT / "README.md").read_text().split("```python\n")[1].split("```")[0]
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120)

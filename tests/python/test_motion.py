@@ -17,11 +17,11 @@ TOP = np.array([0.10, 0.015, 0.03])
 FREE_LIMITS = "[device]\nmax_force = '1kN'\nmax_slew = 1e9\nramp = 0\n"
 
 
-def scene(folder, dynamics: str, fixed: str = "x < 1e-6") -> palpate.Scene:
-    """Scene of a bar of soft rubber, a cantilever unless it is held elsewhere."""
-    box_mesh(cells=(10, 3, 3), size=SIZE, jitter=0).write(folder / "beam.vtu")
+def scene(folder, dynamics: str, fixed: str = "x < 1e-6", more: str = "", cells=(10, 3, 3)) -> palpate.Scene:
+    """Scene of a bar of soft rubber, a cantilever unless it is held elsewhere; ``more`` goes behind [body]."""
+    box_mesh(cells=cells, size=SIZE, jitter=0).write(folder / "beam.vtu")
     text = (
-        f"[body]\nmesh = 'beam.vtu'\nprecision = 'f64'\n"
+        f"[body]\nmesh = 'beam.vtu'\nprecision = 'f64'\n{more}"
         "[material]\nyoungs_modulus = '50kPa'\npoissons_ratio = 0.4\ndensity = 1000\n"
         f"[supports]\nfixed = '{fixed}'\n"
         f"[tool]\nradius = {RADIUS}\ncontact_radius = {CONTACT_RADIUS}\n"
@@ -96,6 +96,66 @@ def test_a_held_press_on_a_single_precision_store(tmp_path):
     force = simulation.run(approach_and_hold(0.003, 12_000))[-1]
     expected = static_force(simulation.green, np.array([0, 0, -0.003]))
     assert force == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.linalg.norm(expected))
+
+
+def test_a_held_press_on_quadratic_elements_comes_to_the_static_answer(tmp_path):
+    made = scene(tmp_path, "modes = 60\n", fixed="z < 1e-6", more="element = 'quadratic'\n", cells=(6, 2, 2))
+    simulation = palpate.Simulation(made)
+    assert simulation.body.mesh.is_quadratic
+    forces = simulation.run(approach_and_hold(0.003, 12_000))
+    expected = static_force(simulation.green, np.array([0, 0, -0.003]))
+    assert forces[-1] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.linalg.norm(expected))
+
+
+def test_a_body_in_motion_sags_under_its_weight_and_moves_about_that(tmp_path):
+    """At rest a touch is that of the sagged body at rest; a blow swings about the sagged state, and dies down to it."""
+    weight = "[[loads]]\ngravity = [0, 0, -9.81]\n"
+    simulation = palpate.Simulation(scene(tmp_path, "modes = 40\n", more=weight))
+    sag = simulation.green.free_displacements
+    top = int(np.argmin(np.linalg.norm(simulation.green.surface_positions - [0.108, 0.02, 0.03], axis=1)))
+    node = int(simulation.green.surface_nodes[top])
+    away = np.full((8000, 3), np.nan)
+    played = simulation.play(away, strikes=[(100, TOP, (0, 0, -1e-3))], watch=[node])
+    heights = played.displacements[:, 0]
+    assert heights[:100] == pytest.approx(np.tile(sag[top], (100, 1)), rel=1e-12)
+    assert np.ptp(heights[200:1000, 2]) > 1e-3
+    assert heights[-1] == pytest.approx(sag[top], abs=1e-6)
+    # On a table the press counts from the sagged surface, and ends at the answer of the sagged body at rest.
+    lying = palpate.Simulation(scene(tmp_path, "modes = 40\n", fixed="z < 1e-6", more=weight))
+    touched = lying.green.touch(TOP, (0, 0, 0), CONTACT_RADIUS)
+    met = approach_and_hold(0.003, 12_000)
+    force = lying.run(met)[-1]
+    stiffness = np.column_stack(
+        [lying.green.touch(TOP, unit, CONTACT_RADIUS).force - touched.force for unit in np.eye(3)]
+    )
+    compliance = np.linalg.inv(stiffness) + np.eye(3) / COUPLING
+    sunk = np.linalg.solve(stiffness, -touched.force)  # mean displacement of the patch by the weight
+    assert sunk[2] < -1e-5
+    # The way along the surface counts from the first touch; the material met there lies beside TOP by a little.
+    expected = -np.linalg.solve(compliance, [0, 0, -0.003 - sunk[2]])
+    assert force == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.linalg.norm(expected))
+
+
+def test_a_blow_excites_each_mode_by_its_share(tmp_path):
+    """After an impulse `J` on a patch `W` a mode swings as `Phi^T W J / omega sin(omega t)`, each on its own."""
+    made = scene(tmp_path, "scheme = 'exact'\nmodes = 12\nrayleigh = [0, 0]\n")
+    made = made.model_copy(update={"tool": made.tool.model_copy(update={"contact_radius": 0.0})})
+    simulation = palpate.Simulation(made)
+    basis, nodes = simulation.motion.basis, simulation.green.surface_nodes
+    struck = int(np.argmin(np.linalg.norm(simulation.body.mesh.nodes - [0.108, 0.02, 0.03], axis=1)))
+    impulse, dt, blow = np.array([4e-4, -3e-4, -1e-3]), 1e-3, 20
+    played = simulation.play(
+        np.full((1500, 3), np.nan), [(blow, simulation.body.mesh.nodes[struck], impulse)], watch=nodes
+    )
+    omega = 2 * np.pi * basis.frequencies
+    # The force is a triangle of two steps around its tick's end: a mode hears it dulled by sinc^2(omega dt / 2).
+    share = basis.shapes[struck].T @ impulse / omega * np.sinc(omega * dt / 2 / np.pi) ** 2
+    t = played.time - played.time[blow]
+    after = t > 1.5 * dt
+    expected = np.einsum("nam,m,mt->tna", basis.shapes[nodes], share, np.sin(np.outer(omega, t[after])))
+    assert np.count_nonzero(np.abs(share) > 0.01 * np.abs(share).max()) > 5
+    # The residual flexibility answers only while the force acts.
+    assert played.displacements[after] == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 
 def test_a_struck_body_rings_at_its_first_frequency(tmp_path):
@@ -188,6 +248,25 @@ def test_slow_motion_and_the_running_loop(tmp_path):
         simulation.reset()
         time.sleep(0.1)
         assert simulation.frame().energy.total == 0
+
+
+def test_a_reset_in_slow_motion_lets_go_at_once(tmp_path):
+    """A step comes due once in a hundred ticks; a reset does not wait for it, nor get lost between two."""
+    simulation = palpate.Simulation(scene(tmp_path, "", fixed="z < 1e-6"))
+    with simulation:
+        simulation.move(TOP + [0, 0, RADIUS + 0.02])
+        time.sleep(0.1)
+        simulation.move(TOP + [0, 0, RADIUS - 0.003])
+        time.sleep(0.5)
+        assert len(simulation.frame().contacts) == 1
+        simulation.set_time_scale(1e-3)
+        simulation.remove()
+        simulation.reset()
+        time.sleep(0.1)
+        frame = simulation.frame()
+        assert frame.contacts == []
+        assert np.abs(frame.forces).max() == 0
+        assert frame.energy.total == frame.energy.work == 0
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.errors import Error
-from palpate.verify import bending, curved, exactness, felt, half_space
+from palpate.verify import bending, curved, exactness, felt, half_space, vibration
 from palpate.verify.check import Benchmark
 
 BENCHMARKS = {
@@ -21,6 +21,11 @@ BENCHMARKS = {
         Benchmark("point", "Point force on a half-space, 10 nodes", half_space.point_force),
         Benchmark("disc", "Uniform pressure on a half-space, 10 nodes", half_space.pressed_disc),
         Benchmark("punch", "Rigid flat punch without friction, 10 nodes", half_space.flat_punch),
+        Benchmark(
+            "clamped", "Frequencies of a beam, clamped and free, length 10 depths, 10 nodes", vibration.clamped_beam
+        ),
+        Benchmark("free", "Frequencies of a free beam, length 10 depths, 10 nodes", vibration.free_beam),
+        Benchmark("fv52", "NAFEMS FV52, plate on hard simple supports, 10 nodes", vibration.plate, slow=True),
         Benchmark("felt", "Stiffness felt on a block", felt.felt_stiffness, slow=True),
     )
 }
