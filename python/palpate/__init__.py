@@ -17,12 +17,14 @@ from palpate.errors import (
     PalpateWarning,
     SceneError,
     StoreError,
+    StoreWarning,
     UnitError,
     ViewerError,
 )
 from palpate.green import Answer, GreensFunction, Touch, precompute
 from palpate.loads import Loads
 from palpate.mesh import TetMesh, tetrahedralize
+from palpate.plan import Plan, plan
 from palpate.scene import Scene
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.stress import StressRecovery, SurfaceStress
@@ -46,10 +48,12 @@ __all__ = [
     "ModalBasis",
     "Newmark",
     "PalpateWarning",
+    "Plan",
     "Scene",
     "SceneError",
     "Simulation",
     "StoreError",
+    "StoreWarning",
     "StressRecovery",
     "SurfaceStress",
     "TetMesh",
@@ -58,6 +62,7 @@ __all__ = [
     "ViewerError",
     "models",
     "modes",
+    "plan",
     "precompute",
     "rayleigh_from_ratios",
     "shapes",

@@ -39,3 +39,7 @@ class MeshWarning(PalpateWarning):
 
 class LockingWarning(PalpateWarning):
     """The elements are too stiff for the material: nearly incompressible, they lock."""
+
+
+class StoreWarning(PalpateWarning):
+    """Something in the way of a precomputed file was thrown away."""

@@ -6,6 +6,7 @@ import contextlib
 import json
 import operator
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,7 +17,8 @@ import numpy as np
 
 from palpate import _native
 from palpate.body import Body
-from palpate.errors import BodyError, StoreError
+from palpate.errors import BodyError, StoreError, StoreWarning
+from palpate.memory import allowed_memory
 from palpate.progress import progress_reporter
 from palpate.strain import Strained, SurfaceStrain
 
@@ -87,7 +89,7 @@ class GreensFunction:
 
     @property
     def precision(self) -> str:
-        """Stored number format, ``"f32"`` or ``"f64"``."""
+        """Stored number format, ``"f16"``, ``"f32"`` or ``"f64"``."""
         return self._core.precision
 
     @property
@@ -272,27 +274,36 @@ def precompute(
     precision: str = "f32",
     touch: Sequence[int] | np.ndarray | None = None,
     path: str | os.PathLike[str] | None = None,
+    memory: int | str | None = None,
     progress: bool | Callable[[int, int], None] = True,
 ) -> GreensFunction:
     """Green's function of a body, from its file if that matches, else computed and written there.
+
+    An interrupted computation leaves what it finished in ``<path>.partial``; the next one with the same arguments goes
+    on from there, to the same bits.
 
     Parameters
     ----------
     body
         A supported body, with its loads.
     precision
-        Stored number format, ``"f32"`` or ``"f64"``; arithmetic is always double.
+        Stored number format: ``"f64"``; ``"f32"`` (right to about 2e-6 of a column's largest entry); or ``"f16"``
+        (5e-4), a quarter of the size of ``"f64"``. Answers are computed in double from what is stored.
     touch
         Surface nodes that may be touched; None: all.
     path
         File; None keeps it in the cache under its content key.
+    memory
+        Bytes that the process may take at its peak, or text such as ``"8GB"``; None: as many as are useful. The
+        operator itself is written as it is computed, and takes none.
     progress
         True shows a bar on a terminal; a function is called with columns done and in all.
 
     Raises
     ------
     BodyError
-        A body that its supports do not hold, or a touch node that is not on the surface.
+        A body that its supports do not hold, a touch node that is not on the surface, or a bound of memory that
+        cannot be kept.
 
     """
     body.require_supported()
@@ -306,9 +317,15 @@ def precompute(
     if target.exists():
         with contextlib.suppress(StoreError):
             return GreensFunction(_native.GreenCore.load(target, key), body)
+    allowed = None if memory is None else allowed_memory(memory)
     with progress_reporter("precomputing", progress) as report:
-        core = _native.GreenCore.precompute(problem, precision, json.dumps(_describe(body)), report)
-    core.save(target)
+        _, discarded = _native.GreenCore.precompute_to(
+            problem, precision, json.dumps(_describe(body)), report, target, allowed
+        )
+    if discarded:
+        warnings.warn(
+            f"{target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
+        )
     return GreensFunction(_native.GreenCore.load(target, key), body)
 
 

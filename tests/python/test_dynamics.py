@@ -9,7 +9,6 @@ import scipy.sparse.linalg
 from conftest import box_mesh, skfem_mass, skfem_stiffness
 
 import palpate
-from palpate import _native
 from palpate.dynamics import residual
 
 SCHEMES = [(0.25, 0.5), (0.3025, 0.6), (1 / 6, 0.5), (0.0, 0.5), (0.1, 0.7)]
@@ -344,37 +343,6 @@ def test_free_body_flies_as_a_rigid_one_and_bends_as_the_full_one():
     assert np.abs(seen[0] - seen[1]).max() < 1e-6 * static
     with pytest.raises(palpate.BodyError, match="rigid motions"):
         palpate.Newmark(body, modes=4)
-
-
-# --- contact through a spring ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("sliding", [True, False])
-def test_a_patch_on_a_spring_is_the_body_with_the_spring_built_in(small, sliding):
-    dt, alpha, delta, coupling, rayleigh = 1e-3, 0.3025, 0.6, 300.0, (1.0, 2e-4)
-    k, m, free = matrices(small)
-    nodes = np.argsort(-small.mesh.nodes.sum(axis=1))[:4]
-    weights = np.array([0.4, 0.3, 0.2, 0.1])
-    patch = np.zeros((3 * len(small.mesh.nodes), 3))
-    for node, weight in zip(nodes, weights, strict=True):
-        patch[3 * node : 3 * node + 3] = weight * np.eye(3)
-    patch = patch[free]
-    targets = 1e-3 * np.sin(0.05 * np.arange(1, 301))[:, None] * [0.3, 0.2, -1.0]
-    basis = palpate.modes(small)
-    rest = np.zeros(len(basis))
-    shapes = basis.shapes.reshape(-1, len(basis))
-    motion = _native.ModalMotion(basis.eigenvalues, shapes, (dt, alpha, delta, *rayleigh), False, rest, rest)
-    pairs = [(3 * int(n), float(w)) for n, w in zip(nodes, weights, strict=True)]
-    forces = motion.press(pairs, targets, coupling, sliding)
-    # Newmark in accelerations for K + k_c W W^T under k_c W d; the spring itself is not damped.
-    damping, stiff = rayleigh[0] * m + rayleigh[1] * k, k + coupling * patch @ patch.T
-    matrix = m + delta * dt * damping + alpha * dt**2 * stiff
-    u, v, a = (np.zeros(len(free)) for _ in range(3))
-    for target, force in zip(targets, forces, strict=True):
-        u, v = u + dt * v + dt**2 * (0.5 - alpha) * a, v + dt * (1 - delta) * a
-        a = np.linalg.solve(matrix, coupling * patch @ target - damping @ v - stiff @ u)
-        u, v = u + alpha * dt**2 * a, v + delta * dt * a
-        assert force == pytest.approx(coupling * (target - patch.T @ u), rel=1e-8, abs=1e-10)
 
 
 # --- arguments -------------------------------------------------------------------------------------------------------

@@ -144,3 +144,10 @@ def test_without_a_limit_nothing_is_held(press):
     tool.move(TOP + [0, 0, RADIUS - 0.02])
     frame = settle(tool, press)
     assert not tool.held and frame.largest_strain > LIMIT and not frame.within_linear_range
+
+
+@pytest.mark.parametrize("value", ["-0.1", "1.5", "inf", "'much'"])
+def test_a_strain_that_cannot_be_held_at_is_refused_with_its_line(tmp_path, value):
+    (tmp_path / "a.toml").write_text(f'[body]\nmodel = "beam"\n[view]\nhold_strain = {value}\n')
+    with pytest.raises(palpate.SceneError, match=r"a.toml:4: view.hold_strain"):
+        palpate.Scene.read(tmp_path / "a.toml")

@@ -174,7 +174,8 @@ def test_a_full_disk_names_the_file_and_leaves_nothing(tmp_path, ending):
 
 
 @pytest.mark.slow
-def test_open_surface_is_repaired_on_request(tmp_path):
+def test_open_surface_is_repaired_on_request(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     pytest.importorskip("pytetwild", reason="pip install palpate[repair]", exc_type=ImportError)
     ball = trimesh.creation.icosphere(subdivisions=3, radius=40.0)
     ball.update_faces(np.arange(len(ball.faces)) > 5)
@@ -183,6 +184,7 @@ def test_open_surface_is_repaired_on_request(tmp_path):
     with pytest.warns(palpate.MeshWarning, match="rebuilt"):
         mesh = palpate.tetrahedralize(ball, 0.012, "mm", repair=True)
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.04**3, rel=0.03)
+    assert not list(tmp_path.iterdir())  # nothing is left behind
 
 
 def test_regions_by_shape_follow_the_centroids():

@@ -55,6 +55,39 @@ def test_a_held_press_comes_to_the_static_answer(tmp_path, weights, modes):
     assert np.abs(np.diff(forces[-100:], axis=0)).max() < 1e-3 * np.linalg.norm(expected)
 
 
+def test_a_held_press_is_the_body_with_the_spring_built_in(tmp_path):
+    """Newmark in accelerations for `K + k_c W W^T` under `k_c W d`; the spring itself is not damped."""
+    made = scene(tmp_path, "modes = 'all'\nrayleigh = [1.0, 2e-4]\n", fixed="z < 1e-6")
+    made = made.model_copy(update={"tool": made.tool.model_copy(update={"contact_radius": 0.0})})
+    simulation = palpate.Simulation(made)
+    body = simulation.body
+    # Without a radius a contact carries the shape functions at the point: here of two corners of a triangle.
+    nodes = [
+        int(np.argmin(np.linalg.norm(body.mesh.nodes - corner, axis=1)))
+        for corner in ([0.048, 0.01, 0.03], [0.06, 0.01, 0.03])
+    ]
+    at = 0.7 * body.mesh.nodes[nodes[0]] + 0.3 * body.mesh.nodes[nodes[1]]
+    # Straight down where it touches, sideways later: the way along the surface counts from the first touch.
+    way = 1e-3 * np.minimum(1.0, 0.01 * np.arange(400))[:, None] * [0.0, 0.0, -1.0]
+    way[20:, :2] = 1e-4 * np.sin(0.05 * np.arange(380))[:, None] * [2.0, 1.0]
+    forces = simulation.run(at + [0, 0, RADIUS] + way)
+    free = np.setdiff1d(np.arange(3 * len(body.mesh.nodes)), body.fixed_dofs)
+    patch = np.zeros((3 * len(body.mesh.nodes), 3))
+    for node, weight in zip(nodes, (0.7, 0.3), strict=True):
+        patch[3 * node : 3 * node + 3] = weight * np.eye(3)
+    patch = patch[free]
+    K, M = (m.tocsc()[free][:, free].toarray() for m in (skfem_stiffness(body), body.mass()))
+    dt, delta, damping, stiff = 1e-3, 0.6, M + 2e-4 * K, K + COUPLING * patch @ patch.T
+    alpha = (delta + 0.5) ** 2 / 4
+    inverse = np.linalg.inv(M + delta * dt * damping + alpha * dt**2 * stiff)
+    u, v, a = np.zeros((3, len(free)))
+    for target, force in zip(way, forces, strict=True):
+        u, v = u + dt * v + dt**2 * (0.5 - alpha) * a, v + dt * (1 - delta) * a
+        a = inverse @ (COUPLING * patch @ target - damping @ v - stiff @ u)
+        u, v = u + alpha * dt**2 * a, v + delta * dt * a
+        assert force == pytest.approx(-COUPLING * (target - patch.T @ u), rel=1e-6, abs=1e-9)
+
+
 def test_a_held_press_on_a_single_precision_store(tmp_path):
     scene(tmp_path, "modes = 20\n", fixed="z < 1e-6")
     (tmp_path / "beam.toml").write_text((tmp_path / "beam.toml").read_text().replace("'f64'", "'f32'"))

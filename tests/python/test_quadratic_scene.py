@@ -12,7 +12,7 @@ from conftest import bent, box_mesh
 import palpate
 from palpate.strain import SurfaceStrain
 from palpate.viewer.messages import decode
-from palpate.viewer.session import Session
+from palpate.viewer.session import Session, Wants
 
 RADIUS, PATCH = 0.006, 0.012
 TOP = np.array([0.041, 0.026, 0.05])
@@ -119,7 +119,7 @@ def test_viewer_is_sent_flat_triangles_and_tets(built):
         assert arrays["tets"].shape == (8 * len(mesh.tets), 4)
         assert np.array_equal(np.unique(arrays["tets"]), np.arange(len(mesh.nodes)))
         assert np.array_equal(arrays["surface_triangles"], mesh.surface_triangles)
-        message, _ = session.frame_message(1, 0, cutaway=True)
+        message, _ = session.frame_message(1, 0, Wants(cutaway=True))
         header, arrays = decode(message)
         assert arrays["displacements"].shape == (len(mesh.nodes), 3)
         assert header["strain"] <= 1e-12

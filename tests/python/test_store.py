@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -114,34 +112,4 @@ except OSError as error:
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert result.returncode == 0, result.stderr
     assert "cut.palpate'" in result.stdout
-    assert os.listdir(tmp_path) == []
-
-
-def test_failing_progress_stops_the_work_and_leaves_nothing(block, tmp_path):
-    def stop(done, total):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        palpate.precompute(block, path=tmp_path / "never.palpate", progress=stop)
-    assert os.listdir(tmp_path) == []
-
-
-@pytest.mark.slow
-def test_interrupt_in_precompute_leaves_nothing(tmp_path):
-    program = f"""
-import sys; sys.path.insert(0, {os.path.dirname(__file__)!r})
-from conftest import box_mesh
-import palpate
-mesh = box_mesh(cells=(28, 22, 22))
-body = palpate.Body(mesh, material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
-print("ready", flush=True)
-palpate.precompute(body, path={str(tmp_path / "big.palpate")!r})
-"""
-    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    assert child.stdout.readline() == b"ready\n"
-    time.sleep(1.0)
-    child.send_signal(signal.SIGINT)
-    _, err = child.communicate(timeout=120)
-    assert child.returncode != 0
-    assert b"KeyboardInterrupt" in err
     assert os.listdir(tmp_path) == []

@@ -5,7 +5,7 @@ import * as THREE from "three";
 
 import type { Surface } from "./surface";
 
-/** Room around the body for its deformation. */
+/** Room around body and tool, for deformation and the force arrow. */
 const MARGIN = 1.1;
 
 /** Part of the picture in CSS pixels from its top left corner. */
@@ -16,27 +16,42 @@ export interface Region {
   height: number;
 }
 
-/**
- * What a box in a corner leaves free: beside it or above or below it, whichever is larger. Taken for each of the
- * overlays in turn.
- */
+/** In a small window that the overlays leave less of than this the body goes under them. */
+const FREE_SHARE_MIN = 0.15;
+const NOTHING: Region = { left: 0, top: 0, width: 0, height: 0 };
+
+/** The largest part of the canvas that is beside all overlays. */
 export function freeRegion(canvas: HTMLElement, overlays: HTMLElement[]): Region {
   const stage = canvas.getBoundingClientRect();
-  let [left, top, right, bottom] = [0, 0, stage.width, stage.height];
-  for (const overlay of overlays) {
-    const box = overlay.getBoundingClientRect();
-    if (box.width === 0 || box.height === 0) continue;
-    const [x0, x1, y0, y1] = [box.left - stage.left, box.right - stage.left, box.top - stage.top, box.bottom - stage.top];
-    if (x1 <= left || x0 >= right || y1 <= top || y0 >= bottom) continue;
-    const [width, height] = [right - left, bottom - top];
-    const areas = [(right - x1) * height, (x0 - left) * height, (bottom - y1) * width, (y0 - top) * width];
-    const largest = areas.indexOf(Math.max(...areas));
-    if (largest === 0) left = x1;
-    else if (largest === 1) right = x0;
-    else if (largest === 2) top = y1;
-    else bottom = y0;
-  }
-  return { left, top, width: right - left, height: bottom - top };
+  const boxes = overlays.map((overlay) => {
+    const { left, top, width, height } = overlay.getBoundingClientRect();
+    return { left: left - stage.left, top: top - stage.top, width, height };
+  });
+  const whole = { left: 0, top: 0, width: stage.width, height: stage.height };
+  const free = largestBeside(whole, boxes);
+  return free.width * free.height < FREE_SHARE_MIN * whole.width * whole.height ? whole : free;
+}
+
+/** Each box leaves what is to one of its four sides; all choices are tried, for there are three boxes or so. */
+function largestBeside(region: Region, boxes: Region[]): Region {
+  const [right, bottom] = [region.left + region.width, region.top + region.height];
+  const place = boxes.findIndex(
+    ({ left, top, width, height }) =>
+      left < right && top < bottom && left + width > region.left && top + height > region.top,
+  );
+  if (place < 0) return region;
+  const box = boxes[place]!;
+  const [boxRight, boxBottom] = [box.left + box.width, box.top + box.height];
+  const rest = boxes.slice(place + 1);
+  return [
+    { ...region, left: boxRight, width: right - boxRight },
+    { ...region, width: box.left - region.left },
+    { ...region, top: boxBottom, height: bottom - boxBottom },
+    { ...region, height: box.top - region.top },
+  ]
+    .filter(({ width, height }) => width > 0 && height > 0)
+    .map((side) => largestBeside(side, rest))
+    .reduce((best, side) => (side.width * side.height > best.width * best.height ? side : best), NOTHING);
 }
 
 /** Moves a target across the line of sight until the body reaches as far to both sides of it, seen from a distance. */
@@ -66,12 +81,16 @@ function across(camera: THREE.Camera, towardsViewer: THREE.Vector3): [THREE.Vect
   return [right, new THREE.Vector3().crossVectors(towardsViewer, right)];
 }
 
-/** Distance from the target, m, along a unit vector towards the viewer, with the target in the middle of the region. */
+/**
+ * Distance from the target, m, along a unit vector towards the viewer, with the target in the middle of the region and
+ * room for the tool, m, all around.
+ */
 export function fitDistance(
   surface: Surface,
   target: THREE.Vector3,
   towardsViewer: THREE.Vector3,
   camera: THREE.PerspectiveCamera,
+  room: number,
   region: Region,
   pictureHeight: number,
 ): number {
@@ -82,7 +101,8 @@ export function fitDistance(
   let distance = 0;
   for (let i = 0; i < surface.rest.length; i += 3) {
     point.fromArray(surface.rest, i).sub(target);
-    const needed = Math.max(Math.abs(point.dot(right)) / tangentRight, Math.abs(point.dot(up)) / tangentUp);
+    const [sideways, upwards] = [Math.abs(point.dot(right)) + room, Math.abs(point.dot(up)) + room];
+    const needed = Math.max(sideways / tangentRight, upwards / tangentUp);
     distance = Math.max(distance, needed + point.dot(towardsViewer));
   }
   return distance;

@@ -117,7 +117,7 @@ export class Viewer {
       },
       onContactRadius: (radius) => this.setContactRadius(radius),
       onReset: () => this.reset(),
-      onResetView: () => this.viewport.reframe(this.body?.data.header.size ?? 1),
+      onResetView: () => this.viewport.reframe(),
       onScreenshot: () => void this.saveScreenshot(),
     });
   }
@@ -126,7 +126,7 @@ export class Viewer {
     const panel = this.panel;
     listenToKeys({
       r: () => this.reset(),
-      v: () => this.viewport.reframe(this.body?.data.header.size ?? 1),
+      v: () => this.viewport.reframe(),
       w: () => panel.toggle("wireframe"),
       c: () => panel.toggle("colors"),
       x: () => panel.toggle("cutaway"),
@@ -195,7 +195,7 @@ export class Viewer {
     this.watched?.dispose();
     this.watched = new WatchedView(this.body.surface, header.size);
     this.viewport.scene.add(this.body.group, this.tool.group, this.watched.dot);
-    this.viewport.frame(this.body.surface, header.size, header.view);
+    this.viewport.frame(this.body.surface, header);
     this.plots.log.clear();
     this.plots.history.clear();
     this.plots.span = header.motion?.span ?? 1;

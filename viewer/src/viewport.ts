@@ -5,6 +5,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { centreAcross, fitDistance, freeRegion } from "./framing";
 import type { Region } from "./framing";
+import type { SceneMessage } from "./protocol";
 import type { Surface } from "./surface";
 
 const FIELD_OF_VIEW_DEG = 35;
@@ -22,7 +23,7 @@ export class Viewport {
   readonly controls: OrbitControls;
   private readonly renderer: THREE.WebGLRenderer;
   private dirty = true;
-  private framed: { surface: Surface; view: View | null } | null = null;
+  private framed: { surface: Surface; header: SceneMessage } | null = null;
   private region: Region = { left: 0, top: 0, width: 1, height: 1 };
 
   /** The body is framed beside the overlays; beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
@@ -49,8 +50,9 @@ export class Viewport {
   }
 
   /** Looks at a body: from the view of its scene if it has one, never closer than where all of it is seen. */
-  frame(surface: Surface, size: number, view: View | null): void {
-    this.framed = { surface, view };
+  frame(surface: Surface, header: SceneMessage): void {
+    const { size, view } = header;
+    this.framed = { surface, header };
     this.centreInFreeRegion();
     const centre = new THREE.Box3().setFromArray(surface.rest).getCenter(new THREE.Vector3());
     const target = view ? new THREE.Vector3(...view.target) : centre;
@@ -59,9 +61,9 @@ export class Viewport {
     offset.normalize();
     if (!view) {
       // The middle of the bounds is not that of the picture: nearer parts look larger. Twice is close enough.
-      for (let i = 0; i < 2; i++) centreAcross(surface, target, offset, this.camera, this.fit(surface, target, offset));
+      for (let i = 0; i < 2; i++) centreAcross(surface, target, offset, this.camera, this.fit(target, offset));
     }
-    const distance = Math.max(wanted, this.fit(surface, target, offset));
+    const distance = Math.max(wanted, this.fit(target, offset));
     this.camera.near = 0.02 * size;
     this.camera.far = distance + 30 * size;
     this.camera.position.copy(target).addScaledVector(offset, distance);
@@ -73,8 +75,8 @@ export class Viewport {
     this.invalidate();
   }
 
-  reframe(size: number): void {
-    if (this.framed) this.frame(this.framed.surface, size, this.framed.view);
+  reframe(): void {
+    if (this.framed) this.frame(this.framed.surface, this.framed.header);
   }
 
   /** Unit vector from what is looked at to the viewer. */
@@ -149,12 +151,14 @@ export class Viewport {
   }
 
   private fitHere(): number {
-    if (!this.framed) return 0;
-    return this.fit(this.framed.surface, this.controls.target, this.towardsViewer());
+    return this.fit(this.controls.target, this.towardsViewer());
   }
 
-  private fit(surface: Surface, target: THREE.Vector3, towardsViewer: THREE.Vector3): number {
-    return fitDistance(surface, target, towardsViewer, this.camera, this.region, this.canvas.clientHeight);
+  private fit(target: THREE.Vector3, towardsViewer: THREE.Vector3): number {
+    if (!this.framed) return 0;
+    const { surface, header } = this.framed;
+    const { camera, region, canvas } = this;
+    return fitDistance(surface, target, towardsViewer, camera, 2 * header.tool_radius, region, canvas.clientHeight);
   }
 
   /** What the camera looks at stands in the middle of the region that nothing is written over. */
@@ -180,11 +184,6 @@ export class Viewport {
     }
     this.scene.add(this.camera, sky);
   }
-}
-
-interface View {
-  position: [number, number, number];
-  target: [number, number, number];
 }
 
 function drawsInSoftware(): boolean {

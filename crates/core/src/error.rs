@@ -27,6 +27,9 @@ pub enum Error {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The memory allowed is not enough.
+    #[error("{0}")]
+    Memory(String),
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,

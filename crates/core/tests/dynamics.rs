@@ -5,7 +5,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use glam::{DMat3, DVec3};
-use palpate_core::dynamics::{Account, Lanes, Model, Newmark, Press, Projection, Rayleigh, exact_step};
+use palpate_core::dynamics::{Account, Held, Lanes, Model, Newmark, Projection, Rayleigh, exact_step};
 
 thread_local! {
     static COUNT: Cell<u64> = const { Cell::new(0) };
@@ -50,11 +50,12 @@ fn bits(x: &[Lanes]) -> Vec<u64> {
 #[test]
 fn steps_never_allocate_and_repeat_their_bits() {
     let model = model(false);
-    let patch: Vec<(u32, f64)> = (0..7).map(|i| (3 * i, 0.2 - 0.01 * f64::from(i))).collect();
+    let patch: Vec<(usize, f64)> = (0..7).map(|i| (3 * i, 0.2 - 0.01 * i as f64)).collect();
     let mut ends = [Vec::new(), Vec::new()];
     for end in &mut ends {
         let (mut state, mut scratch) = (model.state(), model.scratch());
-        let (mut account, mut press) = (Account::new(&state), Press::new(&model, 400.0));
+        let (mut account, mut held) = (Account::new(&state), Projection::new(&model));
+        let mut ahead = model.ahead();
         let mut seen = [0.0; 2];
         let before = COUNT.with(Cell::get);
         for tick in 0..500 {
@@ -62,13 +63,13 @@ fn steps_never_allocate_and_repeat_their_bits() {
             // A row that does not exist is left out, never a panic.
             model.step(&mut state, &mut scratch, &[(4, (9.0 * t).sin()), (5, 0.1), (u32::MAX, 1.0)]);
             account.book(&model, &state);
-            press.hold(&model, &patch);
-            press.tick(&model, &mut state, &mut scratch, DVec3::new(0.0, 1e-3, -t * 1e-2));
+            held.gather(&model, patch.iter().copied());
+            model.advance(&mut ahead, &mut [Held::new(&held, DVec3::new(0.0, 1e-3, -t * 1e-2))]);
             model.read(&state.q, [0, 5].into_iter(), &mut seen);
         }
         assert_eq!(COUNT.with(Cell::get), before, "a step allocated");
         assert!(seen.iter().all(|x| x.is_finite() && *x != 0.0));
-        *end = bits(&state.q);
+        *end = [bits(&state.q), bits(&ahead.free_q)].concat();
     }
     assert_eq!(ends[0], ends[1]);
 }
@@ -77,9 +78,11 @@ fn steps_never_allocate_and_repeat_their_bits() {
 fn bad_numbers_never_panic() {
     let model = model(false);
     let (mut state, mut scratch) = (model.state(), model.scratch());
-    let mut press = Press::new(&model, 400.0);
-    press.hold(&model, &[(0, f64::NAN), (u32::MAX - 2, 1.0)]);
-    assert!(press.tick(&model, &mut state, &mut scratch, DVec3::NAN).is_nan());
+    let (mut patch, mut ahead) = (Projection::new(&model), model.ahead());
+    patch.gather(&model, [(0, f64::NAN), (usize::MAX - 2, 1.0)].into_iter());
+    let mut held = [Held::new(&patch, DVec3::NAN)];
+    model.advance(&mut ahead, &mut held);
+    assert!(held[0].free.is_nan());
     model.step(&mut state, &mut scratch, &[(0, f64::INFINITY)]);
 }
 
@@ -97,16 +100,63 @@ fn a_patch_moves_by_its_free_motion_and_its_compliance() {
         patches[1].gather(&model, [(15, 0.6), (18, 0.4)].into_iter());
         let [here, there] = &patches;
         let force = DVec3::new(0.2, -0.4, 0.7);
-        let free = here.predict(&model, &mut state);
-        assert!((free - here.displacement(&model, &state)).length() < 1e-14 * free.length());
+        model.predict(&mut state);
+        let free = here.read(&model, &state.q);
         scratch.load.fill(Lanes::default());
         there.add_force(&model, force, &mut scratch.load);
         model.correct(&mut state, &scratch.load);
-        let moved = here.displacement(&model, &state) - free;
+        let moved = here.read(&model, &state.q) - free;
         let expected = here.step_compliance(&model, there) * force;
         assert!((moved - expected).length() < 1e-12 * expected.length().max(1e-6), "{moved} {expected}");
         let back = there.step_compliance(&model, here).transpose();
         assert!(max_abs(here.step_compliance(&model, there) - back) < 1e-12 * max_abs(back));
+    }
+}
+
+/// The pass that keeps one step ahead is `predict` and `correct`, for any number of patches that carry a force.
+#[test]
+fn a_motion_kept_ahead_is_the_same_motion() {
+    let model = model(false);
+    let patches: Vec<Projection> = (0..5)
+        .map(|i| {
+            let mut patch = Projection::new(&model);
+            patch.gather(&model, [(3 * i, 0.7), (3 * i + 12, 0.3)].into_iter());
+            patch
+        })
+        .collect();
+    for count in 0..=patches.len() {
+        let (mut state, mut scratch, mut ahead) = (model.state(), model.scratch(), model.ahead());
+        let mut account = Account::new(&state);
+        let mut dissipated = 0.0;
+        for tick in 0..50 {
+            let forces: Vec<DVec3> =
+                (0..count).map(|i| DVec3::new(0.3, -0.1, (0.2 * f64::from(tick) + i as f64).sin())).collect();
+            let mut held: Vec<Held> =
+                patches.iter().zip(&forces).map(|(patch, &force)| Held::new(patch, force)).collect();
+            let advanced = model.advance(&mut ahead, &mut held);
+            model.predict(&mut state);
+            scratch.load.fill(Lanes::default());
+            for (patch, &force) in patches.iter().zip(&forces) {
+                patch.add_force(&model, force, &mut scratch.load);
+            }
+            model.correct(&mut state, &scratch.load);
+            account.book(&model, &state);
+            dissipated += advanced.dissipated;
+            assert_eq!(bits(&ahead.q), bits(&state.q));
+            assert_eq!(bits(&ahead.v), bits(&state.v));
+            let energies = account.energies(&model, &state);
+            for (got, want) in [
+                (advanced.kinetic, energies.kinetic),
+                (advanced.strain, energies.strain),
+                (dissipated, energies.dissipated),
+            ] {
+                assert!((got - want).abs() <= 1e-12 * want, "{got} {want}");
+            }
+            for held in &held {
+                let expected = held.patch.read(&model, &ahead.free_q);
+                assert!((held.free - expected).length() <= 1e-12 * expected.length());
+            }
+        }
     }
 }
 
@@ -126,9 +176,9 @@ fn static_compliance_is_where_a_held_force_ends() {
         model.correct(&mut state, &scratch.load);
     }
     let expected = patch.static_compliance(&model, &patch) * force;
-    let got = patch.displacement(&model, &state);
+    let got = patch.read(&model, &state.q);
     assert!((got - expected).length() < 1e-9 * expected.length(), "{got} {expected}");
-    assert!(patch.velocity(&model, &state).length() < 1e-9);
+    assert!(patch.read(&model, &state.v).length() < 1e-9);
 }
 
 fn max_abs(m: DMat3) -> f64 {

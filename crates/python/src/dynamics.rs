@@ -3,18 +3,16 @@
 use std::path::PathBuf;
 
 use faer::{MatMut, Par};
-use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{
-    Account, Basis, Direct, DirectScratch, DirectState, Energies, Lanes, Model, Newmark, Press, Rayleigh, Scratch,
-    Solver, State, basis_key as core_basis_key, exact_step, partition,
+    Account, Basis, Direct, DirectScratch, DirectState, Energies, Lanes, Model, Newmark, Rayleigh, Scratch, Solver,
+    State, basis_key as core_basis_key, exact_step, partition,
 };
 use palpate_core::fem::SymmetricCsc;
 use palpate_core::green::Factor;
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::body::vectors;
 use crate::errors::to_python;
 
 /// Steps between two looks at Ctrl-C.
@@ -201,30 +199,6 @@ impl ModalMotion {
             self.model.read(&self.state.q, watch.iter().copied(), out);
         })?;
         seen.into_pyarray(py).reshape([forces.nrows(), watch.len()])
-    }
-
-    /// Drives a patch (first row and weight of each node) through a spring of `coupling` N/m along `targets` (t, 3), m;
-    /// forces on the body (t, 3), N. `sliding` gathers the patch anew at every step, as a moving contact must.
-    fn press<'py>(
-        &mut self,
-        py: Python<'py>,
-        nodes: Vec<(u32, f64)>,
-        targets: PyReadonlyArray2<'py, f64>,
-        coupling: f64,
-        sliding: bool,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let targets = vectors(&targets).map_err(|e| to_python(py, e))?;
-        let mut press = Press::new(&self.model, coupling);
-        press.hold(&self.model, &nodes);
-        let mut forces = vec![DVec3::ZERO; targets.len()];
-        repeat(py, targets.len(), |i| {
-            if sliding {
-                press.hold(&self.model, &nodes);
-            }
-            forces[i] = press.tick(&self.model, &mut self.state, &mut self.scratch, targets[i]);
-        })?;
-        let flat: Vec<f64> = forces.iter().flat_map(|f| f.to_array()).collect();
-        flat.into_pyarray(py).reshape([targets.len(), 3])
     }
 
     /// Displacements, velocities or accelerations (`order` 0, 1, 2) at rows; None: at all.

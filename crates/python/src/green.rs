@@ -8,11 +8,11 @@ use std::time::Duration;
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::fem::Supports;
-use palpate_core::green::{GreensFunction, Precision, Problem, precompute};
+use palpate_core::green::{Found, GreensFunction, Plan, Precision, Problem, Target, plan, precompute, precompute_to};
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, capacitance, contact};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::body::{self, indices, materials, vectors};
 use crate::errors::to_python;
@@ -56,7 +56,7 @@ fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
 
 fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
     Precision::parse(name)
-        .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f32' or 'f64'"))))
+        .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f16', 'f32' or 'f64'"))))
 }
 
 /// Displacements inside a body from those of its surface.
@@ -93,7 +93,7 @@ impl GreenCore {
         Ok(py.detach(|| problem.key(precision)))
     }
 
-    /// Solves the reference problem. `progress(done, total)` is called a few times a second; Ctrl-C stops.
+    /// Solves the reference problem in memory. `progress(done, total)` is called a few times a second; Ctrl-C stops.
     #[staticmethod]
     fn precompute(
         py: Python<'_>,
@@ -104,9 +104,50 @@ impl GreenCore {
     ) -> PyResult<Self> {
         let problem = problem(arguments)?;
         let precision = precision(py, precision_name)?;
-        let mut green = run_watched(py, &problem, precision, progress.as_ref())?;
+        let total = 3 * problem.touch.len();
+        let mut green = run_watched(py, total, progress.as_ref(), |note| precompute(&problem, precision, note))?;
         green.description = description;
         Ok(Self { green: Arc::new(green) })
+    }
+
+    /// Solves the reference problem into a file within `memory` bytes, going on where an interrupted computation of the
+    /// same thing stopped. Returns how many columns it had finished, and whether something else was thrown away.
+    #[staticmethod]
+    #[pyo3(signature = (arguments, precision_name, description, progress, path, memory=None))]
+    fn precompute_to(
+        py: Python<'_>,
+        arguments: &Bound<'_, PyTuple>,
+        precision_name: &str,
+        description: &str,
+        progress: Option<Py<PyAny>>,
+        path: PathBuf,
+        memory: Option<usize>,
+    ) -> PyResult<(usize, bool)> {
+        let problem = problem(arguments)?;
+        let precision = precision(py, precision_name)?;
+        let total = 3 * problem.touch.len();
+        let target = Target { path: &path, precision, memory, description };
+        let found = run_watched(py, total, progress.as_ref(), |note| {
+            let mut found = Found::default();
+            precompute_to(&problem, &target, &mut |f| found = f, note)?;
+            Ok(found)
+        })?;
+        Ok((found.resumed, found.discarded))
+    }
+
+    /// Counts of the precomputation of a problem within `memory` bytes.
+    #[staticmethod]
+    #[pyo3(signature = (arguments, precision_name, memory=None))]
+    fn plan<'py>(
+        py: Python<'py>,
+        arguments: &Bound<'py, PyTuple>,
+        precision_name: &str,
+        memory: Option<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let problem = problem(arguments)?;
+        let precision = precision(py, precision_name)?;
+        let counts = py.detach(|| plan(&problem, precision, memory)).map_err(|e| to_python(py, e))?;
+        plan_dict(py, &counts)
     }
 
     /// Writes the store, beside and then renamed.
@@ -237,14 +278,31 @@ impl GreenCore {
     }
 }
 
-/// Runs the computation on its own thread, while this one reports progress and listens for Ctrl-C.
-fn run_watched(
+fn plan_dict<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("free_dofs", plan.free_dofs)?;
+    dict.set_item("columns", plan.columns)?;
+    dict.set_item("rows", plan.rows)?;
+    dict.set_item("factor_entries", plan.factor_entries)?;
+    dict.set_item("factor_flops", plan.factor_flops)?;
+    dict.set_item("sweep_flops", plan.sweep_flops)?;
+    dict.set_item("surface_last_flops", plan.surface_last_flops)?;
+    dict.set_item("block", plan.width)?;
+    dict.set_item("tasks", plan.tasks)?;
+    dict.set_item("memory", plan.memory)?;
+    dict.set_item("store", plan.store)?;
+    Ok(dict)
+}
+
+/// Runs some long work on its own thread, while this one reports progress and listens for Ctrl-C. The work calls the
+/// function it is given with what is done and all there is to do, and stops when that returns false.
+fn run_watched<Made: Send>(
     py: Python<'_>,
-    problem: &Problem,
-    precision: Precision,
+    total: usize,
     progress: Option<&Py<PyAny>>,
-) -> PyResult<GreensFunction> {
-    let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(3 * problem.touch.len()));
+    work: impl FnOnce(&(dyn Fn(usize, usize) -> bool + Sync)) -> Result<Made> + Send,
+) -> PyResult<Made> {
+    let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(total));
     let stop = AtomicBool::new(false);
     let note = |finished: usize, all: usize| {
         done.fetch_max(finished, Ordering::Relaxed);
@@ -252,7 +310,7 @@ fn run_watched(
         !stop.load(Ordering::Relaxed)
     };
     std::thread::scope(|scope| {
-        let worker = scope.spawn(|| palpate_precompute(problem, precision, &note));
+        let worker = scope.spawn(|| work(&note));
         while !worker.is_finished() {
             py.detach(|| wait_a_little(&worker));
             let report = || match progress {
@@ -272,14 +330,6 @@ fn run_watched(
             Err(_) => Err(to_python(py, Error::Invalid("the precomputation failed unexpectedly".into()))),
         }
     })
-}
-
-fn palpate_precompute(
-    problem: &Problem,
-    precision: Precision,
-    note: &(dyn Fn(usize, usize) -> bool + Sync),
-) -> Result<GreensFunction> {
-    precompute(problem, precision, note)
 }
 
 /// Up to a tenth of a second, less when the worker ends.

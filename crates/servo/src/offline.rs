@@ -52,13 +52,13 @@ pub fn run(model: Arc<Model>, limits: SafetyLimits, settings: &Input, script: &S
         };
         let strike = strikes.next_if(|(when, _)| *when == tick).map(|&(_, strike)| strike);
         let output = ticker.tick(&devices, &Input { strike, ..*settings }, 1.0 / RATE);
-        ticker.snapshot_into(&mut snapshot);
         recording.fault = recording.fault.or(output.fault);
         recording.forces.push(output.forces[0]);
-        recording.energies.extend(snapshot.energy);
-        recording
-            .displacements
-            .extend(script.watch.iter().map(|&node| snapshot.displacement_of(&model, node as usize)));
+        recording.energies.extend(ticker.energy());
+        if !script.watch.is_empty() {
+            ticker.snapshot_into(&mut snapshot);
+            recording.displacements.extend(snapshot.displacements_of(&model, script.watch));
+        }
     }
     recording
 }

@@ -139,8 +139,7 @@ impl Servo {
         let (rows, log) = RingBuffer::new(LOG_ROWS);
         let mut servo_loop = Loop {
             stop: stop.clone(),
-            ticker: Ticker::new(model.clone(), limits),
-            model,
+            ticker: Ticker::new(model, limits),
             devices,
             settings: settings_out,
             resets: settings.resets,
@@ -200,7 +199,6 @@ impl Drop for Servo {
 /// What the thread owns.
 struct Loop {
     stop: Arc<AtomicBool>,
-    model: Arc<Model>,
     ticker: Ticker,
     devices: Vec<Box<dyn Device>>,
     settings: triple_buffer::Output<Settings>,
@@ -280,7 +278,7 @@ impl Loop {
             force: self.status.forces[0],
             compute_us: compute_ns as f64 * 1e-3,
             wakeup_us: wakeup_ns as f64 * 1e-3,
-            watched: drawn.displacement_of(&self.model, self.watch as usize),
+            watched: self.ticker.displacement_of(self.watch),
             body_time: drawn.body_time,
             energy: drawn.energy.unwrap_or_default(),
         };

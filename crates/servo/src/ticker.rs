@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use palpate_core::simulation::{Input, MAX_TOOLS, Model, Scratch, Snapshot, State, step};
+use palpate_core::simulation::{Energy, Input, MAX_TOOLS, Model, Scratch, Snapshot, State, step};
 use palpate_devices::DeviceState;
 
 use crate::safety::{Fault, Safety, SafetyLimits};
@@ -56,8 +56,18 @@ impl Ticker {
         output
     }
 
+    /// Energies of a body in motion.
+    pub fn energy(&self) -> Option<Energy> {
+        self.state.motion.as_ref().map(|motion| motion.energy)
+    }
+
+    /// Displacement of a surface node after the last tick, m; never allocates.
+    pub fn displacement_of(&mut self, node: u32) -> DVec3 {
+        self.state.displacement_of(&self.model, node)
+    }
+
     /// Copies what is drawn of the last tick; never allocates.
     pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
-        self.state.snapshot_into(&self.model, snapshot);
+        self.state.snapshot_into(snapshot);
     }
 }

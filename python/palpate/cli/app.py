@@ -26,10 +26,10 @@ Unit = Annotated[str, typer.Option(help="Unit of length of the file: m, cm, mm, 
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit code 2, Ctrl-C is 130."""
-    from palpate.errors import Error, MeshWarning
+    from palpate.errors import Error, MeshWarning, StoreWarning
 
     def show(message: Warning | str, category: type[Warning], *_args: object, **_kwargs: object) -> None:
-        label = "note" if issubclass(category, MeshWarning) else "warning"
+        label = "note" if issubclass(category, (MeshWarning, StoreWarning)) else "warning"
         print(f"palpate: {label}: {message}", file=sys.stderr)
 
     warnings.showwarning = show
@@ -84,9 +84,10 @@ def precompute(
     gravity: Annotated[str | None, typer.Option(help="Let it sag under gravity, m/s^2, such as 0,0,-9.81.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
     unit: Unit = "m",
-    precision: Annotated[str, typer.Option(help="Stored number format: f32 or f64.")] = "f32",
+    precision: Annotated[str, typer.Option(help="Stored number format: f16, f32 or f64.")] = "f32",
     touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
     quadratic: Quadratic = False,
+    memory: Annotated[str | None, typer.Option(help="Peak memory allowed, such as 8GB.")] = None,
 ) -> None:
     """Solve the body once, so that any touch is answered in microseconds.
 
@@ -106,7 +107,8 @@ def precompute(
         region = surface[parse(touch)(body.mesh.nodes[surface])]
         if len(region) == 0:
             raise palpate.BodyError(f"no surface node satisfies --touch '{touch}'")
-    green = palpate.precompute(body, precision=precision, touch=region, path=out)
+    print(palpate.plan(body, precision=precision, touch=region, memory=memory))
+    green = palpate.precompute(body, precision=precision, touch=region, path=out, memory=memory)
     print(f"{green.path}: {_green_line(green)}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +12,9 @@ from palpate.cli.app import app
 
 if TYPE_CHECKING:
     from palpate.bench import dynamics as dynamics_bench
+    from palpate.bench.elements import Row as ElementRow
     from palpate.bench.paper import Row
+    from palpate.bench.precompute import Result
 
 bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
 app.add_typer(bench_app, name="bench")
@@ -85,20 +88,125 @@ def _print_dynamics(rows: list[dynamics_bench.Row]) -> None:
     for name in SPARSE:
         line(name, lambda r, name=name: number(r.sparse_step_us.get(name)))
     line("Palpate, all dofs by its sparse factor", lambda r: number(r.own_sparse_step_us))
+    line("Palpate, all modes, a force on a node", lambda r: number(r.modal_step_us))
     table.add_section()
-    line("Palpate, force tick, patch sliding", lambda r: number(r.sliding_us))
-    line("Palpate, force tick, patch held", lambda r: number(r.holding_us))
+    line("Palpate, force tick in contact", lambda r: number(r.tick_us))
+    line("Palpate, force tick, landing and leaving", lambda r: number(r.tapping_us))
     line("Palpate, whole surface for a frame", lambda r: number(r.surface_us))
-    line("sliding: times faster than the dense inverse", lambda r: number(r.sliding_times_dense, 0))
-    line("sliding: times faster than the best sparse", lambda r: number(r.sliding_times_sparse, 0))
-    line("held: times faster than the dense inverse", lambda r: number(r.holding_times_dense, 0))
-    line("held: times faster than the best sparse", lambda r: number(r.holding_times_sparse, 0))
+    line("tick: times faster than the dense inverse", lambda r: number(r.tick_times_dense, 0))
+    line("tick: times faster than the best sparse", lambda r: number(r.tick_times_sparse, 0))
+    line("60 Hz with surface: times dense inverse", lambda r: number(r.frame_times_dense, 0))
+    line("60 Hz with surface: times the best sparse", lambda r: number(r.frame_times_sparse, 0))
     line("difference from SuperLU after 50 steps", lambda r: f"{r.difference:.0e}")
     console = Console()
     console.print(table)
     absent = [name for name in SPARSE if name not in rows[0].sparse_step_us]
     if absent:
         console.print(f"not installed: {', '.join(absent)}")
+
+
+@bench_app.command()
+def elements(
+    out: Annotated[Path | None, typer.Option(help="Folder for the plot, as PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """4-node and 10-node tetrahedra: error of the felt stiffness against the price of precomputing.
+
+    Example: palpate bench elements --out plots
+    """
+    from palpate.bench import elements as bench
+    from palpate.progress import narrated
+
+    with narrated("measuring both elements on a cube and on the liver"):
+        rows = bench.run()
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+    else:
+        _print_elements(rows)
+    if out is not None:
+        from palpate.plots import plot_elements
+
+        out.mkdir(parents=True, exist_ok=True)
+        plot_elements(rows, out / "elements.png")
+
+
+def _print_elements(rows: list[ElementRow]) -> None:
+    from rich.table import Table
+
+    table = Table(title="Price of precomputing, and error of the stiffness felt by a patch")
+    table.add_column("body")
+    for title in ("element", "nodes", "surface", "time [s]", "store [MB]"):
+        table.add_column(title, justify="right")
+    for nu in rows[0].errors:
+        table.add_column(f"nu {nu}", justify="right", no_wrap=True)
+    for before, row in zip([rows[0], *rows], rows, strict=False):
+        if (before.body, before.element_nodes) != (row.body, row.element_nodes):
+            table.add_section()
+        errors = (f"{100 * error:+.1f} %" for error in row.errors.values())
+        size = str(row.element_nodes), str(row.nodes), str(row.surface_nodes)
+        table.add_row(row.body, *size, f"{row.precompute_cpu_s:.2f}", f"{1e-6 * row.store_bytes:.1f}", *errors)
+
+
+@bench_app.command()
+def precompute(
+    sizes: Annotated[str, typer.Option(help="Bodies, of 1k, 2k, 13k and 20k nodes.")] = "1k,2k,20k",
+    threads: Annotated[str, typer.Option(help="Numbers of threads.")] = "1,2",
+    plot: Annotated[Path | None, typer.Option(help="Draw time against surface dofs into this PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """All surface columns of a liver, beside other solvers in the same run.
+
+    Peers: pip install 'palpate[bench]'. Example: palpate bench precompute --sizes 1k,2k --plot precompute.png
+    """
+    from palpate.bench import precompute as bench
+    from palpate.progress import narrated
+
+    with narrated("measuring; the larger bodies take minutes"):
+        results = bench.run(sizes.split(","), [int(count) for count in threads.split(",")])
+    if plot is not None:
+        bench.plot(results, plot)
+    if as_json:
+        print(json.dumps(bench.as_json(results), indent=2))
+        return
+    _print_precompute(results)
+    for peer, package in bench.missing_peers().items():
+        print(f"{peer} was left out: pip install {package}")
+
+
+def _print_precompute(results: list[Result]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="All surface columns, factorisation included")
+    for title in (
+        "body",
+        "threads",
+        "method",
+        "seconds",
+        "Palpate's share",
+        "of processors",
+        "share",
+        "columns timed",
+        "median of",
+    ):
+        table.add_column(title, justify="left" if title in ("body", "method") else "right")
+    ours = {(r.size, r.threads): r for r in results if r.method == "Palpate"}
+    previous = None
+    for r in results:
+        if previous not in (None, (r.size, r.threads)):
+            table.add_section()
+        body = "" if previous == (r.size, r.threads) else f"{r.nodes} nodes, {r.surface_dofs} surface dofs"
+        previous = (r.size, r.threads)
+        own = ours[previous]
+        shares = ["", ""]
+        if r is not own:
+            shares = [f"{own.seconds / r.seconds:.3f}", f"{own.cpu_seconds / r.cpu_seconds:.3f}"]
+        timed = "all" if r.sampled is None else f"{r.sampled}, scaled"
+        times = (f"{r.seconds:.3g}", shares[0], f"{r.cpu_seconds:.3g}", shares[1])
+        table.add_row(body, str(r.threads), r.method, *times, timed, str(r.repeats))
+        if r.writing_seconds is not None:
+            table.add_row("", "", "  its file: write, verify, map", f"{r.writing_seconds:.3g}")
+    Console().print(table)
 
 
 def _print_table(rows: list[Row]) -> None:

@@ -7,7 +7,9 @@ Exit status 1: no tetrahedra; 3: pytetwild is not installed.
 
 from __future__ import annotations
 
+import os
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +22,8 @@ def main(given: str, made: str) -> int:
         return 3
     with np.load(given) as job:
         vertices, faces, size = job["vertices"], job["faces"].astype(np.int32), float(job["size"])
+    # fTetWild leaves a surface of its own in the working directory.
+    os.chdir(Path(made).parent)
     nodes, tets = tetrahedralize(vertices, faces, edge_length_abs=size)
     if len(tets) == 0:
         return 1

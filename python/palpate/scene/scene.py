@@ -62,7 +62,7 @@ class BodyTable(Table):
     max_element_size: Length | None = None
     element: Literal["linear", "quadratic"] | None = None
     refine: list[RefineTable] = Field(default_factory=list)
-    precision: str = Field("f32", pattern="^f(32|64)$")
+    precision: str = Field("f32", pattern="^f(16|32|64)$")
 
     @model_validator(mode="after")
     def _one_source(self) -> BodyTable:

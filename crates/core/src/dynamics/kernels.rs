@@ -15,15 +15,6 @@ pub struct FreeStep {
     pub vp: Lanes,
 }
 
-/// What a unit of modal force at the step's end adds, for eight modes.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct LoadStep {
-    /// To the displacement, s^2.
-    pub q: Lanes,
-    /// To the velocity, s.
-    pub v: Lanes,
-}
-
 /// Free motion of one step.
 pub struct Predict<'a> {
     pub steps: &'a [FreeStep],
@@ -44,33 +35,10 @@ impl NullaryFnOnce for Predict<'_> {
     }
 }
 
-/// Free motion of one step, and what it makes of three rows: `rows . q`.
-pub struct PredictAndRead<'a> {
-    pub predict: Predict<'a>,
-    pub rows: [&'a [Lanes]; 3],
-}
-
-impl NullaryFnOnce for PredictAndRead<'_> {
-    type Output = [f64; 3];
-    #[inline(always)]
-    fn call(self) -> [f64; 3] {
-        let Predict { steps, q, v, load } = self.predict;
-        let [x, y, z] = self.rows;
-        let mut sums = [Lanes::default(); 3];
-        let rows = x.iter().zip(y).zip(z);
-        for ((((step, q), v), p), ((x, y), z)) in steps.iter().zip(q).zip(v).zip(load).zip(rows) {
-            let free = step.qq.times(q).plus(&step.qv, v).plus(&step.qp, p);
-            *v = step.vq.times(q).plus(&step.vv, v).plus(&step.vp, p);
-            *q = free;
-            sums = [sums[0].plus(x, &free), sums[1].plus(y, &free), sums[2].plus(z, &free)];
-        }
-        sums.map(Lanes::sum)
-    }
-}
-
 /// Effect of the modal forces in `load` on a predicted state.
 pub struct Correct<'a> {
-    pub steps: &'a [LoadStep],
+    pub q_load: &'a [Lanes],
+    pub v_load: &'a [Lanes],
     pub q: &'a mut [Lanes],
     pub v: &'a mut [Lanes],
     pub load: &'a [Lanes],
@@ -80,33 +48,62 @@ impl NullaryFnOnce for Correct<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
-        for (((step, q), v), p) in self.steps.iter().zip(self.q).zip(self.v).zip(self.load) {
-            *q = q.plus(&step.q, p);
-            *v = v.plus(&step.v, p);
+        for ((((q_load, v_load), q), v), p) in
+            self.q_load.iter().zip(self.v_load).zip(self.q).zip(self.v).zip(self.load)
+        {
+            *q = q.plus(q_load, p);
+            *v = v.plus(v_load, p);
         }
     }
 }
 
-/// `v . v`, `q . k q` and `w . c w` with `w = before + v`, in one pass.
+/// `v . v`, `q . k q` and `w . c w` with `w = before + v`, added to sums so far.
 pub struct Energy<'a> {
     pub q: &'a [Lanes],
     pub v: &'a [Lanes],
     pub before: &'a [Lanes],
     pub stiffness: &'a [Lanes],
     pub damping: &'a [Lanes],
+    pub sums: [Lanes; 3],
 }
 
 impl NullaryFnOnce for Energy<'_> {
-    type Output = [f64; 3];
+    type Output = [Lanes; 3];
     #[inline(always)]
-    fn call(self) -> [f64; 3] {
-        let mut sums = [Lanes::default(); 3];
-        let modes = self.q.iter().zip(self.v).zip(self.before).zip(self.stiffness).zip(self.damping);
-        for ((((q, v), before), k), c) in modes {
-            let twice = v.plus_scaled(1.0, before);
-            sums = [sums[0].plus(v, v), sums[1].plus(&q.times(k), q), sums[2].plus(&twice.times(c), &twice)];
+    fn call(self) -> [Lanes; 3] {
+        // A loop a sum: together, the compiler mixes their lanes and takes twice as long.
+        let [mut kinetic, mut strain, mut power] = self.sums;
+        for v in self.v {
+            kinetic = kinetic.plus(v, v);
         }
-        sums.map(Lanes::sum)
+        for (q, k) in self.q.iter().zip(self.stiffness) {
+            strain = strain.plus(&q.times(k), q);
+        }
+        for ((v, before), c) in self.v.iter().zip(self.before).zip(self.damping) {
+            let twice = v.plus_scaled(1.0, before);
+            power = power.plus(&twice.times(c), &twice);
+        }
+        [kinetic, strain, power]
+    }
+}
+
+/// `rows . x`, added to sums so far.
+pub struct Read<'a> {
+    pub rows: [&'a [Lanes]; 3],
+    pub x: &'a [Lanes],
+    pub sums: [Lanes; 3],
+}
+
+impl NullaryFnOnce for Read<'_> {
+    type Output = [Lanes; 3];
+    #[inline(always)]
+    fn call(self) -> [Lanes; 3] {
+        let [x, y, z] = self.rows;
+        let mut sums = self.sums;
+        for (((value, x), y), z) in self.x.iter().zip(x).zip(y).zip(z) {
+            sums = [sums[0].plus(x, value), sums[1].plus(y, value), sums[2].plus(z, value)];
+        }
+        sums
     }
 }
 
@@ -142,9 +139,9 @@ impl NullaryFnOnce for Dot<'_> {
     }
 }
 
-/// `left diag(steps.q) right`, for one row `right`: three sums at a time stay in registers.
+/// `left diag(weights) right`, for one row `right`: three sums at a time stay in registers.
 pub struct Compliance<'a> {
-    pub steps: &'a [LoadStep],
+    pub weights: &'a [Lanes],
     pub left: [&'a [Lanes]; 3],
     pub right: &'a [Lanes],
 }
@@ -155,8 +152,8 @@ impl NullaryFnOnce for Compliance<'_> {
     fn call(self) -> [f64; 3] {
         let [x, y, z] = self.left;
         let mut sums = [Lanes::default(); 3];
-        for ((((step, right), x), y), z) in self.steps.iter().zip(self.right).zip(x).zip(y).zip(z) {
-            let weighted = step.q.times(right);
+        for ((((weight, right), x), y), z) in self.weights.iter().zip(self.right).zip(x).zip(y).zip(z) {
+            let weighted = weight.times(right);
             sums = [sums[0].plus(x, &weighted), sums[1].plus(y, &weighted), sums[2].plus(z, &weighted)];
         }
         sums.map(Lanes::sum)

@@ -6,7 +6,7 @@
 
 use pulp::Arch;
 
-use super::kernels::{AddRows, Correct, Dot, Energy, FreeStep, LoadStep, Predict};
+use super::kernels::{AddRows, Correct, Dot, FreeStep, Predict};
 use super::lanes::{LANES, Lanes, flat, grouped};
 use super::{ModeStep, Rayleigh};
 use crate::{Error, Result};
@@ -21,10 +21,14 @@ pub struct Model {
     shapes: Vec<Lanes>,
     /// Eigenvalues `omega^2`, 1/s^2; zero where a group is filled up.
     pub(super) stiffness: Vec<Lanes>,
+    /// Their inverses, s^2; zero for rigid modes.
+    pub(super) flexibility: Vec<Lanes>,
     /// Damping of each mode, 1/s.
     pub(super) damping: Vec<Lanes>,
     pub(super) free_steps: Vec<FreeStep>,
-    pub(super) load_steps: Vec<LoadStep>,
+    /// What a unit of modal force at the step's end adds to the displacement, s^2, and to the velocity, s.
+    pub(super) q_load: Vec<Lanes>,
+    pub(super) v_load: Vec<Lanes>,
     /// Time step, s.
     pub dt: f64,
 }
@@ -74,14 +78,15 @@ impl Model {
         let groups = modes.div_ceil(LANES);
         let damping: Vec<f64> = eigenvalues.iter().map(|&k| rayleigh.modal(k)).collect();
         let mut free_steps = vec![FreeStep::default(); groups];
-        let mut load_steps = vec![LoadStep::default(); groups];
+        let [mut q_load, mut v_load] = [(); 2].map(|()| vec![Lanes::default(); groups]);
         for (i, (&k, &c)) in eigenvalues.iter().zip(&damping).enumerate() {
             let (m, g, l) = (step(k, c), i / LANES, i % LANES);
             let to = &mut free_steps[g];
             (to.qq.0[l], to.qv.0[l], to.qp.0[l]) = (m.qq, m.qv, m.qp);
             (to.vq.0[l], to.vv.0[l], to.vp.0[l]) = (m.vq, m.vv, m.vp);
-            (load_steps[g].q.0[l], load_steps[g].v.0[l]) = (m.q_load, m.v_load);
+            (q_load[g].0[l], v_load[g].0[l]) = (m.q_load, m.v_load);
         }
+        let flexibility: Vec<f64> = eigenvalues.iter().map(|&k| if k > 0.0 { 1.0 / k } else { 0.0 }).collect();
         Ok(Self {
             arch: Arch::new(),
             groups,
@@ -89,9 +94,11 @@ impl Model {
             rows: shapes.len() / modes,
             shapes: shapes.chunks_exact(modes).flat_map(grouped).collect(),
             stiffness: grouped(eigenvalues),
+            flexibility: grouped(&flexibility),
             damping: grouped(&damping),
             free_steps,
-            load_steps,
+            q_load,
+            v_load,
             dt,
         })
     }
@@ -152,16 +159,14 @@ impl Model {
 
     /// The step without a new force: afterwards `q`, `v` are the free motion at the step's end.
     pub fn predict(&self, state: &mut State) {
-        self.arch.dispatch(self.prediction(state));
-    }
-
-    pub(super) fn prediction<'a>(&'a self, state: &'a mut State) -> Predict<'a> {
-        Predict { steps: &self.free_steps, q: &mut state.q, v: &mut state.v, load: &state.load }
+        let State { q, v, load, .. } = state;
+        self.arch.dispatch(Predict { steps: &self.free_steps, q, v, load });
     }
 
     /// Completes a predicted step by the modal force at its end.
     pub fn correct(&self, state: &mut State, load: &[Lanes]) {
-        self.arch.dispatch(Correct { steps: &self.load_steps, q: &mut state.q, v: &mut state.v, load });
+        let State { q, v, .. } = state;
+        self.arch.dispatch(Correct { q_load: &self.q_load, v_load: &self.v_load, q, v, load });
         state.load.copy_from_slice(load);
         state.steps += 1;
     }
@@ -184,26 +189,6 @@ impl Model {
                 Lanes(std::array::from_fn(of))
             })
             .collect()
-    }
-
-    /// Kinetic and strain energy of a state, and what damping took out in the step that began with the modal velocities
-    /// `before`, J.
-    pub fn energies(&self, state: &State, before: &[Lanes]) -> (f64, f64, f64) {
-        let (stiffness, damping) = (&self.stiffness, &self.damping);
-        let [kinetic, strain, power] =
-            self.arch.dispatch(Energy { q: &state.q, v: &state.v, before, stiffness, damping });
-        (0.5 * kinetic, 0.5 * strain, 0.25 * self.dt * power)
-    }
-
-    /// Turns a modal force `p` in place into the displacement beyond what it does at rest, `q - p / k` of the elastic modes
-    /// (`q` of rigid ones).
-    pub fn beyond_static(&self, state: &State, load: &mut [Lanes]) {
-        for ((p, q), k) in load.iter_mut().zip(&state.q).zip(&self.stiffness) {
-            for l in 0..LANES {
-                let at_rest = if k.0[l] > 0.0 { p.0[l] / k.0[l] } else { 0.0 };
-                p.0[l] = q.0[l] - at_rest;
-            }
-        }
     }
 
     /// Modal numbers without the filling.

@@ -7,9 +7,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::kernels::{AddRows, Compliance, Dot, PredictAndRead};
+use super::Model;
+use super::kernels::{AddRows, Compliance, Dot};
 use super::lanes::Lanes;
-use super::{Model, State};
 
 /// Nodes taken at once when a patch is gathered: few enough streams for the processor to fetch ahead.
 const NODES_AT_ONCE: usize = 5;
@@ -43,19 +43,9 @@ impl Projection {
         }
     }
 
-    /// The step without a new force (see [`Model::predict`]) and the mean displacement of the patch in it, m.
-    pub fn predict(&self, model: &Model, state: &mut State) -> DVec3 {
-        DVec3::from(model.arch.dispatch(PredictAndRead { predict: model.prediction(state), rows: self.rows() }))
-    }
-
-    /// Mean displacement of the patch, m.
-    pub fn displacement(&self, model: &Model, state: &State) -> DVec3 {
-        DVec3::from(self.rows().map(|row| model.arch.dispatch(Dot(row, &state.q))))
-    }
-
-    /// Mean velocity of the patch, m/s.
-    pub fn velocity(&self, model: &Model, state: &State) -> DVec3 {
-        DVec3::from(self.rows().map(|row| model.arch.dispatch(Dot(row, &state.v))))
+    /// Mean over the patch of modal numbers: displacement, m, of the state's `q`, or velocity, m/s, of its `v`.
+    pub fn read(&self, model: &Model, x: &[Lanes]) -> DVec3 {
+        DVec3::from(self.rows().map(|row| model.arch.dispatch(Dot(row, x))))
     }
 
     /// Adds the modal force of a force on the patch, `load += G^T f`.
@@ -63,28 +53,31 @@ impl Projection {
         model.arch.dispatch(AddRows { load, rows: self.rows(), forces: force.to_array() });
     }
 
-    /// Displacement of this patch at the step's end per unit force on `other` there, `G diag(q_load) G_other^T`, m/N.
-    pub fn step_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
-        let (steps, left) = (&model.load_steps, self.rows());
-        DMat3::from_cols_array_2d(&other.rows().map(|right| model.arch.dispatch(Compliance { steps, left, right })))
+    /// Takes the static displacement under a force on the patch off modal displacements: `x -= diag(1/k) G^T f`.
+    pub fn take_static(&self, model: &Model, force: DVec3, x: &mut [Lanes]) {
+        let mut load = vec![Lanes::default(); x.len()];
+        self.add_force(model, -force, &mut load);
+        for ((x, p), flexibility) in x.iter_mut().zip(&load).zip(&model.flexibility) {
+            *x = x.plus(p, flexibility);
+        }
     }
 
-    fn rows(&self) -> [&[Lanes]; 3] {
-        self.axes.each_ref().map(Vec::as_slice)
+    /// Displacement of this patch at the step's end per unit force on `other` there, `G diag(q_load) G_other^T`, m/N.
+    pub fn step_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
+        self.weighted(model, &model.q_load, other)
     }
 
     /// Static part that the modes kept carry, `G diag(1/k) G_other^T` over the elastic modes, m/N.
     pub fn static_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
-        let mut columns = [[0.0; 3]; 3];
-        for (j, column) in columns.iter_mut().enumerate() {
-            for (i, value) in column.iter_mut().enumerate() {
-                let pairs = self.axes[i].iter().zip(&other.axes[j]).zip(&model.stiffness);
-                *value = pairs
-                    .flat_map(|((a, b), k)| (0..super::LANES).map(move |l| (a.0[l] * b.0[l], k.0[l])))
-                    .map(|(product, k)| if k > 0.0 { product / k } else { 0.0 })
-                    .sum();
-            }
-        }
-        DMat3::from_cols_array_2d(&columns)
+        self.weighted(model, &model.flexibility, other)
+    }
+
+    fn weighted(&self, model: &Model, weights: &[Lanes], other: &Projection) -> DMat3 {
+        let left = self.rows();
+        DMat3::from_cols_array_2d(&other.rows().map(|right| model.arch.dispatch(Compliance { weights, left, right })))
+    }
+
+    pub(super) fn rows(&self) -> [&[Lanes]; 3] {
+        self.axes.each_ref().map(Vec::as_slice)
     }
 }

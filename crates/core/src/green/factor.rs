@@ -4,7 +4,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::Perm;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -16,18 +16,24 @@ use super::ordering::nested_dissection;
 use crate::fem::{Supports, SymmetricCsc};
 use crate::{Error, Result};
 
+/// Order and structure of a factor, before any number is computed.
+pub struct Symbolic {
+    lower: SparseColMat<usize, f64>,
+    structure: SymbolicCholesky<usize>,
+}
+
 /// `P K_NN P^T = L L^T`.
 pub struct Factor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
 }
 
-impl Factor {
-    /// Orders and factorises the free part of `stiffness`.
+impl Symbolic {
+    /// Orders the free part of `stiffness` and finds the structure of its factor.
     ///
     /// # Errors
-    /// A pivot that is not positive: a part of the body is not held by any support.
-    pub fn new(stiffness: &SymmetricCsc, supports: &Supports, par: Par) -> Result<Self> {
+    /// Not enough memory.
+    pub fn new(stiffness: &SymmetricCsc, supports: &Supports) -> Result<Self> {
         let lower = free_lower_triangle(stiffness, supports);
         let order = dof_order(stiffness, supports);
         let mut inverse = vec![0usize; order.len()];
@@ -35,24 +41,77 @@ impl Factor {
             inverse[old] = new;
         }
         let perm = Perm::new_checked(order.into_boxed_slice(), inverse.into_boxed_slice(), lower.nrows());
-        let failed = |what: &str| Error::Singular(format!("{what}; is every part of the body held by a support?"));
-        let symbolic = factorize_symbolic_cholesky(
+        let structure = factorize_symbolic_cholesky(
             lower.symbolic(),
             Side::Lower,
             SymmetricOrdering::Custom(perm.as_ref()),
-            // The solves of `pruned` walk the supernodes: never the simplicial form.
+            // Substructures are cut from the supernodes: never the simplicial form.
             CholeskySymbolicParams {
                 supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
                 ..CholeskySymbolicParams::default()
             },
         )
         .map_err(|e| Error::Singular(format!("symbolic factorisation failed ({e:?})")))?;
+        Ok(Self { lower, structure })
+    }
+
+    /// The supernodes, in permuted positions.
+    ///
+    /// # Errors
+    /// Never: the structure is made supernodal.
+    pub fn supernodes(&self) -> Result<&SymbolicSupernodalCholesky<usize>> {
+        match self.structure.raw() {
+            SymbolicCholeskyRaw::Supernodal(supernodes) => Ok(supernodes),
+            SymbolicCholeskyRaw::Simplicial(_) => Err(Error::Singular("the factor has no supernodes".into())),
+        }
+    }
+
+    /// Permuted position of each free dof.
+    pub fn positions(&self) -> Vec<u32> {
+        match self.structure.perm() {
+            Some(perm) => perm.arrays().1.iter().map(|&p| p as u32).collect(),
+            None => (0..self.structure.nrows() as u32).collect(),
+        }
+    }
+
+    /// Entries of the matrix's lower triangle.
+    pub fn matrix_entries(&self) -> usize {
+        self.lower.compute_nnz()
+    }
+
+    /// Operations of [`Symbolic::factorise`]: a column with `c` numbers below its diagonal takes `(c + 1)^2`.
+    ///
+    /// # Errors
+    /// Never: the structure is made supernodal.
+    pub fn flops(&self) -> Result<f64> {
+        let supernodes = self.supernodes()?;
+        let column = |rows: usize| (rows as f64).powi(2);
+        let of = |s: usize| {
+            let size = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
+            let below = supernodes.supernode(s).pattern().len();
+            (1..=size).map(|k| column(below + k)).sum::<f64>()
+        };
+        Ok((0..supernodes.n_supernodes()).map(of).sum())
+    }
+
+    /// Bytes that [`Symbolic::factorise`] needs beside the factor.
+    pub fn scratch_bytes(&self, par: Par) -> usize {
+        self.structure.factorize_numeric_llt_scratch::<f64>(par, Default::default()).unaligned_bytes_required()
+    }
+
+    /// The numbers.
+    ///
+    /// # Errors
+    /// A pivot that is not positive: a part of the body is not held by any support.
+    pub fn factorise(self, par: Par) -> Result<Factor> {
+        let failed = |what: &str| Error::Singular(format!("{what}; is every part of the body held by a support?"));
+        let symbolic = self.structure;
         let mut values = vec![0.0; symbolic.len_val()];
         let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, Default::default()));
         symbolic
             .factorize_numeric_llt(
                 &mut values,
-                lower.as_ref(),
+                self.lower.as_ref(),
                 Side::Lower,
                 LltRegularization::default(),
                 par,
@@ -63,7 +122,17 @@ impl Factor {
         if !values.iter().all(|v| v.is_finite()) {
             return Err(failed("the factor is not finite"));
         }
-        Ok(Self { symbolic, values })
+        Ok(Factor { symbolic, values })
+    }
+}
+
+impl Factor {
+    /// Orders and factorises the free part of `stiffness`.
+    ///
+    /// # Errors
+    /// A pivot that is not positive: a part of the body is not held by any support.
+    pub fn new(stiffness: &SymmetricCsc, supports: &Supports, par: Par) -> Result<Self> {
+        Symbolic::new(stiffness, supports)?.factorise(par)
     }
 
     /// Number of free dofs.
@@ -89,14 +158,6 @@ impl Factor {
         match self.symbolic.raw() {
             SymbolicCholeskyRaw::Supernodal(symbolic) => Ok(SupernodalLltRef::new(symbolic, &self.values)),
             SymbolicCholeskyRaw::Simplicial(_) => Err(Error::Singular("the factor has no supernodes".into())),
-        }
-    }
-
-    /// Permuted position of each free dof.
-    pub fn positions(&self) -> Vec<u32> {
-        match self.symbolic.perm() {
-            Some(perm) => perm.arrays().1.iter().map(|&p| p as u32).collect(),
-            None => (0..self.dimension() as u32).collect(),
         }
     }
 

@@ -4,11 +4,14 @@ use std::path::PathBuf;
 
 use memmap2::Mmap;
 
+use super::scaled;
 use crate::mesh::Surface;
 
 /// Number format of the stored values; arithmetic is always f64.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
+    /// 2 bytes an entry, fixed point with a scale a dof.
+    F16,
     /// 4 bytes an entry.
     F32,
     /// 8 bytes an entry.
@@ -16,9 +19,10 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// `"f32"` or `"f64"`.
+    /// `"f16"`, `"f32"` or `"f64"`.
     pub fn name(self) -> &'static str {
         match self {
+            Precision::F16 => "f16",
             Precision::F32 => "f32",
             Precision::F64 => "f64",
         }
@@ -27,6 +31,7 @@ impl Precision {
     /// Largest relative error of rounding a stored number.
     pub fn unit_roundoff(self) -> f64 {
         match self {
+            Precision::F16 => f64::from(2.0_f32.powi(-15)),
             Precision::F32 => f64::from(f32::EPSILON) / 2.0,
             Precision::F64 => f64::EPSILON / 2.0,
         }
@@ -34,12 +39,34 @@ impl Precision {
 
     /// The format called `name`.
     pub fn parse(name: &str) -> Option<Self> {
-        [Precision::F32, Precision::F64].into_iter().find(|p| p.name() == name)
+        [Precision::F16, Precision::F32, Precision::F64].into_iter().find(|p| p.name() == name)
+    }
+
+    /// Bytes of a stored entry.
+    pub fn bytes(self) -> usize {
+        match self {
+            Precision::F16 => 2,
+            Precision::F32 => 4,
+            Precision::F64 => 8,
+        }
+    }
+
+    /// Bytes of an entry on its way into the store.
+    pub fn panel_bytes(self) -> usize {
+        self.bytes().max(4)
+    }
+
+    /// Bytes of the numbers that columns are computed with. Single precision costs a column up to 1e-5 of its largest
+    /// entry, and reactions more: enough for halves only.
+    pub fn computed_bytes(self) -> usize {
+        if self == Precision::F16 { 4 } else { 8 }
     }
 }
 
 /// Where the entries live; column after column.
 pub enum Values {
+    /// In memory, fixed point.
+    F16(Vec<i16>),
     /// In memory, single.
     F32(Vec<f32>),
     /// In memory, double.
@@ -51,6 +78,8 @@ pub enum Values {
 /// The entries as a slice.
 #[derive(Clone, Copy)]
 pub enum ValueSlice<'a> {
+    /// Fixed point, to be scaled.
+    F16(&'a [i16]),
     /// Single precision.
     F32(&'a [f32]),
     /// Double precision.
@@ -61,8 +90,12 @@ impl Values {
     /// Borrow as a slice of the stored type. The alignment of a mapped store was checked when it was opened.
     pub fn as_slice(&self) -> ValueSlice<'_> {
         match self {
+            Values::F16(v) => ValueSlice::F16(v),
             Values::F32(v) => ValueSlice::F32(v),
             Values::F64(v) => ValueSlice::F64(v),
+            Values::Mapped(map, at, len, Precision::F16) => {
+                ValueSlice::F16(bytemuck::cast_slice(&map[*at..*at + 2 * len]))
+            }
             Values::Mapped(map, at, len, Precision::F32) => {
                 ValueSlice::F32(bytemuck::cast_slice(&map[*at..*at + 4 * len]))
             }
@@ -75,8 +108,10 @@ impl Values {
     /// Stored format.
     pub fn precision(&self) -> Precision {
         match self {
-            Values::F32(_) | Values::Mapped(.., Precision::F32) => Precision::F32,
-            Values::F64(_) | Values::Mapped(.., Precision::F64) => Precision::F64,
+            Values::F16(_) => Precision::F16,
+            Values::F32(_) => Precision::F32,
+            Values::F64(_) => Precision::F64,
+            Values::Mapped(.., precision) => *precision,
         }
     }
 }
@@ -105,6 +140,8 @@ pub struct GreensFunction {
     pub loads: Vec<f64>,
     /// What the reference loads alone do, on the rows: displacements, m, and `K u` on supported rows, N; empty for none.
     pub free_response: Vec<f64>,
+    /// Scale of each row, and of the column that belongs to it, if the entries are scaled (`f16`).
+    pub scale: Vec<f64>,
     /// Content key.
     pub key: String,
     /// Young's modulus if the whole body has one and no loads, Pa: then it only scales forces.
@@ -133,6 +170,8 @@ impl GreensFunction {
     pub fn entry(&self, row: usize, column: usize) -> f64 {
         let at = column * self.rows + row;
         match self.values.as_slice() {
+            // The product of the scales first: it is the same for the mirrored entry.
+            ValueSlice::F16(v) => self.scale[row] * self.scale[self.row_of_column(column)] * f64::from(v[at]),
             ValueSlice::F32(v) => f64::from(v[at]),
             ValueSlice::F64(v) => v[at],
         }
@@ -142,6 +181,10 @@ impl GreensFunction {
     pub fn add_column(&self, column: usize, factor: f64, out: &mut [f64]) {
         let at = column * self.rows;
         match self.values.as_slice() {
+            ValueSlice::F16(v) => {
+                let factor = factor * self.scale[self.row_of_column(column)];
+                scaled::add_scaled(&v[at..at + out.len()], factor, &self.scale, out);
+            }
             ValueSlice::F32(v) => add_scaled(&v[at..at + out.len()], factor, out),
             ValueSlice::F64(v) => add_scaled(&v[at..at + out.len()], factor, out),
         }
@@ -162,6 +205,11 @@ impl GreensFunction {
             }
         }
         u
+    }
+
+    /// Column of the dof in row `row`, which has one.
+    pub(super) fn column_of_row(&self, row: usize) -> usize {
+        3 * self.touch_rank[row / 3] as usize + row % 3
     }
 
     /// Row of the dof in column `column`.

@@ -4,10 +4,13 @@
 #![allow(unsafe_code)] // Mapping a file.
 
 use std::collections::HashMap;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use memmap2::Mmap;
+use rayon::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use super::key::FORMAT_VERSION;
@@ -17,6 +20,156 @@ use crate::{Error, Result};
 
 /// Bytes under one checksum.
 const CHECKSUM_BLOCK: usize = 1 << 24;
+/// Bytes of a checksum (BLAKE3).
+const SUM: usize = 32;
+
+/// A store being written beside its place, column by column; [`StoreWriter::finish`] renames it there.
+pub struct StoreWriter {
+    target: PathBuf,
+    beside: PathBuf,
+    file: Mutex<File>,
+    /// First byte of the operator, its length, and bytes of a column.
+    at: u64,
+    length: usize,
+    column: usize,
+    finished: bool,
+}
+
+impl StoreWriter {
+    /// Writes everything but the operator.
+    ///
+    /// # Errors
+    /// The operating system's, with nothing left behind.
+    pub fn create(target: &Path, green: &GreensFunction, precision: Precision) -> Result<Self> {
+        let io = |source| Error::Io { path: target.to_owned(), source };
+        let (column, columns) = (green.rows * precision.bytes(), 3 * green.touch.len());
+        let length = column * columns;
+        let sums = length.div_ceil(CHECKSUM_BLOCK);
+        let small = green.small_tensors();
+        let dtype = match precision {
+            Precision::F16 => Dtype::I16,
+            Precision::F32 => Dtype::F32,
+            Precision::F64 => Dtype::F64,
+        };
+        // The operator first, where it is aligned.
+        let mut header = Header::new(green, precision);
+        header.tensor("psi", dtype, &[columns, green.rows], length);
+        header.tensor("psi_checksums", Dtype::U8, &[sums, SUM], sums * SUM);
+        for (name, dtype, shape, data) in &small {
+            header.tensor(name, *dtype, shape, data.len());
+        }
+        let header = header.bytes();
+        let at = header.len() as u64;
+        let beside = beside(target);
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&beside).map_err(io)?;
+        let writer =
+            Self { target: target.to_owned(), beside, file: Mutex::new(file), at, length, column, finished: false };
+        writer.write(0, &header)?;
+        let mut place = at + (length + sums * SUM) as u64;
+        for (_, _, _, data) in &small {
+            writer.write(place, data)?;
+            place += data.len() as u64;
+        }
+        Ok(writer)
+    }
+
+    /// Writes consecutive columns, from `column` on.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn put(&self, column: usize, bytes: &[u8]) -> Result<()> {
+        self.write(self.at + (column * self.column) as u64, bytes)
+    }
+
+    /// Adds the checksums and renames the file into its place.
+    ///
+    /// # Errors
+    /// The operating system's, with nothing left behind.
+    pub fn finish(mut self) -> Result<()> {
+        let sums = block_sums(&self.beside, self.at, self.length).map_err(|e| self.io(e))?;
+        self.write(self.at + self.length as u64, sums.as_flattened())?;
+        let synced = self.file.lock().map_err(|_| std::io::Error::other("a writer failed")).and_then(|f| f.sync_all());
+        synced.and_then(|()| fs::rename(&self.beside, &self.target)).map_err(|e| self.io(e))?;
+        self.finished = true;
+        Ok(())
+    }
+
+    fn write(&self, at: u64, bytes: &[u8]) -> Result<()> {
+        let write = || {
+            let mut file = self.file.lock().map_err(|_| std::io::Error::other("a writer failed"))?;
+            file.seek(SeekFrom::Start(at))?;
+            file.write_all(bytes)
+        };
+        write().map_err(|e| self.io(e))
+    }
+
+    /// The user knows the file asked for, not the one beside it.
+    fn io(&self, source: std::io::Error) -> Error {
+        Error::Io { path: self.target.clone(), source }
+    }
+}
+
+impl Drop for StoreWriter {
+    fn drop(&mut self) {
+        if !self.finished {
+            let _ = fs::remove_file(&self.beside);
+        }
+    }
+}
+
+/// The header of a safetensors file: its length in eight bytes, then JSON, padded so that what follows is aligned.
+struct Header {
+    fields: serde_json::Map<String, serde_json::Value>,
+    end: usize,
+}
+
+impl Header {
+    fn new(green: &GreensFunction, precision: Precision) -> Self {
+        let small = green.small_tensors();
+        let metadata = serde_json::json!({
+            "format": "palpate-green",
+            "version": FORMAT_VERSION.to_string(),
+            "key": green.key,
+            "precision": precision.name(),
+            "youngs_modulus": green.youngs_modulus.map_or(String::new(), |e| format!("{e:e}")),
+            "description": green.description,
+            "geometry_checksum": small_checksum(small.iter().map(|(_, _, _, b)| b.as_slice())),
+        });
+        Self { fields: serde_json::Map::from_iter([("__metadata__".to_string(), metadata)]), end: 0 }
+    }
+
+    fn tensor(&mut self, name: &str, dtype: Dtype, shape: &[usize], bytes: usize) {
+        let offsets = [self.end, self.end + bytes];
+        let tensor = serde_json::json!({"dtype": dtype.to_string(), "shape": shape, "data_offsets": offsets});
+        self.fields.insert(name.to_string(), tensor);
+        self.end += bytes;
+    }
+
+    fn bytes(self) -> Vec<u8> {
+        let mut json = serde_json::Value::Object(self.fields).to_string().into_bytes();
+        json.resize(json.len().next_multiple_of(8), b' ');
+        [&(json.len() as u64).to_le_bytes()[..], &json].concat()
+    }
+}
+
+/// Checksums of the blocks of `length` bytes from byte `at` on. They are read, not mapped: pages of a map that were
+/// touched count as memory of the process.
+fn block_sums(path: &Path, at: u64, length: usize) -> std::io::Result<Vec<[u8; SUM]>> {
+    (0..length.div_ceil(CHECKSUM_BLOCK))
+        .into_par_iter()
+        .map_init(
+            || File::open(path),
+            |file, block| {
+                let file = file.as_mut().map_err(|e| std::io::Error::new(e.kind(), e.to_string()))?;
+                let start = block * CHECKSUM_BLOCK;
+                file.seek(SeekFrom::Start(at + start as u64))?;
+                let mut hash = blake3::Hasher::new();
+                hash.update_reader(file.take(CHECKSUM_BLOCK.min(length - start) as u64))?;
+                Ok(*hash.finalize().as_bytes())
+            },
+        )
+        .collect()
+}
 
 impl GreensFunction {
     /// Writes the store beside `path` and renames it into place.
@@ -24,51 +177,16 @@ impl GreensFunction {
     /// # Errors
     /// The operating system's, with nothing left behind.
     pub fn save(&self, path: &Path) -> Result<()> {
-        let io = |source| Error::Io { path: path.to_owned(), source };
-        let partial = partial_path(path);
-        let result = self.write(&partial).and_then(|()| {
-            File::open(&partial).and_then(|f| f.sync_all()).map_err(io)?;
-            fs::rename(&partial, path).map_err(io)
-        });
-        result.map_err(|error| {
-            let _ = fs::remove_file(&partial);
-            match error {
-                // The user knows the file asked for, not the one beside it.
-                Error::Io { source, .. } => io(source),
-                other => other,
-            }
-        })
-    }
-
-    fn write(&self, path: &Path) -> Result<()> {
-        let (bytes, dtype): (&[u8], Dtype) = match self.values.as_slice() {
-            ValueSlice::F32(v) => (bytemuck::cast_slice(v), Dtype::F32),
-            ValueSlice::F64(v) => (bytemuck::cast_slice(v), Dtype::F64),
-        };
-        let small = self.small_tensors();
-        let checksums: Vec<u8> = bytes.chunks(CHECKSUM_BLOCK).flat_map(|c| *blake3::hash(c).as_bytes()).collect();
-        let metadata = HashMap::from([
-            ("format".to_string(), "palpate-green".to_string()),
-            ("version".to_string(), FORMAT_VERSION.to_string()),
-            ("key".to_string(), self.key.clone()),
-            ("precision".to_string(), self.values.precision().name().to_string()),
-            ("youngs_modulus".to_string(), self.youngs_modulus.map_or(String::new(), |e| format!("{e:e}"))),
-            ("description".to_string(), self.description.clone()),
-            ("geometry_checksum".to_string(), small_checksum(small.iter().map(|(_, _, _, b)| b.as_slice()))),
-        ]);
-        let broken = |e: safetensors::SafeTensorError| match e {
-            safetensors::SafeTensorError::IoError(source) => Error::Io { path: path.to_owned(), source },
-            other => store_error(path, format!("cannot be written: {other}")),
-        };
-        let mut views = Vec::new();
-        for (name, dtype, shape, data) in &small {
-            views.push((*name, TensorView::new(*dtype, shape.clone(), data).map_err(broken)?));
-        }
-        let columns = 3 * self.touch.len();
-        views.push(("psi", TensorView::new(dtype, vec![columns, self.rows], bytes).map_err(broken)?));
-        let blocks = checksums.len() / 32;
-        views.push(("psi_checksums", TensorView::new(Dtype::U8, vec![blocks, 32], &checksums).map_err(broken)?));
-        safetensors::serialize_to_file(views, Some(metadata), path).map_err(broken)
+        let writer = StoreWriter::create(path, self, self.values.precision())?;
+        writer.put(
+            0,
+            match self.values.as_slice() {
+                ValueSlice::F16(v) => bytemuck::cast_slice(v),
+                ValueSlice::F32(v) => bytemuck::cast_slice(v),
+                ValueSlice::F64(v) => bytemuck::cast_slice(v),
+            },
+        )?;
+        writer.finish()
     }
 
     /// The tensors that describe the body, in the order in which they are hashed.
@@ -90,6 +208,10 @@ impl GreensFunction {
             if !values.is_empty() {
                 tensors.push((name, Dtype::F64, vec![values.len()], bytemuck::cast_slice(values).to_vec()));
             }
+        }
+        if !self.scale.is_empty() {
+            let scale = bytemuck::cast_slice(&self.scale).to_vec();
+            tensors.insert(0, ("scale", Dtype::F64, vec![self.scale.len()], scale));
         }
         tensors
     }
@@ -197,6 +319,7 @@ impl Reader<'_> {
             values: Values::F64(Vec::new()),
             loads: self.optional("loads")?,
             free_response: self.optional("free_response")?,
+            scale: if self.tensors.tensor("scale").is_ok() { self.numbers("scale")? } else { Vec::new() },
             key: field("key"),
             youngs_modulus: field("youngs_modulus").parse().ok(),
             description: field("description"),
@@ -223,6 +346,7 @@ impl Reader<'_> {
     ) -> Result<(usize, usize, Precision)> {
         let psi = self.tensor("psi")?;
         let precision = match psi.dtype() {
+            Dtype::I16 if green.scale.len() == green.rows => Precision::F16,
             Dtype::F32 => Precision::F32,
             Dtype::F64 => Precision::F64,
             other => return Err(self.damaged(&format!("numbers of type {other:?}"))),
@@ -230,24 +354,21 @@ impl Reader<'_> {
         if psi.shape() != [3 * green.touch.len(), green.rows] {
             return Err(self.damaged("the operator's shape does not match the body"));
         }
-        let checksums = self.tensor("psi_checksums")?;
-        let blocks = psi.data().chunks(CHECKSUM_BLOCK);
-        if checksums.data().len() != 32 * blocks.len() {
-            return Err(self.damaged("checksums are missing"));
-        }
-        for (i, (block, sum)) in blocks.zip(checksums.data().chunks_exact(32)).enumerate() {
-            if blake3::hash(block).as_bytes() != sum {
-                return Err(self.damaged(&format!("checksum of block {i} differs")));
-            }
-        }
         let at = psi.data().as_ptr() as usize - map.as_ptr() as usize;
         debug_assert!(at >= data_start);
-        let aligned = match precision {
-            Precision::F32 => bytemuck::try_cast_slice::<u8, f32>(psi.data()).is_ok(),
-            Precision::F64 => bytemuck::try_cast_slice::<u8, f64>(psi.data()).is_ok(),
-        };
-        if !aligned {
+        if !(psi.data().as_ptr() as usize).is_multiple_of(precision.bytes()) {
             return Err(self.damaged("the operator is not aligned"));
+        }
+        let checksums = self.tensor("psi_checksums")?;
+        if checksums.data().len() != SUM * psi.data().len().div_ceil(CHECKSUM_BLOCK) {
+            return Err(self.damaged("checksums are missing"));
+        }
+        let io = |source| Error::Io { path: self.path.to_owned(), source };
+        let sums = block_sums(self.path, at as u64, psi.data().len()).map_err(io)?;
+        for (i, (found, stored)) in sums.iter().zip(checksums.data().chunks_exact(SUM)).enumerate() {
+            if found != stored {
+                return Err(self.damaged(&format!("checksum of block {i} differs")));
+            }
         }
         Ok((at, 3 * green.touch.len() * green.rows, precision))
     }
@@ -262,9 +383,9 @@ fn small_checksum<'a>(tensors: impl Iterator<Item = &'a [u8]>) -> String {
     hash.finalize().to_hex().to_string()
 }
 
-fn partial_path(path: &Path) -> PathBuf {
+fn beside(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.partial", std::process::id()));
+    name.push(format!(".{}.new", std::process::id()));
     path.with_file_name(name)
 }
 

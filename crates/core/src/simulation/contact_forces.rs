@@ -13,7 +13,7 @@ pub(super) fn update_compliance(model: &Model, state: &mut State, tool: usize) {
     if let (Some(motion), Some(dynamics)) = (motion.as_mut(), &model.dynamics) {
         motion.hold(model, &dynamics.modes, tools, tool);
         // The way of the tool counts from where the moving patch is met, and its free motion is taken off every step.
-        tools[tool].anchor -= motion.free_displacement(&dynamics.modes, tool) + motion.left_out(tools, tool);
+        tools[tool].anchor -= motion.free_displacement(tool) + motion.left_out(tools, tool);
     }
     for other in 0..MAX_TOOLS {
         if tools[other].mode == Mode::Free {
@@ -57,10 +57,7 @@ pub(super) fn solve_forces(model: &Model, state: &mut State) {
         }
     }
     for (i, &a) in active[..count].iter().enumerate() {
-        let free = match (&state.motion, &model.dynamics) {
-            (Some(motion), Some(dynamics)) => motion.free_displacement(&dynamics.modes, a),
-            _ => DVec3::ZERO,
-        };
+        let free = state.motion.as_ref().map_or(DVec3::ZERO, |motion| motion.free_displacement(a));
         let displacement = state.tools[a].position - state.tools[a].anchor - free;
         for (j, &b) in active[..count].iter().enumerate() {
             let mut block = state.compliance[a][b] * (1.0 / state.stiffness_scale);

@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::{Input, MAX_TOOLS, Mode, Model, Scratch, State, ToolContact};
 use crate::contact::{Patch, SurfacePoint, compliance_block, patch_weights};
-use crate::dynamics::{Lanes, Model as Modes, Projection, State as ModalState};
+use crate::dynamics::{Ahead, Held, Lanes, Model as Modes, Projection};
 use crate::{Error, Result};
 
 /// Shortest and longest time step, s: a tick makes at most ten of the one, and feels the other.
@@ -65,11 +65,9 @@ pub struct Energy {
 /// How the body moves.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    pub(super) modal: ModalState,
-    /// Modal velocities before the step, for the damping's account.
-    before: Vec<Lanes>,
-    /// Modal force of the step: contacts, and a strike.
-    load: Vec<Lanes>,
+    modal: Ahead,
+    /// Mean displacement of each patch at the end of the next step if no force acts there, m.
+    free: [DVec3; MAX_TOOLS],
     patches: [Projection; MAX_TOOLS],
     /// A patch that is struck: where, its force at the end of this step and of the last one, N, and its displacement at the
     /// start of this one, m.
@@ -78,6 +76,8 @@ pub struct Motion {
     /// What is left of the blow: its impulse over the sum of its shape, N, its length and the next instant, in steps.
     blow_shape: (DVec3, u32, u32),
     struck_at: DVec3,
+    /// A node whose displacement is wanted every tick.
+    watched: (Option<u32>, Projection),
     /// `R` between the patches.
     residual: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
     /// Body time not yet stepped through, s.
@@ -104,38 +104,38 @@ pub struct Strike {
 impl Motion {
     /// At rest.
     pub(super) fn new(modes: &Modes) -> Self {
-        let modal = modes.state();
         Self {
-            before: modal.v.clone(),
-            load: modal.load.clone(),
+            modal: modes.ahead(),
+            free: Default::default(),
             patches: std::array::from_fn(|_| Projection::new(modes)),
             struck: Projection::new(modes),
             blow: Default::default(),
             blow_shape: Default::default(),
             struck_at: DVec3::ZERO,
+            watched: (None, Projection::new(modes)),
             residual: Default::default(),
             due: 0.0,
             time: 0.0,
             last: Default::default(),
             energy: Energy::default(),
-            modal,
         }
     }
 
-    /// Brings the body to rest.
-    fn rest(&mut self) {
-        for x in [&mut self.modal.q, &mut self.modal.v, &mut self.modal.load] {
+    /// Brings the body to rest, with a step due so that contacts hear of it.
+    fn rest(&mut self, modes: &Modes) {
+        let Ahead { q, v, free_q, free_v } = &mut self.modal;
+        for x in [q, v, free_q, free_v] {
             x.fill(Lanes::default());
         }
-        self.blow = Default::default();
+        (self.free, self.blow, self.last) = Default::default();
         self.blow_shape = Default::default();
+        self.due = modes.dt;
         self.energy = Energy::default();
     }
 
-    /// The body without new forces at the step's end.
-    pub(super) fn predict(&mut self, modes: &Modes) {
-        self.before.copy_from_slice(&self.modal.v);
-        modes.predict(&mut self.modal);
+    /// Modal displacements now.
+    pub(super) fn modal_displacements(&self) -> &[Lanes] {
+        &self.modal.q
     }
 
     /// Displacement of a surface point in the free motion, m; the residual flexibility of other contacts is left out.
@@ -144,15 +144,35 @@ impl Motion {
         let mut sum = DVec3::ZERO;
         for (node, share) in triangle.into_iter().zip(at.barycentric) {
             let mut corner = [0.0; 3];
-            modes.read(&self.modal.q, 3 * node as usize.., &mut corner);
+            modes.read(&self.modal.free_q, 3 * node as usize.., &mut corner);
             sum += share * DVec3::from(corner);
         }
         sum
     }
 
+    /// Displacement of a node beside `Psi W f`, m: `Phi (q - p / k)`, `p` being the modal force of the contacts.
+    pub(super) fn displacement_of(
+        &mut self,
+        modes: &Modes,
+        tools: &[ToolContact; MAX_TOOLS],
+        node: u32,
+        here: &Patch,
+    ) -> DVec3 {
+        if self.watched.0 != Some(node) {
+            gather(&mut self.watched.1, modes, here);
+            self.watched.0 = Some(node);
+        }
+        let watched = &self.watched.1;
+        let touching = tools.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free);
+        let kept: DVec3 =
+            touching.map(|(contact, patch)| watched.static_compliance(modes, patch) * contact.force).sum();
+        watched.read(modes, &self.modal.q) - kept
+    }
+
     /// Takes hold of a patch for a tool: its compliance within a step with every other one, m/N.
     pub(super) fn hold(&mut self, model: &Model, modes: &Modes, tools: &[ToolContact; MAX_TOOLS], tool: usize) {
         gather(&mut self.patches[tool], modes, &tools[tool].patch);
+        self.free[tool] = self.patches[tool].read(modes, &self.modal.free_q);
         for other in 0..MAX_TOOLS {
             if tools[other].mode == Mode::Free {
                 continue;
@@ -172,8 +192,8 @@ impl Motion {
     }
 
     /// Mean displacement of a tool's patch in the free motion, m.
-    pub(super) fn free_displacement(&self, modes: &Modes, tool: usize) -> DVec3 {
-        self.patches[tool].displacement(modes, &self.modal)
+    pub(super) fn free_displacement(&self, tool: usize) -> DVec3 {
+        self.free[tool]
     }
 
     /// How far the forces that other tools already exert move a patch beyond its modes, m.
@@ -188,7 +208,7 @@ impl Motion {
     pub(super) fn strike(&mut self, modes: &Modes, patch: &Patch, impulse: DVec3, duration: f64) {
         if self.blow == [DVec3::ZERO; 2] && self.blow_shape.2 == 0 {
             gather(&mut self.struck, modes, patch);
-            self.struck_at = self.struck.displacement(modes, &self.modal);
+            self.struck_at = self.struck.read(modes, &self.modal.q);
             let steps = (duration / modes.dt).round().clamp(1.0, BLOW_STEPS_MAX) as u32;
             // The sum of sin(pi k / (n + 1)) over k = 1..n is the cotangent of pi / (2 (n + 1)).
             let sum = 1.0 / (std::f64::consts::FRAC_PI_2 / f64::from(steps + 1)).tan();
@@ -206,29 +226,33 @@ impl Motion {
         size * (std::f64::consts::PI * f64::from(instant) / f64::from(steps + 1)).sin()
     }
 
-    /// Completes the step by the forces of contacts and strike, and keeps account of the energy.
-    pub(super) fn correct(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
-        let modes = &dynamics.modes;
-        self.load.fill(Lanes::default());
-        for (contact, patch) in tools.iter().zip(&self.patches) {
-            if contact.mode != Mode::Free {
-                patch.add_force(modes, contact.force, &mut self.load);
-            }
-        }
+    /// Ends the step by the forces of contacts and strike, predicts the next, and keeps account of the energy.
+    pub(super) fn advance(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
         self.blow[0] = self.next_of_blow();
-        if self.blow[0] != DVec3::ZERO {
-            self.struck.add_force(modes, self.blow[0], &mut self.load);
+        let mut held = [Held::new(&self.struck, self.blow[0]); MAX_TOOLS + 1];
+        let mut holders = [0; MAX_TOOLS];
+        let mut count = 0;
+        for (tool, contact) in tools.iter().enumerate().filter(|(_, contact)| contact.mode != Mode::Free) {
+            held[count] = Held::new(&self.patches[tool], contact.force);
+            holders[count] = tool;
+            count += 1;
         }
-        modes.correct(&mut self.modal, &self.load);
-        self.account_for_energy(dynamics, tools);
-        self.account_for_work(modes, tools);
+        // The strike comes behind the contacts: the array was filled with it.
+        let with_strike = count + usize::from(self.blow[0] != DVec3::ZERO);
+        let step = dynamics.modes.advance(&mut self.modal, &mut held[..with_strike]);
+        for (&tool, held) in holders[..count].iter().zip(&held) {
+            self.free[tool] = held.free;
+        }
+        let energy = &mut self.energy;
+        (energy.kinetic, energy.strain) = (step.kinetic, step.strain);
+        energy.dissipated += step.dissipated;
+        self.account_for_contacts(dynamics, tools);
+        self.account_for_work(&dynamics.modes, tools);
     }
 
-    fn account_for_energy(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
+    /// What springs and the modes left out hold.
+    fn account_for_contacts(&mut self, dynamics: &Dynamics, tools: &[ToolContact; MAX_TOOLS]) {
         let energy = &mut self.energy;
-        let (kinetic, strain, dissipated) = dynamics.modes.energies(&self.modal, &self.before);
-        (energy.kinetic, energy.strain) = (kinetic, strain);
-        energy.dissipated += dissipated;
         energy.coupling = 0.0;
         let touching = || (0..MAX_TOOLS).filter(|&tool| tools[tool].mode != Mode::Free);
         for a in touching() {
@@ -248,22 +272,11 @@ impl Motion {
             self.last[tool] = (contact.mode != Mode::Free).then_some((contact.force, contact.position));
         }
         if self.blow != [DVec3::ZERO; 2] {
-            let now = self.struck.displacement(modes, &self.modal);
+            let now = self.struck.read(modes, &self.modal.q);
             self.energy.work += 0.5 * (self.blow[0] + self.blow[1]).dot(now - self.struck_at);
             self.struck_at = now;
             self.blow[1] = self.blow[0];
         }
-    }
-
-    /// Modal displacements of what is drawn beside `Psi W f`, so that the modes left out are there too: `q - p / k`.
-    pub(super) fn drawn_into(&self, modes: &Modes, tools: &[ToolContact; MAX_TOOLS], out: &mut [Lanes]) {
-        out.fill(Lanes::default());
-        for (contact, patch) in tools.iter().zip(&self.patches) {
-            if contact.mode != Mode::Free {
-                patch.add_force(modes, contact.force, out);
-            }
-        }
-        modes.beyond_static(&self.modal, out);
     }
 }
 
@@ -290,31 +303,30 @@ pub(super) fn strike(model: &Model, state: &mut State, scratch: &mut Scratch, in
 }
 
 /// Lets body time pass; a reset brings the body to rest.
-pub(super) fn advance(state: &mut State, input: &Input) {
-    if let Some(motion) = &mut state.motion {
+pub(super) fn pass_time(model: &Model, state: &mut State, input: &Input) {
+    if let (Some(dynamics), Some(motion)) = (&model.dynamics, &mut state.motion) {
         motion.due += if input.advance > 0.0 { input.advance.min(*TIME_STEPS.end()) } else { 0.0 };
         if input.reset {
-            motion.rest();
+            motion.rest(&dynamics.modes);
         }
     }
 }
 
-/// Takes a body in motion to the end of its next step, as it would go without new forces. False if no step is due.
-pub(super) fn predict(model: &Model, state: &mut State) -> bool {
+/// Whether a step of a body in motion has come due, and begins; true for one that does not move.
+pub(super) fn begin_step(model: &Model, state: &mut State) -> bool {
     let (Some(dynamics), Some(motion)) = (&model.dynamics, &mut state.motion) else { return true };
     // A thousandth of a step forgives the rounding of many small advances.
     let due = motion.due > 0.999 * dynamics.modes.dt;
     if due {
         motion.due -= dynamics.modes.dt;
         motion.time += dynamics.modes.dt;
-        motion.predict(&dynamics.modes);
     }
     due
 }
 
-/// Completes a step of a body in motion. False for one that does not move: a single answer is all there is.
-pub(super) fn correct(model: &Model, state: &mut State) -> bool {
+/// Ends a step of a body in motion. False for one that does not move: a single answer is all there is.
+pub(super) fn end_step(model: &Model, state: &mut State) -> bool {
     let (Some(dynamics), Some(motion)) = (&model.dynamics, &mut state.motion) else { return false };
-    motion.correct(dynamics, &state.tools);
+    motion.advance(dynamics, &state.tools);
     true
 }

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::contact_forces::{solve_forces, update_compliance};
 use super::{Energy, MAX_TOOLS, Model, Motion};
 use crate::contact::{Patch, add_patch_response, compliance_block};
-use crate::dynamics::Lanes;
+use crate::dynamics::{Lanes, Model as Modes, Projection};
 
 /// What a tool is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +46,15 @@ pub struct ToolContact {
     pub refused: bool,
 }
 
+impl ToolContact {
+    /// Out of the scene: as at the start, without touching the patch's arrays.
+    pub(super) fn clear(&mut self, position: DVec3) {
+        (self.mode, self.entry_depth, self.patch.count) = (Mode::Free, 0.0, 0);
+        (self.point, self.normal, self.anchor, self.force) = Default::default();
+        (self.position, self.refused) = (position, false);
+    }
+}
+
 /// State of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct State {
@@ -69,42 +78,63 @@ pub struct Snapshot {
     /// Time that a body in motion has gone through since the start, s.
     pub body_time: f64,
     stiffness_scale: f64,
-    /// Modal displacements beyond the static ones; empty for a body at rest.
-    moving: Vec<Lanes>,
+    /// Modal displacements; empty for a body at rest.
+    modal: Vec<Lanes>,
 }
 
 impl State {
     /// Copies what is drawn; nothing is allocated where the snapshot is one of this model's.
-    pub fn snapshot_into(&self, model: &Model, snapshot: &mut Snapshot) {
+    pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
         snapshot.tools.clone_from(&self.tools);
         snapshot.stiffness_scale = self.stiffness_scale;
-        if let (Some(motion), Some(dynamics)) = (&self.motion, &model.dynamics) {
+        if let Some(motion) = &self.motion {
             (snapshot.energy, snapshot.body_time) = (Some(motion.energy), motion.time);
-            motion.drawn_into(&dynamics.modes, &self.tools, &mut snapshot.moving);
+            snapshot.modal.copy_from_slice(motion.modal_displacements());
         }
+    }
+
+    /// Displacement of one surface node, m, as the snapshot has it; never allocates.
+    pub fn displacement_of(&mut self, model: &Model, node: u32) -> DVec3 {
+        let mut sum = DVec3::from_slice(&model.free[3 * node as usize..][..3]);
+        let mut here = Patch { count: 1, ..Patch::default() };
+        (here.nodes[0], here.weights[0]) = (node, 1.0);
+        for tool in self.tools.iter().filter(|tool| tool.mode != Mode::Free) {
+            let response = compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO);
+            sum += response * tool.force / self.stiffness_scale;
+        }
+        if let (Some(motion), Some(dynamics)) = (&mut self.motion, &model.dynamics) {
+            sum += motion.displacement_of(&dynamics.modes, &self.tools, node, &here);
+        }
+        sum
     }
 }
 
 impl Snapshot {
     /// Of a body at rest.
     pub fn new(model: &Model) -> Self {
-        let moving = model.dynamics.as_ref().map_or_else(Vec::new, |d| d.modes.state().q);
-        Self { stiffness_scale: 1.0, moving, ..Self::default() }
+        let modal = model.dynamics.as_ref().map_or_else(Vec::new, |d| d.modes.state().q);
+        Self { stiffness_scale: 1.0, modal, ..Self::default() }
     }
 
-    /// Displacement of one surface node, m.
-    pub fn displacement_of(&self, model: &Model, node: usize) -> DVec3 {
-        let mut sum = DVec3::from_slice(&model.free[3 * node..3 * node + 3]);
-        for tool in self.tools.iter().filter(|t| t.mode != Mode::Free) {
-            let mut here = Patch { count: 1, ..Patch::default() };
-            (here.nodes[0], here.weights[0]) = (node as u32, 1.0);
+    /// Displacements of some surface nodes, m.
+    pub fn displacements_of(&self, model: &Model, nodes: &[u32]) -> Vec<DVec3> {
+        let moving = self.moving(model);
+        nodes.iter().map(|&node| self.displacement_of(model, &moving, node)).collect()
+    }
+
+    fn displacement_of(&self, model: &Model, moving: &[Lanes], node: u32) -> DVec3 {
+        let first = 3 * node as usize;
+        let mut sum = DVec3::from_slice(&model.free[first..first + 3]);
+        let mut here = Patch { count: 1, ..Patch::default() };
+        (here.nodes[0], here.weights[0]) = (node, 1.0);
+        for tool in self.touching() {
             let response = compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO);
             sum += response * tool.force / self.stiffness_scale;
         }
-        if let Some(dynamics) = &model.dynamics {
-            let mut moving = [0.0; 3];
-            dynamics.modes.read(&self.moving, 3 * node.., &mut moving);
-            sum += DVec3::from(moving);
+        if let Some(modes) = self.modes_of(model) {
+            let mut moved = [0.0; 3];
+            modes.read(moving, first.., &mut moved);
+            sum += DVec3::from(moved);
         }
         sum
     }
@@ -113,16 +143,37 @@ impl Snapshot {
     pub fn displacements(&self, model: &Model) -> Vec<f64> {
         let green = model.green();
         let mut displacements = model.free.clone();
-        for tool in self.tools.iter().filter(|t| t.mode != Mode::Free) {
+        for tool in self.touching() {
             let force = tool.force / self.stiffness_scale;
             add_patch_response(green, &tool.patch, force, &mut displacements);
         }
-        if let Some(dynamics) = &model.dynamics {
-            let mut moving = vec![0.0; displacements.len()];
-            dynamics.modes.read(&self.moving, 0.., &mut moving);
-            displacements.iter_mut().zip(&moving).for_each(|(u, m)| *u += m);
+        if let Some(modes) = self.modes_of(model) {
+            let mut moved = vec![0.0; displacements.len()];
+            modes.read(&self.moving(model), 0.., &mut moved);
+            displacements.iter_mut().zip(&moved).for_each(|(u, m)| *u += m);
         }
         displacements
+    }
+
+    /// The modes, unless the pose is one of a body come to rest.
+    fn modes_of<'a>(&self, model: &'a Model) -> Option<&'a Modes> {
+        model.dynamics.as_ref().map(|dynamics| &dynamics.modes).filter(|_| !self.modal.is_empty())
+    }
+
+    fn touching(&self) -> impl Iterator<Item = &ToolContact> {
+        self.tools.iter().filter(|tool| tool.mode != Mode::Free)
+    }
+
+    /// Modal displacements of what is drawn beside `Psi W f`, so that the modes left out are there too: `q - p / k`, `p`
+    /// being the modal force `Phi^T W f`.
+    fn moving(&self, model: &Model) -> Vec<Lanes> {
+        let Some(modes) = self.modes_of(model) else { return Vec::new() };
+        let (mut projection, mut moving) = (Projection::new(modes), self.modal.clone());
+        for tool in self.touching() {
+            projection.gather(modes, tool.patch.iter().map(|(node, weight)| (3 * node, weight)));
+            projection.take_static(modes, tool.force, &mut moving);
+        }
+        moving
     }
 
     /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts

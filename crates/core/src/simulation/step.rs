@@ -11,14 +11,14 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
 
     // 1. A body that moves makes as many time steps as have come due; one that does not answers at once.
     motion::strike(model, state, scratch, input);
-    motion::advance(state, input);
-    while motion::predict(model, state) {
+    motion::pass_time(model, state, input);
+    while motion::begin_step(model, state) {
         // 2. Contacts begin and end, and push.
         begin_and_end(model, state, scratch, input);
         push(model, state);
 
         // 3. Their forces go into the motion.
-        if !motion::correct(model, state) {
+        if !motion::end_step(model, state) {
             break;
         }
     }

@@ -26,7 +26,7 @@ pub(super) fn advance(
     contact.refused = false;
     contact.position = tool.position;
     if !tool.active || input.reset || !tool.position.is_finite() {
-        *contact = ToolContact { position: tool.position, ..ToolContact::default() };
+        contact.clear(tool.position);
         return false;
     }
     match contact.mode {

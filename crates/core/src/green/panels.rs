@@ -1,0 +1,81 @@
+//! Finished blocks of columns, until the operator is put together from them.
+//!
+//! A block's panel holds, for each of its columns, the rows from the block's first column on in solving order, those
+//! without a column last; the numbers of a row are contiguous. Everything earlier is the mirror
+//! of an earlier panel.
+
+use std::sync::OnceLock;
+
+use super::number::Number;
+use super::partial::Partial;
+use crate::{Error, Result};
+
+/// Which columns a block has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// First column, in the order of elimination.
+    pub first: usize,
+    /// Number of columns.
+    pub width: usize,
+    /// Rows of its panel.
+    pub rows: usize,
+}
+
+impl Block {
+    /// Numbers in its panel.
+    pub fn len(&self) -> usize {
+        self.rows * self.width
+    }
+}
+
+/// Where the panels are kept.
+pub enum Panels<T> {
+    /// In memory.
+    Memory(Vec<OnceLock<Vec<T>>>),
+    /// In a file beside the store to be.
+    File(Partial),
+}
+
+impl<T: Number> Panels<T> {
+    /// Room for some blocks in memory.
+    pub fn in_memory(blocks: usize) -> Self {
+        Panels::Memory((0..blocks).map(|_| OnceLock::new()).collect())
+    }
+
+    /// Whether a block is there.
+    pub fn has(&self, block: usize) -> bool {
+        match self {
+            Panels::Memory(panels) => panels[block].get().is_some(),
+            Panels::File(partial) => partial.has(block),
+        }
+    }
+
+    /// Keeps the panel of a block.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn put(&self, block: usize, panel: &[T]) -> Result<()> {
+        match self {
+            Panels::Memory(panels) => {
+                let _ = panels[block].set(panel.to_vec());
+                Ok(())
+            }
+            Panels::File(partial) => partial.put(block, bytemuck::cast_slice(panel)),
+        }
+    }
+
+    /// Copies numbers of a panel, from its number `at` on.
+    ///
+    /// # Errors
+    /// The operating system's, or a block that is not there.
+    pub fn get(&self, block: usize, at: usize, out: &mut [T]) -> Result<()> {
+        match self {
+            Panels::Memory(panels) => {
+                let missing = || Error::Invalid("a block of columns is missing".into());
+                out.copy_from_slice(&panels[block].get().ok_or_else(missing)?[at..at + out.len()]);
+                Ok(())
+            }
+            Panels::File(partial) => partial.get(block, at * size_of::<T>(), bytemuck::cast_slice_mut(out)),
+        }
+    }
+}

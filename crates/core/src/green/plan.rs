@@ -1,0 +1,192 @@
+//! What a precomputation will do and need, counted before any number is computed.
+
+use rayon::current_num_threads;
+
+use super::columns::{Layout, Problem};
+use super::factor::Symbolic;
+use super::mirror;
+use super::operator::Precision;
+use super::panels::Block;
+use super::sweep::{loaded, scratch_numbers};
+use super::system::System;
+use super::tree::Tree;
+use crate::fem::SymmetricCsc;
+use crate::{Error, Result};
+
+/// Columns of a block, best first: enough for the matrix products, few enough for the cache and to share among tasks.
+/// Multiples of 48, the width of the product's innermost kernel.
+const WIDTHS: [usize; 4] = [192, 96, 48, 24];
+/// Fewer blocks than this are shared badly among tasks: a smaller body takes narrower ones. It does not depend on the
+/// number of threads, so that the bits do not either.
+const FEWEST_BLOCKS: usize = 24;
+/// Bytes that the allocator, METIS and the tasks' stacks take beside what is counted, measured.
+const OVERHEAD_BYTES: usize = 24 << 20;
+/// The counts of a precomputation.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Order of the factorised matrix.
+    pub free_dofs: usize,
+    /// Columns of the operator.
+    pub columns: usize,
+    /// Rows of the operator.
+    pub rows: usize,
+    /// Numbers in the factor.
+    pub factor_entries: usize,
+    /// Operations of the factorisation.
+    pub factor_flops: f64,
+    /// Operations of the columns, by sweeps through the elimination tree.
+    pub sweep_flops: f64,
+    /// At least this many operations would be needed with all touchable dofs ordered last, the trailing block of the
+    /// factor being inverted: `s^3/3` each for the factor, its inverse and their product.
+    pub surface_last_flops: f64,
+    /// Columns of a block.
+    pub width: usize,
+    /// Blocks solved at a time.
+    pub tasks: usize,
+    /// Peak of the memory taken, beside what the process holds already, bytes.
+    pub memory: usize,
+    /// Size of the operator in its store, bytes.
+    pub store: usize,
+}
+
+/// Everything that precedes the first number.
+pub struct Prepared {
+    /// Stiffness of all dofs.
+    pub stiffness: SymmetricCsc,
+    /// Order and structure of the factor.
+    pub symbolic: Symbolic,
+    /// Rows and columns.
+    pub layout: Layout,
+    /// The tree.
+    pub tree: Tree,
+    /// The blocks of columns.
+    pub blocks: Vec<Block>,
+    /// The counts.
+    pub plan: Plan,
+}
+
+impl Prepared {
+    /// Orders, counts, and chooses route and blocks so that the peak stays below `memory` bytes. `in_memory`: the
+    /// operator itself is to be held, too.
+    ///
+    /// # Errors
+    /// A bound that cannot be kept, with what would fit.
+    pub fn new(problem: &Problem, precision: Precision, memory: Option<usize>, in_memory: bool) -> Result<Self> {
+        let stiffness = crate::fem::stiffness(&problem.mesh, &problem.materials);
+        let symbolic = Symbolic::new(&stiffness, &problem.supports)?;
+        let layout = Layout::new(problem, &stiffness, &symbolic);
+        let tree = Tree::new(symbolic.supernodes()?, &layout.wanted);
+        let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
+        let sizes = Sizes::new(&system, &symbolic, &tree, precision, in_memory)?;
+        let (width, tasks, peak) = sizes.choose(&layout, &tree, memory)?;
+        let blocks = layout.blocks(width);
+        let plan = Plan {
+            free_dofs: problem.supports.free.len(),
+            columns: layout.columns,
+            rows: layout.rows(),
+            factor_entries: symbolic.supernodes()?.len_val(),
+            factor_flops: symbolic.flops()?,
+            sweep_flops: blocks.iter().map(|block| sweep_flops(&system, &tree, block)).sum(),
+            surface_last_flops: ((layout.columns - layout.supported) as f64).powi(3),
+            width,
+            tasks,
+            memory: peak,
+            store: layout.columns * layout.rows() * precision.bytes(),
+        };
+        Ok(Self { stiffness, symbolic, layout, tree, blocks, plan })
+    }
+}
+
+/// Operations of a block.
+fn sweep_flops(system: &System<'_>, tree: &Tree, block: &Block) -> f64 {
+    let sources = system.layout.loads(system.stiffness, system.supports, tree, block);
+    let loaded = loaded(tree, block.width, &sources);
+    let readers = system.readers(tree, block);
+    let of = |k: usize| {
+        let (size, boundary) = (tree.nodes[k].size() as f64, tree.nodes[k].boundary_size() as f64);
+        2.0 * size * ((size + boundary) * loaded[k].len() as f64 + boundary * readers[k] as f64)
+    };
+    (0..tree.nodes.len()).map(of).sum()
+}
+
+/// Bytes of everything, by stage.
+struct Sizes {
+    /// Matrix and structure, held throughout.
+    matrix: usize,
+    /// Beside it during the factorisation, and while the operators are made from the factor.
+    factorising: usize,
+    making: usize,
+    /// The operators.
+    operators: usize,
+    /// The operator and its panels, if they are held.
+    result: usize,
+    /// Of a number in a panel, and of one that is computed with.
+    stored: usize,
+    computed: usize,
+}
+
+impl Sizes {
+    fn new(
+        system: &System<'_>,
+        symbolic: &Symbolic,
+        tree: &Tree,
+        precision: Precision,
+        in_memory: bool,
+    ) -> Result<Self> {
+        let supernodes = symbolic.supernodes()?;
+        let (layout, stored, computed) = (system.layout, precision.panel_bytes(), precision.computed_bytes());
+        let factor = 8 * supernodes.len_val();
+        let lower = 16 * symbolic.matrix_entries();
+        let dofs = system.stiffness.dimension;
+        let structure = 8 * supernodes.row_idx().len() + 64 * dofs + 4 * tree.boundaries.len();
+        let numbers: usize = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).sum();
+        let largest = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).max().unwrap_or(0);
+        let panels: usize = layout.blocks(WIDTHS[0]).iter().map(Block::len).sum();
+        let held = stored * panels + precision.bytes() * layout.columns * layout.rows();
+        Ok(Self {
+            matrix: 12 * system.stiffness.values.len() + structure + OVERHEAD_BYTES,
+            factorising: factor + lower + symbolic.scratch_bytes(faer::Par::rayon(0)),
+            making: factor + computed * numbers + 3 * 8 * largest,
+            operators: computed * numbers,
+            result: if in_memory { held } else { 0 },
+            stored,
+            computed,
+        })
+    }
+
+    /// Peak with blocks of `width` columns in `tasks` tasks.
+    fn peak(&self, layout: &Layout, tree: &Tree, width: usize, tasks: usize) -> usize {
+        let panel = self.stored * width * layout.rows();
+        let solving = self.operators + tasks * (self.computed * scratch_numbers(tree, width) + panel);
+        let mirroring = tasks * self.stored * mirror::numbers(layout, width);
+        self.matrix + self.result + self.factorising.max(self.making).max(solving).max(mirroring)
+    }
+
+    /// Width, tasks and peak: as many tasks as there are threads, as wide as possible, within the bound.
+    fn choose(&self, layout: &Layout, tree: &Tree, memory: Option<usize>) -> Result<(usize, usize, usize)> {
+        let widest = (layout.columns / FEWEST_BLOCKS).max(WIDTHS[2]);
+        let mut least = usize::MAX;
+        for tasks in (1..=current_num_threads()).rev() {
+            for width in WIDTHS.into_iter().filter(|&width| width <= widest) {
+                let peak = self.peak(layout, tree, width, tasks);
+                least = least.min(peak);
+                if memory.is_none_or(|bound| peak <= bound) {
+                    return Ok((width, tasks, peak));
+                }
+            }
+        }
+        let gigabytes = |bytes: usize| format!("{:.3} GB", bytes as f64 / 1e9);
+        let remedy = if self.matrix + self.factorising < least {
+            "a smaller touch region needs less, and so does 'f16'"
+        } else {
+            "only a coarser mesh needs less, whatever the touch region and the precision"
+        };
+        Err(Error::Memory(format!(
+            "the precomputation needs at least {} of memory beside what is in use, {} are left; its factor alone takes \
+             {}: {remedy}",
+            gigabytes(least),
+            gigabytes(memory.unwrap_or(0)),
+            gigabytes(self.matrix + self.factorising)
+        )))
+    }
+}

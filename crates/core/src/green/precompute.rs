@@ -1,0 +1,305 @@
+//! The whole precomputation: plan, factor, columns, mirror; in memory or into a file that survives an interruption.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use faer::Par;
+
+use super::columns::{Layout, Problem};
+use super::free_response::free_response;
+use super::key::FORMAT_VERSION;
+use super::mirror::{Mirror, task_failed};
+use super::number::Number;
+use super::operator::{GreensFunction, Precision, Values};
+use super::operators::operators;
+use super::panels::{Block, Panels};
+use super::partial::Partial;
+use super::plan::{Plan, Prepared};
+use super::scaled::{quantise, scales};
+use super::store::StoreWriter;
+use super::sweep::{Scratch, Sweep};
+use super::system::System;
+use crate::fem::SymmetricCsc;
+use crate::{Error, Result};
+
+/// Told `(columns done, columns in all)` from any thread; `false` stops the computation.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) -> bool + Sync);
+
+/// Where the operator is to be written, and how.
+pub struct Target<'a> {
+    /// The store.
+    pub path: &'a Path,
+    /// Number format.
+    pub precision: Precision,
+    /// Bytes that may be taken; `None`: any.
+    pub memory: Option<usize>,
+    /// What the file was made from, in JSON, for people.
+    pub description: &'a str,
+}
+
+/// What [`precompute_to`] found where it was to write.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Columns that an interrupted computation had finished.
+    pub resumed: usize,
+    /// It had left something that does not belong to this computation, which was thrown away.
+    pub discarded: bool,
+}
+
+/// Counts what a precomputation would do and need.
+///
+/// # Errors
+/// A bound of memory (bytes) that cannot be kept.
+pub fn plan(problem: &Problem, precision: Precision, memory: Option<usize>) -> Result<Plan> {
+    Ok(Prepared::new(problem, precision, memory, false)?.plan)
+}
+
+/// Solves the reference problem for every touchable dof, in memory.
+///
+/// # Errors
+/// A singular stiffness, or [`Error::Interrupted`].
+pub fn precompute(problem: &Problem, precision: Precision, progress: Progress<'_>) -> Result<GreensFunction> {
+    let prepared = Prepared::new(problem, precision, None, true)?;
+    let mut green = geometry(problem, &prepared.layout, precision)?;
+    let panels = prepared.blocks.len();
+    green.values = match precision {
+        Precision::F64 => {
+            let solved = solve::<f64, f64>(problem, prepared, Panels::in_memory(panels), progress)?;
+            green.free_response.clone_from(&solved.free_response);
+            Values::F64(solved.collect(&green, |_, column, out| out.copy_from_slice(column))?)
+        }
+        Precision::F32 => {
+            let solved = solve::<f64, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
+            green.free_response.clone_from(&solved.free_response);
+            Values::F32(solved.collect(&green, |_, column, out| out.copy_from_slice(column))?)
+        }
+        Precision::F16 => {
+            let solved = solve::<f32, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
+            green.free_response.clone_from(&solved.free_response);
+            green.scale = solved.scales()?;
+            let inverse: Vec<f64> = green.scale.iter().map(|scale| 1.0 / scale).collect();
+            let quantised = |row: usize, column: &[f32], out: &mut [i16]| quantise(column, inverse[row], &inverse, out);
+            Values::F16(solved.collect(&green, quantised)?)
+        }
+    };
+    Ok(green)
+}
+
+/// Solves the reference problem into a file, without ever holding the operator.
+///
+/// Finished blocks are kept in `<path>.partial`; where a computation of the same thing was interrupted, it goes on, with
+/// the same bits as if it had not been.
+///
+/// # Errors
+/// A singular stiffness, a bound that cannot be kept, the operating system's (nothing is left behind), or
+/// [`Error::Interrupted`] (the finished blocks are left behind).
+pub fn precompute_to(
+    problem: &Problem,
+    target: &Target<'_>,
+    found: &mut dyn FnMut(Found),
+    progress: Progress<'_>,
+) -> Result<()> {
+    let prepared = Prepared::new(problem, target.precision, target.memory, false)?;
+    let mut green = geometry(problem, &prepared.layout, target.precision)?;
+    target.description.clone_into(&mut green.description);
+    match target.precision {
+        Precision::F64 => write::<f64, f64>(problem, prepared, green, target, found, progress),
+        Precision::F32 => write::<f64, f32>(problem, prepared, green, target, found, progress),
+        Precision::F16 => write::<f32, f32>(problem, prepared, green, target, found, progress),
+    }
+}
+
+fn write<C: Number, T: Number>(
+    problem: &Problem,
+    prepared: Prepared,
+    mut green: GreensFunction,
+    target: &Target<'_>,
+    found: &mut dyn FnMut(Found),
+    progress: Progress<'_>,
+) -> Result<()> {
+    let (kind, width) = (size_of::<T>(), prepared.plan.width);
+    let header = format!(
+        "{{\"format\":\"palpate-partial\",\"version\":{FORMAT_VERSION},\"key\":\"{}\",\"bytes\":{kind},\"width\":{width}}}\n",
+        green.key
+    );
+    let named = |error: Error| match error {
+        // The user knows the file asked for, not the one beside it.
+        Error::Io { source, .. } => Error::Io { path: target.path.to_owned(), source },
+        other => other,
+    };
+    let path = partial_path(target.path);
+    let (partial, discarded) = Partial::open(&path, &header, &prepared.blocks, kind).map_err(named)?;
+    let done = |partial: &Partial| -> usize {
+        prepared.blocks.iter().enumerate().filter(|(k, _)| partial.has(*k)).map(|(_, block)| block.width).sum()
+    };
+    found(Found { resumed: done(&partial), discarded });
+    let finished = AtomicUsize::new(0);
+    let watched = |done: usize, all: usize| {
+        finished.fetch_max(done, Ordering::Relaxed);
+        progress(done, all)
+    };
+    let result = solve::<C, T>(problem, prepared, Panels::File(partial), &watched).and_then(|solved| {
+        green.free_response.clone_from(&solved.free_response);
+        if target.precision == Precision::F16 {
+            green.scale = solved.scales()?;
+        }
+        solved.store(&green, target, progress)
+    });
+    // What was finished before an interruption is worth keeping; after any other failure it is in the way.
+    if !matches!(result, Err(Error::Interrupted)) || finished.into_inner() == 0 {
+        drop(std::fs::remove_file(&path));
+    }
+    result.map_err(named)
+}
+
+/// All panels, finished.
+struct Solved<T> {
+    free_response: Vec<f64>,
+    stiffness: SymmetricCsc,
+    layout: Layout,
+    blocks: Vec<Block>,
+    panels: Panels<T>,
+    tasks: usize,
+}
+
+/// Factorises and solves the blocks that are missing.
+fn solve<C: Number, T: Number>(
+    problem: &Problem,
+    prepared: Prepared,
+    panels: Panels<T>,
+    progress: Progress<'_>,
+) -> Result<Solved<T>> {
+    let Prepared { stiffness, symbolic, layout, tree, blocks, plan } = prepared;
+    let missing: Vec<usize> = (0..blocks.len()).filter(|&k| !panels.has(k)).collect();
+    let columns: usize = missing.iter().map(|&k| blocks[k].width).sum();
+    let done = AtomicUsize::new(layout.columns - columns);
+    let go_on = |more: usize| match progress(done.fetch_add(more, Ordering::Relaxed) + more, layout.columns) {
+        true => Ok(()),
+        false => Err(Error::Interrupted),
+    };
+    go_on(0)?;
+    let mut response = Vec::new();
+    if !missing.is_empty() || !problem.loads.is_empty() {
+        let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
+        let factor = symbolic.factorise(Par::rayon(0))?;
+        go_on(0)?;
+        response = free_response(system.stiffness, &factor, system.supports, &problem.loads, &layout.row_dofs)?;
+        let operators = operators::<C>(&tree, factor.supernodal()?);
+        drop(factor);
+        let sweep = Sweep { tree, operators };
+        let next = AtomicUsize::new(0);
+        in_tasks(plan.tasks, &|| {
+            let mut scratch = Scratch::new(&sweep.tree, plan.width);
+            let mut panel = Vec::new();
+            while let Some(&block) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                system.solve(&sweep, &blocks[block], &mut scratch, &mut panel);
+                panels.put(block, &panel)?;
+                go_on(blocks[block].width)?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(Solved { free_response: response, stiffness, layout, blocks, panels, tasks: plan.tasks })
+}
+
+impl<T: Number> Solved<T> {
+    fn mirror(&self) -> Mirror<'_, T> {
+        Mirror { layout: &self.layout, blocks: &self.blocks, panels: &self.panels }
+    }
+
+    fn scales(&self) -> Result<Vec<f64>> {
+        scales(&self.mirror(), &self.stiffness)
+    }
+
+    /// All columns one after the other, each made by `convert(its row, its entries, place to fill)`.
+    fn collect<U: Default + Clone + Send>(
+        &self,
+        green: &GreensFunction,
+        convert: impl Fn(usize, &[T], &mut [U]) + Sync,
+    ) -> Result<Vec<U>> {
+        let mut values = vec![U::default(); self.layout.columns * green.rows];
+        let columns: Vec<Mutex<&mut [U]>> = values.chunks_mut(green.rows).map(Mutex::new).collect();
+        self.mirror().columns(self.tasks, &|place, column| {
+            let row = self.layout.order[place] as usize;
+            let mut out = columns[green.column_of_row(row)].lock().map_err(|_| task_failed())?;
+            convert(row, column, &mut out);
+            Ok(())
+        })?;
+        drop(columns);
+        Ok(values)
+    }
+
+    /// All columns into the store.
+    fn store(&self, green: &GreensFunction, target: &Target<'_>, progress: Progress<'_>) -> Result<()> {
+        let writer = StoreWriter::create(target.path, green, target.precision)?;
+        let inverse: Vec<f64> = green.scale.iter().map(|scale| 1.0 / scale).collect();
+        self.mirror().columns(self.tasks, &|place, column| {
+            let row = self.layout.order[place] as usize;
+            if !progress(self.layout.columns, self.layout.columns) {
+                return Err(Error::Interrupted);
+            }
+            if target.precision == Precision::F16 {
+                let mut quantised = vec![0i16; column.len()];
+                quantise(column, inverse[row], &inverse, &mut quantised);
+                return writer.put(green.column_of_row(row), bytemuck::cast_slice(&quantised));
+            }
+            writer.put(green.column_of_row(row), bytemuck::cast_slice(column))
+        })?;
+        writer.finish()
+    }
+}
+
+/// Everything but the numbers.
+fn geometry(problem: &Problem, layout: &Layout, precision: Precision) -> Result<GreensFunction> {
+    let mut touch_rank = vec![u32::MAX; problem.surface_nodes.len()];
+    for (rank, &node) in problem.touch.iter().enumerate() {
+        touch_rank[node as usize] = rank as u32;
+    }
+    let supports = &problem.supports;
+    let row_of_dof: HashMap<u32, u32> =
+        layout.row_dofs.iter().enumerate().map(|(row, &dof)| (dof, row as u32)).collect();
+    Ok(GreensFunction {
+        surface_nodes: problem.surface_nodes.clone(),
+        surface: problem.surface()?,
+        touch: problem.touch.clone(),
+        touch_rank,
+        fixed_dofs: supports.fixed.clone(),
+        fixed_rows: supports.fixed.iter().map(|d| row_of_dof[d]).collect(),
+        rows: layout.row_dofs.len(),
+        row_is_fixed: layout.row_dofs.iter().map(|&d| supports.is_fixed(d)).collect(),
+        values: Values::F64(Vec::new()),
+        scale: Vec::new(),
+        loads: problem.loads.clone(),
+        free_response: Vec::new(),
+        key: problem.key(precision),
+        youngs_modulus: problem.common_youngs_modulus(),
+        description: String::new(),
+        path: None,
+    })
+}
+
+/// Runs `work` in some tasks at once, to the first error.
+pub fn in_tasks(tasks: usize, work: &(dyn Fn() -> Result<()> + Sync)) -> Result<()> {
+    let outcome = Mutex::new(Ok(()));
+    rayon::scope(|scope| {
+        for _ in 0..tasks {
+            scope.spawn(|_| {
+                if let (Err(error), Ok(mut first)) = (work(), outcome.lock())
+                    && first.is_ok()
+                {
+                    *first = Err(error);
+                }
+            });
+        }
+    });
+    outcome.into_inner().map_err(|_| task_failed())?
+}
+
+/// Where unfinished work on a store is kept.
+pub fn partial_path(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(".partial");
+    path.with_file_name(name)
+}

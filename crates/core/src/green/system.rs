@@ -1,0 +1,73 @@
+//! A block of columns from its loads to its panel.
+
+use super::columns::Layout;
+use super::number::Number;
+use super::panels::Block;
+use super::sweep::{Scratch, Sweep, loaded, readers};
+use super::tree::{NONE, Tree};
+use crate::fem::{Supports, SymmetricCsc};
+
+/// What every block reads.
+pub struct System<'a> {
+    /// Stiffness of all dofs.
+    pub stiffness: &'a SymmetricCsc,
+    /// The supports.
+    pub supports: &'a Supports,
+    /// Rows and columns.
+    pub layout: &'a Layout,
+}
+
+impl System<'_> {
+    /// Solves a block into its panel: displacements of free rows, and on supported rows the reactions `K_DN u_N`, with
+    /// `K_Dj` for moved supports.
+    pub fn solve<C: Number, T: Number>(
+        &self,
+        sweep: &Sweep<C>,
+        block: &Block,
+        scratch: &mut Scratch<C>,
+        panel: &mut Vec<T>,
+    ) {
+        let tree = &sweep.tree;
+        let sources = self.layout.loads(self.stiffness, self.supports, tree, block);
+        sweep.solve(scratch, &sources, &loaded(tree, block.width, &sources), &self.readers(tree, block));
+        panel.clear();
+        let mut sums = vec![0.0; block.width];
+        for place in block.first..self.layout.rows() {
+            let dof = self.layout.dof(place);
+            if let Some(kept) = self.layout.kept(tree, self.supports, dof) {
+                panel.extend(scratch.row(kept, block.width).iter().map(|value| T::from_f64(value.to_f64())));
+            } else {
+                self.reactions(tree, dof, block, scratch, &mut sums);
+                panel.extend(sums.iter().map(|&sum| T::from_f64(sum)));
+            }
+        }
+    }
+
+    /// Reaction of one supported dof in every column of a block.
+    fn reactions<C: Number>(&self, tree: &Tree, dof: u32, block: &Block, scratch: &Scratch<C>, sums: &mut [f64]) {
+        sums.fill(0.0);
+        for (other, stiffness) in self.stiffness.column(dof as usize) {
+            if let Some(kept) = self.layout.kept(tree, self.supports, other) {
+                let values = scratch.row(kept, block.width);
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += stiffness * value.to_f64());
+                continue;
+            }
+            let place = self.layout.place_of_dof[other as usize];
+            let column = (place as usize).wrapping_sub(block.first);
+            if place != NONE && column < block.width {
+                sums[column] += stiffness;
+            }
+        }
+    }
+
+    /// How many columns of a block read something at each node. A moved support is felt everywhere, and read by the
+    /// reactions of all others; a force is read from its own row on.
+    pub fn readers(&self, tree: &Tree, block: &Block) -> Vec<usize> {
+        if block.first < self.layout.supported {
+            return readers(tree, block.width, None);
+        }
+        let dofs = (block.first..block.first + block.width).map(|place| self.layout.dof(place));
+        let rows: Vec<u32> = dofs.filter_map(|dof| self.layout.kept(tree, self.supports, dof)).collect();
+        readers(tree, block.width, Some(&rows))
+    }
+}

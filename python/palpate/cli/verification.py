@@ -1,0 +1,104 @@
+"""The accuracy table from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.app import app
+
+if TYPE_CHECKING:
+    from palpate.verify import Benchmark, Check, Outcome
+
+
+@app.command()
+def verify(
+    names: Annotated[list[str] | None, typer.Argument(help="Benchmarks; all if none is named.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the plots, as PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Compute what has a known answer, and compare; exit code 1 if a figure misses its tolerance.
+
+    Example: palpate verify
+
+    Example: palpate verify cantilever le10
+
+    Example: palpate verify convergence felt --out plots
+    """
+    from palpate.progress import narrated
+    from palpate.verify import chosen
+
+    outcomes: list[tuple[Benchmark, Outcome]] = []
+    for benchmark in chosen(names or []):
+        with narrated(benchmark.title):
+            outcomes.append((benchmark, benchmark.run()))
+    if as_json:
+        print(json.dumps(_as_rows(outcomes), indent=2))
+    else:
+        _print_table(outcomes)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        for _, outcome in outcomes:
+            for file, draw in outcome.plots.items():
+                draw(out / file)
+    if not all(check.passed for _, outcome in outcomes for check in outcome.checks):
+        raise typer.Exit(1)
+
+
+def _as_rows(outcomes: list[tuple[Benchmark, Outcome]]) -> list[dict]:
+    from dataclasses import asdict
+
+    return [
+        {"benchmark": benchmark.name, **asdict(check), "error": check.error, "verdict": _verdict(check)}
+        for benchmark, outcome in outcomes
+        for check in outcome.checks
+    ]
+
+
+def _print_table(outcomes: list[tuple[Benchmark, Outcome]]) -> None:
+    """One block a benchmark: its title with the source of its targets, then its figures."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    console.width = max(console.width, 100) if not console.is_terminal else console.width
+    for k, (benchmark, outcome) in enumerate(outcomes):
+        sources = "; ".join(dict.fromkeys(check.source for check in outcome.checks))
+        console.print(f"[bold]{benchmark.name}[/bold]  {benchmark.title} [dim]({sources})[/dim]", highlight=False)
+        table = Table(box=None, pad_edge=False, show_header=k == 0, header_style="dim", expand=True)
+        table.add_column("", ratio=1)
+        for title, width in (("computed", 12), ("target", 11), ("error", 8), ("tolerance", 9), ("", 5)):
+            table.add_column(title, width=width, justify="right", no_wrap=True)
+        for check in outcome.checks:
+            verdict = _verdict(check)
+            style = {"pass": "green", "FAIL": "bold red", "shown": "dim"}[verdict]
+            table.add_row(f"  {check.quantity}", *_figures(check), f"[{style}]{verdict}[/{style}]")
+        console.print(table)
+    judged = [check for _, outcome in outcomes for check in outcome.checks if check.tolerance is not None]
+    missed = sum(not check.passed for check in judged)
+    console.print(f"{len(judged)} figures, {missed or 'none'} beyond tolerance", highlight=False)
+
+
+def _figures(check: Check) -> tuple[str, ...]:
+    """Format computed, target, error and tolerance."""
+    tolerance = "" if check.tolerance is None else _part(check.tolerance)
+    if check.target == 0:  # the figure is an error itself
+        return _part(check.computed), "0", _part(check.error), tolerance
+    unit = f" {check.unit}" if check.unit else ""
+    return f"{check.computed:.4g}{unit}", f"{check.target:.4g}{unit}", _part(check.error), tolerance
+
+
+def _part(value: float) -> str:
+    """Format a relative figure: per cent, or a power of ten if there is too little of it."""
+    if value == 0:
+        return "0"
+    return f"{100 * value:.2g} %" if value >= 1e-4 else f"{value:.0e}"
+
+
+def _verdict(check: Check) -> str:
+    if check.tolerance is None:
+        return "shown"
+    return "pass" if check.passed else "FAIL"

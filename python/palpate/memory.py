@@ -1,0 +1,38 @@
+"""Memory of this process, and what of an allowance is left."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from palpate.errors import BodyError
+from palpate.units import memory as memory_units
+
+
+def memory_in_use() -> int:
+    """Bytes that this process holds in memory now (its peak so far where the system tells no more)."""
+    statm = Path("/proc/self/statm")
+    if statm.exists():
+        return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    if sys.platform == "win32":
+        return 0
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
+
+
+def allowed_memory(limit: int | str) -> int:
+    """Bytes that may still be taken when the process as a whole may reach ``limit`` bytes, or text such as ``"8GB"``.
+
+    Raises
+    ------
+    BodyError
+        Nothing is left.
+
+    """
+    total, used = memory_units(limit), memory_in_use()
+    if not total > used:
+        raise BodyError(f"a memory limit of {total / 1e9:.3g} GB is less than the {used / 1e9:.3g} GB already in use")
+    return int(total - used)
