@@ -160,8 +160,20 @@ def liver(p: np.ndarray) -> np.ndarray:
     return body + 3 * groove
 
 
-def _even(p: np.ndarray) -> np.ndarray:
-    return np.ones(p.shape[:-1])
+def _finer_where_bent(p: np.ndarray, field: Field, radius: float, finest: float) -> np.ndarray:
+    """1 where the shape's mean radius of curvature exceeds ``radius`` mm, less in proportion where it is smaller."""
+    step = 0.25 * radius
+    slopes = []
+    for axis in step * np.eye(3):
+        gradients = [_gradient(p + side * axis, field)[..., np.argmax(axis)] for side in (1, -1)]
+        slopes.append((gradients[0] - gradients[1]) / (2 * step))
+    return np.clip(2 / np.maximum(radius * np.abs(sum(slopes)), 1e-9), finest, 1)
+
+
+def _gradient(p: np.ndarray, field: Field, step: float = 0.1) -> np.ndarray:
+    """Return the unit normal of the level through each point."""
+    gradient = np.stack([field(p + axis) - field(p - axis) for axis in step * np.eye(3)], axis=-1)
+    return gradient / np.maximum(np.linalg.norm(gradient, axis=-1, keepdims=True), 1e-9)
 
 
 def _finer(p: np.ndarray, spots: list[tuple]) -> np.ndarray:
@@ -175,7 +187,8 @@ def _finer(p: np.ndarray, spots: list[tuple]) -> np.ndarray:
 
 def _doll_size(p: np.ndarray) -> np.ndarray:
     m = _mirrored(p)
-    return _finer(m, [((0, -60, 183), 34, 0.6), ((20, -44, 199), 18, 0.5), ((43, -8, 227), 34, 0.7)])
+    spots = [((0, -60, 183), 26, 0.5), ((20, -48, 199), 16, 0.35), ((45, -8, 230), 30, 0.42)]
+    return np.minimum(_finer(m, spots), _finer_where_bent(p, doll, 22, 0.6))
 
 
 def _plain_doll_size(p: np.ndarray) -> np.ndarray:
@@ -187,9 +200,13 @@ def _kidney_size(p: np.ndarray) -> np.ndarray:
     return _finer(p, [((-40, -2, 36), 28, 0.55)])
 
 
+def _liver_size(p: np.ndarray) -> np.ndarray:
+    return _finer_where_bent(p, liver, 30, 0.4)
+
+
 SHAPES = {
     "doll": Shape(doll, (-125, -150, -6), (125, 60, 262), _doll_size),
     "plain_doll": Shape(plain_doll, (-128, -150, -6), (128, 60, 262), _plain_doll_size),
     "kidney": Shape(kidney, (-58, -35, -5), (45, 35, 125), _kidney_size),
-    "liver": Shape(liver, (-120, -75, -20), (125, 75, 165), _even),
+    "liver": Shape(liver, (-120, -75, -20), (125, 75, 165), _liver_size),
 }

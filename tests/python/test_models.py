@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from palpate import models
+from palpate import _native, models
 from palpate.errors import MeshError
 
 EVERY = [(name, False) for name in models.NAMES] + [(name, True) for name in models.PAPER]
@@ -28,7 +30,7 @@ def model(request):
 
 def test_closed_surface_without_holes(model):
     _, _, mesh = model
-    triangles = mesh.surface_triangles
+    triangles = mesh.surface_triangles  # drawn ones: four for a curved face
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     unique, counts = np.unique(edges, axis=0, return_counts=True)
     assert (counts == 2).all()
@@ -76,8 +78,28 @@ def test_counts_of_the_paper(name):
 
 
 @pytest.mark.parametrize("name", models.NAMES)
-def test_demo_meshes_are_fine(name):
-    assert 3000 <= len(models.load(name).nodes) <= 6000
+def test_demo_meshes_have_ten_nodes_an_element(name):
+    mesh = models.load(name)
+    assert mesh.is_quadratic
+    assert 3000 <= len(mesh.nodes) <= 6000
+    # In single precision the square of 3 s unknowns is the store, at most 220 MB.
+    assert 36 * len(mesh.surface_nodes) ** 2 <= 220e6
+    low, high = _native.determinant_ranges(mesh.nodes, mesh.tets.astype(np.uint32)).reshape(-1, 2).T
+    assert (low / high).min() > 0.19
+
+
+@pytest.mark.parametrize("name", ["doll", "kidney", "liver"])
+def test_demo_meshes_fill_their_shapes(name, monkeypatch):
+    """The volume is that where the implicit shape is negative."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "scripts"))
+    from model_shapes import SHAPES
+
+    mesh, shape, step = models.load(name), SHAPES[name], 2.0
+    axes = [np.arange(a, b, step) for a, b in zip(shape.low, shape.high, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    value = shape.field(points)
+    volume = np.clip(0.5 - value / step, 0, 1).sum() * step**3 * 1e-9
+    assert mesh.volume == pytest.approx(volume, rel=0.01)
 
 
 def test_named_functions_load_the_same():
@@ -91,10 +113,10 @@ def test_named_functions_load_the_same():
 def test_fine_beam_is_symmetric():
     """Mirrored in its middle planes, so that bending it does not twist it."""
     mesh = models.beam()
-    centres = mesh.nodes[mesh.tets].sum(axis=1) / 0.0025  # whole numbers: four corners on a grid of 2.5 mm
+    centres = mesh.nodes[mesh.tets[:, :4]].sum(axis=1) / 0.005  # whole numbers: four corners on a grid of 5 mm
     for axis, middle in ((1, 0.0), (2, 0.01)):
         mirrored = centres.copy()
-        mirrored[:, axis] = 8 * middle / 0.0025 - mirrored[:, axis]
+        mirrored[:, axis] = 8 * middle / 0.005 - mirrored[:, axis]
         both = [np.unique(np.round(c).astype(int), axis=0) for c in (centres, mirrored)]
         assert np.array_equal(*both)
 

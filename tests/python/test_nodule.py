@@ -21,16 +21,17 @@ def nodule():
 
 
 def patch_weights(mesh, point, radius, split=24):
-    """`int N_i phi dA / int phi dA` on the flat top by brute force: the centroids of split^2 parts of each triangle."""
-    triangles = mesh.surface_triangles
-    flat = triangles[(np.abs(mesh.nodes[triangles][:, :, 2] - TOP) < 1e-9).all(axis=1)]
+    """`int N_i phi dA / int phi dA` on the flat top by brute force: the centroids of split^2 parts of each face."""
+    faces = mesh.surface_faces
+    flat = faces[(np.abs(mesh.nodes[faces][:, :, 2] - TOP) < 1e-9).all(axis=1)]
     i, j = np.meshgrid(np.arange(split), np.arange(split), indexing="ij")
     upright = np.stack([i + 1 / 3, j + 1 / 3], axis=-1)[i + j < split]
     turned = np.stack([i + 2 / 3, j + 2 / 3], axis=-1)[i + j < split - 1]
     parts = np.vstack([upright, turned]) / split
-    shapes = np.column_stack([1 - parts.sum(axis=1), parts])
-    corners = mesh.nodes[flat]
-    positions = np.einsum("pn,knx->kpx", shapes, corners)
+    L = np.column_stack([1 - parts.sum(axis=1), parts])
+    shapes = np.hstack([L * (2 * L - 1), 4 * L * np.roll(L, -1, axis=1)])
+    corners = mesh.nodes[flat[:, :3]]
+    positions = np.einsum("pn,knx->kpx", L, corners)
     distance = np.linalg.norm(positions - point, axis=2) / radius
     mask = np.where(distance < 1, (1 - distance**2) ** 2, 0)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -117,7 +117,7 @@ def test_plan_counts_and_bounds_memory(block):
     assert palpate.plan(block, precision="f16").store == free.store // 2
     assert 0 < free.factor_flops < free.sweep_flops
     assert "Gflop" in str(free)
-    body = palpate.Body(box_mesh(cells=(24, 4, 4)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
+    body = palpate.Body(box_mesh(cells=(50, 8, 2)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
     problem = problem_arrays(body, None)
     wide = _native.GreenCore.plan(problem, "f32")
     narrow = _native.GreenCore.plan(problem, "f32", wide["memory"] - 100_000)

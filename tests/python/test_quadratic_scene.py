@@ -140,10 +140,45 @@ def test_command_line_makes_and_solves_them(tmp_path):
     assert "10-node tetrahedra" in made.stdout
     mesh = palpate.TetMesh.read(tmp_path / "ball.vtu")
     assert mesh.is_quadratic
-    solve = ("--fix", "z < -2cm", "-o", "ball.palpate", "--quadratic")
+    solve = ("--fix", "z < -2cm", "-o", "ball.palpate", "--element", "quadratic")
     solved = run("precompute", "ball.vtu", *solve)
     assert solved.returncode == 0, solved.stderr
     assert f"of {len(mesh.surface_nodes)} surface nodes" in solved.stdout
     refused = run("mesh", "ball.stl", "ball.node", "--unit", "mm", "--max-size", "12mm", "--quadratic")
     assert refused.returncode == 2
     assert "cannot be written to .node files" in refused.stderr
+
+
+def test_a_surface_becomes_ten_node_tetrahedra_unless_told_otherwise(tmp_path):
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=3, radius=0.04).export(tmp_path / "ball.stl")
+    counts = {}
+    for element in ("", 'element = "linear"', 'element = "quadratic"'):
+        text = f'[body]\nmesh = "ball.stl"\n{element}\n[supports]\nfixed = "z < -0.02"\n'
+        (tmp_path / "ball.toml").write_text(text)
+        mesh = palpate.Scene.read(tmp_path / "ball.toml").build().body.mesh
+        counts[element] = (mesh.tets.shape[1], len(mesh.nodes))
+    assert [nodes for nodes, _ in counts.values()] == [10, 4, 10]
+    assert counts[""] == counts['element = "quadratic"']
+    # At twice the size there are about as many nodes.
+    assert 0.5 < counts[""][1] / counts['element = "linear"'][1] < 1.5
+
+
+def test_command_line_takes_the_same_elements(tmp_path):
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=3, radius=0.04).export(tmp_path / "ball.stl")
+    bent(box_mesh(cells=(3, 2, 2)).to_quadratic()).write(tmp_path / "bent.vtu")
+
+    def run(file, *arguments):
+        fixed = ("--fix", "z < min + 5mm", "-o", "out.palpate")
+        command = [sys.executable, "-c", "from palpate.cli import main; main()", "precompute", file, *fixed, *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+
+    for arguments, element in (((), "quadratic"), (("--element", "linear"), "linear")):
+        assert run("ball.stl", *arguments).returncode == 0
+        assert palpate.GreensFunction.load(tmp_path / "out.palpate").description["element"] == element
+    refused = run("bent.vtu", "--element", "linear")
+    assert refused.returncode == 2
+    assert "bent.vtu holds 10-node tetrahedra: leave out --element" in refused.stderr

@@ -139,7 +139,7 @@ impl Servo {
         let (rows, log) = RingBuffer::new(LOG_ROWS);
         let mut servo_loop = Loop {
             stop: stop.clone(),
-            ticker: Ticker::new(model, limits),
+            ticker: Ticker::new(model.clone(), limits),
             devices,
             settings: settings_out,
             resets: settings.resets,
@@ -278,7 +278,7 @@ impl Loop {
             force: self.status.forces[0],
             compute_us: compute_ns as f64 * 1e-3,
             wakeup_us: wakeup_ns as f64 * 1e-3,
-            watched: self.ticker.displacement_of(self.watch),
+            watched: self.ticker.displacement_of(self.watch as usize),
             body_time: drawn.body_time,
             energy: drawn.energy.unwrap_or_default(),
         };

@@ -61,8 +61,8 @@ impl Ticker {
         self.state.motion.as_ref().map(|motion| motion.energy)
     }
 
-    /// Displacement of a surface node after the last tick, m; never allocates.
-    pub fn displacement_of(&mut self, node: u32) -> DVec3 {
+    /// Displacement of one surface node after the last tick, m; never allocates.
+    pub fn displacement_of(&mut self, node: usize) -> DVec3 {
         self.state.displacement_of(&self.model, node)
     }
 

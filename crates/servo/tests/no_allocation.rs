@@ -182,7 +182,6 @@ fn exercise_model(model: Arc<Model>, strike: impl Fn(usize) -> Option<Strike>) {
             devices[1] = DeviceState { position: DVec3::new(0.07, 0.05, 0.101), active: tick > 500, ..devices[1] };
             let output = ticker.tick(&devices, &Input { strike: strike(tick), ..settings }, 1e-3);
             ticker.snapshot_into(&mut snapshot);
-            ticker.displacement_of(7);
             touched += usize::from(output.forces[0].z > 0.0);
             run.push(output.forces.map(|f| f.to_array().map(f64::to_bits)));
         }

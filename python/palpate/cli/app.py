@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +21,14 @@ app = typer.Typer(
 cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 
-Quadratic = Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra: they do not lock near nu = 0.5.")]
+
+class Element(str, Enum):
+    """What --element takes."""
+
+    LINEAR = "linear"
+    QUADRATIC = "quadratic"
+
+
 Unit = Annotated[str, typer.Option(help="Unit of length of the file: m, cm, mm, um, in.")]
 
 
@@ -57,9 +65,9 @@ def mesh(
     unit: Unit = "m",
     max_size: Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")] = None,
     repair: Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")] = False,
-    quadratic: Quadratic = False,
+    quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
 ) -> None:
-    """Fill a closed surface with tetrahedra.
+    """Fill a closed surface with tetrahedra, of 4 nodes unless --quadratic: other programs and formats expect those.
 
     Example: palpate mesh liver.stl liver.vtu --unit mm --max-size 4mm
 
@@ -86,7 +94,10 @@ def precompute(
     unit: Unit = "m",
     precision: Annotated[str, typer.Option(help="Stored number format: f16, f32 or f64.")] = "f32",
     touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
-    quadratic: Quadratic = False,
+    element: Annotated[
+        Element | None,
+        typer.Option(help="Tetrahedra with 4 or 10 nodes; default: quadratic for a surface, a volume mesh as it is."),
+    ] = None,
     memory: Annotated[str | None, typer.Option(help="Peak memory allowed, such as 8GB.")] = None,
 ) -> None:
     """Solve the body once, so that any touch is answered in microseconds.
@@ -99,8 +110,7 @@ def precompute(
 
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    made = _read_any(mesh, unit)
-    body = _body(made.to_quadratic() if quadratic else made, material, fix, loads)
+    body = _body(_read_any(mesh, unit, element), material, fix, loads)
     region = None
     if touch is not None:
         surface = body.mesh.surface_nodes
@@ -214,11 +224,17 @@ def cache_clear() -> None:
     print(f"deleted {len(files)} files")
 
 
-def _read_any(path: Path, unit: str) -> TetMesh:
-    from palpate.mesh import TetMesh, tetrahedralize
-    from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
+def _read_any(path: Path, unit: str, element: Element | None) -> TetMesh:
+    from palpate.errors import MeshError
+    from palpate.mesh import TetMesh
+    from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, tetrahedralize_with
 
-    return tetrahedralize(path, None, unit) if path.suffix.lower() in SURFACE_ENDINGS else TetMesh.read(path, unit)
+    if path.suffix.lower() in SURFACE_ENDINGS:
+        return tetrahedralize_with("linear" if element == Element.LINEAR else "quadratic", path, None, unit)
+    mesh = TetMesh.read(path, unit)
+    if element == Element.LINEAR and mesh.is_quadratic:
+        raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or say quadratic")
+    return mesh.to_quadratic() if element == Element.QUADRATIC else mesh
 
 
 def _body(mesh: TetMesh, material: Material, fix: str, loads: Loads | None) -> Body:

@@ -149,7 +149,7 @@ def _print_elements(rows: list[ElementRow]) -> None:
 
 @bench_app.command()
 def precompute(
-    sizes: Annotated[str, typer.Option(help="Bodies, of 1k, 2k, 13k and 20k nodes.")] = "1k,2k,20k",
+    sizes: Annotated[str, typer.Option(help="Bodies, of about 1k, 2k, 15k and 20k nodes.")] = "1k,2k,20k",
     threads: Annotated[str, typer.Option(help="Numbers of threads.")] = "1,2",
     plot: Annotated[Path | None, typer.Option(help="Draw time against surface dofs into this PNG.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
@@ -177,36 +177,25 @@ def _print_precompute(results: list[Result]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title="All surface columns, factorisation included")
-    for title in (
-        "body",
-        "threads",
-        "method",
-        "seconds",
-        "Palpate's share",
-        "of processors",
-        "share",
-        "columns timed",
-        "median of",
-    ):
-        table.add_column(title, justify="left" if title in ("body", "method") else "right")
-    ours = {(r.size, r.threads): r for r in results if r.method == "Palpate"}
-    previous = None
+    groups: dict[tuple[str, int], list[Result]] = {}
     for r in results:
-        if previous not in (None, (r.size, r.threads)):
-            table.add_section()
-        body = "" if previous == (r.size, r.threads) else f"{r.nodes} nodes, {r.surface_dofs} surface dofs"
-        previous = (r.size, r.threads)
-        own = ours[previous]
-        shares = ["", ""]
-        if r is not own:
-            shares = [f"{own.seconds / r.seconds:.3f}", f"{own.cpu_seconds / r.cpu_seconds:.3f}"]
-        timed = "all" if r.sampled is None else f"{r.sampled}, scaled"
-        times = (f"{r.seconds:.3g}", shares[0], f"{r.cpu_seconds:.3g}", shares[1])
-        table.add_row(body, str(r.threads), r.method, *times, timed, str(r.repeats))
-        if r.writing_seconds is not None:
-            table.add_row("", "", "  its file: write, verify, map", f"{r.writing_seconds:.3g}")
-    Console().print(table)
+        groups.setdefault((r.size, r.threads), []).append(r)
+    for (_, threads), rows in groups.items():
+        ours = next(r for r in rows if r.method == "Palpate")
+        title = f"{ours.nodes} nodes, {ours.surface_dofs} surface dofs, {threads} thread{'s' * (threads > 1)}"
+        table = Table(title=title, title_justify="left")
+        table.add_column("all surface columns by", no_wrap=True)
+        for heading in ("s", "share", "CPU s", "share", "columns", "runs"):
+            table.add_column(heading, justify="right")
+        for r in rows:
+            shares = (f"{ours.seconds / r.seconds:.3f}", f"{ours.cpu_seconds / r.cpu_seconds:.3f}")
+            columns = "all" if r.sampled is None else f"{r.sampled} scaled"
+            table.add_row(
+                r.method, f"{r.seconds:.4g}", shares[0], f"{r.cpu_seconds:.4g}", shares[1], columns, str(r.repeats)
+            )
+        Console().print(table)
+        print(f"Palpate's file, written, verified and mapped: {ours.writing_seconds:.3g} s more")
+    print("share: Palpate's time over that of the row")
 
 
 def _print_table(rows: list[Row]) -> None:

@@ -10,7 +10,7 @@ import tempfile
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -24,8 +24,15 @@ if TYPE_CHECKING:
 SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
 Ball = tuple[tuple[float, float, float], float, float]
 
+Element = Literal["linear", "quadratic"]  # with 4 and 10 nodes
+
+# Into so many parts the longest side is divided where no size is given. 10-node elements twice as large have as many
+# nodes as the 4-node ones, and a smaller error.
+PARTS = {"linear": 15.0, "quadratic": 7.5}
+
 # The mesh may cut corners of a curved surface, but not lose a part of it.
 VOLUME_TOLERANCE = 0.1
+TIME_LIMIT = 300.0  # s
 REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install palpate[repair]' and --repair"
 
 
@@ -36,9 +43,12 @@ def tetrahedralize(
     refine: Sequence[Ball] = (),
     *,
     repair: bool = False,
-    time_limit: float = 300.0,
+    time_limit: float = TIME_LIMIT,
 ) -> TetMesh:
-    """Fill a closed surface with tetrahedra, by NETGEN; or a broken one, by fTetWild.
+    """Fill a closed surface with 4-node tetrahedra, by NETGEN; or a broken one, by fTetWild.
+
+    Before solving, ``.to_quadratic()`` is advised, at twice the element size: at the same price the result is several
+    times more accurate.
 
     Parameters
     ----------
@@ -63,6 +73,31 @@ def tetrahedralize(
         nothing.
 
     """
+    return _fill(surface, max_element_size, "linear", unit, refine, repair, time_limit)
+
+
+def tetrahedralize_with(
+    element: Element,
+    surface: str | os.PathLike[str] | trimesh.Trimesh,
+    max_element_size: float | None = None,
+    unit: str = "m",
+    refine: Sequence[Ball] = (),
+) -> TetMesh:
+    """Fill a closed surface as :func:`tetrahedralize` does, with either element; None: a size that suits it."""
+    mesh = _fill(surface, max_element_size, element, unit, refine)
+    return mesh.to_quadratic() if element == "quadratic" else mesh
+
+
+def _fill(
+    surface: str | os.PathLike[str] | trimesh.Trimesh,
+    max_element_size: float | None,
+    element: Element,
+    unit: str,
+    refine: Sequence[Ball],
+    repair: bool = False,
+    time_limit: float = TIME_LIMIT,
+) -> TetMesh:
+    """4-node tetrahedra, by default of the size that suits what they shall become."""
     name, shape = _load(surface)
     shape = shape.copy()
     shape.apply_scale(length_scale(unit))
@@ -71,7 +106,7 @@ def tetrahedralize(
     else:
         _check_surface(name, shape)
     extent = float(np.ptp(shape.vertices, axis=0).max())
-    size = extent / 15 if max_element_size is None else float(max_element_size)
+    size = extent / PARTS[element] if max_element_size is None else float(max_element_size)
     if not (np.isfinite(size) and size > 0):
         raise MeshError(f"max_element_size must be positive, got {max_element_size}")
     for (x, y, z), radius, ball_size in refine:

@@ -63,7 +63,7 @@ def load(name: str, paper: bool = False) -> TetMesh:
     name
         One of :data:`NAMES`; with ``paper`` also ``"liver_dynamic"``, the coarser liver of the paper's table 2.
     paper
-        With the paper's numbers of nodes and elements (within 5 %) instead of a finer mesh.
+        With the paper's numbers of nodes and elements (within 5 %), 4 nodes each, instead of 10-node elements.
 
     Returns
     -------

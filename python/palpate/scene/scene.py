@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
@@ -19,9 +19,9 @@ from palpate import models
 from palpate.body import Body
 from palpate.errors import Error, SceneError
 from palpate.green import GreensFunction, precompute
-from palpate.mesh import TetMesh, tetrahedralize
+from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
-from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
+from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element, tetrahedralize_with
 from palpate.predicate import parse
 from palpate.scene.dynamics import DynamicsTable, Motion
 from palpate.scene.loads import LoadTable, together
@@ -50,8 +50,10 @@ class RefineTable(Table):
 class BodyTable(Table):
     """The solid, one of: a mesh file (volume, or surface to be filled), a built-in model, a precomputed store.
 
-    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. ``element = "quadratic"``
-    gives 4-node tetrahedra the middles of their edges as nodes; supports listed by node then hold those between them.
+    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
+    filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
+    ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
+    hold the middles between them.
     """
 
     mesh: str | None = None
@@ -60,7 +62,7 @@ class BodyTable(Table):
     paper: bool = False
     unit: str = "m"
     max_element_size: Length | None = None
-    element: Literal["linear", "quadratic"] | None = None
+    element: Element | None = None
     refine: list[RefineTable] = Field(default_factory=list)
     precision: str = Field("f32", pattern="^f(16|32|64)$")
 
@@ -71,6 +73,16 @@ class BodyTable(Table):
         if self.model is not None and self.model not in models.NAMES:
             raise ValueError(f"unknown model '{self.model}'; there are {', '.join(models.NAMES)}")
         return self
+
+    @property
+    def fills_a_surface(self) -> bool:
+        """Whether the mesh is yet to be made."""
+        return Path(self.mesh or "").suffix.lower() in SURFACE_ENDINGS
+
+    @property
+    def adds_middles(self) -> bool:
+        """Whether 4-node tetrahedra become 10-node ones."""
+        return self.element == "quadratic" or (self.element is None and self.fills_a_surface)
 
 
 class SupportsTable(Table):
@@ -183,8 +195,10 @@ class Scene(Table):
             return BuiltScene(self, None, GreensFunction.load(self._folder / self.body.store))
         mesh = self._mesh()
         if self.body.element == "linear" and mesh.is_quadratic:
-            raise SceneError(f"{self.body.mesh} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
-        if self.body.element == "quadratic":
+            raise SceneError(
+                f"{self.body.mesh or self.name} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'"
+            )
+        if self.body.adds_middles:
             mesh = mesh.to_quadratic()
         labels, materials = np.zeros(len(mesh.tets), dtype=np.int64), {0: self.material.material()}
         for rank, region in enumerate(self.region):
@@ -217,9 +231,10 @@ class Scene(Table):
         if self.body.model is not None:
             return models.load(self.body.model, paper=self.body.paper)
         source = self._folder / str(self.body.mesh)
-        if source.suffix.lower() in SURFACE_ENDINGS:
+        if self.body.fills_a_surface:
             finer = [(ball.center, ball.radius, ball.size) for ball in self.body.refine]
-            return tetrahedralize(source, self.body.max_element_size, self.body.unit, finer)
+            element = self.body.element or "quadratic"
+            return tetrahedralize_with(element, source, self.body.max_element_size, self.body.unit, finer)
         return TetMesh.read(source, self.body.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:
@@ -234,7 +249,7 @@ class Scene(Table):
                     f"no node satisfies supports.fixed = '{fixed}': the body reaches from {low} to {high} m"
                 )
             return mask
-        if self.body.element == "quadratic" and max(fixed, default=0) < len(mesh.nodes):
+        if self.body.adds_middles and max(fixed, default=0) < len(mesh.nodes):
             held = np.zeros(len(mesh.nodes), dtype=bool)
             held[fixed] = True
             between = held[mesh.tets[:, EDGES]].all(axis=2)

@@ -73,11 +73,11 @@ pub struct Motion {
     /// start of this one, m.
     struck: Projection,
     blow: [DVec3; 2],
+    /// The node that is watched.
+    watched: Projection,
     /// What is left of the blow: its impulse over the sum of its shape, N, its length and the next instant, in steps.
     blow_shape: (DVec3, u32, u32),
     struck_at: DVec3,
-    /// A node whose displacement is wanted every tick.
-    watched: (Option<u32>, Projection),
     /// `R` between the patches.
     residual: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
     /// Body time not yet stepped through, s.
@@ -109,10 +109,10 @@ impl Motion {
             free: Default::default(),
             patches: std::array::from_fn(|_| Projection::new(modes)),
             struck: Projection::new(modes),
+            watched: Projection::new(modes),
             blow: Default::default(),
             blow_shape: Default::default(),
             struck_at: DVec3::ZERO,
-            watched: (None, Projection::new(modes)),
             residual: Default::default(),
             due: 0.0,
             time: 0.0,
@@ -127,8 +127,7 @@ impl Motion {
         for x in [q, v, free_q, free_v] {
             x.fill(Lanes::default());
         }
-        (self.free, self.blow, self.last) = Default::default();
-        self.blow_shape = Default::default();
+        (self.free, self.blow, self.blow_shape, self.last) = Default::default();
         self.due = modes.dt;
         self.energy = Energy::default();
     }
@@ -136,6 +135,18 @@ impl Motion {
     /// Modal displacements now.
     pub(super) fn modal_displacements(&self) -> &[Lanes] {
         &self.modal.q
+    }
+
+    /// Displacement of a surface node by the modes, less what tools do to it at rest, m: `q - p / k` at its rows.
+    pub(super) fn beyond_static(&mut self, modes: &Modes, tools: &[ToolContact; MAX_TOOLS], node: usize) -> DVec3 {
+        self.watched.gather(modes, std::iter::once((3 * node, 1.0)));
+        let mut moved = self.watched.read(modes, &self.modal.q);
+        for (contact, patch) in tools.iter().zip(&self.patches) {
+            if contact.mode != Mode::Free {
+                moved -= self.watched.static_compliance(modes, patch) * contact.force;
+            }
+        }
+        moved
     }
 
     /// Displacement of a surface point in the free motion, m; the residual flexibility of other contacts is left out.
@@ -148,25 +159,6 @@ impl Motion {
             sum += share * DVec3::from(corner);
         }
         sum
-    }
-
-    /// Displacement of a node beside `Psi W f`, m: `Phi (q - p / k)`, `p` being the modal force of the contacts.
-    pub(super) fn displacement_of(
-        &mut self,
-        modes: &Modes,
-        tools: &[ToolContact; MAX_TOOLS],
-        node: u32,
-        here: &Patch,
-    ) -> DVec3 {
-        if self.watched.0 != Some(node) {
-            gather(&mut self.watched.1, modes, here);
-            self.watched.0 = Some(node);
-        }
-        let watched = &self.watched.1;
-        let touching = tools.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free);
-        let kept: DVec3 =
-            touching.map(|(contact, patch)| watched.static_compliance(modes, patch) * contact.force).sum();
-        watched.read(modes, &self.modal.q) - kept
     }
 
     /// Takes hold of a patch for a tool: its compliance within a step with every other one, m/N.

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::contact_forces::{solve_forces, update_compliance};
 use super::{Energy, MAX_TOOLS, Model, Motion};
 use crate::contact::{Patch, add_patch_response, compliance_block};
-use crate::dynamics::{Lanes, Model as Modes, Projection};
+use crate::dynamics::{Lanes, Projection};
 
 /// What a tool is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,20 +93,24 @@ impl State {
         }
     }
 
-    /// Displacement of one surface node, m, as the snapshot has it; never allocates.
-    pub fn displacement_of(&mut self, model: &Model, node: u32) -> DVec3 {
-        let mut sum = DVec3::from_slice(&model.free[3 * node as usize..][..3]);
-        let mut here = Patch { count: 1, ..Patch::default() };
-        (here.nodes[0], here.weights[0]) = (node, 1.0);
+    /// Displacement of one surface node, m; never allocates.
+    pub fn displacement_of(&mut self, model: &Model, node: usize) -> DVec3 {
+        let mut sum = DVec3::from_slice(&model.free[3 * node..3 * node + 3]);
         for tool in self.tools.iter().filter(|tool| tool.mode != Mode::Free) {
-            let response = compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO);
-            sum += response * tool.force / self.stiffness_scale;
+            sum += response_of(model, node, tool) / self.stiffness_scale;
         }
         if let (Some(motion), Some(dynamics)) = (&mut self.motion, &model.dynamics) {
-            sum += motion.displacement_of(&dynamics.modes, &self.tools, node, &here);
+            sum += motion.beyond_static(&dynamics.modes, &self.tools, node);
         }
         sum
     }
+}
+
+/// Static displacement of a surface node under the force of a tool, m.
+fn response_of(model: &Model, node: usize, tool: &ToolContact) -> DVec3 {
+    let mut here = Patch { count: 1, ..Patch::default() };
+    (here.nodes[0], here.weights[0]) = (node as u32, 1.0);
+    compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO) * tool.force
 }
 
 impl Snapshot {
@@ -125,15 +129,12 @@ impl Snapshot {
     fn displacement_of(&self, model: &Model, moving: &[Lanes], node: u32) -> DVec3 {
         let first = 3 * node as usize;
         let mut sum = DVec3::from_slice(&model.free[first..first + 3]);
-        let mut here = Patch { count: 1, ..Patch::default() };
-        (here.nodes[0], here.weights[0]) = (node, 1.0);
         for tool in self.touching() {
-            let response = compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO);
-            sum += response * tool.force / self.stiffness_scale;
+            sum += response_of(model, node as usize, tool) / self.stiffness_scale;
         }
-        if let Some(modes) = self.modes_of(model) {
+        if let Some(dynamics) = &model.dynamics {
             let mut moved = [0.0; 3];
-            modes.read(moving, first.., &mut moved);
+            dynamics.modes.read(moving, first.., &mut moved);
             sum += DVec3::from(moved);
         }
         sum
@@ -147,17 +148,12 @@ impl Snapshot {
             let force = tool.force / self.stiffness_scale;
             add_patch_response(green, &tool.patch, force, &mut displacements);
         }
-        if let Some(modes) = self.modes_of(model) {
+        if let Some(dynamics) = &model.dynamics {
             let mut moved = vec![0.0; displacements.len()];
-            modes.read(&self.moving(model), 0.., &mut moved);
+            dynamics.modes.read(&self.moving(model), 0.., &mut moved);
             displacements.iter_mut().zip(&moved).for_each(|(u, m)| *u += m);
         }
         displacements
-    }
-
-    /// The modes, unless the pose is one of a body come to rest.
-    fn modes_of<'a>(&self, model: &'a Model) -> Option<&'a Modes> {
-        model.dynamics.as_ref().map(|dynamics| &dynamics.modes).filter(|_| !self.modal.is_empty())
     }
 
     fn touching(&self) -> impl Iterator<Item = &ToolContact> {
@@ -167,7 +163,8 @@ impl Snapshot {
     /// Modal displacements of what is drawn beside `Psi W f`, so that the modes left out are there too: `q - p / k`, `p`
     /// being the modal force `Phi^T W f`.
     fn moving(&self, model: &Model) -> Vec<Lanes> {
-        let Some(modes) = self.modes_of(model) else { return Vec::new() };
+        let Some(dynamics) = &model.dynamics else { return Vec::new() };
+        let modes = &dynamics.modes;
         let (mut projection, mut moving) = (Projection::new(modes), self.modal.clone());
         for tool in self.touching() {
             projection.gather(modes, tool.patch.iter().map(|(node, weight)| (3 * node, weight)));
