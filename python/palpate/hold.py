@@ -67,11 +67,21 @@ class HeldTool:
         """Prepare the contact when another one has begun; None while nothing is touched."""
         contact = next((c for c in self._simulation.contacts() if c.tool == self._tool), None)
         if contact is None:
-            self._reach = None
+            if not self._bounced_off():
+                self._reach = None
         elif self._reach is None or not self._reach.holds_for(contact, self._simulation.stiffness_scale):
             answer = self._simulation.contact_response(self._tool)
             self._reach = None if answer is None else _Reach(self._simulation, *answer, self._limit)
         return self._reach
+
+    def _bounced_off(self) -> bool:
+        """Whether a body in motion has left a tool that still wants into it.
+
+        Until the body is back the tool stays within the limit of the contact before, or it would be hit all the harder.
+        """
+        if self._reach is None or self.wanted is None or self._simulation.motion is None:
+            return False
+        return float((self.wanted - self._reach.contact.anchor) @ self._reach.contact.normal) < 0
 
 
 class _Reach:

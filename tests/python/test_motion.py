@@ -269,6 +269,29 @@ def test_a_reset_in_slow_motion_lets_go_at_once(tmp_path):
         assert frame.energy.total == frame.energy.work == 0
 
 
+@pytest.mark.parametrize("modes", ["'all'", "20"])
+def test_the_log_has_the_drawn_displacement_of_the_watched_node(tmp_path, modes):
+    simulation = palpate.Simulation(scene(tmp_path, f"modes = {modes}\n", fixed="z < 1e-6"))
+    node = int(simulation.green.surface_nodes[-3])
+    with simulation:
+        simulation.watch(node)
+        simulation.move(TOP + [0, 0, RADIUS - 0.002])
+        time.sleep(0.2)
+        simulation.strike([0.12, 0, 0], (0, 1e-3, 0))
+        time.sleep(0.05)
+        frame = simulation.frame()
+        time.sleep(0.02)
+        log = simulation.drain_log()
+    assert frame.contacts
+    row = log[np.argmin(np.abs(log["time"] - frame.time))]
+    drawn = frame.displacements[-3]
+    assert row["watched"] == pytest.approx(drawn, abs=1e-9 * np.abs(drawn).max())
+    assert row["kinetic"] == frame.energy.kinetic and row["work"] == frame.energy.work
+    assert (np.diff(log["body_time"]) >= 0).all() and log["body_time"][-1] == pytest.approx(1e-3 * len(log), abs=3e-3)
+    with pytest.raises(palpate.SceneError, match="is not on the surface"):
+        simulation.watch(10**6)
+
+
 @pytest.mark.parametrize(
     ("dynamics", "message"),
     [

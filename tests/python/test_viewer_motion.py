@@ -159,3 +159,24 @@ def test_the_default_blow_swings_a_body_visibly_and_honestly(moving):
         swings.append(np.linalg.norm(played.displacements, axis=2).max() / session.size)
     assert np.median(strains) < 0.1 and max(strains) < 0.25
     assert max(swings) > 0.03
+
+
+def test_the_tool_is_held_back_in_motion(moving):
+    """By the static response: the body swings about a pose at the limit, and comes to rest there."""
+
+    async def session():
+        async with serving(moving) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            radius = scene["tool_radius"]
+            # Slow motion would only take longer.
+            await client.say(type="set", time_scale=1)
+            await client.say(type="press", position=[*TOP[:2], TOP[2] + radius + 1e-3], grab=False)
+            await client.receive("frame")
+            await client.say(type="press", position=[*TOP[:2], TOP[2] + radius - 0.02], grab=False)
+            header, _ = await client.frame_where(lambda h: h["tool"]["wanted"] is not None and h["time"] > 2.5)
+            assert 0.08 < header["strain"] < 0.105
+            assert header["force"][2] > 0.05
+            await client.say(type="release")
+            await client.frame_where(lambda h: h["contacts"] == [] and h["strain"] < 0.01)
+
+    asyncio.run(session())
