@@ -312,6 +312,7 @@ def test_the_impulse_is_given_and_repeated(moving_page):
 def test_a_click_strikes_in_motion(moving_page):
     page = moving_page
     until(page, lambda s: s["motion"]["struck_at"] is not None)
+    time.sleep(1.0)  # the page gives the scene's own blow when it opens
     before = state(page)["motion"]
     x, y = page.evaluate("window.palpate.pickPoint()")
     page.get_by_test_id("strike").click()

@@ -117,7 +117,8 @@ impl Snapshot {
     /// Of a body at rest.
     pub fn new(model: &Model) -> Self {
         let modal = model.dynamics.as_ref().map_or_else(Vec::new, |d| d.modes.state().q);
-        Self { stiffness_scale: 1.0, modal, ..Self::default() }
+        let energy = model.dynamics.as_ref().map(|_| Energy::default());
+        Self { stiffness_scale: 1.0, modal, energy, ..Self::default() }
     }
 
     /// Displacements of some surface nodes, m.
