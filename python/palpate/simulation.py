@@ -370,9 +370,7 @@ class Simulation:
             Positions that are not finite or of another shape.
 
         """
-        path = np.ascontiguousarray(positions, dtype=np.float64)
-        if path.ndim != 2 or path.shape[1] != 3:
-            raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
+        path = _path(positions)
         bad = np.flatnonzero(~np.isfinite(path).all(axis=1))
         if bad.size:
             raise SceneError(f"position {bad[0]} is not finite")
@@ -401,9 +399,7 @@ class Simulation:
             Another shape, strikes on a body that does not move, or nodes that are not on the surface.
 
         """
-        path = np.ascontiguousarray(positions, dtype=np.float64)
-        if path.ndim != 2 or path.shape[1] != 3:
-            raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
+        path = _path(positions)
         if strikes:
             self._require_motion("strike")
         blows = [(int(tick), *_blow(*blow)) for tick, *blow in strikes]
@@ -444,6 +440,13 @@ def _blow(point: Sequence[float], impulse: Sequence[float], duration: float = 0.
     if not (np.isfinite(duration) and duration >= 0):
         raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
     return _three(point, "a strike's point"), _three(impulse, "a strike's impulse"), float(duration)
+
+
+def _path(positions: np.ndarray) -> np.ndarray:
+    path = np.ascontiguousarray(positions, dtype=np.float64)
+    if path.ndim != 2 or path.shape[1] != 3:
+        raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
+    return path
 
 
 def _three(values: Sequence[float], what: str) -> tuple[float, float, float]:

@@ -161,16 +161,12 @@ def info(
     if file.name.endswith(".modes.palpate"):
         basis = palpate.ModalBasis.load(file)
         print(f"{file}: {len(basis)} modes, {basis.frequencies[0]:.4g} to {basis.frequencies[-1]:.4g} Hz")
-        for name, value in basis.description.items():
-            print(f"  {name.replace('_', ' ')}: {value}")
-        print(f"  key: {basis.key}")
+        _print_origin(basis.description, basis.key)
         return
     if file.suffix == ".palpate":
         green = palpate.GreensFunction.load(file)
         print(f"{file}: {_green_line(green)}")
-        for name, value in green.description.items():
-            print(f"  {name.replace('_', ' ')}: {value}")
-        print(f"  key: {green.key}")
+        _print_origin(green.description, green.key)
         return
     if file.suffix == ".toml":
         scene = palpate.Scene.read(file)
@@ -253,6 +249,13 @@ def _mesh_line(mesh: TetMesh) -> str:
         f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {'10-node ' if mesh.is_quadratic else ''}tetrahedra, "
         f"{len(mesh.surface_nodes)} surface nodes, {len(mesh.surface_triangles)} triangles"
     )
+
+
+def _print_origin(description: dict[str, object], key: str) -> None:
+    """Say what a precomputed file was made from."""
+    for name, value in description.items():
+        print(f"  {name.replace('_', ' ')}: {value}")
+    print(f"  key: {key}")
 
 
 def _green_line(green) -> str:
