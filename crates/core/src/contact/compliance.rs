@@ -1,34 +1,10 @@
-//! The compliance `C = W^T Psi W` that a patch feels: three by three, m/N.
+//! A single touch: the compliance `C = W^T Psi W` that a patch feels, three by three, m/N, and the force for a displacement.
 
 use glam::{DMat3, DVec3};
 
-use super::{Patch, PatchScratch, SurfaceQuery, patch_weights};
+use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, SurfaceQuery, TouchPatch, patch_weights};
 use crate::green::GreensFunction;
 use crate::{Error, Result};
-
-/// `W_a^T Psi W_b` between two patches: mean displacement of `a` per unit force spread over `b`. Supported dofs do not
-/// move. `None` if a node of either patch may not be touched.
-pub fn compliance_block(green: &GreensFunction, a: &Patch, b: &Patch) -> Option<DMat3> {
-    let mut sum = [[0.0; 3]; 3];
-    for (source, source_weight) in b.iter() {
-        let first = green.first_column(source)?;
-        for (axis, column_sum) in sum.iter_mut().enumerate() {
-            if green.row_is_fixed[3 * source + axis] {
-                continue;
-            }
-            for (target, target_weight) in a.iter() {
-                let weight = source_weight * target_weight;
-                for (k, s) in column_sum.iter_mut().enumerate() {
-                    let row = 3 * target + k;
-                    if !green.row_is_fixed[row] {
-                        *s += weight * green.entry(row, first + axis);
-                    }
-                }
-            }
-        }
-    }
-    Some(DMat3::from_cols_array_2d(&sum))
-}
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
 pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
@@ -59,24 +35,19 @@ pub fn touch(
     let query = SurfaceQuery::new(&green.surface)?;
     let centre =
         query.closest(&green.surface, point).ok_or_else(|| Error::Invalid("the touch point must be finite".into()))?;
-    let mut patch = Patch::default();
-    let covered = patch_weights(&green.surface, &centre, radius, &mut PatchScratch::new(&green.surface), &mut patch);
-    if covered > patch.count {
-        return Err(Error::Invalid(format!(
-            "a contact radius of {radius} m covers {covered} nodes; choose a smaller one"
-        )));
-    }
-    if let Some((node, _)) = patch.iter().find(|&(n, _)| green.first_column(n).is_none()) {
-        let node = green.surface_nodes[node];
-        return Err(Error::Invalid(format!("node {node} under the contact is not touchable")));
-    }
-    let compliance = compliance_block(green, &patch, &patch).unwrap_or(DMat3::ZERO);
+    let mut weighed = Patch::default();
+    let (surface, mut scratch) = (&green.surface, PatchScratch::new(&green.surface));
+    let mut patch = TouchPatch::default();
+    patch_weights(surface, &PatchGeometry::new(surface), &centre, radius, &mut scratch, &mut weighed)
+        .and_then(|()| patch.admit(green, &weighed))
+        .map_err(|refusal| refused(green, radius, refusal))?;
+    let compliance = patch.own_compliance(green);
     let mut displacements = green.free_displacements();
-    let sag = patch_mean(&patch, &displacements);
+    let sag = patch_mean(patch.patch(), &displacements);
     let wanted = std::array::from_fn(|k| displacement[k].map(|d| d - sag[k]));
     let force = constrained_force(&compliance, wanted)
         .ok_or_else(|| Error::Invalid("the contact lies on the support, which does not give".into()))?;
-    add_patch_response(green, &patch, force, &mut displacements);
+    patch.add_response(green, force, &mut displacements);
     Ok((force, displacements))
 }
 
@@ -85,22 +56,15 @@ fn patch_mean(patch: &Patch, displacements: &[f64]) -> DVec3 {
     patch.iter().map(|(node, weight)| weight * DVec3::from_slice(&displacements[3 * node..])).sum()
 }
 
-/// Adds `Psi W f` to the surface displacements (3s).
-pub(crate) fn add_patch_response(green: &GreensFunction, patch: &Patch, force: DVec3, displacements: &mut [f64]) {
-    let surface = displacements.len();
-    for (node, weight) in patch.iter() {
-        let Some(first) = green.first_column(node) else { continue };
-        for axis in 0..3 {
-            if !green.row_is_fixed[3 * node + axis] && force[axis] != 0.0 {
-                green.add_column(first + axis, weight * force[axis], &mut displacements[..surface]);
-            }
+fn refused(green: &GreensFunction, radius: f64, refusal: Refusal) -> Error {
+    Error::Invalid(match refusal {
+        Refusal::TooManyNodes => {
+            format!("a contact radius of {radius} m covers more than {MAX_PATCH_NODES} nodes; choose a smaller one")
         }
-    }
-    for (u, &fixed) in displacements.iter_mut().zip(&green.row_is_fixed) {
-        if fixed {
-            *u = 0.0;
+        Refusal::NotTouchable(node) => {
+            format!("node {} under the contact is not touchable", green.surface_nodes[node as usize])
         }
-    }
+    })
 }
 
 /// `C_aa f_a = d_a` for the prescribed components, zero force on the free ones: free components are replaced by the

@@ -3,8 +3,11 @@
 mod closest;
 mod compliance;
 mod patch;
+mod quadrature;
+mod touchable;
 
 pub use closest::{SurfacePoint, SurfaceQuery};
-pub(crate) use compliance::add_patch_response;
-pub use compliance::{compliance_block, smallest_eigenvalue, touch};
+pub use compliance::{smallest_eigenvalue, touch};
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
+pub use quadrature::PatchGeometry;
+pub use touchable::{Refusal, TouchPatch};

@@ -7,31 +7,26 @@
 //! quadratic face may be negative. `N_i` and `dA` are those of the elements' faces, curved ones included.
 
 use std::marker::PhantomData;
+use std::sync::atomic::Ordering;
 
 use glam::DVec3;
 
-use super::SurfacePoint;
+use super::quadrature::{PatchGeometry, halfway};
+use super::{Refusal, SurfacePoint};
 use crate::element::{Face, Tri3, Tri6};
 use crate::mesh::{Faces, Surface};
+use crate::{Error, Result};
 
 /// Most nodes a patch of the servo may have: its 3x3 compliance costs the square of it, once a contact.
 pub const MAX_PATCH_NODES: usize = 256;
-
-/// Quadrature cells are split until their edges are below this part of the contact radius.
-const CELL_SIZE: f64 = 0.2;
-
-/// Depth at which splitting stops: cells of 2^-24 of a triangle's edge are below any physical radius.
-const MAX_DEPTH: u32 = 24;
 
 /// The nodes under a contact and their shares.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// How many of the arrays' entries are in use.
     pub count: usize,
-    /// Ranks of the surface nodes.
-    pub nodes: [u32; MAX_PATCH_NODES],
-    /// Weights; they sum to one.
-    pub weights: [f64; MAX_PATCH_NODES],
+    nodes: [u32; MAX_PATCH_NODES],
+    weights: [f64; MAX_PATCH_NODES],
 }
 
 impl Default for Patch {
@@ -43,7 +38,34 @@ impl Default for Patch {
 impl Patch {
     /// The `(node, weight)` pairs.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
-        self.nodes[..self.count].iter().zip(&self.weights[..self.count]).map(|(&n, &w)| (n as usize, w))
+        self.nodes().iter().zip(self.weights()).map(|(&n, &w)| (n as usize, w))
+    }
+
+    /// Ranks of the surface nodes.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes[..self.count]
+    }
+
+    /// Weights; they sum to one.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights[..self.count]
+    }
+
+    /// Becomes a single node.
+    pub fn set_node(&mut self, node: u32) {
+        (self.count, self.nodes[0], self.weights[0]) = (1, node, 1.0);
+    }
+
+    /// Becomes a copy of another; only the entries in use are copied.
+    pub fn copy_from(&mut self, other: &Patch) {
+        self.count = other.count;
+        self.nodes[..self.count].copy_from_slice(other.nodes());
+        self.weights[..self.count].copy_from_slice(other.weights());
+    }
+
+    fn push(&mut self, node: u32, weight: f64) {
+        (self.nodes[self.count], self.weights[self.count]) = (node, weight);
+        self.count += 1;
     }
 }
 
@@ -76,93 +98,124 @@ impl PatchScratch {
     }
 }
 
-/// Weights of a contact of radius `radius` (m) around `centre`, into `patch`. Returns the number of nodes covered; more
-/// than [`MAX_PATCH_NODES`] leave `patch` empty.
+/// Weights of a contact of radius `radius` (m) around `centre`, into `patch`.
+///
+/// # Errors
+/// More than [`MAX_PATCH_NODES`] nodes; the walk over the surface stops there, and `patch` is empty.
 pub fn patch_weights(
     surface: &Surface,
+    geometry: &PatchGeometry,
     centre: &SurfacePoint,
     radius: f64,
     scratch: &mut PatchScratch,
     patch: &mut Patch,
-) -> usize {
+) -> Result<(), Refusal> {
     match &surface.faces {
-        Faces::Linear(faces) => weights_on::<Tri3, 3>(surface, faces, centre, radius, scratch, patch),
-        Faces::Quadratic(faces) => weights_on::<Tri6, 6>(surface, faces, centre, radius, scratch, patch),
+        Faces::Linear(faces) => weights_on::<Tri3, 3>(surface, faces, geometry, centre, radius, scratch, patch),
+        Faces::Quadratic(faces) => weights_on::<Tri6, 6>(surface, faces, geometry, centre, radius, scratch, patch),
     }
 }
 
 fn weights_on<F: Face<N>, const N: usize>(
     surface: &Surface,
     faces: &[[u32; N]],
+    geometry: &PatchGeometry,
     centre: &SurfacePoint,
     radius: f64,
     scratch: &mut PatchScratch,
     patch: &mut Patch,
-) -> usize {
+) -> Result<(), Refusal> {
     patch.count = 0;
-    let walk = Walk::<F, N>::new(surface, faces, centre, radius);
-    walk.collect_sums(centre.triangle, scratch);
+    let walk = Walk::<F, N>::new(surface, faces, geometry, centre, radius);
+    let finished = walk.collect_sums(centre.triangle, scratch);
     let total: f64 = scratch.touched.iter().map(|&n| scratch.sums[n as usize]).sum();
-    let covered = scratch.touched.len();
-    for (k, &node) in scratch.touched.iter().enumerate() {
-        if covered <= MAX_PATCH_NODES {
-            patch.nodes[k] = node;
-            patch.weights[k] = scratch.sums[node as usize] / total;
+    for &node in &scratch.touched {
+        let sum = std::mem::take(&mut scratch.sums[node as usize]);
+        if finished {
+            patch.push(node, sum / total);
         }
-        scratch.sums[node as usize] = 0.0;
+    }
+    if !finished {
+        return Err(Refusal::TooManyNodes);
     }
     if total <= 0.0 {
-        return walk.point_weights(centre, patch);
+        patch.count = 0;
+        walk.point_weights(centre, patch);
     }
-    patch.count = if covered <= MAX_PATCH_NODES { covered } else { 0 };
-    covered
+    Ok(())
+}
+
+impl PatchGeometry {
+    /// Refuses a contact radius under which some contact would cover more nodes than a tick can weigh. A radius within one
+    /// that passed before passes at once.
+    ///
+    /// # Errors
+    /// The radius and the limit.
+    pub fn check_radius(&self, surface: &Surface, radius: f64) -> Result<()> {
+        if radius <= f64::from_bits(self.verified_radius.load(Ordering::Relaxed)) {
+            return Ok(());
+        }
+        let (mut scratch, mut patch) = (PatchScratch::new(surface), Patch::default());
+        for triangle in 0..surface.triangles.len() as u32 {
+            let corners = surface.corners(triangle);
+            let position: DVec3 = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let normal = surface.normals[triangle as usize];
+            let centre = SurfacePoint { position, triangle, barycentric: [1.0 / 3.0; 3], normal, signed_distance: 0.0 };
+            if patch_weights(surface, self, &centre, radius, &mut scratch, &mut patch).is_err() {
+                return Err(Error::Invalid(format!(
+                    "a contact radius of {radius} m covers too many surface nodes, the limit is {MAX_PATCH_NODES}: \
+                     choose a smaller radius or a coarser mesh"
+                )));
+            }
+        }
+        // Positive numbers are ordered as their bits are.
+        self.verified_radius.fetch_max(radius.to_bits(), Ordering::Relaxed);
+        Ok(())
+    }
 }
 
 /// The faces around a contact, whose shape functions are `F`'s.
 struct Walk<'a, F, const N: usize> {
     surface: &'a Surface,
     faces: &'a [[u32; N]],
+    geometry: &'a PatchGeometry,
     /// The contact point on its face: where the closest point on the drawn triangle is mapped to. On straight faces it is
     /// that point; on curved ones they differ by the sagitta of a drawn triangle.
     centre: DVec3,
-    squared_radius: f64,
+    radius: f64,
     facing: DVec3,
     face: PhantomData<F>,
 }
 
 impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
-    fn new(surface: &'a Surface, faces: &'a [[u32; N]], centre: &SurfacePoint, radius: f64) -> Self {
+    fn new(
+        surface: &'a Surface,
+        faces: &'a [[u32; N]],
+        geometry: &'a PatchGeometry,
+        centre: &SurfacePoint,
+        radius: f64,
+    ) -> Self {
         let facing = surface.normals[centre.triangle as usize];
-        let mut walk =
-            Self { surface, faces, centre: DVec3::ZERO, squared_radius: radius * radius, facing, face: PhantomData };
-        let (places, corners) = walk.face_of(centre.triangle);
-        walk.centre = place::<F, N>(&places, along(&corners, centre.barycentric));
-        walk
-    }
-
-    /// Node positions of the face to which triangle `t` belongs, and the triangle's corners in its coordinates.
-    fn face_of(&self, t: u32) -> ([DVec3; N], [DVec3; 3]) {
-        let (face, part) = (t as usize / F::PARTS.len(), t as usize % F::PARTS.len());
-        let places = self.faces[face].map(|n| self.surface.positions[n as usize]);
-        (places, F::PARTS[part].map(|k| F::NODES[k]))
+        let face = &geometry.faces[centre.triangle as usize / F::PARTS.len()];
+        let on_face = along(corners_of::<F, N>(centre.triangle), centre.barycentric);
+        let place = face.at([on_face.y, on_face.z]);
+        Self { surface, faces, geometry, centre: place, radius, facing, face: PhantomData }
     }
 
     /// The limit of a vanishing radius: the shape functions at the point.
-    fn point_weights(&self, centre: &SurfacePoint, patch: &mut Patch) -> usize {
-        let (_, corners) = self.face_of(centre.triangle);
+    fn point_weights(&self, centre: &SurfacePoint, patch: &mut Patch) {
         let nodes = self.faces[centre.triangle as usize / F::PARTS.len()];
-        for (node, weight) in nodes.into_iter().zip(F::shapes(along(&corners, centre.barycentric))) {
+        let on_face = along(corners_of::<F, N>(centre.triangle), centre.barycentric);
+        for (node, weight) in nodes.into_iter().zip(F::shapes(on_face)) {
             if weight.abs() > 1e-12 {
-                patch.nodes[patch.count] = node;
-                patch.weights[patch.count] = weight;
-                patch.count += 1;
+                patch.push(node, weight);
             }
         }
-        patch.count
     }
 
     /// Walks the connected triangles inside the ball, from triangle `first`, and adds `int N_i phi dA` to each node's sum.
-    fn collect_sums(&self, first: u32, scratch: &mut PatchScratch) {
+    /// False where there are too many nodes.
+    fn collect_sums(&self, first: u32, scratch: &mut PatchScratch) -> bool {
         scratch.touched.clear();
         scratch.queue.clear();
         scratch.visit = scratch.visit.wrapping_add(1);
@@ -172,13 +225,16 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
         while next < scratch.queue.len() {
             let t = scratch.queue[next];
             next += 1;
-            let (places, corners) = self.face_of(t);
-            let mut cell = Cell::<F, N> { walk: self, places, sums: [0.0; N], covered: false };
-            let ends = corners.map(|l| place::<F, N>(&places, l));
-            cell.integrate(corners, ends, 0);
-            if cell.covered {
-                for (node, sum) in self.faces[t as usize / F::PARTS.len()].into_iter().zip(cell.sums) {
+            let face = &self.geometry.faces[t as usize / F::PARTS.len()];
+            let corners = corners_of::<F, N>(t).map(|l| [l.y, l.z]);
+            let ends = self.surface.corners(t);
+            let moments = face.integrate(corners, ends, self.centre, self.radius);
+            if moments.covered {
+                for (node, sum) in self.faces[t as usize / F::PARTS.len()].into_iter().zip(moments.of_shapes::<N>()) {
                     if scratch.touched_by[node as usize] != scratch.visit {
+                        if scratch.touched.len() == MAX_PATCH_NODES {
+                            return false;
+                        }
                         scratch.touched_by[node as usize] = scratch.visit;
                         scratch.touched.push(node);
                     }
@@ -190,92 +246,32 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
                 if other != u32::MAX
                     && scratch.visited[other as usize] != scratch.visit
                     && self.surface.normals[other as usize].dot(self.facing) > 0.0
-                    && self.reaches(&places, [corners[i], corners[j]], [ends[i], ends[j]])
+                    && self.reaches(face.at(halfway(corners[i], corners[j])), [ends[i], ends[j]])
                 {
                     scratch.visited[other as usize] = scratch.visit;
                     scratch.queue.push(other);
                 }
             }
         }
+        true
     }
 
     /// Whether an edge comes into the ball. A curved edge bulges from its chord by no more than its middle does.
-    fn reaches(&self, places: &[DVec3; N], corners: [DVec3; 2], ends: [DVec3; 2]) -> bool {
-        let middle = place::<F, N>(places, (corners[0] + corners[1]) / 2.0);
+    fn reaches(&self, middle: DVec3, ends: [DVec3; 2]) -> bool {
         let bulge = (middle - (ends[0] + ends[1]) / 2.0).length();
-        let reach = self.squared_radius.sqrt() + bulge;
+        let reach = self.radius + bulge;
         squared_distance_to_segment(self.centre, ends[0], ends[1]) < reach * reach
     }
 }
 
-/// Position of a face's point with barycentric coordinates `l`.
-fn place<F: Face<N>, const N: usize>(places: &[DVec3; N], l: DVec3) -> DVec3 {
-    places.iter().zip(F::shapes(l)).map(|(&x, n)| x * n).sum()
+/// Corners of triangle `t` in the barycentric coordinates of its face.
+fn corners_of<F: Face<N>, const N: usize>(t: u32) -> [DVec3; 3] {
+    F::PARTS[t as usize % F::PARTS.len()].map(|k| F::NODES[k])
 }
 
 /// Point of a triangle by its corners and its barycentric coordinates in it.
-fn along(corners: &[DVec3; 3], [a, b, c]: [f64; 3]) -> DVec3 {
+fn along(corners: [DVec3; 3], [a, b, c]: [f64; 3]) -> DVec3 {
     corners[0] * a + corners[1] * b + corners[2] * c
-}
-
-/// Quadrature of one triangle of a face against the mask.
-struct Cell<'a, F, const N: usize> {
-    walk: &'a Walk<'a, F, N>,
-    places: [DVec3; N],
-    sums: [f64; N],
-    /// Whether any of it lies under the mask.
-    covered: bool,
-}
-
-impl<F: Face<N>, const N: usize> Cell<'_, F, N> {
-    /// Splits the cell (`corners` in the face's coordinates, `ends` in space) until it is small against the radius, then
-    /// applies the mid-edge rule, exact for quadratics.
-    fn integrate(&mut self, corners: [DVec3; 3], ends: [DVec3; 3], depth: u32) {
-        let ([a, b, c], [la, lb, lc]) = (ends, corners);
-        let squared_edges = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
-        let longest = squared_edges[0].max(squared_edges[1]).max(squared_edges[2]);
-        let chord_mids = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
-        let mid_corners = [(la + lb) / 2.0, (lb + lc) / 2.0, (lc + la) / 2.0];
-        let mids = mid_corners.map(|l| place::<F, N>(&self.places, l));
-        // A face is at most quadratic: it leaves the plane of the cell's corners by `4 sum l_i l_j d_ij`, with the
-        // deviations `d` at the middles of the edges; the sum of the products is at most a third.
-        let deviation = (0..3).map(|k| (mids[k] - chord_mids[k]).length_squared()).fold(0.0, f64::max).sqrt();
-        // No point of the flat cell is farther from its centroid than two thirds of its longest edge.
-        let squared_radius = self.walk.squared_radius;
-        let reach = squared_radius.sqrt() + 2.0 / 3.0 * longest.sqrt() + 4.0 / 3.0 * deviation;
-        if ((a + b + c) / 3.0 - self.walk.centre).length_squared() > reach * reach {
-            return;
-        }
-        if longest > CELL_SIZE * CELL_SIZE * squared_radius && depth < MAX_DEPTH {
-            self.integrate([la, mid_corners[0], mid_corners[2]], [a, mids[0], mids[2]], depth + 1);
-            self.integrate([mid_corners[0], lb, mid_corners[1]], [mids[0], b, mids[1]], depth + 1);
-            self.integrate([mid_corners[2], mid_corners[1], lc], [mids[2], mids[1], c], depth + 1);
-            self.integrate(mid_corners, mids, depth + 1);
-            return;
-        }
-        // The cell's part of the face's coordinates, of which the whole has the area 1/2.
-        let part = 0.5 * ((lb.y - la.y) * (lc.z - la.z) - (lc.y - la.y) * (lb.z - la.z));
-        for (l, point) in mid_corners.into_iter().zip(mids) {
-            let inside = 1.0 - (point - self.walk.centre).length_squared() / squared_radius;
-            if inside > 0.0 {
-                self.covered = true;
-                let weight = part / 3.0 * self.stretch(l) * inside * inside;
-                for (sum, shape) in self.sums.iter_mut().zip(F::shapes(l)) {
-                    *sum += weight * shape;
-                }
-            }
-        }
-    }
-
-    /// Area in space over area in the face's coordinates.
-    fn stretch(&self, l: DVec3) -> f64 {
-        let mut tangents = [DVec3::ZERO; 2];
-        for (&x, [s, t]) in self.places.iter().zip(F::derivatives(l)) {
-            tangents[0] += x * s;
-            tangents[1] += x * t;
-        }
-        tangents[0].cross(tangents[1]).length()
-    }
 }
 
 fn squared_distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {

@@ -13,7 +13,7 @@
 use faer::dyn_stack::MemBuffer;
 use faer::{MatMut, Par};
 
-use super::{Energies, Newmark, Rayleigh};
+use super::{Energy, Newmark, Rayleigh};
 use crate::fem::{Supports, SymmetricCsc};
 use crate::green::Factor;
 use crate::{Error, Result};
@@ -183,11 +183,12 @@ impl Direct {
         state.steps += 1;
     }
 
-    /// Energies at a state.
-    pub fn energies(&self, state: &DirectState) -> Energies {
-        Energies {
+    /// Energy at a state.
+    pub fn energies(&self, state: &DirectState) -> Energy {
+        Energy {
             kinetic: 0.5 * quadratic_form(&self.mass, &state.v),
             strain: 0.5 * quadratic_form(&self.stiffness, &state.u),
+            coupling: 0.0,
             dissipated: state.dissipated,
             work: state.work,
         }

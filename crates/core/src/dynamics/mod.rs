@@ -9,23 +9,18 @@
 //! `direct` solves this on all dofs. `K`, `M` and `B` share eigenvectors, so `modal` carries the same motion by one
 //! recurrence of two numbers a mode: the same answer with all modes, and the cost of the modes kept with fewer.
 
-mod ahead;
 mod direct;
 mod energy;
 mod exponential;
-mod kernels;
-mod lanes;
 mod modal;
-mod projection;
 mod scheme;
 mod store;
 
-pub use ahead::{Ahead, Held, StepEnergy};
 pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
-pub use energy::{Account, Energies};
+pub use energy::Energy;
 pub use exponential::exact_step;
-pub use lanes::{LANES, Lanes};
-pub use modal::{Model, Scratch, State};
-pub use projection::Projection;
+pub use modal::{
+    EnergyAccount, LANES, Lanes, LoadedPatch, ModalModel, ModalScratch, ModalState, PredictedState, Projection, StepEnergy,
+};
 pub use scheme::{ModeStep, Newmark, Rayleigh};
 pub use store::{BASIS_VERSION, Basis, basis_key};

@@ -29,6 +29,7 @@ mod scaled;
 mod store;
 mod sweep;
 mod system;
+mod touch;
 mod tree;
 
 pub use columns::Problem;
@@ -37,4 +38,5 @@ pub use interior::Interior;
 pub use key::FORMAT_VERSION;
 pub use operator::{GreensFunction, Precision, Values};
 pub use plan::Plan;
+pub use touch::TouchNode;
 pub use precompute::{Found, Progress, Target, plan, precompute, precompute_to};

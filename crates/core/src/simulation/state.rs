@@ -1,16 +1,15 @@
-//! What evolves: each tool's contact.
+//! What evolves: contacts in slots, what tools remember, bodies.
 
 use glam::{DMat3, DVec3};
 
-use super::contact_forces::{solve_forces, update_compliance};
-use super::{Energy, MAX_TOOLS, Model, Motion};
-use crate::contact::{Patch, add_patch_response, compliance_block};
-use crate::dynamics::{Lanes, Projection};
+use super::motion::Motion;
+use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Model};
+use crate::contact::{Refusal, TouchPatch};
 
-/// What a tool is doing.
+/// What a contact does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// Not touching.
+    /// The slot is empty.
     #[default]
     Free,
     /// Touching, unilateral: never pulls.
@@ -19,181 +18,143 @@ pub enum Mode {
     Grab,
 }
 
-/// One tool's contact with the body.
-#[derive(Clone, Debug, Default)]
-pub struct ToolContact {
-    // Written when a contact begins or ends.
-    /// What the tool is doing.
+/// A contact of one tool with one body; vectors are in the body's frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Contact {
+    // Written when it begins.
+    /// What it does; [`Mode::Free`] is an empty slot.
     pub mode: Mode,
-    /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
-    /// the least reached since for one that was released inside, so that a force always starts from zero.
-    pub entry_depth: f64,
+    /// Index of the tool.
+    pub tool: usize,
+    /// Index of the body.
+    pub body: usize,
+    /// Counts the contacts since the start: tells one from another in the same slot.
+    pub serial: u64,
     /// Contact point on the untouched surface, m.
     pub point: DVec3,
     /// Unit outward normal there.
     pub normal: DVec3,
     /// Tool position at which the contact carries no force, m.
     pub anchor: DVec3,
-    /// Nodes under the contact.
-    pub patch: Patch,
 
     // Written every tick.
-    /// Tool position, m.
-    pub position: DVec3,
+    /// Displacement of the tool from the anchor, m.
+    pub displacement: DVec3,
     /// Force on the body, N.
     pub force: DVec3,
-    /// Whether a contact was refused: outside the touch region, or too many nodes.
-    pub refused: bool,
 }
 
-impl ToolContact {
-    /// Out of the scene: as at the start, without touching the patch's arrays.
-    pub(super) fn clear(&mut self, position: DVec3) {
-        (self.mode, self.entry_depth, self.patch.count) = (Mode::Free, 0.0, 0);
-        (self.point, self.normal, self.anchor, self.force) = Default::default();
-        (self.position, self.refused) = (position, false);
+/// Slots for contacts. The patches stand apart, so that looking through the slots touches little memory.
+#[derive(Clone, Debug)]
+pub struct Contacts {
+    pub(super) slots: [Contact; MAX_CONTACTS],
+    pub(super) patches: Vec<TouchPatch>,
+    pub(super) begun: u64,
+}
+
+impl Default for Contacts {
+    fn default() -> Self {
+        Self { slots: Default::default(), patches: vec![TouchPatch::default(); MAX_CONTACTS], begun: 0 }
     }
 }
 
-/// State of a simulation.
-#[derive(Clone, Debug, Default)]
-pub struct State {
-    /// The tools' contacts.
-    pub tools: [ToolContact; MAX_TOOLS],
-    /// Compliance between the tools in contact, m/N: static, at the Green's function's own Young's modulus, or of one step.
-    pub compliance: [[DMat3; MAX_TOOLS]; MAX_TOOLS],
+impl Contacts {
+    /// The contacts and their patches.
+    pub fn iter(&self) -> impl Iterator<Item = (&Contact, &TouchPatch)> {
+        self.slots.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free)
+    }
+
+    /// Slots of the contacts of a body.
+    pub(super) fn on(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..MAX_CONTACTS).filter(move |&slot| self.slots[slot].mode != Mode::Free && self.slots[slot].body == body)
+    }
+
+    /// Slot of the contact of a tool with a body.
+    pub(super) fn of(&self, tool: usize, body: usize) -> Option<usize> {
+        self.on(body).find(|&slot| self.slots[slot].tool == tool)
+    }
+
+    /// An empty slot.
+    pub(super) fn empty(&self) -> Option<usize> {
+        (0..MAX_CONTACTS).find(|&slot| self.slots[slot].mode == Mode::Free)
+    }
+
+    /// Empties a slot.
+    pub(super) fn clear(&mut self, slot: usize) {
+        self.slots[slot] = Contact::default();
+    }
+
+    /// Copies the contacts that there are; nothing is allocated.
+    pub(super) fn copy_from(&mut self, other: &Contacts) {
+        self.begun = other.begun;
+        for slot in 0..MAX_CONTACTS {
+            self.slots[slot] = other.slots[slot];
+            if other.slots[slot].mode != Mode::Free {
+                self.patches[slot].copy_from(&other.patches[slot]);
+            }
+        }
+    }
+}
+
+/// What a tool remembers of each body it does not touch.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ToolState {
+    /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
+    /// the least reached since for one that was released inside, so that a force always starts from zero.
+    pub entry_depth: [f64; MAX_BODIES],
+    /// Why no contact began where the tool reaches the body.
+    pub refused: [Option<Refusal>; MAX_BODIES],
+}
+
+/// What evolves of one body.
+#[derive(Clone, Debug)]
+pub struct BodyState {
     /// Young's modulus over the Green's function's.
     pub stiffness_scale: f64,
     /// How the body moves, if it does.
     pub motion: Option<Motion>,
 }
 
-/// What the frame side needs to draw a tick; its memory is sized once.
-#[derive(Clone, Debug, Default)]
-pub struct Snapshot {
-    /// The tools' contacts.
-    pub tools: [ToolContact; MAX_TOOLS],
-    /// Where the energy of a body in motion is.
-    pub energy: Option<Energy>,
-    /// Time that a body in motion has gone through since the start, s.
-    pub body_time: f64,
-    stiffness_scale: f64,
-    /// Modal displacements; empty for a body at rest.
-    modal: Vec<Lanes>,
+/// State of a simulation.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// One a body of the model.
+    pub bodies: Vec<BodyState>,
+    /// One a tool, used or not.
+    pub tools: [ToolState; MAX_TOOLS],
+    /// The contacts.
+    pub contacts: Contacts,
+    /// Static compliance between the contacts in two slots, at the Green's function's own Young's modulus, m/N.
+    pub(super) compliance: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
 }
 
 impl State {
-    /// Copies what is drawn; nothing is allocated where the snapshot is one of this model's.
-    pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
-        snapshot.tools.clone_from(&self.tools);
-        snapshot.stiffness_scale = self.stiffness_scale;
-        if let Some(motion) = &self.motion {
-            (snapshot.energy, snapshot.body_time) = (Some(motion.energy), motion.time);
-            snapshot.modal.copy_from_slice(motion.modal_displacements());
+    pub(super) fn at_rest(model: &Model) -> Self {
+        let body = |body: &super::BodyModel| BodyState {
+            stiffness_scale: 1.0,
+            motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
+        };
+        Self {
+            bodies: model.bodies.iter().map(body).collect(),
+            tools: Default::default(),
+            contacts: model.contacts(),
+            compliance: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
         }
     }
 
-    /// Displacement of one surface node, m; never allocates.
-    pub fn displacement_of(&mut self, model: &Model, node: usize) -> DVec3 {
-        let mut sum = DVec3::from_slice(&model.free[3 * node..3 * node + 3]);
-        for tool in self.tools.iter().filter(|tool| tool.mode != Mode::Free) {
-            sum += response_of(model, node, tool) / self.stiffness_scale;
+    /// Displacement of one surface node of a body, m, in the body's frame; never allocates.
+    pub fn displacement_of(&mut self, model: &Model, body: usize, node: usize) -> DVec3 {
+        let Self { bodies, contacts, .. } = self;
+        let (Some(fixed), Some(state)) = (model.bodies.get(body), bodies.get_mut(body)) else { return DVec3::ZERO };
+        let Some(free) = fixed.free.get(3 * node..3 * node + 3) else { return DVec3::ZERO };
+        let mut sum = DVec3::from_slice(free);
+        for slot in contacts.on(body) {
+            let compliance = contacts.patches[slot].compliance_at(&fixed.green, node);
+            sum += compliance * contacts.slots[slot].force / state.stiffness_scale;
         }
-        if let (Some(motion), Some(dynamics)) = (&mut self.motion, &model.dynamics) {
-            sum += motion.beyond_static(&dynamics.modes, &self.tools, node);
+        if let (Some(motion), Some(dynamics)) = (&mut state.motion, &fixed.dynamics) {
+            sum += motion.beyond_static(&dynamics.modes, contacts, body, node);
         }
         sum
-    }
-}
-
-/// Static displacement of a surface node under the force of a tool, m.
-fn response_of(model: &Model, node: usize, tool: &ToolContact) -> DVec3 {
-    let mut here = Patch { count: 1, ..Patch::default() };
-    (here.nodes[0], here.weights[0]) = (node as u32, 1.0);
-    compliance_block(model.green(), &here, &tool.patch).unwrap_or(DMat3::ZERO) * tool.force
-}
-
-impl Snapshot {
-    /// Of a body at rest.
-    pub fn new(model: &Model) -> Self {
-        let modal = model.dynamics.as_ref().map_or_else(Vec::new, |d| d.modes.state().q);
-        let energy = model.dynamics.as_ref().map(|_| Energy::default());
-        Self { stiffness_scale: 1.0, modal, energy, ..Self::default() }
-    }
-
-    /// Displacements of some surface nodes, m.
-    pub fn displacements_of(&self, model: &Model, nodes: &[u32]) -> Vec<DVec3> {
-        let moving = self.moving(model);
-        nodes.iter().map(|&node| self.displacement_of(model, &moving, node)).collect()
-    }
-
-    fn displacement_of(&self, model: &Model, moving: &[Lanes], node: u32) -> DVec3 {
-        let first = 3 * node as usize;
-        let mut sum = DVec3::from_slice(&model.free[first..first + 3]);
-        for tool in self.touching() {
-            sum += response_of(model, node as usize, tool) / self.stiffness_scale;
-        }
-        if let Some(dynamics) = &model.dynamics {
-            let mut moved = [0.0; 3];
-            dynamics.modes.read(moving, first.., &mut moved);
-            sum += DVec3::from(moved);
-        }
-        sum
-    }
-
-    /// Displacements of all surface dofs (3s), m: `u = u_free + Psi W f`, and `Phi (q - p / k)` of a body in motion.
-    pub fn displacements(&self, model: &Model) -> Vec<f64> {
-        let green = model.green();
-        let mut displacements = model.free.clone();
-        for tool in self.touching() {
-            let force = tool.force / self.stiffness_scale;
-            add_patch_response(green, &tool.patch, force, &mut displacements);
-        }
-        if let Some(dynamics) = &model.dynamics {
-            let mut moved = vec![0.0; displacements.len()];
-            dynamics.modes.read(&self.moving(model), 0.., &mut moved);
-            displacements.iter_mut().zip(&moved).for_each(|(u, m)| *u += m);
-        }
-        displacements
-    }
-
-    fn touching(&self) -> impl Iterator<Item = &ToolContact> {
-        self.tools.iter().filter(|tool| tool.mode != Mode::Free)
-    }
-
-    /// Modal displacements of what is drawn beside `Psi W f`, so that the modes left out are there too: `q - p / k`, `p`
-    /// being the modal force `Phi^T W f`.
-    fn moving(&self, model: &Model) -> Vec<Lanes> {
-        let Some(dynamics) = &model.dynamics else { return Vec::new() };
-        let modes = &dynamics.modes;
-        let (mut projection, mut moving) = (Projection::new(modes), self.modal.clone());
-        for tool in self.touching() {
-            projection.gather(modes, tool.patch.iter().map(|(node, weight)| (3 * node, weight)));
-            projection.take_static(modes, tool.force, &mut moving);
-        }
-        moving
-    }
-
-    /// Displacements of all surface dofs (3s) per unit way of `tool` from its anchor along each axis, m/m, for the contacts
-    /// as they are and a body come to rest. The answer is linear in the ways of all tools; `None` for a tool that does not
-    /// touch.
-    pub fn response(&self, model: &Model, tool: usize) -> Option<[Vec<f64>; 3]> {
-        if self.tools[tool].mode == Mode::Free {
-            return None;
-        }
-        let mut pushed = State { tools: self.tools.clone(), stiffness_scale: self.stiffness_scale, ..State::default() };
-        for other in 0..MAX_TOOLS {
-            if pushed.tools[other].mode != Mode::Free {
-                update_compliance(model, &mut pushed, other);
-            }
-            pushed.tools[other].position = pushed.tools[other].anchor;
-        }
-        Some(DVec3::AXES.map(|way| {
-            pushed.tools[tool].position = pushed.tools[tool].anchor + way;
-            solve_forces(model, &mut pushed);
-            let at_rest =
-                Self { tools: pushed.tools.clone(), stiffness_scale: self.stiffness_scale, ..Self::default() };
-            at_rest.displacements(model).iter().zip(&model.free).map(|(u, free)| u - free).collect()
-        }))
     }
 }

@@ -1,57 +1,100 @@
 //! The tick, in stages.
 
-use super::contact_forces::{solve_forces, update_compliance};
-use super::{Input, MAX_TOOLS, Mode, Model, Output, Scratch, State};
-use super::{motion, stick};
+use super::law::Approach;
+use super::{Input, Mode, Model, Output, Scratch, State, motion, solve, strike};
 
-/// Advances the contacts of all tools, and the body where it moves, by one tick; returns the forces on the devices.
+/// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) -> Output {
-    let scale = input.stiffness_scale;
-    state.stiffness_scale = if scale > 0.0 && scale.is_finite() && model.dynamics.is_none() { scale } else { 1.0 };
+    for body in 0..model.bodies.len() {
+        state.bodies[body].stiffness_scale = stiffness_scale(model, body, input);
 
-    // 1. A body that moves makes as many time steps as have come due; one that does not answers at once.
-    motion::strike(model, state, scratch, input);
-    motion::pass_time(model, state, input);
-    while motion::begin_step(model, state) {
-        // 2. Contacts begin and end, and push.
-        begin_and_end(model, state, scratch, input);
-        push(model, state);
+        // 1. A body that moves makes as many time steps as have come due; one that does not answers at once.
+        strike::begin(model, state, scratch, body, input);
+        motion::pass_time(model, state, body, &input.controls);
+        while motion::begin_step(model, state, body) {
+            // 2. Contacts begin, follow their tools, and push.
+            follow_tools(model, state, scratch, body, input);
+            push(model, state, scratch, body);
 
-        // 3. Their forces go into the motion.
-        if !motion::end_step(model, state) {
-            break;
+            // 3. Their forces go into the motion.
+            if !motion::end_step(model, state, body) {
+                break;
+            }
         }
     }
 
-    // 4. The device feels minus what the body feels.
+    // 4. The device feels minus what the bodies feel.
+    answer(model, state)
+}
+
+/// Contacts of a body begin, follow their tools, or end, by geometry and buttons.
+fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
+    for (tool, tool_model) in model.tools.iter().enumerate() {
+        let law = tool_model.law.law();
+        let said = &input.tools[tool];
+        let place = state.contacts.of(tool, body);
+        state.tools[tool].refused[body] = None;
+        if !said.active || input.controls.reset || !said.pose.is_finite() {
+            state.tools[tool].entry_depth[body] = 0.0;
+            place.iter().for_each(|&slot| state.contacts.clear(slot));
+            continue;
+        }
+        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), tool, body, input);
+        match place {
+            Some(slot) => {
+                if !law.update(&approach, &mut state.contacts.slots[slot]) {
+                    state.tools[tool].entry_depth[body] = approach.depth();
+                    state.contacts.clear(slot);
+                }
+            }
+            None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], scratch) {
+                Ok(Some(begun)) => solve::add_contact(model, state, begun, scratch),
+                Ok(None) => {}
+                Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
+            },
+        }
+    }
+}
+
+/// Forces of all contacts of a body together; a contact whose law ends it by its force is let go, and the rest solved
+/// again.
+fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
+    for _ in 0..model.tools.len() {
+        solve::contact_forces(model, state, &mut scratch.system, body);
+        let mut ended = false;
+        for slot in 0..state.contacts.slots.len() {
+            let contact = &state.contacts.slots[slot];
+            if contact.mode == Mode::Free || contact.body != body {
+                continue;
+            }
+            let tool = contact.tool;
+            if model.tools[tool].law.law().end(contact) {
+                let position = contact.anchor + contact.displacement;
+                let motion = state.bodies[body].motion.as_ref();
+                let approach = Approach::at(model, motion, tool, body, position);
+                state.tools[tool].entry_depth[body] = approach.depth();
+                state.contacts.clear(slot);
+                ended = true;
+            }
+        }
+        if !ended {
+            break;
+        }
+    }
+}
+
+fn answer(model: &Model, state: &State) -> Output {
     let mut output = Output::default();
-    for (tool, contact) in state.tools.iter().enumerate() {
-        output.force_on_device[tool] = -contact.force;
-        output.in_contact[tool] = contact.mode != Mode::Free;
+    for (contact, _) in state.contacts.iter() {
+        let placement = &model.bodies[contact.body].placement;
+        output.wrench_on_device[contact.tool].force -= placement.vector_to_world(contact.force);
+        output.in_contact[contact.tool] = true;
     }
     output
 }
 
-/// Begins and ends contacts by geometry and buttons.
-fn begin_and_end(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) {
-    for tool in 0..MAX_TOOLS {
-        let (contacts, moving) = (&mut state.tools, state.motion.as_ref());
-        if stick::advance(model, moving, &mut contacts[tool], scratch, &input.tools[tool], input) {
-            update_compliance(model, state, tool);
-        }
-    }
-}
-
-/// Forces of all contacts together; a press that would pull is let go, and the rest solved again.
-fn push(model: &Model, state: &mut State) {
-    for _ in 0..MAX_TOOLS {
-        solve_forces(model, state);
-        let mut released = false;
-        for contact in &mut state.tools {
-            released |= stick::release_if_pulling(model, state.motion.as_ref(), contact);
-        }
-        if !released {
-            break;
-        }
-    }
+/// A body in motion keeps the stiffness that its modes belong to.
+fn stiffness_scale(model: &Model, body: usize, input: &Input) -> f64 {
+    let scale = input.controls.stiffness_scale[body];
+    if scale > 0.0 && scale.is_finite() && !model.bodies[body].moves() { scale } else { 1.0 }
 }

@@ -1,7 +1,7 @@
 //! Motion kept one step ahead, so that a tick passes over the modes once.
 //!
 //! A step is a free motion and what new forces add to it. The free motion of the next step follows from the end of this
-//! one, so a single pass adds the forces, predicts, and reads what the prediction makes of the patches that are held. At
+//! one, so a single pass adds the forces, predicts, and reads what the prediction makes of the loaded patches. At
 //! the next tick their forces are known from a 3x3 solve alone.
 //!
 //! The pass takes blocks of modes through all its loops: what a block touches stays in the first-level cache, and each
@@ -10,16 +10,17 @@
 use glam::DVec3;
 use pulp::NullaryFnOnce;
 
-use super::kernels::{AddRows, Correct, Energy, Predict, Read};
+use super::kernels::{AddRows, Correct, EnergySums, Predict, Read};
 use super::lanes::Lanes;
-use super::{Model, Projection};
+use super::model::ModalModel;
+use super::projection::Projection;
 
 /// Groups of modes a block: about 20 arrays of them fill half of a first-level cache.
 const BLOCK: usize = 16;
 
 /// A motion and where it goes without new forces.
 #[derive(Clone, Debug)]
-pub struct Ahead {
+pub struct PredictedState {
     /// Modal displacements now, m sqrt(kg).
     pub q: Vec<Lanes>,
     /// Modal velocities now, m sqrt(kg)/s.
@@ -32,9 +33,9 @@ pub struct Ahead {
 
 /// A patch under a force, and where it goes.
 #[derive(Clone, Copy)]
-pub struct Held<'a> {
+pub struct LoadedPatch<'a> {
     /// Its rows.
-    pub patch: &'a Projection,
+    pub projection: &'a Projection,
     /// Force at the end of the step, N.
     pub force: DVec3,
     /// Mean displacement in the free motion of the next step, m; written by the step.
@@ -53,25 +54,25 @@ pub struct StepEnergy {
     pub dissipated: f64,
 }
 
-impl<'a> Held<'a> {
+impl<'a> LoadedPatch<'a> {
     /// A patch and its force.
-    pub fn new(patch: &'a Projection, force: DVec3) -> Self {
-        Self { patch, force, free: DVec3::ZERO, sums: Default::default() }
+    pub fn new(projection: &'a Projection, force: DVec3) -> Self {
+        Self { projection, force, free: DVec3::ZERO, sums: Default::default() }
     }
 }
 
-impl Model {
+impl ModalModel {
     /// At rest.
-    pub fn ahead(&self) -> Ahead {
+    pub fn predicted_state(&self) -> PredictedState {
         let zero = || vec![Lanes::default(); self.groups];
-        Ahead { q: zero(), v: zero(), free_q: zero(), free_v: zero() }
+        PredictedState { q: zero(), v: zero(), free_q: zero(), free_v: zero() }
     }
 
     /// Ends the step by the forces of patches, and predicts the next one.
-    pub fn advance(&self, state: &mut Ahead, held: &mut [Held<'_>]) -> StepEnergy {
-        let [kinetic, strain, power] = self.arch.dispatch(Advance { model: self, state, held });
-        for held in held {
-            held.free = DVec3::from(held.sums.map(Lanes::sum));
+    pub fn advance(&self, state: &mut PredictedState, patches: &mut [LoadedPatch<'_>]) -> StepEnergy {
+        let [kinetic, strain, power] = self.arch.dispatch(Advance { model: self, state, patches });
+        for patch in patches {
+            patch.free = DVec3::from(patch.sums.map(Lanes::sum));
         }
         StepEnergy { kinetic: 0.5 * kinetic, strain: 0.5 * strain, dissipated: 0.25 * self.dt * power }
     }
@@ -79,25 +80,25 @@ impl Model {
 
 /// The pass.
 struct Advance<'a, 'b> {
-    model: &'a Model,
-    state: &'a mut Ahead,
-    held: &'a mut [Held<'b>],
+    model: &'a ModalModel,
+    state: &'a mut PredictedState,
+    patches: &'a mut [LoadedPatch<'b>],
 }
 
 impl NullaryFnOnce for Advance<'_, '_> {
     type Output = [f64; 3];
     #[inline(always)]
     fn call(self) -> [f64; 3] {
-        let Self { model, state, held } = self;
+        let Self { model, state, patches } = self;
         let mut sums = [Lanes::default(); 3];
         let mut load = [Lanes::default(); BLOCK];
         for start in (0..model.groups).step_by(BLOCK) {
             let block = start..model.groups.min(start + BLOCK);
             let load = &mut load[..block.len()];
             load.fill(Lanes::default());
-            for held in held.iter() {
-                let rows = held.patch.rows().map(|row| &row[block.clone()]);
-                AddRows { load, rows, forces: held.force.to_array() }.call();
+            for patch in patches.iter() {
+                let rows = patch.projection.rows().map(|row| &row[block.clone()]);
+                AddRows { load, rows, forces: patch.force.to_array() }.call();
             }
             let [q, v] = [&mut state.q, &mut state.v].map(|x| &mut x[block.clone()]);
             let [free_q, free_v] = [&mut state.free_q, &mut state.free_v].map(|x| &mut x[block.clone()]);
@@ -106,15 +107,15 @@ impl NullaryFnOnce for Advance<'_, '_> {
             let (q_load, v_load) = (&model.q_load[block.clone()], &model.v_load[block.clone()]);
             Correct { q_load, v_load, q: free_q, v: free_v, load }.call();
             let (stiffness, damping) = (&model.stiffness[block.clone()], &model.damping[block.clone()]);
-            sums = Energy { q: free_q, v: free_v, before: v, stiffness, damping, sums }.call();
+            sums = EnergySums { q: free_q, v: free_v, before: v, stiffness, damping, sums }.call();
             q.copy_from_slice(free_q);
             v.copy_from_slice(free_v);
 
             // The next one, and what it makes of the patches.
             Predict { steps: &model.free_steps[block.clone()], q: free_q, v: free_v, load }.call();
-            for held in held.iter_mut() {
-                let rows = held.patch.rows().map(|row| &row[block.clone()]);
-                held.sums = Read { rows, x: free_q, sums: held.sums }.call();
+            for patch in patches.iter_mut() {
+                let rows = patch.projection.rows().map(|row| &row[block.clone()]);
+                patch.sums = Read { rows, x: free_q, sums: patch.sums }.call();
             }
         }
         sums.map(Lanes::sum)

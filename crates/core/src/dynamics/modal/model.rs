@@ -1,4 +1,4 @@
-//! Motion by modes: `Model` is fixed, `State` evolves, `Scratch` is reusable memory. Nothing here allocates in a step.
+//! Motion by modes: `ModalModel` is fixed, `ModalState` evolves, `ModalScratch` is reusable memory. Nothing here allocates in a step.
 //!
 //! `u = Phi q` with `Phi^T M Phi = I` and `Phi^T K Phi = diag(k)`. A step is `predict`, the motion under no new force,
 //! then `correct` by the modal force `p = Phi^T F` at the step's end. Between both a contact may ask for the free motion
@@ -8,11 +8,11 @@ use pulp::Arch;
 
 use super::kernels::{AddRows, Correct, Dot, FreeStep, Predict};
 use super::lanes::{LANES, Lanes, flat, grouped};
-use super::{ModeStep, Rayleigh};
+use crate::dynamics::scheme::{ModeStep, Rayleigh};
 use crate::{Error, Result};
 
 /// Modes, the rows of their shapes at the wanted dofs, and the step of each mode.
-pub struct Model {
+pub struct ModalModel {
     pub(super) arch: Arch,
     pub(super) groups: usize,
     modes: usize,
@@ -35,7 +35,7 @@ pub struct Model {
 
 /// Where the motion is.
 #[derive(Clone, Debug)]
-pub struct State {
+pub struct ModalState {
     /// Modal displacements, m sqrt(kg).
     pub q: Vec<Lanes>,
     /// Modal velocities, m sqrt(kg)/s.
@@ -48,12 +48,12 @@ pub struct State {
 
 /// Memory of a step.
 #[derive(Clone, Debug)]
-pub struct Scratch {
+pub struct ModalScratch {
     /// Modal force under construction, N/sqrt(kg).
     pub load: Vec<Lanes>,
 }
 
-impl Model {
+impl ModalModel {
     /// Prepares the recurrences.
     ///
     /// `shapes` holds `rows` x modes numbers, row by row; `step(k, c)` is the step of a mode with eigenvalue `k` and
@@ -114,25 +114,25 @@ impl Model {
     }
 
     /// At rest.
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> ModalState {
         let zero = || vec![Lanes::default(); self.groups];
-        State { q: zero(), v: zero(), load: zero(), steps: 0 }
+        ModalState { q: zero(), v: zero(), load: zero(), steps: 0 }
     }
 
     /// In motion, with modal displacements and velocities and no force.
     ///
     /// # Errors
     /// A length other than the number of modes.
-    pub fn state_from(&self, q: &[f64], v: &[f64]) -> Result<State> {
+    pub fn state_from(&self, q: &[f64], v: &[f64]) -> Result<ModalState> {
         if q.len() != self.modes || v.len() != self.modes {
             return Err(Error::Invalid(format!("{} modal displacements and velocities are needed", self.modes)));
         }
-        Ok(State { q: grouped(q), v: grouped(v), load: vec![Lanes::default(); self.groups], steps: 0 })
+        Ok(ModalState { q: grouped(q), v: grouped(v), load: vec![Lanes::default(); self.groups], steps: 0 })
     }
 
     /// Memory for a step.
-    pub fn scratch(&self) -> Scratch {
-        Scratch { load: vec![Lanes::default(); self.groups] }
+    pub fn scratch(&self) -> ModalScratch {
+        ModalScratch { load: vec![Lanes::default(); self.groups] }
     }
 
     /// Shapes at a row.
@@ -141,7 +141,7 @@ impl Model {
     }
 
     /// Advances by one step under forces `(row, N)` at the step's end; rows that do not exist are left out.
-    pub fn step(&self, state: &mut State, scratch: &mut Scratch, forces: &[(u32, f64)]) {
+    pub fn step(&self, state: &mut ModalState, scratch: &mut ModalScratch, forces: &[(u32, f64)]) {
         self.predict(state);
         scratch.load.fill(Lanes::default());
         for &(row, force) in forces {
@@ -158,14 +158,14 @@ impl Model {
     }
 
     /// The step without a new force: afterwards `q`, `v` are the free motion at the step's end.
-    pub fn predict(&self, state: &mut State) {
-        let State { q, v, load, .. } = state;
+    pub fn predict(&self, state: &mut ModalState) {
+        let ModalState { q, v, load, .. } = state;
         self.arch.dispatch(Predict { steps: &self.free_steps, q, v, load });
     }
 
     /// Completes a predicted step by the modal force at its end.
-    pub fn correct(&self, state: &mut State, load: &[Lanes]) {
-        let State { q, v, .. } = state;
+    pub fn correct(&self, state: &mut ModalState, load: &[Lanes]) {
+        let ModalState { q, v, .. } = state;
         self.arch.dispatch(Correct { q_load: &self.q_load, v_load: &self.v_load, q, v, load });
         state.load.copy_from_slice(load);
         state.steps += 1;
@@ -179,7 +179,7 @@ impl Model {
     }
 
     /// Modal accelerations, `p - c v - k q`, m sqrt(kg)/s^2.
-    pub fn accelerations(&self, state: &State) -> Vec<Lanes> {
+    pub fn accelerations(&self, state: &ModalState) -> Vec<Lanes> {
         (0..self.groups)
             .map(|g| {
                 let of = |l: usize| {

@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::Model;
+use super::model::ModalModel;
 use super::kernels::{AddRows, Compliance, Dot};
 use super::lanes::Lanes;
 
@@ -22,13 +22,13 @@ pub struct Projection {
 
 impl Projection {
     /// Memory for a patch; nothing gathered yet.
-    pub fn new(model: &Model) -> Self {
+    pub fn new(model: &ModalModel) -> Self {
         Self { axes: std::array::from_fn(|_| vec![Lanes::default(); model.groups]) }
     }
 
     /// Gathers a patch: the row of each node's first component (the other two follow it) and its weight. Rows that do not
     /// exist are left out.
-    pub fn gather(&mut self, model: &Model, nodes: impl Iterator<Item = (usize, f64)> + Clone) {
+    pub fn gather(&mut self, model: &ModalModel, nodes: impl Iterator<Item = (usize, f64)> + Clone) {
         for (axis, sum) in self.axes.iter_mut().enumerate() {
             sum.fill(Lanes::default());
             let mut nodes = nodes.clone().filter(|(first, _)| first + 2 < model.rows()).peekable();
@@ -44,17 +44,17 @@ impl Projection {
     }
 
     /// Mean over the patch of modal numbers: displacement, m, of the state's `q`, or velocity, m/s, of its `v`.
-    pub fn read(&self, model: &Model, x: &[Lanes]) -> DVec3 {
+    pub fn read(&self, model: &ModalModel, x: &[Lanes]) -> DVec3 {
         DVec3::from(self.rows().map(|row| model.arch.dispatch(Dot(row, x))))
     }
 
     /// Adds the modal force of a force on the patch, `load += G^T f`.
-    pub fn add_force(&self, model: &Model, force: DVec3, load: &mut [Lanes]) {
+    pub fn add_force(&self, model: &ModalModel, force: DVec3, load: &mut [Lanes]) {
         model.arch.dispatch(AddRows { load, rows: self.rows(), forces: force.to_array() });
     }
 
     /// Takes the static displacement under a force on the patch off modal displacements: `x -= diag(1/k) G^T f`.
-    pub fn take_static(&self, model: &Model, force: DVec3, x: &mut [Lanes]) {
+    pub fn take_static(&self, model: &ModalModel, force: DVec3, x: &mut [Lanes]) {
         let mut load = vec![Lanes::default(); x.len()];
         self.add_force(model, -force, &mut load);
         for ((x, p), flexibility) in x.iter_mut().zip(&load).zip(&model.flexibility) {
@@ -63,16 +63,16 @@ impl Projection {
     }
 
     /// Displacement of this patch at the step's end per unit force on `other` there, `G diag(q_load) G_other^T`, m/N.
-    pub fn step_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
+    pub fn step_compliance(&self, model: &ModalModel, other: &Projection) -> DMat3 {
         self.weighted(model, &model.q_load, other)
     }
 
     /// Static part that the modes kept carry, `G diag(1/k) G_other^T` over the elastic modes, m/N.
-    pub fn static_compliance(&self, model: &Model, other: &Projection) -> DMat3 {
+    pub fn static_compliance(&self, model: &ModalModel, other: &Projection) -> DMat3 {
         self.weighted(model, &model.flexibility, other)
     }
 
-    fn weighted(&self, model: &Model, weights: &[Lanes], other: &Projection) -> DMat3 {
+    fn weighted(&self, model: &ModalModel, weights: &[Lanes], other: &Projection) -> DMat3 {
         let left = self.rows();
         DMat3::from_cols_array_2d(&other.rows().map(|right| model.arch.dispatch(Compliance { weights, left, right })))
     }

@@ -4,7 +4,7 @@ use pulp::NullaryFnOnce;
 
 use super::lanes::{Lanes, dot};
 
-/// Coefficients of [`super::ModeStep`] that carry the state, for eight modes.
+/// Coefficients of [`crate::dynamics::ModeStep`] that carry the state, for eight modes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FreeStep {
     pub qq: Lanes,
@@ -58,7 +58,7 @@ impl NullaryFnOnce for Correct<'_> {
 }
 
 /// `v . v`, `q . k q` and `w . c w` with `w = before + v`, added to sums so far.
-pub struct Energy<'a> {
+pub struct EnergySums<'a> {
     pub q: &'a [Lanes],
     pub v: &'a [Lanes],
     pub before: &'a [Lanes],
@@ -67,7 +67,7 @@ pub struct Energy<'a> {
     pub sums: [Lanes; 3],
 }
 
-impl NullaryFnOnce for Energy<'_> {
+impl NullaryFnOnce for EnergySums<'_> {
     type Output = [Lanes; 3];
     #[inline(always)]
     fn call(self) -> [Lanes; 3] {

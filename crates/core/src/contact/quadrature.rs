@@ -1,0 +1,299 @@
+//! Quadrature of shape functions against the mask `phi = (1 - r^2/a^2)^2` over one drawn triangle of a face.
+//!
+//! The triangle is split until its cells' edges are below a fifth of the contact radius `a`; each cell takes the mid-edge
+//! rule, exact for quadratics. What is summed are the moments `int phi s^m t^n dA` over the face's coordinates, of which
+//! the shape functions' integrals are fixed combinations.
+//!
+//! On a flat face with straight edges all cells are alike, so their mid-edges form a lattice, and along a row of it `r^2`
+//! is a quadratic in the running index: the rows and the part of each that the ball of radius `a` covers are known
+//! beforehand. A curved face is split cell by cell, and its polynomial is prepared.
+
+use glam::DVec3;
+
+use crate::mesh::{Faces, Surface};
+
+/// Quadrature cells are split until their edges are below this part of the contact radius.
+const CELL_SIZE: f64 = 0.2;
+/// Depth at which splitting stops: cells of 2^-24 of a triangle's edge are below any physical radius.
+const MAX_DEPTH: u32 = 24;
+/// A face whose polynomial bends it by less than this part of its edges is flat to round-off.
+const FLAT: f64 = 1e-13;
+
+/// A face as a polynomial of its coordinates, `x = c0 + c1 s + c2 t + c3 s^2 + c4 s t + c5 t^2` with corners at (0, 0),
+/// (1, 0) and (0, 1).
+#[derive(Clone, Debug)]
+pub struct FaceGeometry {
+    coefficients: [DVec3; 6],
+    /// Whether the last three vanish.
+    flat: bool,
+    /// Area in space over area in coordinates, where the face is flat.
+    stretch: f64,
+}
+
+/// The faces of a surface at rest.
+pub struct PatchGeometry {
+    pub(super) faces: Vec<FaceGeometry>,
+    /// Largest contact radius known to be within the limit everywhere, m, as bits.
+    pub(super) verified_radius: std::sync::atomic::AtomicU64,
+}
+
+impl PatchGeometry {
+    /// Prepares the faces.
+    pub fn new(surface: &Surface) -> Self {
+        let at = |n: u32| surface.positions[n as usize];
+        let faces = match &surface.faces {
+            Faces::Linear(faces) => faces.iter().map(|f| FaceGeometry::linear(f.map(at))).collect(),
+            Faces::Quadratic(faces) => faces.iter().map(|f| FaceGeometry::quadratic(f.map(at))).collect(),
+        };
+        Self { faces, verified_radius: 0.into() }
+    }
+}
+
+/// A point of a face: its coordinates `s`, `t`.
+pub type Coordinates = [f64; 2];
+
+/// `int phi`, and with `s`, `t`, `s^2`, `s t`, `t^2`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Moments {
+    sums: [f64; 6],
+    /// Whether any of the triangle lies under the mask.
+    pub covered: bool,
+}
+
+impl Moments {
+    /// Integrals of the shape functions of a face with `N` nodes, 3 or 6.
+    pub fn of_shapes<const N: usize>(&self) -> [f64; N] {
+        let [one, s, t, ss, st, tt] = self.sums;
+        let linear = [one - s - t, s, t];
+        let quadratic = [
+            one - 3.0 * (s + t) + 2.0 * (ss + tt) + 4.0 * st,
+            2.0 * ss - s,
+            2.0 * tt - t,
+            4.0 * (s - ss - st),
+            4.0 * st,
+            4.0 * (t - st - tt),
+        ];
+        std::array::from_fn(|k| if N == 3 { linear[k] } else { quadratic[k] })
+    }
+
+    fn add(&mut self, [s, t]: Coordinates, weight: f64) {
+        self.covered = true;
+        for (sum, power) in self.sums.iter_mut().zip([1.0, s, t, s * s, s * t, t * t]) {
+            *sum += weight * power;
+        }
+    }
+}
+
+impl FaceGeometry {
+    fn linear([a, b, c]: [DVec3; 3]) -> Self {
+        let zero = DVec3::ZERO;
+        let coefficients = [a, b - a, c - a, zero, zero, zero];
+        Self { coefficients, flat: true, stretch: (b - a).cross(c - a).length() }
+    }
+
+    fn quadratic([x0, x1, x2, x01, x12, x20]: [DVec3; 6]) -> Self {
+        let bent = [2.0 * (x0 + x1 - 2.0 * x01), 4.0 * (x0 - x01 - x20 + x12), 2.0 * (x0 + x2 - 2.0 * x20)];
+        let size = (x1 - x0).length() + (x2 - x0).length();
+        if bent.iter().all(|c| c.length() <= FLAT * size) {
+            return Self::linear([x0, x1, x2]);
+        }
+        let coefficients =
+            [x0, 4.0 * x01 - 3.0 * x0 - x1, 4.0 * x20 - 3.0 * x0 - x2, bent[0], bent[1], bent[2]];
+        Self { coefficients, flat: false, stretch: 0.0 }
+    }
+
+    /// Position of a point.
+    pub fn at(&self, [s, t]: Coordinates) -> DVec3 {
+        let c = &self.coefficients;
+        let flat = c[0] + c[1] * s + c[2] * t;
+        if self.flat { flat } else { flat + (c[3] * s + c[4] * t) * s + c[5] * (t * t) }
+    }
+
+    /// Area in space over area in coordinates.
+    fn stretch_at(&self, [s, t]: Coordinates) -> f64 {
+        let c = &self.coefficients;
+        let along_s = c[1] + c[3] * (2.0 * s) + c[4] * t;
+        let along_t = c[2] + c[4] * s + c[5] * (2.0 * t);
+        along_s.cross(along_t).length()
+    }
+
+    /// Moments over the triangle with the given corners, positions `ends`, under the mask around `centre`.
+    pub fn integrate(&self, corners: [Coordinates; 3], ends: [DVec3; 3], centre: DVec3, radius: f64) -> Moments {
+        let mut moments = Moments::default();
+        if self.flat {
+            Lattice::new(corners, ends, centre, radius, self.stretch).integrate(&mut moments);
+        } else {
+            let mask = Mask { face: self, centre, squared_radius: radius * radius, radius };
+            mask.integrate(corners, ends, 0, &mut moments);
+        }
+        moments
+    }
+}
+
+/// Coordinates halfway between two points.
+pub fn halfway([a, b]: Coordinates, [c, d]: Coordinates) -> Coordinates {
+    [(a + c) / 2.0, (b + d) / 2.0]
+}
+
+/// Twice the area of a triangle in coordinates.
+fn doubled_area([a, b, c]: [Coordinates; 3]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+}
+
+/// The mid-edges of a flat triangle's cells, in units of half a cell's edge: points `(i, j)` with `i + j <= 2 n`, of which
+/// one index at least is odd, `n` cells to an edge. Distances are counted from the point `(i_0, j_0)` closest to the centre,
+/// so that they keep their digits where the triangle is much larger than the contact.
+struct Lattice {
+    /// `2 n`.
+    size: i64,
+    /// `i_0`, `j_0`.
+    origin: [i64; 2],
+    /// Squared distance from the centre over that of the radius: `d + e x + f y + g x^2 + h x y + k y^2` at the point
+    /// `(i_0 + x, j_0 + y)`.
+    distance: [f64; 6],
+    /// Coordinates at the origin, and their increments along `i` and `j`.
+    start: Coordinates,
+    along_i: Coordinates,
+    along_j: Coordinates,
+    /// Weight of a point that two cells share.
+    weight: f64,
+}
+
+impl Lattice {
+    fn new(corners: [Coordinates; 3], [a, b, c]: [DVec3; 3], centre: DVec3, radius: f64, stretch: f64) -> Self {
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let (mut depth, mut squared_edge) = (0, longest);
+        let finest = CELL_SIZE * CELL_SIZE * radius * radius;
+        while squared_edge > finest && depth < MAX_DEPTH {
+            squared_edge /= 4.0;
+            depth += 1;
+        }
+        let size = 2i64 << depth;
+        let step = 1.0 / size as f64;
+        let (u, v) = ((b - a) * step, (c - a) * step);
+        let origin = closest_point(a - centre, u, v, size);
+        let [i, j] = origin.map(|index| index as f64);
+        let (w, u, v) = ((a + u * i + v * j - centre) / radius, u / radius, v / radius);
+        let distance =
+            [w.length_squared(), 2.0 * w.dot(u), 2.0 * w.dot(v), u.length_squared(), 2.0 * u.dot(v), v.length_squared()];
+        let increment = |to: Coordinates| [(to[0] - corners[0][0]) * step, (to[1] - corners[0][1]) * step];
+        let (along_i, along_j) = (increment(corners[1]), increment(corners[2]));
+        // A cell has `4 step^2` of the triangle's area; the rule gives a third of it to each of its mid-edges.
+        let weight = 2.0 * stretch * 0.5 * doubled_area(corners) * 4.0 * step * step / 3.0;
+        let start = [0, 1].map(|k| corners[0][k] + along_i[k] * i + along_j[k] * j);
+        Self { size, origin, distance, start, along_i, along_j, weight }
+    }
+
+    fn integrate(&self, moments: &mut Moments) {
+        let [d, e, f, g, h, k] = self.distance;
+        let [i, j] = self.origin;
+        // The least distance along a row, over real x, is a quadratic in y as well.
+        let least = [d - e * e / (4.0 * g), f - e * h / (2.0 * g), k - h * h / (4.0 * g)];
+        let Some((first, last)) = below_one(least, -j, self.size - j) else { return };
+        for row in first..=last {
+            let y = row as f64;
+            let along = [d + (f + k * y) * y, e + h * y, g];
+            if let Some((low, high)) = below_one(along, -i, self.size - (j + row) - i) {
+                self.integrate_row(row, along, low, high, moments);
+            }
+        }
+    }
+
+    /// Adds the points from `low` to `high` of a row, all counted from the origin.
+    fn integrate_row(&self, row: i64, [d, e, g]: [f64; 3], low: i64, high: i64, moments: &mut Moments) {
+        let [i, j] = [self.origin[0], self.origin[1] + row];
+        // On even rows every other point is a corner of cells.
+        let (step, mut x) = if j % 2 == 0 { (2, low + (i + low + 1) % 2) } else { (1, low) };
+        let mut sums = [0.0; 3];
+        while x <= high {
+            let place = x as f64;
+            let inside = (1.0 - (d + (e + g * place) * place)).max(0.0);
+            // Points on the triangle's edges belong to one cell only.
+            let on_edge = i + x == 0 || j == 0 || i + x + j == self.size;
+            let weight = if on_edge { 0.5 } else { 1.0 } * inside * inside;
+            sums[0] += weight;
+            sums[1] += weight * place;
+            sums[2] += weight * (place * place);
+            x += step;
+        }
+        if sums[0] <= 0.0 {
+            return;
+        }
+        moments.covered = true;
+        let [zeroth, first, second] = sums.map(|sum| self.weight * sum);
+        let [s, t] = [0, 1].map(|k| self.start[k] + self.along_j[k] * row as f64);
+        let [ds, dt] = self.along_i;
+        let along = [
+            zeroth,
+            s * zeroth + ds * first,
+            t * zeroth + dt * first,
+            s * s * zeroth + 2.0 * s * ds * first + ds * ds * second,
+            s * t * zeroth + (s * dt + t * ds) * first + ds * dt * second,
+            t * t * zeroth + 2.0 * t * dt * first + dt * dt * second,
+        ];
+        moments.sums.iter_mut().zip(along).for_each(|(sum, part)| *sum += part);
+    }
+}
+
+/// Whole `(i, j)` within 0 to `size` about where `offset + i u + j v` is shortest.
+fn closest_point(offset: DVec3, u: DVec3, v: DVec3, size: i64) -> [i64; 2] {
+    let (uu, uv, vv) = (u.length_squared(), u.dot(v), v.length_squared());
+    let (ou, ov) = (offset.dot(u), offset.dot(v));
+    let determinant = uu * vv - uv * uv;
+    let whole = |numerator: f64| (numerator / determinant).round().clamp(0.0, size as f64) as i64;
+    [whole(uv * ov - vv * ou), whole(uv * ou - uu * ov)]
+}
+
+/// Whole numbers from `least` to `most` at which `c0 + c1 x + c2 x^2 < 1`, an interval that may be one too wide at its ends.
+fn below_one([c0, c1, c2]: [f64; 3], least: i64, most: i64) -> Option<(i64, i64)> {
+    let discriminant = c1 * c1 - 4.0 * c2 * (c0 - 1.0);
+    if !(discriminant > 0.0 && c2 > 0.0) {
+        return None;
+    }
+    let (middle, half) = (-c1 / (2.0 * c2), discriminant.sqrt() / (2.0 * c2));
+    let (low, high) = ((middle - half).floor().max(least as f64), (middle + half).ceil().min(most as f64));
+    (low <= high).then_some((low as i64, high as i64))
+}
+
+/// The mask over a curved face.
+struct Mask<'a> {
+    face: &'a FaceGeometry,
+    centre: DVec3,
+    radius: f64,
+    squared_radius: f64,
+}
+
+impl Mask<'_> {
+    /// Splits the cell (`corners` in the face's coordinates, `ends` in space) until it is small against the radius, then
+    /// applies the mid-edge rule.
+    fn integrate(&self, corners: [Coordinates; 3], ends: [DVec3; 3], depth: u32, moments: &mut Moments) {
+        let ([a, b, c], [la, lb, lc]) = (ends, corners);
+        let squared_edges = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
+        let longest = squared_edges[0].max(squared_edges[1]).max(squared_edges[2]);
+        let middles = [halfway(la, lb), halfway(lb, lc), halfway(lc, la)];
+        let at = middles.map(|l| self.face.at(l));
+        let chords = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
+        // A face is at most quadratic: it leaves the plane of the cell's corners by `4 sum l_i l_j d_ij`, with the
+        // deviations `d` at the middles of the edges; the sum of the products is at most a third.
+        let squared_deviation = (0..3).map(|k| (at[k] - chords[k]).length_squared()).fold(0.0, f64::max);
+        // No point of the flat cell is farther from its centroid than two thirds of its longest edge.
+        let reach = self.radius + 2.0 / 3.0 * longest.sqrt() + 4.0 / 3.0 * squared_deviation.sqrt();
+        if ((a + b + c) / 3.0 - self.centre).length_squared() > reach * reach {
+            return;
+        }
+        if longest > CELL_SIZE * CELL_SIZE * self.squared_radius && depth < MAX_DEPTH {
+            self.integrate([la, middles[0], middles[2]], [a, at[0], at[2]], depth + 1, moments);
+            self.integrate([middles[0], lb, middles[1]], [at[0], b, at[1]], depth + 1, moments);
+            self.integrate([middles[2], middles[1], lc], [at[2], at[1], c], depth + 1, moments);
+            self.integrate(middles, at, depth + 1, moments);
+            return;
+        }
+        let part = 0.5 * doubled_area(corners);
+        for (middle, point) in middles.into_iter().zip(at) {
+            let inside = 1.0 - (point - self.centre).length_squared() / self.squared_radius;
+            if inside > 0.0 {
+                moments.add(middle, part / 3.0 * self.face.stretch_at(middle) * inside * inside);
+            }
+        }
+    }
+}

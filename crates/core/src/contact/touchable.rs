@@ -1,0 +1,91 @@
+//! A patch that may be touched: all of its nodes have columns of `Psi`. Where one has none, that is an outcome, not a zero.
+
+use glam::{DMat3, DVec3};
+
+use super::patch::{MAX_PATCH_NODES, Patch};
+use crate::green::{GreensFunction, TouchNode};
+
+/// Why no contact begins at a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// A node under the contact lies outside the touch region; its rank among the surface nodes.
+    NotTouchable(u32),
+    /// The contact covers more than [`MAX_PATCH_NODES`] nodes.
+    TooManyNodes,
+}
+
+impl Refusal {
+    /// One line for people.
+    pub fn message(self) -> &'static str {
+        match self {
+            Refusal::NotTouchable(_) => "the contact reaches outside the touch region",
+            Refusal::TooManyNodes => "the contact covers too many nodes: choose a smaller contact radius",
+        }
+    }
+}
+
+/// A patch with the columns of its nodes.
+#[derive(Clone, Debug)]
+pub struct TouchPatch {
+    patch: Patch,
+    columns: [TouchNode; MAX_PATCH_NODES],
+}
+
+impl Default for TouchPatch {
+    fn default() -> Self {
+        Self { patch: Patch::default(), columns: [TouchNode::default(); MAX_PATCH_NODES] }
+    }
+}
+
+impl TouchPatch {
+    /// Becomes `patch`; on an error it is empty.
+    ///
+    /// # Errors
+    /// The first node that may not be touched.
+    pub fn admit(&mut self, green: &GreensFunction, patch: &Patch) -> Result<(), Refusal> {
+        self.patch.count = 0;
+        for (column, (node, _)) in self.columns.iter_mut().zip(patch.iter()) {
+            *column = green.touchable(node).ok_or(Refusal::NotTouchable(node as u32))?;
+        }
+        self.patch.copy_from(patch);
+        Ok(())
+    }
+
+    /// Nodes and weights.
+    pub fn patch(&self) -> &Patch {
+        &self.patch
+    }
+
+    fn columns(&self) -> &[TouchNode] {
+        &self.columns[..self.patch.count]
+    }
+
+    /// `W^T Psi W`: mean displacement of the patch per unit force spread over it, m/N. Supported dofs do not move.
+    pub fn own_compliance(&self, green: &GreensFunction) -> DMat3 {
+        green.symmetric_block(self.patch.nodes(), self.columns(), self.patch.weights())
+    }
+
+    /// `W^T Psi W_other`: mean displacement of this patch per unit force spread over the other, m/N.
+    pub fn compliance_with(&self, green: &GreensFunction, other: &TouchPatch) -> DMat3 {
+        let (nodes, weights) = (self.patch.nodes(), self.patch.weights());
+        green.weighted_block(nodes, weights, other.columns(), other.patch.weights())
+    }
+
+    /// Displacement of any surface node per unit force spread over the patch, m/N.
+    pub fn compliance_at(&self, green: &GreensFunction, node: usize) -> DMat3 {
+        green.weighted_block(&[node as u32], &[1.0], self.columns(), self.patch.weights())
+    }
+
+    /// Adds `Psi W f` to the displacements of all surface dofs (3s), m.
+    pub fn add_response(&self, green: &GreensFunction, force: DVec3, displacements: &mut [f64]) {
+        let forces: Vec<(TouchNode, DVec3)> =
+            self.columns().iter().zip(self.patch.weights()).map(|(&column, &weight)| (column, weight * force)).collect();
+        green.add_forces(&forces, displacements);
+    }
+
+    /// Becomes a copy of another; only the entries in use are copied.
+    pub fn copy_from(&mut self, other: &TouchPatch) {
+        self.patch.copy_from(&other.patch);
+        self.columns[..other.patch.count].copy_from_slice(other.columns());
+    }
+}

@@ -1,0 +1,133 @@
+//! A body as the tick sees it: its Green's function, its surface prepared for contact, what moves it.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::Placement;
+use crate::contact::{PatchGeometry, SurfacePoint, SurfaceQuery};
+use crate::dynamics::ModalModel;
+use crate::green::GreensFunction;
+use crate::mesh::Surface;
+use crate::{Error, Result};
+
+/// Shortest and longest time step, s: a tick makes at most ten of the one, and feels the other.
+pub(super) const TIME_STEPS: std::ops::RangeInclusive<f64> = 1e-4..=1e-2;
+
+/// What sets a body in motion: its modes at the surface dofs, and the coupling to a tool.
+pub struct BodyDynamics {
+    pub(crate) modes: ModalModel,
+    /// Spring between a patch and its tool, N/m.
+    pub coupling: f64,
+}
+
+impl BodyDynamics {
+    /// `modes` has a row for every surface dof.
+    ///
+    /// # Errors
+    /// A time step that ticks cannot make, or a coupling that is not positive.
+    pub fn new(modes: ModalModel, coupling: f64) -> Result<Self> {
+        if !TIME_STEPS.contains(&modes.dt) {
+            let (low, high) = (TIME_STEPS.start(), TIME_STEPS.end());
+            return Err(Error::Invalid(format!("the time step must lie between {low} and {high} s, got {}", modes.dt)));
+        }
+        if !(coupling > 0.0 && coupling.is_finite()) {
+            return Err(Error::Invalid(format!("the coupling must be positive, got {coupling} N/m")));
+        }
+        Ok(Self { modes, coupling })
+    }
+}
+
+/// A body of a scene. Everything in it is in the body's own frame but its placement.
+pub struct BodyModel {
+    /// Where it stands.
+    pub placement: Placement,
+    pub(crate) green: Arc<GreensFunction>,
+    /// Displacements of the surface under the reference loads, m (3s): the shape that tools meet.
+    pub(super) free: Vec<f64>,
+    pub(super) query: SurfaceQuery,
+    /// The surface under the reference loads.
+    pub(super) loaded: Surface,
+    /// Faces at rest, prepared for the quadrature of contact weights.
+    pub(crate) geometry: PatchGeometry,
+    /// What moves the body; none answers as if it came to rest within each tick.
+    pub(super) dynamics: Option<BodyDynamics>,
+    /// Mean length of the edges of the drawn triangles, m.
+    pub(super) mean_edge: f64,
+}
+
+impl BodyModel {
+    /// Prepares the surface.
+    ///
+    /// # Errors
+    /// A surface that cannot be searched.
+    pub fn new(green: Arc<GreensFunction>, placement: Placement) -> Result<Self> {
+        let free = green.free_displacements();
+        let shifts = free.chunks_exact(3).map(DVec3::from_slice);
+        let positions = green.surface.positions.iter().zip(shifts).map(|(&p, u)| p + u).collect();
+        let loaded = Surface::new(positions, green.surface.faces.clone())?;
+        let query = SurfaceQuery::new(&loaded)?;
+        let geometry = PatchGeometry::new(&green.surface);
+        let mean_edge = mean_edge(&green.surface);
+        Ok(Self { placement, green, free, query, loaded, geometry, dynamics: None, mean_edge })
+    }
+
+    /// The same body in motion.
+    ///
+    /// # Errors
+    /// Modes that are not given at every surface dof.
+    pub fn with_dynamics(self, dynamics: BodyDynamics) -> Result<Self> {
+        let (rows, dofs) = (dynamics.modes.rows(), self.free.len());
+        if rows != dofs {
+            return Err(Error::Invalid(format!("the modes have {rows} rows, the surface has {dofs} dofs")));
+        }
+        Ok(Self { dynamics: Some(dynamics), ..self })
+    }
+
+    /// The Green's function behind the body.
+    pub fn green(&self) -> &GreensFunction {
+        &self.green
+    }
+
+    /// Whether the body moves.
+    pub fn moves(&self) -> bool {
+        self.dynamics.is_some()
+    }
+
+    /// Displacements of the surface dofs under the reference loads, m (3s).
+    pub fn free_displacements(&self) -> &[f64] {
+        &self.free
+    }
+
+    /// Point of the loaded surface, untouched by tools, that is closest to `point`.
+    pub(super) fn closest(&self, point: DVec3) -> Option<SurfacePoint> {
+        self.query.closest(&self.loaded, point)
+    }
+
+    /// Where the material under a point of the loaded surface is in the unloaded body. Weights are taken there, so that
+    /// a contact carries the same nodes whatever the loads.
+    pub(super) fn material_point(&self, loaded: &SurfacePoint) -> SurfacePoint {
+        let corners = self.green.surface.corners(loaded.triangle);
+        let position = corners.into_iter().zip(loaded.barycentric).map(|(p, n)| n * p).sum();
+        SurfacePoint { position, ..*loaded }
+    }
+
+    /// Refuses a contact radius under which some contact could cover more nodes than a tick can weigh.
+    ///
+    /// # Errors
+    /// The radius, with the largest that is allowed.
+    pub fn check_contact_radius(&self, radius: f64) -> Result<()> {
+        if !(radius >= 0.0 && radius.is_finite()) {
+            return Err(Error::Invalid(format!("the contact radius must not be negative, got {radius} m")));
+        }
+        self.geometry.check_radius(&self.green.surface, radius)
+    }
+}
+
+fn mean_edge(surface: &Surface) -> f64 {
+    let lengths = surface.triangles.iter().flat_map(|t| {
+        let [a, b, c] = t.map(|n| surface.positions[n as usize]);
+        [a.distance(b), b.distance(c), c.distance(a)]
+    });
+    lengths.sum::<f64>() / (3 * surface.triangles.len()).max(1) as f64
+}

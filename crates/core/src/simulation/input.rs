@@ -1,0 +1,159 @@
+//! What hands and settings say at a tick, and what the tick answers.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::{MAX_BODIES, MAX_TOOLS};
+
+/// Place and direction of a rigid tool.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Of the tip, m, in the world.
+    pub position: DVec3,
+    /// World from tool, a unit quaternion.
+    pub orientation: DQuat,
+}
+
+impl Pose {
+    /// At a place, not turned.
+    pub fn at(position: DVec3) -> Self {
+        Self { position, orientation: DQuat::IDENTITY }
+    }
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.position.is_finite() && self.orientation.is_finite()
+    }
+}
+
+/// Velocity of a rigid tool.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Twist {
+    /// Of the tip, m/s, in the world.
+    pub linear: DVec3,
+    /// Angular velocity, rad/s, in the world.
+    pub angular: DVec3,
+}
+
+/// Force and torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// N, in the world.
+    pub force: DVec3,
+    /// About the tip, N m, in the world.
+    pub torque: DVec3,
+}
+
+/// What one device says at a tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ToolInput {
+    /// Where the tool is.
+    pub pose: Pose,
+    /// How it moves.
+    pub twist: Twist,
+    /// Whether the tool is in the scene at all.
+    pub active: bool,
+    /// Whether it holds on to the surface it touches.
+    pub grab: bool,
+}
+
+/// A blow for a body in motion.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Strike {
+    /// Which body.
+    pub body: usize,
+    /// Where, m, in the world; the closest surface point is struck.
+    pub point: DVec3,
+    /// Impulse on the body, N s, in the world.
+    pub impulse: DVec3,
+    /// Radius of the patch that is struck, m.
+    pub radius: f64,
+    /// How long it takes, s of the body's time: the force is half a wave, and lasts one step at least.
+    pub duration: f64,
+}
+
+/// What settings say at a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Controls {
+    /// Contact radius of each tool's contacts that begin now, m.
+    pub contact_radius: [f64; MAX_TOOLS],
+    /// Young's modulus of each body over that of its Green's function: it only scales forces.
+    pub stiffness_scale: [f64; MAX_BODIES],
+    /// Largest strain to which tools may take a body; zero for any.
+    pub strain_limit: f64,
+    /// Let go of everything, and bring moving bodies to rest.
+    pub reset: bool,
+    /// How far bodies in motion advance in this tick, s.
+    pub advance: f64,
+    /// A strike that begins now.
+    pub strike: Option<Strike>,
+}
+
+impl Default for Controls {
+    fn default() -> Self {
+        Self {
+            contact_radius: [0.0; MAX_TOOLS],
+            stiffness_scale: [1.0; MAX_BODIES],
+            strain_limit: 0.0,
+            reset: false,
+            advance: 1e-3,
+            strike: None,
+        }
+    }
+}
+
+/// Everything that comes into a tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Input {
+    /// What the devices say.
+    pub tools: [ToolInput; MAX_TOOLS],
+    /// What the settings say.
+    pub controls: Controls,
+}
+
+/// What the tick answers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Output {
+    /// On each device: minus what the tool does to the bodies. Not yet made safe.
+    pub wrench_on_device: [Wrench; MAX_TOOLS],
+    /// Whether each tool touches.
+    pub in_contact: [bool; MAX_TOOLS],
+    /// Whether each tool is held back by the limit of strain.
+    pub limited: [bool; MAX_TOOLS],
+}
+
+/// Where a body stands in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Of the body's origin, m.
+    pub position: DVec3,
+    /// World from body, a rotation.
+    pub rotation: DMat3,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self { position: DVec3::ZERO, rotation: DMat3::IDENTITY }
+    }
+}
+
+impl Placement {
+    /// A point of the world in the body's frame.
+    pub fn point_to_body(&self, point: DVec3) -> DVec3 {
+        self.vector_to_body(point - self.position)
+    }
+
+    /// A vector of the world in the body's frame.
+    pub fn vector_to_body(&self, vector: DVec3) -> DVec3 {
+        self.rotation.transpose() * vector
+    }
+
+    /// A point of the body's frame in the world.
+    pub fn point_to_world(&self, point: DVec3) -> DVec3 {
+        self.rotation * point + self.position
+    }
+
+    /// A vector of the body's frame in the world.
+    pub fn vector_to_world(&self, vector: DVec3) -> DVec3 {
+        self.rotation * vector
+    }
+}

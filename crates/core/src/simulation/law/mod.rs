@@ -1,0 +1,134 @@
+//! Contact laws: when a contact begins, how it follows its tool, how it gives, when it ends.
+//!
+//! A law is a file here that implements [`Law`]; `step` calls it and knows nothing else of it. What a law does must not
+//! allocate, and must not hand out energy over a closed path of the tool.
+
+mod node;
+mod patch;
+mod stick;
+
+use glam::{DMat3, DVec3};
+
+use super::body::{BodyDynamics, BodyModel};
+use super::motion::Motion;
+use super::{Contact, Input, Model, Scratch, ToolModel};
+use crate::contact::{Refusal, SurfacePoint};
+
+/// A tool farther than this many radii from the surface at rest meets it there: displacements are smaller than that.
+const MOVING_REACH: f64 = 4.0;
+
+/// The laws there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LawKind {
+    /// A smooth patch of a physical radius that sticks to the material it first touched.
+    #[default]
+    Patch,
+    /// The contact of Jun, Choi and Cho: the node closest to where the tool first touched.
+    Node,
+}
+
+impl LawKind {
+    /// `"patch"` or `"node"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            LawKind::Patch => "patch",
+            LawKind::Node => "node",
+        }
+    }
+
+    /// The law called `name`.
+    pub fn parse(name: &str) -> Option<Self> {
+        [LawKind::Patch, LawKind::Node].into_iter().find(|kind| kind.name() == name)
+    }
+
+    pub(super) fn law(self) -> &'static dyn Law {
+        match self {
+            LawKind::Patch => &stick::Sticking(patch::Patch),
+            LawKind::Node => &stick::Sticking(node::Node),
+        }
+    }
+}
+
+/// What a contact law says, in the order of a tick.
+pub trait Law: Sync {
+    /// For a tool without a contact: begins one where it reaches the body, with its patch in `scratch`. `entry_depth` is what
+    /// the tool remembers of this body.
+    ///
+    /// # Errors
+    /// Why the body cannot be touched there.
+    fn begin(
+        &self,
+        approach: &Approach<'_>,
+        entry_depth: &mut f64,
+        scratch: &mut Scratch,
+    ) -> Result<Option<Contact>, Refusal>;
+
+    /// Follows the tool; false ends the contact.
+    fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool;
+
+    /// Compliance in series with the body's own at the contact, the same in all directions, m/N.
+    fn respond(&self, tool: &ToolModel, dynamics: Option<&BodyDynamics>, own: &DMat3) -> f64;
+
+    /// Whether the contact ends by the force that was found.
+    fn end(&self, contact: &Contact) -> bool;
+}
+
+/// A tool beside a body; vectors are in the body's frame.
+pub struct Approach<'a> {
+    /// The body.
+    pub body: &'a BodyModel,
+    /// Index of the body.
+    pub body_index: usize,
+    /// How it moves.
+    pub motion: Option<&'a Motion>,
+    /// The tool.
+    pub tool: &'a ToolModel,
+    /// Index of the tool.
+    pub tool_index: usize,
+    /// Where the tool is, m.
+    pub position: DVec3,
+    /// Whether it holds on to what it touches.
+    pub grab: bool,
+    /// Contact radius of a contact that begins now, m.
+    pub contact_radius: f64,
+}
+
+impl<'a> Approach<'a> {
+    /// Of a tool as its device has it.
+    pub fn new(model: &'a Model, motion: Option<&'a Motion>, tool: usize, body: usize, input: &Input) -> Self {
+        let said = &input.tools[tool];
+        let position = model.bodies[body].placement.point_to_body(said.pose.position);
+        let contact_radius = input.controls.contact_radius[tool];
+        Self { grab: said.grab, contact_radius, ..Self::at(model, motion, tool, body, position) }
+    }
+
+    /// Of a tool at a place of the body's frame.
+    pub fn at(model: &'a Model, motion: Option<&'a Motion>, tool: usize, body: usize, position: DVec3) -> Self {
+        Self {
+            body: &model.bodies[body],
+            body_index: body,
+            motion,
+            tool: &model.tools[tool],
+            tool_index: tool,
+            position,
+            grab: false,
+            contact_radius: 0.0,
+        }
+    }
+
+    /// Closest point of the surface where it is now, as a point of the loaded surface at rest.
+    pub fn closest(&self) -> Option<SurfacePoint> {
+        let closest = self.body.closest(self.position)?;
+        match (self.motion, &self.body.dynamics) {
+            (Some(motion), Some(dynamics)) if closest.signed_distance.abs() < MOVING_REACH * self.tool.radius => {
+                self.body.closest(self.position - motion.displacement_at(self.body, &dynamics.modes, &closest))
+            }
+            _ => Some(closest),
+        }
+    }
+
+    /// How deep the tool is in the untouched surface, m; zero outside.
+    pub fn depth(&self) -> f64 {
+        self.closest().map_or(0.0, |closest| self.tool.radius - closest.signed_distance).max(0.0)
+    }
+}

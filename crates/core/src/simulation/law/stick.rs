@@ -1,0 +1,85 @@
+//! Contacts that stick: a footprint stays on the material it first touched until release.
+//!
+//! With a footprint that does not move, `f = C^-1 d` is the gradient of `d^T C^-1 d / 2`: a closed path of the tool does no
+//! net work. The anchor lies where the surface, sagged under the reference loads, was met: the tool's displacement from it
+//! is the whole `d - W^T u_free`. A press lets go where it would pull; its tangential energy is then lost, never gained.
+
+use glam::{DMat3, DVec3};
+
+use super::{Approach, Law};
+use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
+use crate::simulation::body::BodyDynamics;
+use crate::simulation::{Contact, Mode, Scratch, ToolModel};
+
+/// A grab reaches this many tool radii from the surface.
+const GRAB_REACH: f64 = 2.0;
+
+/// Which nodes a contact takes, and with what weights.
+pub trait Footprint: Sync {
+    /// Weighs the nodes around `centre`, a point of the unloaded surface, into `scratch.candidate`.
+    ///
+    /// # Errors
+    /// More nodes than a tick can weigh.
+    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal>;
+}
+
+/// The sticking law on a footprint.
+pub struct Sticking<F>(pub F);
+
+impl<F: Footprint> Law for Sticking<F> {
+    fn begin(
+        &self,
+        approach: &Approach<'_>,
+        entry_depth: &mut f64,
+        scratch: &mut Scratch,
+    ) -> Result<Option<Contact>, Refusal> {
+        let Some(closest) = approach.closest() else { return Ok(None) };
+        let radius = approach.tool.radius;
+        let depth = radius - closest.signed_distance;
+        *entry_depth = entry_depth.min(depth.max(0.0));
+        let reaches = match approach.grab {
+            true => closest.signed_distance.abs() < GRAB_REACH * radius,
+            false => depth > *entry_depth,
+        };
+        if !reaches {
+            return Ok(None);
+        }
+        self.0.cover(approach, &approach.body.material_point(&closest), scratch)?;
+        let excess = if approach.grab { 0.0 } else { depth - *entry_depth };
+        let anchor = approach.position + closest.normal * excess;
+        Ok(Some(Contact {
+            mode: if approach.grab { Mode::Grab } else { Mode::Press },
+            tool: approach.tool_index,
+            body: approach.body_index,
+            point: closest.position,
+            normal: closest.normal,
+            anchor,
+            displacement: approach.position - anchor,
+            force: DVec3::ZERO,
+            serial: 0,
+        }))
+    }
+
+    fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
+        contact.displacement = approach.position - contact.anchor;
+        match contact.mode {
+            Mode::Grab if !approach.grab => return false,
+            Mode::Press if approach.grab => contact.mode = Mode::Grab,
+            _ => {}
+        }
+        true
+    }
+
+    /// A body in motion is coupled by a spring. Near a support, where a body at rest is stiffer than any device can render,
+    /// its compliance is raised evenly so that no direction exceeds the tool's maximum stiffness.
+    fn respond(&self, tool: &ToolModel, dynamics: Option<&BodyDynamics>, own: &DMat3) -> f64 {
+        match dynamics {
+            Some(dynamics) => 1.0 / dynamics.coupling,
+            None => (1.0 / tool.max_stiffness - smallest_eigenvalue(own)).max(0.0),
+        }
+    }
+
+    fn end(&self, contact: &Contact) -> bool {
+        contact.mode == Mode::Press && contact.force.dot(contact.normal) >= 0.0
+    }
+}

@@ -1,0 +1,51 @@
+//! A dense symmetric system of a few contacts.
+
+use crate::simulation::MAX_CONTACTS;
+
+/// Most unknowns.
+pub const MAX_DOFS: usize = 3 * MAX_CONTACTS;
+
+/// Matrix and right-hand side; only their leading part is used.
+pub struct System {
+    /// The matrix, rows first.
+    pub matrix: [[f64; MAX_DOFS]; MAX_DOFS],
+    /// The right-hand side, then the solution.
+    pub right: [f64; MAX_DOFS],
+}
+
+impl Default for System {
+    fn default() -> Self {
+        Self { matrix: [[0.0; MAX_DOFS]; MAX_DOFS], right: [0.0; MAX_DOFS] }
+    }
+}
+
+impl System {
+    /// Solves the leading `n` equations in place. A pivot that is not positive yields infinities or NaN, which the safety
+    /// stage turns into a latched fault; nothing here panics.
+    pub fn solve(&mut self, n: usize) {
+        let (a, x) = (&mut self.matrix, &mut self.right);
+        for j in 0..n {
+            for k in 0..j {
+                for i in j..n {
+                    a[i][j] -= a[i][k] * a[j][k];
+                }
+            }
+            let pivot = a[j][j].sqrt();
+            for i in j..n {
+                a[i][j] /= pivot;
+            }
+        }
+        for i in 0..n {
+            for k in 0..i {
+                x[i] -= a[i][k] * x[k];
+            }
+            x[i] /= a[i][i];
+        }
+        for i in (0..n).rev() {
+            for k in i + 1..n {
+                x[i] -= a[k][i] * x[k];
+            }
+            x[i] /= a[i][i];
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Rows and columns of the compliance between contacts: worked out once, when a contact begins.
+
+use crate::simulation::{Contact, Model, Scratch, State};
+
+/// Takes up a contact that begins, whose patch is `scratch.candidate`: a slot, its compliance with every other contact of
+/// the body, and of a body in motion where the moving patch is met. Refused where a node may not be touched.
+pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &Scratch) {
+    let (tool, body) = (begun.tool, begun.body);
+    let (green, State { bodies, contacts, compliance, tools }) = (&model.bodies[body].green, state);
+    // There are as many slots as pairs of a tool and a body.
+    let Some(slot) = contacts.empty() else { return };
+    if let Err(refusal) = contacts.patches[slot].admit(green, &scratch.candidate) {
+        tools[tool].refused[body] = Some(refusal);
+        return;
+    }
+    contacts.begun += 1;
+    contacts.slots[slot] = Contact { serial: contacts.begun, ..begun };
+    compliance[slot][slot] = contacts.patches[slot].own_compliance(green);
+    for other in contacts.on(body).filter(|&other| other != slot) {
+        let block = contacts.patches[slot].compliance_with(green, &contacts.patches[other]);
+        compliance[slot][other] = block;
+        compliance[other][slot] = block.transpose();
+    }
+    if let (Some(motion), Some(dynamics)) = (&mut bodies[body].motion, &model.bodies[body].dynamics) {
+        motion.add_contact(&dynamics.modes, contacts, compliance, slot);
+        // The tool's displacement counts from where the moving patch is met, and its free motion is taken off every step.
+        let met = motion.free_displacement(slot) + motion.residual_displacement(contacts, slot);
+        contacts.slots[slot].anchor -= met;
+        contacts.slots[slot].displacement += met;
+    }
+}
