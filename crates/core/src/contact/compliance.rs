@@ -2,32 +2,19 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Patch, PatchScratch, SurfaceQuery, patch_weights};
-use crate::green::GreensFunction;
+use super::{MAX_PATCH_NODES, Patch, PatchScratch, SurfaceQuery, patch_weights};
+use crate::green::{GreensFunction, TouchNode};
 use crate::{Error, Result};
 
 /// `W_a^T Psi W_b` between two patches: mean displacement of `a` per unit force spread over `b`. Supported dofs do not
-/// move. `None` if a node of either patch may not be touched.
+/// move. `None` if a node of `b` may not be touched.
 pub fn compliance_block(green: &GreensFunction, a: &Patch, b: &Patch) -> Option<DMat3> {
-    let mut sum = [[0.0; 3]; 3];
-    for (source, source_weight) in b.iter() {
-        let first = green.first_column(source)?;
-        for (axis, column_sum) in sum.iter_mut().enumerate() {
-            if green.row_is_fixed[3 * source + axis] {
-                continue;
-            }
-            for (target, target_weight) in a.iter() {
-                let weight = source_weight * target_weight;
-                for (k, s) in column_sum.iter_mut().enumerate() {
-                    let row = 3 * target + k;
-                    if !green.row_is_fixed[row] {
-                        *s += weight * green.entry(row, first + axis);
-                    }
-                }
-            }
-        }
+    let mut columns = [TouchNode::default(); MAX_PATCH_NODES];
+    for (column, (node, _)) in columns.iter_mut().zip(b.iter()) {
+        *column = green.touchable(node)?;
     }
-    Some(DMat3::from_cols_array_2d(&sum))
+    let (nodes, weights) = (&a.nodes[..a.count], &a.weights[..a.count]);
+    Some(green.weighted_block(nodes, weights, &columns[..b.count], &b.weights[..b.count]))
 }
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
@@ -56,6 +43,7 @@ pub fn touch(
     displacement: [Option<f64>; 3],
     radius: f64,
 ) -> Result<(DVec3, Vec<f64>)> {
+    green.require_intact()?;
     let query = SurfaceQuery::new(&green.surface)?;
     let centre =
         query.closest(&green.surface, point).ok_or_else(|| Error::Invalid("the touch point must be finite".into()))?;
@@ -66,7 +54,7 @@ pub fn touch(
             "a contact radius of {radius} m covers {covered} nodes; choose a smaller one"
         )));
     }
-    if let Some((node, _)) = patch.iter().find(|&(n, _)| green.first_column(n).is_none()) {
+    if let Some((node, _)) = patch.iter().find(|&(n, _)| green.touchable(n).is_none()) {
         let node = green.surface_nodes[node];
         return Err(Error::Invalid(format!("node {node} under the contact is not touchable")));
     }
@@ -87,20 +75,9 @@ fn patch_mean(patch: &Patch, displacements: &[f64]) -> DVec3 {
 
 /// Adds `Psi W f` to the surface displacements (3s).
 pub(crate) fn add_patch_response(green: &GreensFunction, patch: &Patch, force: DVec3, displacements: &mut [f64]) {
-    let surface = displacements.len();
-    for (node, weight) in patch.iter() {
-        let Some(first) = green.first_column(node) else { continue };
-        for axis in 0..3 {
-            if !green.row_is_fixed[3 * node + axis] && force[axis] != 0.0 {
-                green.add_column(first + axis, weight * force[axis], &mut displacements[..surface]);
-            }
-        }
-    }
-    for (u, &fixed) in displacements.iter_mut().zip(&green.row_is_fixed) {
-        if fixed {
-            *u = 0.0;
-        }
-    }
+    let forces: Vec<(TouchNode, DVec3)> =
+        patch.iter().filter_map(|(node, weight)| Some((green.touchable(node)?, weight * force))).collect();
+    green.add_forces(&forces, displacements);
 }
 
 /// `C_aa f_a = d_a` for the prescribed components, zero force on the free ones: free components are replaced by the

@@ -88,7 +88,7 @@ fn cover(model: &Model, contact: &mut ToolContact, scratch: &mut Scratch, centre
     let surface = &model.green.surface;
     let covered = patch_weights(surface, centre, radius, &mut scratch.patch, &mut scratch.candidate);
     let patch = &scratch.candidate;
-    let usable = covered == patch.count && patch.iter().all(|(node, _)| model.green.first_column(node).is_some());
+    let usable = covered == patch.count && patch.iter().all(|(node, _)| model.green.touchable(node).is_some());
     if usable {
         contact.patch.clone_from(patch);
     }
