@@ -250,7 +250,7 @@ impl GreenCore {
     /// Stored number format.
     #[getter]
     fn precision(&self) -> &'static str {
-        self.green.values.precision().name()
+        self.green.precision().name()
     }
 
     /// Content key.

@@ -40,6 +40,7 @@ pub struct Answer {
 /// A capacitance matrix that is singular to working precision: too much was released, or the store's precision does not
 /// carry that many neighbouring constraints.
 pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize, f64)]) -> Result<Answer> {
+    green.require_intact()?;
     let mut response = if green.loads.is_empty() { vec![0.0; green.rows] } else { green.free_response.clone() };
     for &(column, value) in known {
         green.add_column(column, value, &mut response);
@@ -90,7 +91,7 @@ fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response
     let wanted = |i: usize| switched[i].1 + if green.row_is_fixed[rows[i]] { green.load_on_row(rows[i]) } else { 0.0 };
     let residual = Mat::from_fn(n, 1, |i, _| wanted(i) - response[rows[i]]);
     let unknown = if rows.iter().any(|&row| green.row_is_fixed[row]) {
-        solve_released(&capacitance, &residual, green.values.precision().unit_roundoff().max(COMPUTED_ERROR))?
+        solve_released(&capacitance, &residual, green.precision().unit_roundoff().max(COMPUTED_ERROR))?
     } else {
         match capacitance.llt(Side::Lower) {
             Ok(factor) => factor.solve(&residual),

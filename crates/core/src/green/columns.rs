@@ -1,9 +1,12 @@
 //! The reference problem, and the rows and columns of its `Psi`: which there are, and in which order they are solved.
 
 use super::factor::Symbolic;
+use glam::DVec3;
+
 use super::key::content_key;
-use super::operator::Precision;
 use super::panels::Block;
+use super::places::Places;
+use super::precision::Precision;
 use super::sweep::Source;
 use super::tree::{NONE, Tree, Wanted};
 use crate::Result;
@@ -68,8 +71,10 @@ pub struct Layout {
     pub columns: usize,
     /// How many of the columns are moved supports.
     pub supported: usize,
-    /// For each row its place in `order`.
-    pub place_of_row: Vec<u32>,
+    /// Where the store keeps the surface nodes.
+    pub places: Places,
+    /// For each row of the store its place in `order`.
+    pub place_of_stored: Vec<u32>,
     /// For each dof its place in `order`, or [`NONE`].
     pub place_of_dof: Vec<u32>,
     /// Permuted position of each free dof.
@@ -101,10 +106,13 @@ impl Layout {
         });
         let columns = order.partition_point(|&row| has_column[row as usize]);
         let supported = order[..columns].partition_point(|&row| at(row_dofs[row as usize]).is_none());
-        let mut place_of_row = vec![NONE; row_dofs.len()];
+        let positions_of_surface: Vec<DVec3> =
+            problem.surface_nodes.iter().map(|&n| problem.mesh.nodes[n as usize]).collect();
+        let places = Places::new(&positions_of_surface, &problem.touch);
+        let mut place_of_stored = vec![NONE; row_dofs.len()];
         let mut place_of_dof = vec![NONE; stiffness.dimension];
         for (place, &row) in order.iter().enumerate() {
-            place_of_row[row as usize] = place as u32;
+            place_of_stored[places.stored_row(row as usize)] = place as u32;
             place_of_dof[row_dofs[row as usize] as usize] = place as u32;
         }
         let mut wanted = vec![Wanted::default(); positions.len()];
@@ -122,7 +130,7 @@ impl Layout {
                 wanted[position as usize].always |= !has_column;
             }
         }
-        Self { row_dofs, order, columns, supported, place_of_row, place_of_dof, positions, wanted }
+        Self { row_dofs, order, columns, supported, places, place_of_stored, place_of_dof, positions, wanted }
     }
 
     /// Number of rows.
@@ -137,6 +145,11 @@ impl Layout {
             (from..to).step_by(width).map(block)
         };
         cut(0, self.supported).chain(cut(self.supported, self.columns)).collect()
+    }
+
+    /// Row of the store, and column where it has one, of a place in the order.
+    pub fn stored(&self, place: usize) -> usize {
+        self.places.stored_row(self.order[place] as usize)
     }
 
     /// Dof of a place in the order.

@@ -1,9 +1,10 @@
 //! The content key: a hash of everything that determines a Green's function.
 
-use super::{Precision, Problem};
+use super::columns::Problem;
+use super::precision::Precision;
 
 /// Version of the store's layout; part of the key, so that an old file is recomputed, never misread.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
 
 /// Hex BLAKE3 hash of mesh, materials, supports, loads, touch region, element, precision and format version.
 pub fn content_key(problem: &Problem, precision: Precision) -> String {

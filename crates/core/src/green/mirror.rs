@@ -24,7 +24,7 @@ pub fn numbers(layout: &Layout, width: usize) -> usize {
 }
 
 impl<T: Number> Mirror<'_, T> {
-    /// Hands every column to `take`, as its place in the order and its rows in their final order, from up
+    /// Hands every column to `take`, as its place in the order and its rows in the order of the store, from up
     /// to `tasks` tasks at a time.
     ///
     /// # Errors
@@ -40,7 +40,7 @@ impl<T: Number> Mirror<'_, T> {
                 }
                 self.lines(block, &mut lines, &mut panel)?;
                 for (k, line) in lines.chunks_exact(self.layout.rows()).enumerate() {
-                    for (value, &place) in column.iter_mut().zip(&self.layout.place_of_row) {
+                    for (value, &place) in column.iter_mut().zip(&self.layout.place_of_stored) {
                         *value = line[place as usize];
                     }
                     take(self.blocks[block].first + k, &column)?;

@@ -11,32 +11,40 @@
 //! (Jun, Choi and Cho, equations 3.1-3.3, corrected.) Only the columns of touchable surface dofs and the rows of surface
 //! and supported dofs are kept.
 
+mod blocks;
+mod checksums;
 mod columns;
+mod columns_file;
+mod entries;
 mod factor;
 mod free_response;
+mod function;
 mod interior;
 mod key;
 mod mirror;
 mod number;
-mod operator;
+mod numbers;
 mod operators;
 mod ordering;
 mod panels;
 mod partial;
+mod places;
 mod plan;
+mod precision;
 mod precompute;
 mod scaled;
 mod store;
+mod store_writer;
 mod sweep;
 mod system;
-mod touch;
 mod tree;
 
 pub use columns::Problem;
 pub use factor::{Factor, Symbolic};
+pub use function::GreensFunction;
 pub use interior::Interior;
 pub use key::FORMAT_VERSION;
-pub use operator::{GreensFunction, Precision, Values};
+pub use places::TouchNode;
 pub use plan::Plan;
-pub use touch::TouchNode;
+pub use precision::Precision;
 pub use precompute::{Found, Progress, Target, plan, precompute, precompute_to};

@@ -6,9 +6,8 @@
 //! that holds it keeps its own.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::panels::Block;
@@ -22,7 +21,7 @@ const SUM: usize = 32;
 /// Panels in a file.
 pub struct Partial {
     path: PathBuf,
-    file: Mutex<File>,
+    file: File,
     /// First byte of each panel, and the end.
     starts: Vec<u64>,
     finished: Vec<AtomicBool>,
@@ -47,18 +46,18 @@ impl Partial {
         header[..description.len()].copy_from_slice(description.as_bytes());
         let existing = OpenOptions::new().read(true).write(true).open(path).ok();
         let found = existing.is_some();
-        if let Some(mut file) = existing {
+        if let Some(file) = existing {
             let mut start = vec![0; HEADER];
-            if file.read_exact(&mut start).is_ok() && start == header {
+            if file.read_exact_at(&mut start, 0).is_ok() && start == header {
                 let partial = Self::new(path, file, starts);
                 partial.verify().map_err(io)?;
                 return Ok((partial, false));
             }
             fs::remove_file(path).map_err(io)?;
         }
-        let mut file = OpenOptions::new().read(true).write(true).create_new(true).open(path).map_err(io)?;
+        let file = OpenOptions::new().read(true).write(true).create_new(true).open(path).map_err(io)?;
         header.resize(HEADER + SUM * blocks.len(), 0);
-        let partial = match file.write_all(&header) {
+        let partial = match file.write_all_at(&header, 0) {
             Ok(()) => Self::new(path, file, starts),
             Err(error) => {
                 let _ = fs::remove_file(path);
@@ -70,19 +69,20 @@ impl Partial {
 
     fn new(path: &Path, file: File, starts: Vec<u64>) -> Self {
         let finished = starts[1..].iter().map(|_| AtomicBool::new(false)).collect();
-        Self { path: path.to_owned(), file: Mutex::new(file), starts, finished }
+        Self { path: path.to_owned(), file, starts, finished }
     }
 
     /// Finds the blocks whose sums fit.
     fn verify(&self) -> std::io::Result<()> {
         let mut sums = vec![0; SUM * self.finished.len()];
-        if self.read(HEADER as u64, &mut sums).is_err() {
+        if self.file.read_exact_at(&mut sums, HEADER as u64).is_err() {
             return Ok(());
         }
         let mut panel = Vec::new();
         for (block, sum) in sums.chunks_exact(SUM).enumerate().filter(|(_, sum)| sum.iter().any(|&b| b != 0)) {
             panel.resize((self.starts[block + 1] - self.starts[block]) as usize, 0);
-            let fits = self.read(self.starts[block], &mut panel).is_ok() && blake3::hash(&panel).as_bytes() == sum;
+            let fits = self.file.read_exact_at(&mut panel, self.starts[block]).is_ok()
+                && blake3::hash(&panel).as_bytes() == sum;
             self.finished[block].store(fits, Ordering::Release);
         }
         Ok(())
@@ -99,8 +99,9 @@ impl Partial {
     /// The operating system's.
     pub fn put(&self, block: usize, panel: &[u8]) -> Result<()> {
         let sum = blake3::hash(panel);
-        self.write(self.starts[block], panel)
-            .and_then(|()| self.write((HEADER + SUM * block) as u64, sum.as_bytes()))
+        self.file
+            .write_all_at(panel, self.starts[block])
+            .and_then(|()| self.file.write_all_at(sum.as_bytes(), (HEADER + SUM * block) as u64))
             .map_err(|source| Error::Io { path: self.path.clone(), source })?;
         self.finished[block].store(true, Ordering::Release);
         Ok(())
@@ -111,19 +112,8 @@ impl Partial {
     /// # Errors
     /// The operating system's.
     pub fn get(&self, block: usize, at: usize, out: &mut [u8]) -> Result<()> {
-        self.read(self.starts[block] + at as u64, out).map_err(|source| Error::Io { path: self.path.clone(), source })
-    }
-
-    fn write(&self, at: u64, bytes: &[u8]) -> std::io::Result<()> {
-        let mut file = self.file.lock().map_err(|_| std::io::Error::other("a writer failed"))?;
-        file.seek(SeekFrom::Start(at))?;
-        file.write_all(bytes)
-    }
-
-    fn read(&self, at: u64, bytes: &mut [u8]) -> std::io::Result<()> {
-        let mut file = self.file.lock().map_err(|_| std::io::Error::other("a writer failed"))?;
-        file.seek(SeekFrom::Start(at))?;
-        file.read_exact(bytes)
+        let at = self.starts[block] + at as u64;
+        self.file.read_exact_at(out, at).map_err(|source| Error::Io { path: self.path.clone(), source })
     }
 }
 
@@ -141,7 +131,7 @@ mod tests {
         partial.put(0, &[7; 24]).expect("a writable file");
         partial.put(1, &[8; 4]).expect("a writable file");
         // The sum of the second block is there, its numbers are not.
-        partial.write(partial.starts[1], &[9; 4]).expect("a writable file");
+        partial.file.write_all_at(&[9; 4], partial.starts[1]).expect("a writable file");
         let (resumed, discarded) = open("one");
         assert!(!discarded && resumed.has(0) && !resumed.has(1));
         let mut bytes = [0; 3];

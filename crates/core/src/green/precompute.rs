@@ -8,17 +8,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use faer::Par;
 
 use super::columns::{Layout, Problem};
+use super::entries::Entries;
 use super::free_response::free_response;
+use super::function::GreensFunction;
 use super::key::FORMAT_VERSION;
 use super::mirror::{Mirror, task_failed};
 use super::number::Number;
-use super::operator::{GreensFunction, Precision, Values};
+use super::numbers::Numbers;
 use super::operators::operators;
 use super::panels::{Block, Panels};
 use super::partial::Partial;
 use super::plan::{Plan, Prepared};
+use super::precision::Precision;
 use super::scaled::{quantise, scales};
-use super::store::StoreWriter;
+use super::store_writer::StoreWriter;
 use super::sweep::{Scratch, Sweep};
 use super::system::System;
 use crate::fem::SymmetricCsc;
@@ -63,28 +66,35 @@ pub fn plan(problem: &Problem, precision: Precision, memory: Option<usize>) -> R
 pub fn precompute(problem: &Problem, precision: Precision, progress: Progress<'_>) -> Result<GreensFunction> {
     let prepared = Prepared::new(problem, precision, None, true)?;
     let mut green = geometry(problem, &prepared.layout, precision)?;
-    let panels = prepared.blocks.len();
-    green.values = match precision {
-        Precision::F64 => {
-            let solved = solve::<f64, f64>(problem, prepared, Panels::in_memory(panels), progress)?;
-            green.free_response.clone_from(&solved.free_response);
-            Values::F64(solved.collect(&green, |_, column, out| out.copy_from_slice(column))?)
-        }
-        Precision::F32 => {
-            let solved = solve::<f64, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
-            green.free_response.clone_from(&solved.free_response);
-            Values::F32(solved.collect(&green, |_, column, out| out.copy_from_slice(column))?)
-        }
-        Precision::F16 => {
-            let solved = solve::<f32, f32>(problem, prepared, Panels::in_memory(panels), progress)?;
-            green.free_response.clone_from(&solved.free_response);
-            green.scale = solved.scales()?;
-            let inverse: Vec<f64> = green.scale.iter().map(|scale| 1.0 / scale).collect();
-            let quantised = |row: usize, column: &[f32], out: &mut [i16]| quantise(column, inverse[row], &inverse, out);
-            Values::F16(solved.collect(&green, quantised)?)
-        }
-    };
+    match precision {
+        Precision::F64 => collect::<f64, f64>(problem, prepared, &mut green, progress)?,
+        Precision::F32 => collect::<f64, f32>(problem, prepared, &mut green, progress)?,
+        Precision::F16 => collect::<f32, f32>(problem, prepared, &mut green, progress)?,
+    }
     Ok(green)
+}
+
+fn collect<C: Number, T: Number>(
+    problem: &Problem,
+    prepared: Prepared,
+    green: &mut GreensFunction,
+    progress: Progress<'_>,
+) -> Result<()> {
+    let precision = green.precision();
+    let panels = Panels::in_memory(prepared.blocks.len());
+    let mut solved = solve::<C, T>(problem, prepared, panels, progress)?;
+    green.free_response = std::mem::take(&mut solved.free_response);
+    let scale = solved.scales(precision)?;
+    let mut numbers = Numbers::zeros(precision, solved.layout.columns * green.rows);
+    let bytes = green.rows * precision.bytes();
+    let columns: Vec<Mutex<&mut [u8]>> = numbers.bytes_mut().chunks_mut(bytes).map(Mutex::new).collect();
+    solved.columns(precision, &scale, &|column, bytes| {
+        columns[column].lock().map_err(|_| task_failed())?.copy_from_slice(bytes);
+        Ok(())
+    })?;
+    drop(columns);
+    green.entries = Entries::new(solved.layout.places, &green.row_is_fixed, scale, numbers, None);
+    Ok(())
 }
 
 /// Solves the reference problem into a file, without ever holding the operator.
@@ -140,12 +150,18 @@ fn write<C: Number, T: Number>(
         finished.fetch_max(done, Ordering::Relaxed);
         progress(done, all)
     };
-    let result = solve::<C, T>(problem, prepared, Panels::File(partial), &watched).and_then(|solved| {
-        green.free_response.clone_from(&solved.free_response);
-        if target.precision == Precision::F16 {
-            green.scale = solved.scales()?;
-        }
-        solved.store(&green, target, progress)
+    let result = solve::<C, T>(problem, prepared, Panels::File(partial), &watched).and_then(|mut solved| {
+        green.free_response = std::mem::take(&mut solved.free_response);
+        let scale = solved.scales(target.precision)?;
+        green.entries = without_numbers(&solved.layout, &green.row_is_fixed, scale.clone(), target.precision);
+        let writer = StoreWriter::create(target.path, &green)?;
+        solved.columns(target.precision, &scale, &|column, bytes| {
+            if !progress(solved.layout.columns, solved.layout.columns) {
+                return Err(Error::Interrupted);
+            }
+            writer.put(column, bytes)
+        })?;
+        writer.finish()
     });
     // What was finished before an interruption is worth keeping; after any other failure it is in the way.
     if !matches!(result, Err(Error::Interrupted)) || finished.into_inner() == 0 {
@@ -209,68 +225,46 @@ impl<T: Number> Solved<T> {
         Mirror { layout: &self.layout, blocks: &self.blocks, panels: &self.panels }
     }
 
-    fn scales(&self) -> Result<Vec<f64>> {
-        scales(&self.mirror(), &self.stiffness)
+    /// Scales of the stored rows; none where the format needs none.
+    fn scales(&self, precision: Precision) -> Result<Vec<f64>> {
+        if precision == Precision::F16 { scales(&self.mirror(), &self.stiffness) } else { Ok(Vec::new()) }
     }
 
-    /// All columns one after the other, each made by `convert(its row, its entries, place to fill)`.
-    fn collect<U: Default + Clone + Send>(
+    /// Hands the bytes of every column to `put`, as column of the store and bytes, from several tasks at a time.
+    fn columns(
         &self,
-        green: &GreensFunction,
-        convert: impl Fn(usize, &[T], &mut [U]) + Sync,
-    ) -> Result<Vec<U>> {
-        let mut values = vec![U::default(); self.layout.columns * green.rows];
-        let columns: Vec<Mutex<&mut [U]>> = values.chunks_mut(green.rows).map(Mutex::new).collect();
-        self.mirror().columns(self.tasks, &|place, column| {
-            let row = self.layout.order[place] as usize;
-            let mut out = columns[green.column_of_row(row)].lock().map_err(|_| task_failed())?;
-            convert(row, column, &mut out);
-            Ok(())
-        })?;
-        drop(columns);
-        Ok(values)
-    }
-
-    /// All columns into the store.
-    fn store(&self, green: &GreensFunction, target: &Target<'_>, progress: Progress<'_>) -> Result<()> {
-        let writer = StoreWriter::create(target.path, green, target.precision)?;
-        let inverse: Vec<f64> = green.scale.iter().map(|scale| 1.0 / scale).collect();
-        self.mirror().columns(self.tasks, &|place, column| {
-            let row = self.layout.order[place] as usize;
-            if !progress(self.layout.columns, self.layout.columns) {
-                return Err(Error::Interrupted);
+        precision: Precision,
+        scale: &[f64],
+        put: &(dyn Fn(usize, &[u8]) -> Result<()> + Sync),
+    ) -> Result<()> {
+        let inverse: Vec<f64> = scale.iter().map(|scale| 1.0 / scale).collect();
+        self.mirror().columns(self.tasks, &|place, numbers| {
+            let column = self.layout.stored(place);
+            if precision != Precision::F16 {
+                return put(column, bytemuck::cast_slice(numbers));
             }
-            if target.precision == Precision::F16 {
-                let mut quantised = vec![0i16; column.len()];
-                quantise(column, inverse[row], &inverse, &mut quantised);
-                return writer.put(green.column_of_row(row), bytemuck::cast_slice(&quantised));
-            }
-            writer.put(green.column_of_row(row), bytemuck::cast_slice(column))
-        })?;
-        writer.finish()
+            let mut quantised = vec![0i16; numbers.len()];
+            quantise(numbers, inverse[column], &inverse, &mut quantised);
+            put(column, bytemuck::cast_slice(&quantised))
+        })
     }
 }
 
 /// Everything but the numbers.
 fn geometry(problem: &Problem, layout: &Layout, precision: Precision) -> Result<GreensFunction> {
-    let mut touch_rank = vec![u32::MAX; problem.surface_nodes.len()];
-    for (rank, &node) in problem.touch.iter().enumerate() {
-        touch_rank[node as usize] = rank as u32;
-    }
     let supports = &problem.supports;
     let row_of_dof: HashMap<u32, u32> =
         layout.row_dofs.iter().enumerate().map(|(row, &dof)| (dof, row as u32)).collect();
+    let row_is_fixed: Vec<bool> = layout.row_dofs.iter().map(|&d| supports.is_fixed(d)).collect();
     Ok(GreensFunction {
         surface_nodes: problem.surface_nodes.clone(),
         surface: problem.surface()?,
         touch: problem.touch.clone(),
-        touch_rank,
         fixed_dofs: supports.fixed.clone(),
         fixed_rows: supports.fixed.iter().map(|d| row_of_dof[d]).collect(),
         rows: layout.row_dofs.len(),
-        row_is_fixed: layout.row_dofs.iter().map(|&d| supports.is_fixed(d)).collect(),
-        values: Values::F64(Vec::new()),
-        scale: Vec::new(),
+        entries: without_numbers(layout, &row_is_fixed, Vec::new(), precision),
+        row_is_fixed,
         loads: problem.loads.clone(),
         free_response: Vec::new(),
         key: problem.key(precision),
@@ -278,6 +272,11 @@ fn geometry(problem: &Problem, layout: &Layout, precision: Precision) -> Result<
         description: String::new(),
         path: None,
     })
+}
+
+/// Places, format and scales of entries that are still to be computed.
+fn without_numbers(layout: &Layout, row_is_fixed: &[bool], scale: Vec<f64>, precision: Precision) -> Entries {
+    Entries::new(layout.places.clone(), row_is_fixed, scale, Numbers::zeros(precision, 0), None)
 }
 
 /// Runs `work` in some tasks at once, to the first error.

@@ -19,12 +19,12 @@ use crate::fem::SymmetricCsc;
 /// Largest `|q|`.
 const RANGE: f64 = i16::MAX as f64;
 
-/// Scale of every row; a column has that of its row.
+/// Scale of every row of the store; a column has that of its row.
 ///
 /// # Errors
 /// That of reading a panel.
 pub fn scales<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -> Result<Vec<f64>> {
-    let Layout { row_dofs, order, columns, supported, place_of_row, .. } = mirror.layout;
+    let Layout { row_dofs, order, columns, supported, place_of_stored, .. } = mirror.layout;
     let own = |dof: u32| stiffness.column(dof as usize).find(|&(row, _)| row == dof).map_or(0.0, |(_, value)| value);
     let mut of_place: Vec<f64> = mirror.diagonal()?.into_iter().map(Number::to_f64).collect();
     for (scale, &row) in of_place.iter_mut().zip(&order[..*supported]) {
@@ -36,7 +36,7 @@ pub fn scales<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -> Re
         largest[row - columns] = largest[row - columns].max(value.to_f64().abs() / of_place[column]);
     })?;
     of_place.extend(largest.into_iter().map(|value| if value > 0.0 { value / RANGE } else { 1.0 }));
-    Ok(place_of_row.iter().map(|&place| of_place[place as usize]).collect())
+    Ok(place_of_stored.iter().map(|&place| of_place[place as usize]).collect())
 }
 
 /// `q` of a column from its entries, the inverse scales being given.
@@ -44,12 +44,5 @@ pub fn quantise<T: Number>(column: &[T], column_inverse: f64, row_inverses: &[f6
     for ((q, value), inverse) in out.iter_mut().zip(column).zip(row_inverses) {
         // The conversion saturates, where rounding has crossed the bound.
         *q = (value.to_f64() * (inverse * column_inverse)).round() as i16;
-    }
-}
-
-/// `out += factor * s_j * s_i q_ij`, `factor_scaled` being `factor * s_j`.
-pub fn add_scaled(column: &[i16], factor_scaled: f64, row_scales: &[f64], out: &mut [f64]) {
-    for ((o, &q), scale) in out.iter_mut().zip(column).zip(row_scales) {
-        *o += factor_scaled * (scale * f64::from(q));
     }
 }

@@ -1,0 +1,187 @@
+//! The stored numbers of `Psi`, and the only ways to read them.
+//!
+//! Rows and columns lie in the order of [`Places`]; numbers are `f32`, `f64`, or 16-bit integers `q` with
+//! `Psi_ij = s_i s_j q_ij` and one scale a dof. Nobody outside sees either: every question names nodes, dispatches once
+//! on the format, and is answered in f64.
+//!
+//! A store up to a bound is in memory as a whole. Of a larger one the square of touchable rows and columns is, which is all
+//! that contacts ask for; other rows are read from the file by position. Nothing is mapped, so a file that somebody cuts
+//! short can kill no reader: what cannot be read any more is NaN, and [`Entries::require_intact`] says beforehand why. The
+//! file's length is compared there; should it shrink between that call and the reading, the answer is NaN, which the
+//! checks behind every answer refuse.
+
+use glam::DVec3;
+use pulp::Arch;
+
+use super::columns_file::ColumnsFile;
+use super::numbers::{AddColumns, COLUMNS_AT_ONCE, Numbers, One};
+use super::places::{Places, TouchNode};
+use super::precision::Precision;
+use crate::Result;
+
+/// The numbers of a Green's function.
+pub struct Entries {
+    pub(super) arch: Arch,
+    pub(super) places: Places,
+    /// Numbers of a column.
+    rows: usize,
+    /// Numbers of a column that are in memory: all, or those of the touchable nodes.
+    pub(super) resident: usize,
+    pub(super) numbers: Numbers,
+    /// Scale of each stored row, and of the column that belongs to it; empty unless the numbers are integers.
+    pub(super) scale: Vec<f64>,
+    /// For each place the scales of its dofs, zero on supported ones: they neither move nor are pushed.
+    pub(super) free: Vec<[f64; 4]>,
+    /// The whole columns, where they are not in memory.
+    pub(super) file: Option<ColumnsFile>,
+}
+
+impl Entries {
+    /// Numbers of columns of which the first rows, as many as fit, are in memory, and all in `file` if there is one.
+    ///
+    /// `scale` is by stored row and empty unless the numbers are integers; `row_is_fixed` is in the user's order.
+    pub(super) fn new(
+        places: Places,
+        row_is_fixed: &[bool],
+        scale: Vec<f64>,
+        numbers: Numbers,
+        file: Option<ColumnsFile>,
+    ) -> Self {
+        let free = |place: usize| {
+            let node = places.nodes()[place] as usize;
+            let of_axis = |axis| scale.get(3 * place + axis).copied().unwrap_or(1.0);
+            let dof = |axis| if axis == 3 || row_is_fixed[3 * node + axis] { 0.0 } else { of_axis(axis) };
+            std::array::from_fn(dof)
+        };
+        let rows = row_is_fixed.len();
+        let resident = if file.is_some() { 3 * places.touchable_count() } else { rows };
+        let free = (0..places.nodes().len()).map(free).collect();
+        Self { arch: Arch::new(), rows, resident, numbers, scale, free, file, places }
+    }
+
+    /// Number format.
+    pub fn precision(&self) -> Precision {
+        self.numbers.precision()
+    }
+
+    /// Where the nodes are.
+    pub(super) fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// Scales of the stored rows.
+    pub(super) fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    /// Hands the bytes of all columns to `put`, as first column and bytes.
+    pub(super) fn each_bytes(&self, put: &mut dyn FnMut(usize, &[u8]) -> Result<()>) -> Result<()> {
+        let Some(file) = &self.file else { return put(0, self.numbers.bytes()) };
+        let mut column = vec![0; self.rows * self.precision().bytes()];
+        for index in 0..3 * self.places.touchable_count() {
+            file.read(index, 0, &mut column)?;
+            put(index, &column)?;
+        }
+        Ok(())
+    }
+
+    /// Whether everything can still be read.
+    pub fn is_intact(&self) -> bool {
+        self.file.as_ref().is_none_or(ColumnsFile::is_intact)
+    }
+
+    /// Refuses a store that was cut short since it was loaded, where what is in memory is not all.
+    ///
+    /// # Errors
+    /// [`crate::Error::Store`].
+    pub fn require_intact(&self) -> Result<()> {
+        self.file.as_ref().map_or(Ok(()), ColumnsFile::require_intact)
+    }
+
+    /// Whether the rows of a surface node are in memory.
+    pub fn is_resident(&self, node: usize) -> bool {
+        3 * self.places.place(node) < self.resident
+    }
+
+    /// Entry of a row and a column in the user's order.
+    pub fn entry(&self, row: usize, column: TouchNode, axis: usize) -> f64 {
+        let (row, column) = (self.places.stored_row(row), 3 * column.place() + axis);
+        let value = if row < self.resident {
+            self.numbers.run(self.arch, One(column * self.resident + row))
+        } else {
+            self.from_file::<1>(row, column)[0]
+        };
+        // The product of the scales first: it is the same for the mirrored entry.
+        self.scale_of(row) * self.scale_of(column) * value
+    }
+
+    /// `out += factor * Psi(rows, column)` for all rows in the user's order.
+    pub fn add_column(&self, column: TouchNode, axis: usize, factor: f64, out: &mut [f64]) {
+        let column = 3 * column.place() + axis;
+        let mut sums = vec![0.0; self.rows];
+        self.add_columns(&[(column, factor * self.scale_of(column))], &mut sums);
+        let (surface, inside) = sums.split_at(3 * self.free.len());
+        for (place, (&node, sums)) in self.places.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
+            for (axis, sum) in sums.iter().enumerate() {
+                out[3 * node as usize + axis] += self.scale_of(3 * place + axis) * sum;
+            }
+        }
+        for (row, sum) in (surface.len()..).zip(inside) {
+            out[row] += self.scale_of(row) * sum;
+        }
+    }
+
+    /// Adds the displacements of all surface dofs (user's order, 3s) under `forces`, N; supported dofs neither take a force
+    /// nor move.
+    pub fn add_forces(&self, forces: &[(TouchNode, DVec3)], out: &mut [f64]) {
+        let of_node = |&(node, force): &(TouchNode, DVec3)| {
+            let free = self.free[node.place()];
+            (0..3).map(move |axis| (3 * node.place() + axis, free[axis] * force[axis]))
+        };
+        let columns: Vec<(usize, f64)> = forces.iter().flat_map(of_node).filter(|&(_, factor)| factor != 0.0).collect();
+        let mut sums = vec![0.0; 3 * self.free.len()];
+        self.add_columns(&columns, &mut sums);
+        for (place, (&node, sums)) in self.places.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
+            for axis in 0..3 {
+                out[3 * node as usize + axis] += self.free[place][axis] * sums[axis];
+            }
+        }
+    }
+
+    /// `sums += factor * column` over the first stored rows, for stored columns and factors; NaN where the file fails.
+    fn add_columns(&self, columns: &[(usize, f64)], sums: &mut [f64]) {
+        let mut read = self.file.as_ref().map(|_| Numbers::zeros(self.precision(), COLUMNS_AT_ONCE * sums.len()));
+        for group in columns.chunks(COLUMNS_AT_ONCE) {
+            // The last group is filled up with nothing times its first column.
+            let mut starts = [group[0].0 * self.resident; COLUMNS_AT_ONCE];
+            let mut factors = [0.0; COLUMNS_AT_ONCE];
+            for (k, &(column, factor)) in group.iter().enumerate() {
+                (starts[k], factors[k]) = (column * self.resident, factor);
+            }
+            let mut numbers = &self.numbers;
+            if let (Some(read), Some(file)) = (&mut read, &self.file) {
+                let bytes = sums.len() * self.precision().bytes();
+                let pieces = read.bytes_mut().chunks_exact_mut(bytes).zip(group);
+                if pieces.into_iter().any(|(piece, &(column, _))| file.read(column, 0, piece).is_err()) {
+                    return sums.fill(f64::NAN);
+                }
+                starts = std::array::from_fn(|k| if k < group.len() { k * sums.len() } else { 0 });
+                numbers = read;
+            }
+            numbers.run(self.arch, AddColumns { starts, factors, sums });
+        }
+    }
+
+    /// Stored numbers, unscaled, of a column from row `row` on, out of the file; NaN where it fails.
+    pub(super) fn from_file<const N: usize>(&self, row: usize, column: usize) -> [f64; N] {
+        let mut numbers = Numbers::zeros(self.precision(), N);
+        let from = row * self.precision().bytes();
+        let read = self.file.as_ref().is_some_and(|file| file.read(column, from, numbers.bytes_mut()).is_ok());
+        std::array::from_fn(|k| if read { numbers.run(self.arch, One(k)) } else { f64::NAN })
+    }
+
+    /// Scale of a stored row, and of the column that belongs to it.
+    pub(super) fn scale_of(&self, row: usize) -> f64 {
+        self.scale.get(row).copied().unwrap_or(1.0)
+    }
+}
