@@ -51,8 +51,8 @@ def demo(
     Example: palpate demo beam --impulse --paper --out results
     """
     from palpate import models
-    from palpate.cli.catalogue import model_scene
     from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
+    from palpate.scene import model_scene
 
     def scene_of(name: str) -> Scene:
         return impulse_scene(name, paper) if impulse else model_scene(name, paper, motion)
@@ -127,7 +127,7 @@ def _strain_line(record: PressRecord, hold_strain: float) -> str:
 
 def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     from palpate.cli.scripted import scripted_press
-    from palpate.plots import plot_log, write_log
+    from palpate.validation.plots import plot_log, write_log
 
     out.mkdir(parents=True, exist_ok=True)
     record = scripted_press(built, seconds)

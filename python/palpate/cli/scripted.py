@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import SceneError
-from palpate.hold import HeldTool
 from palpate.scene import BuiltScene
-from palpate.simulation import Frame, Simulation
+from palpate.simulation import Frame, HeldTool, Simulation
 
 # Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
 POINTER_RATE = 120.0

@@ -14,10 +14,10 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from palpate import _native
-from palpate.body import Body
+from palpate.body import Body, description
+from palpate.cache import cache_directory
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
-from palpate.green import _describe, cache_directory
 from palpate.progress import narrated, progress_reporter
 
 # Up to so many free dofs the dense solver is quicker than Lanczos for most counts.
@@ -175,7 +175,7 @@ def modes(
     else:
         with progress_reporter("computing modes", progress) as report:
             eigenvalues, vectors = _lanczos(body, matrices, wanted, report)
-    basis = _basis(matrices, eigenvalues, vectors, key, {**_describe(body), "mass": mass, "modes": wanted})
+    basis = _basis(matrices, eigenvalues, vectors, key, {**description(body), "mass": mass, "modes": wanted})
     basis.save(target)
     return basis
 
@@ -221,7 +221,7 @@ def _shift(body: Body) -> float:
     try:
         body.require_supported()
     except BodyError:
-        rows = body._material_rows
+        rows = body.element_materials
         length = np.linalg.norm(np.ptp(body.mesh.nodes, axis=0))
         return -float(rows[:, 0].min() / (rows[:, 2].max() * length**2))
     return 0.0
@@ -252,7 +252,7 @@ def basis_key(body: Body, mass: str) -> str:
 
 def _difference(basis: ModalBasis, body: Body) -> str:
     """First thing in which a file and a body are seen to differ."""
-    now = _describe(body)
+    now = description(body)
     for name in ("nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
         there = basis.description.get(name)
         if there != now[name]:

@@ -16,18 +16,17 @@ import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
 
 from palpate import models
-from palpate.body import Body
+from palpate.body import Body, parse
 from palpate.errors import Error, SceneError
+from palpate.fields import HONEST_STRAIN
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element, tetrahedralize_with
-from palpate.predicate import parse
 from palpate.scene.dynamics import DynamicsTable, Motion
 from palpate.scene.loads import LoadTable, together
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
-from palpate.strain import HONEST_STRAIN
 
 if sys.version_info >= (3, 11):
     import tomllib

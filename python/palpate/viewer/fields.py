@@ -10,12 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from palpate.gauge import ElementStrain
-from palpate.interior import Interior
-from palpate.principal import extreme_values, largest_magnitude
+from palpate.fields import (
+    ElementStrain,
+    Interior,
+    StressRecovery,
+    SurfaceStrain,
+    SurfaceStress,
+    extreme_values,
+    largest_magnitude,
+)
 from palpate.simulation import Simulation
-from palpate.strain import SurfaceStrain
-from palpate.stress import StressRecovery, SurfaceStress
 
 # A range never spans less than this part of the body's size, as a strain, or of Young's modulus: rest is not noise
 # blown up.
@@ -76,7 +80,7 @@ class Fields:
         self._inside: StressRecovery | None = None
 
     def largest_strain(self, displacements: np.ndarray) -> float:
-        """Largest strain of a pose (s, 3), m, as :mod:`palpate.gauge` has it."""
+        """Largest strain of a pose (s, 3), m, as :mod:`palpate.fields.strain_measure` has it."""
         pose = self._of(displacements)
         if self._recovery is None:
             return pose.once("largest", lambda: self._simulation.strain_gauge.largest(displacements))

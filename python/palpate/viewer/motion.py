@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from palpate.body import free_end
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
-from palpate.scene import BuiltScene
-from palpate.scene.dynamics import StrikeTable
-from palpate.selection import free_end
+from palpate.fields import HONEST_STRAIN
+from palpate.scene import BuiltScene, StrikeTable
 from palpate.simulation import Contact, Simulation
-from palpate.strain import HONEST_STRAIN
 from palpate.viewer.messages import vector, whole
 
 # So many of the lowest modes are offered.

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
-from palpate.hold import HeldTool
 from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltScene
-from palpate.simulation import Frame, Simulation
+from palpate.simulation import Frame, HeldTool, Simulation
 from palpate.viewer.fields import Fields
 from palpate.viewer.messages import encode, number, vector
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
