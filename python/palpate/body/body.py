@@ -101,7 +101,7 @@ class Body:
         Raises
         ------
         BodyError
-            No support, nothing left free, or a part of the body that its supports do not hold.
+            No support, nothing left free, or a part of the body that its supports leave free to move.
 
         """
         if not self.fixed_mask.any():
@@ -113,8 +113,8 @@ class Body:
             members = np.flatnonzero(labels == part)
             rank = rigid_constraint_rank(self.mesh.nodes[members], self.fixed_mask[members])
             if rank < 6:
-                held = "no support" if rank == 0 else f"supports that leave {6 - rank} rigid motions free"
+                supports = "no support" if rank == 0 else f"supports that leave {6 - rank} rigid motions free"
                 raise BodyError(
-                    f"the part of {len(members)} nodes around node {members[0]} has {held}: "
+                    f"the part of {len(members)} nodes around node {members[0]} has {supports}: "
                     "fix at least three of its nodes that are not in line"
                 )

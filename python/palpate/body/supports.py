@@ -1,4 +1,4 @@
-"""Supports of a body: which components of which nodes are fixed, and whether that holds it."""
+"""Supports of a body: which components of which nodes are fixed, and whether the body can still move rigidly."""
 
 from __future__ import annotations
 

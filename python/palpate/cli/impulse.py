@@ -61,7 +61,7 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
 
 
 def impulse_scene(model: str, paper: bool) -> Scene:
-    """Scene of the same body and blow, for the viewer: on the node itself, by average acceleration as in the paper.
+    """Scene of the same body and strike, for the viewer: on the node itself, by average acceleration as in the paper.
 
     Raises
     ------

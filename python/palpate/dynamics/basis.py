@@ -217,7 +217,7 @@ def _lanczos(
 
 
 def _shift(body: Body) -> float:
-    """Zero for a held body; else about minus the square of its first elastic frequency: `K - sigma M` is SPD."""
+    """Zero for a supported body; else about minus the square of its first elastic frequency: `K - sigma M` is SPD."""
     try:
         body.require_supported()
     except BodyError:

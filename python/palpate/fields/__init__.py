@@ -3,7 +3,7 @@
 from palpate.fields.element_strain import ElementStrain
 from palpate.fields.interior import Interior
 from palpate.fields.principal import extreme_values, largest_magnitude
-from palpate.fields.strain_measure import HONEST_STRAIN, Strained, StrainGauge, StrainSource
+from palpate.fields.strain_measure import HONEST_STRAIN, Strained, StrainMeasure, StrainSource
 from palpate.fields.stress import StressRecovery, SurfaceStress
 from palpate.fields.surface_strain import SurfaceStrain
 
@@ -11,7 +11,7 @@ __all__ = [
     "HONEST_STRAIN",
     "ElementStrain",
     "Interior",
-    "StrainGauge",
+    "StrainMeasure",
     "StrainSource",
     "Strained",
     "StressRecovery",

@@ -1,10 +1,10 @@
-"""The largest strain of a pose: the one measure that is reported everywhere, and that holds a tool back.
+"""The largest strain of a pose: the one measure that is reported everywhere, and by which a tool is limited.
 
 Of a body whose elements are known it is the largest principal strain in magnitude, `max |e_1|, |e_3|`, over the surface
 nodes, with the infinitesimal strain that :class:`palpate.StressRecovery` recovers there. A bare store knows no
 elements: there it is the Green strain in the plane of the surface, :class:`palpate.fields.SurfaceStrain`.
 
-A gauge splits the way to it in two, so that many poses of one contact cost little each: a ``sample`` that is an affine
+A measure works in two steps, so that many poses of one contact cost little each: a ``sample`` that is an affine
 function of the displacements, and the ``magnitudes`` of a sample.
 """
 
@@ -19,29 +19,29 @@ import numpy as np
 HONEST_STRAIN = 0.1
 
 
-class StrainGauge(Protocol):
-    """What measures the strain of a pose."""
+class StrainMeasure(Protocol):
+    """Measure of the strain of a pose."""
 
     def sample(self, displacements: np.ndarray) -> np.ndarray:
-        """Give what strain follows from, affine in displacements (s, 3), m."""
+        """Quantity that strain follows from, affine in displacements (s, 3), m."""
 
     def magnitudes(self, sample: np.ndarray) -> np.ndarray:
         """Largest principal strain in magnitude at each place that is looked at."""
 
     def largest(self, displacements: np.ndarray) -> float:
-        """Largest of them all."""
+        """Largest of the magnitudes, for displacements (s, 3), m."""
 
 
 class StrainSource(Protocol):
-    """What a pose belongs to."""
+    """Body or simulation that a pose belongs to."""
 
     @property
-    def strain_gauge(self) -> StrainGauge:
-        """What measures the strain of its poses."""
+    def strain_measure(self) -> StrainMeasure:
+        """Measure of the strain of its poses."""
 
 
 class Strained:
-    """A pose that knows its largest strain; ``_source`` has the gauge."""
+    """A pose that knows its largest strain; ``_source`` has the measure."""
 
     displacements: np.ndarray
     _source: StrainSource
@@ -49,7 +49,7 @@ class Strained:
     @cached_property
     def largest_strain(self) -> float:
         """Largest principal strain in magnitude over the surface; milliseconds, when read."""
-        return self._source.strain_gauge.largest(self.displacements)
+        return self._source.strain_measure.largest(self.displacements)
 
     @property
     def within_linear_range(self) -> bool:

@@ -88,7 +88,7 @@ class StressRecovery:
     nodes
         Nodes at which they are recovered instead, inner ones too: a cut-away view shows them.
     interior
-        Of the body, if it is there already: its factor is the dearest part.
+        Of the body, if it is there already: its factorisation is most of the work.
 
     """
 

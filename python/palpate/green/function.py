@@ -15,7 +15,7 @@ import numpy as np
 from palpate import _native
 from palpate.body import Body, description, problem_arrays
 from palpate.errors import BodyError, StoreError
-from palpate.fields import ElementStrain, StrainGauge, StressRecovery, SurfaceStrain
+from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
 
 Components = Sequence[float | None]
@@ -75,8 +75,8 @@ class GreensFunction:
         return self._core.free_displacements.reshape(-1, 3)
 
     @cached_property
-    def strain_gauge(self) -> StrainGauge:
-        """What measures the largest strain of answers: by the elements of the body, of a bare store by its surface."""
+    def strain_measure(self) -> StrainMeasure:
+        """Measure of the largest strain of answers: by the elements of the body; of a bare store, by its surface."""
         if self.body is None:
             return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
         return ElementStrain(StressRecovery(self.body))
@@ -126,7 +126,7 @@ class GreensFunction:
         ----------
         displacements
             Prescribed displacement of touchable nodes from the unloaded shape, m; None leaves a component as it is:
-            free, or held by its support. Fixed nodes may be named: their support moves.
+            free, or fixed by its support. Fixed nodes may be named: their support moves.
         forces
             Forces on touchable nodes, N, besides the body's own loads; None is no force. On a support they go straight
             into it.

@@ -54,7 +54,7 @@ def precompute(
     Raises
     ------
     BodyError
-        A body that its supports do not hold, a touch node that is not on the surface, or a bound of memory that
+        A body that its supports leave free to move, a touch node that is not on the surface, or a bound of memory that
         cannot be kept.
 
     """

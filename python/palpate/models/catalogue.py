@@ -26,7 +26,7 @@ class PaperModel:
     simulation_ms: float | None = None  # table 1: one contact's force and deformation
     step_seconds: float | None = None  # table 2: one Newmark step
     dofs: int | None = None  # table 2
-    note: str = ""  # where the counts contradict themselves, and what the model here holds to
+    note: str = ""  # where the counts contradict themselves, and what the model here keeps
 
 
 # Tables 1 and 2 of the paper. "liver_dynamic" is the coarser liver of table 2.
@@ -105,7 +105,7 @@ def beam(paper: bool = False) -> TetMesh:
 
 
 def fixed(name: str, mesh: TetMesh) -> np.ndarray:
-    """Return the nodes where a model is held, as a mask for :class:`palpate.Body`.
+    """Return the nodes where a model is fixed, as a mask for :class:`palpate.Body`.
 
     The doll stands on its seat and the under-sides of its legs; the kidney lies on its back, the liver hangs on the
     bare area at its back and top, where its ligaments are; the beam is clamped at x = 0.

@@ -1,6 +1,6 @@
 """Scenes: what to touch and with what, as read from a file."""
 
-from palpate.scene.dynamics import DynamicsTable, Motion, StrikeTable
+from palpate.scene.dynamics import BodyMotion, DynamicsTable, StrikeTable
 from palpate.scene.model_scenes import MODES, TOOLS, YOUNGS_MODULUS, model_scene
 from palpate.scene.scene import BuiltScene, Scene
 
@@ -8,9 +8,9 @@ __all__ = [
     "MODES",
     "TOOLS",
     "YOUNGS_MODULUS",
+    "BodyMotion",
     "BuiltScene",
     "DynamicsTable",
-    "Motion",
     "Scene",
     "StrikeTable",
     "model_scene",

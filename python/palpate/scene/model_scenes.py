@@ -17,7 +17,7 @@ DAMPING_RATIOS = (0.03, 0.03)
 
 
 def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
-    """Scene of a built-in model, held by its own supports; with ``motion`` it moves.
+    """Scene of a built-in model, on its own supports; with ``motion`` it moves.
 
     Raises
     ------

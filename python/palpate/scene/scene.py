@@ -23,7 +23,7 @@ from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element, tetrahedralize_with
-from palpate.scene.dynamics import DynamicsTable, Motion
+from palpate.scene.dynamics import BodyMotion, DynamicsTable
 from palpate.scene.loads import LoadTable, together
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
@@ -36,6 +36,8 @@ else:
 
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
 UNION_MEMBERS = {"str", "int", "list[int]"}
+# Keys of former versions, and what they are called now.
+RENAMED = {"view.hold_strain": "strain_limit"}
 
 
 class RefineTable(Table):
@@ -52,7 +54,7 @@ class BodyTable(Table):
     Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
     filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
     ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
-    hold the middles between them.
+    fix the middles between them.
     """
 
     mesh: str | None = None
@@ -85,7 +87,7 @@ class BodyTable(Table):
 
 
 class SupportsTable(Table):
-    """Where the body is held: a predicate over x, y, z, or node indices; a model has its own."""
+    """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
 
     fixed: str | list[int] | None = None
 
@@ -107,14 +109,14 @@ class DeviceTable(Table):
 
 
 class ViewTable(Table):
-    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that holds the tool.
+    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
 
-    Linear elasticity balloons beyond about 10 % strain; ``hold_strain = 0`` lets the pointer go on all the same.
+    Linear elasticity balloons beyond about 10 % strain; ``strain_limit = 0`` takes the limit away.
     """
 
     position: tuple[float, float, float] | None = None
     target: tuple[float, float, float] | None = None
-    hold_strain: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
+    strain_limit: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
 
 
 class Scene(Table):
@@ -187,7 +189,7 @@ class Scene(Table):
         Raises
         ------
         Error
-            A mesh that cannot be read or made, supports that hold nothing, a store that does not match.
+            A mesh that cannot be read or made, supports that leave it free to move, a store that does not match.
 
         """
         if self.body.store is not None:
@@ -249,11 +251,11 @@ class Scene(Table):
                 )
             return mask
         if self.body.adds_middles and max(fixed, default=0) < len(mesh.nodes):
-            held = np.zeros(len(mesh.nodes), dtype=bool)
-            held[fixed] = True
-            between = held[mesh.tets[:, EDGES]].all(axis=2)
-            held[mesh.tets[:, 4:][between]] = True
-            return held
+            mask = np.zeros(len(mesh.nodes), dtype=bool)
+            mask[fixed] = True
+            between = mask[mesh.tets[:, EDGES]].all(axis=2)
+            mask[mesh.tets[:, 4:][between]] = True
+            return mask
         return fixed
 
 
@@ -264,7 +266,7 @@ class BuiltScene:
     scene: Scene
     body: Body | None
     green: GreensFunction
-    motion: Motion | None = None
+    motion: BodyMotion | None = None
 
 
 def _explain(path: Path, text: str, error: ValidationError) -> str:
@@ -277,7 +279,7 @@ def _explain(path: Path, text: str, error: ValidationError) -> str:
     at = f"{path}:{line}" if line else str(path)
     if first["type"] == "extra_forbidden":
         known = _known_keys(keys[:-1])
-        near = difflib.get_close_matches(keys[-1], known, 1)
+        near = [RENAMED[where]] if where in RENAMED else difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
         return f"{at}: unknown key '{where}'; {hint}"
     if first["type"] == "missing" and isinstance(place[-1], int):

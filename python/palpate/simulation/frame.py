@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from palpate.dynamics import Energy
 from palpate.fields import Strained, StrainSource
-from palpate.simulation.recording import MotionEnergy
 
 
 @dataclass(frozen=True)
 class Contact:
     """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one.
 
-    ``anchor`` is where the tool carries no force: the way from there is the displacement of the patch.
+    ``anchor`` is where the tool carries no force: the tool's displacement from there is that of the patch.
     """
 
     tool: int
@@ -57,5 +57,5 @@ class Frame(Strained):
     displacements: np.ndarray
     contacts: list[Contact] = field(repr=False)
     statistics: dict
-    energy: MotionEnergy | None
+    energy: Energy | None
     _source: StrainSource = field(repr=False, compare=False)

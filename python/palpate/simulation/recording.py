@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.dynamics import Energy
+
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
     + [("watched", "f8", 3), ("body_time", "f8")]
@@ -13,31 +15,6 @@ LOG_DTYPE = np.dtype(
 )
 # Ticks a second.
 RATE = 1000.0
-
-
-@dataclass(frozen=True)
-class MotionEnergy:
-    """Energies of a body in motion, J: a number, or an array over the ticks of a recording.
-
-    Attributes
-    ----------
-    kinetic, strain, coupling
-        Of the body's motion, of its deformation, and of the springs between tools and body.
-    dissipated, work
-        Taken out by damping, and done by tools and strikes, since the start.
-
-    """
-
-    kinetic: float | np.ndarray
-    strain: float | np.ndarray
-    coupling: float | np.ndarray
-    dissipated: float | np.ndarray
-    work: float | np.ndarray
-
-    @property
-    def total(self) -> float | np.ndarray:
-        """What the body and its couplings hold now, J."""
-        return self.kinetic + self.strain + self.coupling
 
 
 @dataclass(frozen=True)
@@ -60,4 +37,4 @@ class Recording:
     time: np.ndarray
     forces: np.ndarray
     displacements: np.ndarray
-    energy: MotionEnergy | None
+    energy: Energy | None

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
+from palpate.dynamics import Energy
 from palpate.errors import SceneError
-from palpate.fields import ElementStrain, StrainGauge, SurfaceStress
-from palpate.scene import BuiltScene, Motion, Scene
+from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
+from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation.frame import Contact, Frame
-from palpate.simulation.recording import LOG_DTYPE, RATE, MotionEnergy, Recording
+from palpate.simulation.recording import LOG_DTYPE, RATE, Recording
 
 PERCENTILES = ("p50", "p99", "p999", "max")
 
@@ -94,7 +95,7 @@ class Simulation:
         self._core.set_target(tool, self._targets[tool], True, self._grab[tool])
 
     def grab(self, on: bool, tool: int = 0) -> None:
-        """Hold on to the surface near the tool, or let go."""
+        """Grab the surface near the tool, or let go."""
         self._grab[self._tool(tool)] = bool(on)
         self._core.set_target(tool, self._targets[tool], True, bool(on))
 
@@ -158,7 +159,7 @@ class Simulation:
 
         """
         self._require_motion("strike")
-        self._core.strike(*_blow(point, impulse, duration))
+        self._core.strike(*_strike(point, impulse, duration))
 
     def set_time_scale(self, time_scale: float) -> None:
         """Seconds that a body in motion advances in a second, in (0, 1]: below one is slow motion.
@@ -200,7 +201,7 @@ class Simulation:
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         displacements = raw["displacements"].reshape(-1, 3)
         forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
-        energy = None if raw["energy"] is None else MotionEnergy(*raw["energy"])
+        energy = None if raw["energy"] is None else Energy(*raw["energy"])
         return Frame(raw["time"], forces, positions, displacements, contacts, statistics, energy, self)
 
     def contacts(self) -> list[Contact]:
@@ -208,10 +209,10 @@ class Simulation:
         return [self._contact(record) for record in self._core.contacts() or []]
 
     def contact_response(self, tool: int = 0) -> tuple[Contact, np.ndarray] | None:
-        """Contact of a tool and (3, s, 3) displacements per unit way of the tool from the anchor along x, y and z.
+        """Contact of a tool, and the surface's displacements (3, s, 3) per unit displacement of the tool along an axis.
 
-        The surface is at `u_free` plus these times the ways, with the stiffness of contacts limited as in the force
-        loop; None for a tool that does not touch.
+        The tool's displacement counts from the anchor; the surface is at `u_free` plus these fields times its
+        components, with the stiffness of contacts limited as in the force loop; None for a tool that does not touch.
         """
         answer = self._core.contact_response(self._tool(tool))
         if answer is None:
@@ -220,9 +221,9 @@ class Simulation:
         return self._contact(record), np.reshape(fields, (3, -1, 3))
 
     @property
-    def strain_gauge(self) -> StrainGauge:
-        """What measures the largest strain of frames."""
-        return self.green.strain_gauge
+    def strain_measure(self) -> StrainMeasure:
+        """Measure of the largest strain of frames."""
+        return self.green.strain_measure
 
     def stress(self, displacements: np.ndarray) -> SurfaceStress:
         """Stress and strain at the surface nodes, for a frame's or an answer's displacements (s, 3), m; milliseconds.
@@ -233,10 +234,10 @@ class Simulation:
             A body from a store, which knows only its surface.
 
         """
-        gauge = self.strain_gauge
-        if not isinstance(gauge, ElementStrain):
+        measure = self.strain_measure
+        if not isinstance(measure, ElementStrain):
             raise SceneError("a body from a store knows only its surface: stress needs its elements")
-        field = gauge.recovery.recover(displacements)
+        field = measure.recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
         return SurfaceStress(self._scale * field.stress, field.strain)
 
@@ -244,7 +245,7 @@ class Simulation:
         """Rows of the 1 kHz log since the last call.
 
         ``time``, ``position``, ``force``, ``compute_us``, ``wakeup_us``; ``watched``, the displacement of the node of
-        :meth:`watch`, m; and of a body in motion ``body_time``, s, and its energies, J, as in :class:`MotionEnergy`.
+        :meth:`watch`, m; and of a body in motion ``body_time``, s, and its energies, J, as in :class:`palpate.Energy`.
         """
         return np.ascontiguousarray(self._core.drain_log()).view(LOG_DTYPE)
 
@@ -281,7 +282,7 @@ class Simulation:
         positions
             (t, 3) m of the tool; a row of NaN takes it out of the scene.
         strikes
-            Blows ``(tick, point, impulse)`` or ``(tick, point, impulse, duration)``, as of :meth:`strike`.
+            Strikes ``(tick, point, impulse)`` or ``(tick, point, impulse, duration)``, as of :meth:`strike`.
         watch
             Surface nodes whose displacements are recorded.
 
@@ -294,16 +295,18 @@ class Simulation:
         path = _path(positions)
         if strikes:
             self._require_motion("strike")
-        blows = [(int(tick), *_blow(*blow)) for tick, *blow in strikes]
+        struck = [(int(tick), *_strike(*strike)) for tick, *strike in strikes]
         ranks = self._ranks_of(watch)
-        forces, energies, moved, fault = self._core.run(path, sorted(blows, key=lambda blow: blow[0]), ranks.tolist())
+        forces, energies, moved, fault = self._core.run(
+            path, sorted(struck, key=lambda strike: strike[0]), ranks.tolist()
+        )
         if fault is not None:
             raise SceneError(fault)
-        energy = MotionEnergy(*energies.reshape(-1, 5).T) if len(energies) else None
+        energy = Energy(*energies.reshape(-1, 5).T) if len(energies) else None
         time = np.arange(1, len(path) + 1) / RATE
         return Recording(time, forces.reshape(-1, 3), moved.reshape(len(path), len(ranks), 3), energy)
 
-    def _moving(self, motion: Motion) -> tuple:
+    def _moving(self, motion: BodyMotion) -> tuple:
         shapes = motion.basis.shapes[self.green.surface_nodes].reshape(-1, len(motion.basis))
         return motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling
 
@@ -328,7 +331,7 @@ class Simulation:
         return tool
 
 
-def _blow(point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> tuple:
+def _strike(point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> tuple:
     if not (np.isfinite(duration) and duration >= 0):
         raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
     return _three(point, "a strike's point"), _three(impulse, "a strike's impulse"), float(duration)

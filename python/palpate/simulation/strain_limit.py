@@ -1,4 +1,4 @@
-"""A tool that is held back where a pose would leave what linear elasticity can say.
+"""A tool whose displacement is limited where a pose would leave what linear elasticity can say.
 
 Beyond about 10 % strain a linear solution balloons. While a contact sticks, the displacements are affine in the tool's
 displacement `d` from its anchor, `u = u_free + sum_k d_k U_k`, and so is what a strain measure samples
@@ -17,12 +17,12 @@ import numpy as np
 from palpate.simulation.frame import Contact
 from palpate.simulation.simulation import Simulation
 
-# Strain is held this part of the limit below it, found to the same accuracy in at most so many steps.
+# Strain stays this part of the limit below it, found to the same accuracy in at most so many steps.
 MARGIN = 1e-3
 STEPS = 20
 
 
-class HeldTool:
+class LimitedTool:
     """A simulated tool whose targets are limited; the contact is looked at when it moves and at each :meth:`update`.
 
     Parameters
@@ -40,7 +40,7 @@ class HeldTool:
         self._simulation, self._limit, self._tool = simulation, limit, tool
         self._reach: _Reach | None = None
         self.wanted: np.ndarray | None = None
-        self.held = False
+        self.limited = False
 
     def move(self, position: Sequence[float] | np.ndarray) -> None:
         """Send the tool towards a position, m, as far as the limit lets it."""
@@ -53,8 +53,8 @@ class HeldTool:
             return
         reach = self._current_reach() if self._limit > 0 else None
         share = 1.0 if reach is None else reach.share(self.wanted - reach.contact.anchor)
-        self.held = share < 1.0
-        if reach is None or not self.held:
+        self.limited = share < 1.0
+        if reach is None or not self.limited:
             self._simulation.move(self.wanted, tool=self._tool)
         else:
             anchor = reach.contact.anchor
@@ -63,7 +63,7 @@ class HeldTool:
     def remove(self) -> None:
         """Take the tool out of the scene."""
         self._simulation.remove(self._tool)
-        self.wanted, self.held, self._reach = None, False, None
+        self.wanted, self.limited, self._reach = None, False, None
 
     def _current_reach(self) -> _Reach | None:
         """Prepare the contact when another one has begun; None while nothing is touched."""
@@ -93,25 +93,25 @@ class _Reach:
         self.contact = contact
         # Near a support the stiffness of a contact is limited, and its response depends on the body's own.
         self._scale = simulation.stiffness_scale
-        self._limit, self._margin, self._gauge = limit, MARGIN * limit, simulation.strain_gauge
+        self._limit, self._margin, self._measure = limit, MARGIN * limit, simulation.strain_measure
         free = simulation.green.free_displacements
-        self._base = self._gauge.sample(free)
-        self._slopes = np.stack([self._gauge.sample(free + field) - self._base for field in response])
-        self._counted = self._gauge.magnitudes(self._base) < limit - self._margin
+        self._base = self._measure.sample(free)
+        self._slopes = np.stack([self._measure.sample(free + field) - self._base for field in response])
+        self._counted = self._measure.magnitudes(self._base) < limit - self._margin
 
     def holds_for(self, contact: Contact, scale: float) -> bool:
         mine = self.contact
         same_place = np.array_equal(mine.anchor, contact.anchor) and np.array_equal(mine.nodes, contact.nodes)
         return same_place and np.array_equal(mine.weights, contact.weights) and scale == self._scale
 
-    def share(self, way: np.ndarray) -> float:
-        """Largest share of a way from the anchor, up to 1, within the limit.
+    def share(self, displacement: np.ndarray) -> float:
+        """Largest share of a displacement from the anchor, up to 1, within the limit.
 
         The excess over the limit goes to zero by chords, in a single one where the body has no loads: recovered strain
         is then proportional to the share. The end that stays is given half its excess (the Illinois rule), for the
         in-plane Green strain is quadratic.
         """
-        step = np.tensordot(way, self._slopes, axes=1)
+        step = np.tensordot(displacement, self._slopes, axes=1)
         low, high = 0.0, 1.0
         low_excess, high_excess = self._excess(low, step), self._excess(high, step)
         if high_excess <= self._margin:
@@ -129,5 +129,5 @@ class _Reach:
 
     def _excess(self, share: float, step: np.ndarray) -> float:
         """Largest strain of the places that count, less the limit; the margin keeps what is reported within it."""
-        magnitudes = self._gauge.magnitudes(self._base + share * step)
+        magnitudes = self._measure.magnitudes(self._base + share * step)
         return float(magnitudes.max(initial=0.0, where=self._counted)) - self._limit + self._margin

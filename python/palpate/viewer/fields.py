@@ -69,9 +69,9 @@ class Fields:
 
     def __init__(self, simulation: Simulation, size: float):
         self._simulation, self._size = simulation, size
-        gauge = simulation.strain_gauge
-        self._surface = gauge if isinstance(gauge, SurfaceStrain) else None
-        self._recovery = gauge.recovery if isinstance(gauge, ElementStrain) else None
+        measure = simulation.strain_measure
+        self._surface = measure if isinstance(measure, SurfaceStrain) else None
+        self._recovery = measure.recovery if isinstance(measure, ElementStrain) else None
         self.offered = [DISPLACEMENT, SURFACE_STRAIN] if self._recovery is None else [DISPLACEMENT, STRAIN]
         if self._recovery is not None:
             self.offered += [VON_MISES, PRINCIPAL]
@@ -83,7 +83,7 @@ class Fields:
         """Largest strain of a pose (s, 3), m, as :mod:`palpate.fields.strain_measure` has it."""
         pose = self._of(displacements)
         if self._recovery is None:
-            return pose.once("largest", lambda: self._simulation.strain_gauge.largest(displacements))
+            return pose.once("largest", lambda: self._simulation.strain_measure.largest(displacements))
         return float(largest_magnitude(self._stress(pose).strain).max())
 
     def picture(self, name: str, displacements: np.ndarray, interior: bool) -> Picture:

@@ -170,8 +170,8 @@ class MovingBody:
 
     def _strain_of(self, displacements: np.ndarray) -> float:
         """Largest strain of displacements alone, without that of the body's own loads."""
-        gauge, free = self._simulation.strain_gauge, self._green.free_displacements
-        return float(gauge.magnitudes(gauge.sample(free + displacements) - gauge.sample(free)).max())
+        measure, free = self._simulation.strain_measure, self._green.free_displacements
+        return float(measure.magnitudes(measure.sample(free + displacements) - measure.sample(free)).max())
 
     def _default_impulse(self) -> float:
         """Blow along the normal, where the surface follows the first mode well, that stays within honest strain, N s.

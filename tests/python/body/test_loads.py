@@ -89,12 +89,12 @@ def test_rest_state_equals_a_direct_solve(loaded, loaded_green):
 
 @pytest.mark.parametrize("quadratic", [False, True])
 def test_hanging_bar_equals_theory(tmp_path, quadratic):
-    """Under its own weight a bar with nu = 0 stretches by rho g L^2 / 2 E, which quadratic elements hold exactly."""
+    """Under its own weight a bar with nu = 0 stretches by rho g L^2 / 2 E, as quadratic elements do exactly."""
     mesh = box_mesh(cells=(3, 3, 10), size=(0.02, 0.02, 0.1), jitter=0)
     mesh = mesh.to_quadratic() if quadratic else mesh
     loads = palpate.Loads(gravity=(0, 0, -9.81))
     top = mesh.nodes[:, 2] > 0.1 - 1e-9
-    # Held as the theory wants it: along the bar everywhere at the top, sideways nowhere but against rigid motion.
+    # Supported as the theory wants it: along the bar everywhere at the top, sideways nowhere but against rigid motion.
     fixed = np.zeros((len(mesh.nodes), 3), dtype=bool)
     fixed[top, 2] = True
     fixed[np.flatnonzero(top & (np.linalg.norm(mesh.nodes[:, :2], axis=1) < 1e-9)), :2] = True
@@ -106,21 +106,21 @@ def test_hanging_bar_equals_theory(tmp_path, quadratic):
 
 
 def test_touch_starts_from_the_loaded_state(loaded, loaded_green):
-    """A patch left where the loads put it is not pushed; one held at its unloaded place carries them."""
+    """A patch left where the loads put it is not pushed; one kept at its unloaded place carries them."""
     node = int(np.setdiff1d(loaded.mesh.surface_nodes, loaded.fixed_nodes)[9])
     row = np.searchsorted(loaded.mesh.surface_nodes, node)
     sag = loaded_green.free_displacements[row]
     idle = loaded_green.touch(point=loaded.mesh.nodes[node], displacement=sag)
     assert np.abs(idle.force).max() <= 1e-12
     assert idle.displacements == pytest.approx(loaded_green.free_displacements, abs=1e-15)
-    held = loaded_green.touch(point=loaded.mesh.nodes[node], displacement=(0, 0, 0))
+    kept = loaded_green.touch(point=loaded.mesh.nodes[node], displacement=(0, 0, 0))
     answer = loaded_green.solve(displacements={node: (0, 0, 0)})
-    assert held.force == pytest.approx(answer.forces[row] - loaded.load_vector()[node], rel=1e-9)
-    assert held.displacements == pytest.approx(answer.displacements, abs=1e-12)
+    assert kept.force == pytest.approx(answer.forces[row] - loaded.load_vector()[node], rel=1e-9)
+    assert kept.displacements == pytest.approx(answer.displacements, abs=1e-12)
 
 
 def test_simulation_presses_the_sagged_body(loaded, loaded_green):
-    """The tool meets the surface where the loads have put it, and feels the way from there."""
+    """The tool meets the surface where the loads have put it, and feels its displacement from there."""
     scene = palpate.Scene.of_store(loaded_green.path)
     limits = {"max_force": 100.0, "max_slew": 1e9, "ramp": 0.0}
     tool = {"radius": 0.006, "contact_radius": 0.012}
@@ -139,8 +139,8 @@ def test_simulation_presses_the_sagged_body(loaded, loaded_green):
     forces = simulation.run(point + sag + (0.006 + clearance[:, None]) * normal)
     assert np.abs(forces[clearance > 1e-9]).max() == 0
     assert (forces[clearance < -1e-9] @ normal > 0).all()
-    pushed, held = (loaded_green.touch(point, d, 0.012).force for d in (-1e-3 * normal, np.zeros(3)))
-    assert forces[-1] == pytest.approx(held - pushed, rel=1e-9)
+    pushed, kept = (loaded_green.touch(point, d, 0.012).force for d in (-1e-3 * normal, np.zeros(3)))
+    assert forces[-1] == pytest.approx(kept - pushed, rel=1e-9)
     with simulation:
         frame = simulation.frame()
         assert frame.displacements == pytest.approx(loaded_green.free_displacements, abs=1e-15)

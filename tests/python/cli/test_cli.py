@@ -135,14 +135,14 @@ def test_scripted_press_leaves_a_log_and_a_plot(tmp_path):
     assert "largest strain" in result.stdout and "honest" not in result.stdout
 
 
-def test_scripted_press_is_held_or_flagged(tmp_path):
+def test_scripted_press_is_limited_or_flagged(tmp_path):
     scene = '[body]\nmodel = "kidney"\npaper = true\n'
-    (tmp_path / "held.toml").write_text(scene)
-    (tmp_path / "free.toml").write_text(scene + "[view]\nhold_strain = 0\n")
-    held = run("run", "held.toml", "--headless", "1", cwd=tmp_path).stdout
-    assert "largest strain 10.0 %, where the tool was held back" in held and "honest" not in held
+    (tmp_path / "limited.toml").write_text(scene)
+    (tmp_path / "free.toml").write_text(scene + "[view]\nstrain_limit = 0\n")
+    limited = run("run", "limited.toml", "--headless", "1", cwd=tmp_path).stdout
+    assert "largest strain 10.0 %, where the tool was limited" in limited and "honest" not in limited
     free = run("run", "free.toml", "--headless", "1", cwd=tmp_path).stdout
-    assert "beyond 10 %, to which linear elasticity is honest" in free and "held" not in free
+    assert "beyond 10 %, to which linear elasticity is honest" in free and "limited" not in free
 
 
 def test_wrong_scene_costs_one_line(tmp_path):

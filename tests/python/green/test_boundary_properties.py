@@ -54,14 +54,14 @@ def materials(draw, mesh):
 
 @st.composite
 def supports(draw, mesh):
-    """The face at least x held by nodes, plus some single components anywhere, inside too."""
+    """The face at least x fixed by nodes, plus some single components anywhere, inside too."""
     nodes = mesh.nodes
     mask = np.zeros((len(nodes), 3), dtype=bool)
     mask[nodes[:, 0] < nodes[:, 0].min() + 1e-9] = True
     rng = np.random.default_rng(draw(seeds))
     mask |= rng.random(mask.shape) < draw(st.sampled_from([0.0, 0.1]))
     if draw(st.booleans()):
-        # Rollers: some of the held nodes give in one direction.
+        # Rollers: some of the fixed nodes give in one direction.
         mask[rng.random(len(nodes)) < 0.3, draw(st.integers(0, 2))] = False
     return mask
 
@@ -81,7 +81,7 @@ def loads(draw, mesh):
 
 @st.composite
 def bodies(draw) -> palpate.Body:
-    """A body that its supports hold."""
+    """A body whose supports prevent rigid motions."""
     mesh, table = draw(materials(draw(meshes())))
     mask = draw(supports(mesh))
     body = palpate.Body(mesh, material=table, fixed=mask, loads=draw(loads(mesh)))
@@ -100,8 +100,8 @@ def changes(draw, body) -> dict:
     surface = rng.permutation(body.mesh.surface_nodes)
     counts = [draw(st.integers(0, 5)) for _ in range(2)]
     placed, forced = surface[: counts[0]], surface[counts[0] : sum(counts)]
-    held = np.intersect1d(surface, body.fixed_nodes)
-    released = rng.permutation(held)[: draw(st.integers(0, min(3, max(len(held) - 6, 0))))]
+    supported = np.intersect1d(surface, body.fixed_nodes)
+    released = rng.permutation(supported)[: draw(st.integers(0, min(3, max(len(supported) - 6, 0))))]
     displacements = {
         int(n): tuple(
             v if keep else None for v, keep in zip(1e-3 * rng.normal(size=3), rng.random(3) < 0.7, strict=True)

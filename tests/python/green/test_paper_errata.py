@@ -40,19 +40,19 @@ class Problem:
         return self.identity[:, self.S]
 
     @property
-    def held(self) -> np.ndarray:
+    def fixed(self) -> np.ndarray:
         """Dofs with a known displacement in the new problem."""
         return np.union1d(self.D, self.S)
 
     @property
     def v(self) -> np.ndarray:
         """The answer: forces where displacements are known, displacements elsewhere (3.5 corrected)."""
-        return np.where(np.isin(np.arange(len(self.K)), self.held), self.f, self.u)
+        return np.where(np.isin(np.arange(len(self.K)), self.fixed), self.f, self.u)
 
     @property
     def vb(self) -> np.ndarray:
         """The knowns of the new problem (3.5 corrected)."""
-        return np.where(np.isin(np.arange(len(self.K)), self.held), self.u, self.loads)
+        return np.where(np.isin(np.arange(len(self.K)), self.fixed), self.u, self.loads)
 
     def columns(self) -> tuple[np.ndarray, np.ndarray]:
         """`A` and `Ab` of the reference problem (3.2 corrected): columns on the supports, `A v + Ab vb = 0`."""
@@ -142,8 +142,8 @@ def test_3_5_printed_exchanges_knowns_and_unknowns(problem):
     E = problem.E
     A, Ab = problem.columns()
     swapped, swapped_b = A + (Ab - A) @ E @ E.T, Ab + (A - Ab) @ E @ E.T
-    held = np.isin(np.arange(len(problem.K)), problem.held)
-    printed_v, printed_vb = np.where(held, problem.u, problem.f), np.where(held, problem.f, problem.u)
+    fixed = np.isin(np.arange(len(problem.K)), problem.fixed)
+    printed_v, printed_vb = np.where(fixed, problem.u, problem.f), np.where(fixed, problem.f, problem.u)
     assert relative(swapped @ problem.v, -swapped_b @ problem.vb) <= EXACT
     scale = np.abs(swapped_b @ printed_vb).max()
     assert np.abs(swapped @ printed_v + swapped_b @ printed_vb).max() >= WRONG * scale
@@ -196,8 +196,8 @@ def test_releasing_a_support_fails_with_the_printed_one(problem):
     assert np.allclose(E.T @ literal @ E, np.eye(3))
     kept = np.setdiff1d(problem.D, released)
     u, f = (x.ravel() for x in direct_solve(problem.body, dict.fromkeys(kept.tolist(), 0.0), problem.loads))
-    held = np.isin(np.arange(len(problem.K)), kept)
-    v, vb = np.where(held, f, u), np.where(held, u, problem.loads)
+    fixed = np.isin(np.arange(len(problem.K)), kept)
+    v, vb = np.where(fixed, f, u), np.where(fixed, u, problem.loads)
     assert relative(formulas_3_8_to_3_10(literal, E, vb), v) >= WRONG
     assert relative(formulas_3_8_to_3_10(problem.psi(), E, vb), v) <= EXACT
     answer = problem.green.solve(forces=_by_node(problem.loads), release=np.unique(released // 3))

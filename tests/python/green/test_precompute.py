@@ -90,12 +90,12 @@ def test_columns_are_those_of_scipy_and_symmetric_to_the_bit(precision, region, 
 
 def test_held_and_written_operators_are_the_same(block, tmp_path):
     for precision in ERRORS:
-        held = _native.GreenCore.precompute(problem_arrays(block, None), precision, "{}", None)
+        in_memory = _native.GreenCore.precompute(problem_arrays(block, None), precision, "{}", None)
         written = palpate.precompute(block, precision=precision, path=tmp_path / precision)
-        held.save(tmp_path / "held")
-        a, b = (touchable_square(g)[0] for g in (palpate.GreensFunction.load(tmp_path / "held"), written))
+        in_memory.save(tmp_path / "in_memory")
+        a, b = (touchable_square(g)[0] for g in (palpate.GreensFunction.load(tmp_path / "in_memory"), written))
         assert np.array_equal(a, b)
-        assert held.precision == precision == written.precision
+        assert in_memory.precision == precision == written.precision
 
 
 def test_sixteen_bits_answer_within_a_thousandth(block, block_green, tmp_path):

@@ -209,17 +209,17 @@ def test_interior_release_and_free_release_are_refused(block, block_green, tmp_p
 
 @pytest.mark.parametrize("precision", ["f32", "f64"])
 def test_releases_that_leave_the_body_floating_are_refused(block, tmp_path, precision):
-    """Two held nodes leave a hinge, three do not; a prescribed displacement serves as a support."""
+    """Two supported nodes leave a hinge, three do not; a prescribed displacement serves as a support."""
     green = palpate.precompute(block, precision=precision, path=tmp_path / "block.palpate")
-    held = block.fixed_nodes[[0, 3, 12]].tolist()
+    supported = block.fixed_nodes[[0, 3, 12]].tolist()
     push = {79: (0.0, 0.0, 0.01)}
     for kept in range(3):
-        gone = [n for n in block.fixed_nodes.tolist() if n not in held[:kept]]
+        gone = [n for n in block.fixed_nodes.tolist() if n not in supported[:kept]]
         with pytest.raises(palpate.BodyError, match="leave the body, or a part of it, free to move"):
             green.solve(forces=push, release=gone)
-    gone = [n for n in block.fixed_nodes.tolist() if n not in held]
+    gone = [n for n in block.fixed_nodes.tolist() if n not in supported]
     answer = green.solve(forces=push, release=gone)
-    prescribed = {3 * n + k: 0.0 for n in held for k in range(3)}
+    prescribed = {3 * n + k: 0.0 for n in supported for k in range(3)}
     loads = np.zeros(3 * len(block.mesh.nodes))
     loads[3 * 79 + 2] = 0.01
     u, f = direct_solve(block, prescribed, loads)

@@ -1,4 +1,4 @@
-"""Contacts on a body that moves: held, struck and let go, against static answers, natural frequencies and energy."""
+"""Contacts on a body that moves: pressed, struck and let go, against static answers, natural frequencies and energy."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FREE_LIMITS = "[device]\nmax_force = '1kN'\nmax_slew = 1e9\nramp = 0\n"
 
 
 def scene(folder, dynamics: str, fixed: str = "x < 1e-6", more: str = "", cells=(10, 3, 3)) -> palpate.Scene:
-    """Scene of a bar of soft rubber, a cantilever unless it is held elsewhere; ``more`` goes behind [body]."""
+    """Scene of a bar of soft rubber, a cantilever unless it is fixed elsewhere; ``more`` goes behind [body]."""
     box_mesh(cells=cells, size=SIZE, jitter=0).write(folder / "beam.vtu")
     text = (
         f"[body]\nmesh = 'beam.vtu'\nprecision = 'f64'\n{more}"
@@ -32,15 +32,15 @@ def scene(folder, dynamics: str, fixed: str = "x < 1e-6", more: str = "", cells=
 
 
 def approach_and_hold(depth: float, ticks: int, speed: float = 0.1) -> np.ndarray:
-    """Tool positions: down at a speed from 1 mm above, held when it is so deep."""
-    way = np.minimum(speed * 1e-3 * np.arange(ticks), 1e-3 + depth) - 1e-3
-    return TOP + np.array([0, 0, RADIUS]) - np.outer(way, [0, 0, 1])
+    """Tool positions: down at a speed from 1 mm above, resting when it is so deep."""
+    depths = np.minimum(speed * 1e-3 * np.arange(ticks), 1e-3 + depth) - 1e-3
+    return TOP + np.array([0, 0, RADIUS]) - np.outer(depths, [0, 0, 1])
 
 
-def static_force(green: palpate.GreensFunction, way: np.ndarray) -> np.ndarray:
+def static_force(green: palpate.GreensFunction, displacement: np.ndarray) -> np.ndarray:
     """Force on the device of the body at rest, pushed through the coupling."""
     stiffness = np.column_stack([green.touch(TOP, unit, CONTACT_RADIUS).force for unit in np.eye(3)])
-    return -np.linalg.solve(np.linalg.inv(stiffness) + np.eye(3) / COUPLING, way)
+    return -np.linalg.solve(np.linalg.inv(stiffness) + np.eye(3) / COUPLING, displacement)
 
 
 @pytest.mark.parametrize("weights", ["", "delta = 0.5\nalpha = 0.25\n", "scheme = 'exact'\n"])
@@ -67,10 +67,10 @@ def test_a_held_press_is_the_body_with_the_spring_built_in(tmp_path):
         for corner in ([0.048, 0.01, 0.03], [0.06, 0.01, 0.03])
     ]
     at = 0.7 * body.mesh.nodes[nodes[0]] + 0.3 * body.mesh.nodes[nodes[1]]
-    # Straight down where it touches, sideways later: the way along the surface counts from the first touch.
-    way = 1e-3 * np.minimum(1.0, 0.01 * np.arange(400))[:, None] * [0.0, 0.0, -1.0]
-    way[20:, :2] = 1e-4 * np.sin(0.05 * np.arange(380))[:, None] * [2.0, 1.0]
-    forces = simulation.run(at + [0, 0, RADIUS] + way)
+    # Straight down where it touches, sideways later: the displacement along the surface counts from the first touch.
+    path = 1e-3 * np.minimum(1.0, 0.01 * np.arange(400))[:, None] * [0.0, 0.0, -1.0]
+    path[20:, :2] = 1e-4 * np.sin(0.05 * np.arange(380))[:, None] * [2.0, 1.0]
+    forces = simulation.run(at + [0, 0, RADIUS] + path)
     free = np.setdiff1d(np.arange(3 * len(body.mesh.nodes)), body.fixed_dofs)
     patch = np.zeros((3 * len(body.mesh.nodes), 3))
     for node, weight in zip(nodes, (0.7, 0.3), strict=True):
@@ -81,7 +81,7 @@ def test_a_held_press_is_the_body_with_the_spring_built_in(tmp_path):
     alpha = (delta + 0.5) ** 2 / 4
     inverse = np.linalg.inv(M + delta * dt * damping + alpha * dt**2 * stiff)
     u, v, a = np.zeros((3, len(free)))
-    for target, force in zip(way, forces, strict=True):
+    for target, force in zip(path, forces, strict=True):
         u, v = u + dt * v + dt**2 * (0.5 - alpha) * a, v + dt * (1 - delta) * a
         a = inverse @ (COUPLING * patch @ target - damping @ v - stiff @ u)
         u, v = u + alpha * dt**2 * a, v + delta * dt * a
@@ -108,7 +108,7 @@ def test_a_held_press_on_quadratic_elements_comes_to_the_static_answer(tmp_path)
 
 
 def test_a_body_in_motion_sags_under_its_weight_and_moves_about_that(tmp_path):
-    """At rest a touch is that of the sagged body at rest; a blow swings about the sagged state, and dies down to it."""
+    """At rest a touch is that of the sagged body at rest; a strike swings about that state, and dies down to it."""
     weight = "[[loads]]\ngravity = [0, 0, -9.81]\n"
     simulation = palpate.Simulation(scene(tmp_path, "modes = 40\n", more=weight))
     sag = simulation.green.free_displacements
@@ -131,26 +131,26 @@ def test_a_body_in_motion_sags_under_its_weight_and_moves_about_that(tmp_path):
     compliance = np.linalg.inv(stiffness) + np.eye(3) / COUPLING
     sunk = np.linalg.solve(stiffness, -touched.force)  # mean displacement of the patch by the weight
     assert sunk[2] < -1e-5
-    # The way along the surface counts from the first touch; the material met there lies beside TOP by a little.
+    # Displacement along the surface counts from the first touch; the material met there lies beside TOP by a little.
     expected = -np.linalg.solve(compliance, [0, 0, -0.003 - sunk[2]])
     assert force == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.linalg.norm(expected))
 
 
-def test_a_blow_excites_each_mode_by_its_share(tmp_path):
+def test_a_strike_excites_each_mode_by_its_share(tmp_path):
     """After an impulse `J` on a patch `W` a mode swings as `Phi^T W J / omega sin(omega t)`, each on its own."""
     made = scene(tmp_path, "scheme = 'exact'\nmodes = 12\nrayleigh = [0, 0]\n")
     made = made.model_copy(update={"tool": made.tool.model_copy(update={"contact_radius": 0.0})})
     simulation = palpate.Simulation(made)
     basis, nodes = simulation.motion.basis, simulation.green.surface_nodes
     struck = int(np.argmin(np.linalg.norm(simulation.body.mesh.nodes - [0.108, 0.02, 0.03], axis=1)))
-    impulse, dt, blow = np.array([4e-4, -3e-4, -1e-3]), 1e-3, 20
+    impulse, dt, tick = np.array([4e-4, -3e-4, -1e-3]), 1e-3, 20
     played = simulation.play(
-        np.full((1500, 3), np.nan), [(blow, simulation.body.mesh.nodes[struck], impulse)], watch=nodes
+        np.full((1500, 3), np.nan), [(tick, simulation.body.mesh.nodes[struck], impulse)], watch=nodes
     )
     omega = 2 * np.pi * basis.frequencies
     # The force is a triangle of two steps around its tick's end: a mode hears it dulled by sinc^2(omega dt / 2).
     share = basis.shapes[struck].T @ impulse / omega * np.sinc(omega * dt / 2 / np.pi) ** 2
-    t = played.time - played.time[blow]
+    t = played.time - played.time[tick]
     after = t > 1.5 * dt
     expected = np.einsum("nam,m,mt->tna", basis.shapes[nodes], share, np.sin(np.outer(omega, t[after])))
     assert np.count_nonzero(np.abs(share) > 0.01 * np.abs(share).max()) > 5
@@ -193,7 +193,7 @@ def test_energy_never_exceeds_the_work_of_the_hand(tmp_path, weights, modes):
     assert 500 < len(touched) < 3500
 
 
-def test_undamped_average_acceleration_keeps_the_energy_of_a_blow(tmp_path):
+def test_undamped_average_acceleration_keeps_the_energy_of_a_strike(tmp_path):
     simulation = palpate.Simulation(scene(tmp_path, "rayleigh = [0, 0]\ndelta = 0.5\nalpha = 0.25\n"))
     played = simulation.play(np.full((5000, 3), np.nan), strikes=[(0, TOP, (0, 0, -1e-3))])
     total = played.energy.total[5:]
@@ -212,13 +212,13 @@ def test_the_tool_meets_the_body_where_it_is(tmp_path):
     assert (forces[:, 2] >= 0).all()
 
 
-def test_a_long_blow_is_a_row_of_short_ones(tmp_path):
-    """Half a wave in time: the motion is linear, so shifted and weighted answers to a blow of one step add up to it."""
+def test_a_long_strike_is_a_row_of_short_ones(tmp_path):
+    """Half a wave in time: the motion is linear, so shifted and weighted answers to one of one step add up to it."""
     simulation = palpate.Simulation(scene(tmp_path, ""))
     away, watch = np.full((300, 3), np.nan), simulation.green.surface_nodes[::7]
 
-    def after(*blow):
-        return simulation.play(away, strikes=[(0, TOP, (0, 3e-4, -1e-3), *blow)], watch=watch).displacements
+    def after(*strike):
+        return simulation.play(away, strikes=[(0, TOP, (0, 3e-4, -1e-3), *strike)], watch=watch).displacements
 
     short, steps = after(), 20
     assert np.array_equal(short, after(5e-4))

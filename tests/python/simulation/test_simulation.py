@@ -140,8 +140,8 @@ def test_device_limits_hold(tmp_path, scene):
     (tmp_path / "tame.toml").write_text(text[: text.index("[device]")] + limits)
     path = along((0, 0, 0.001), (0, 0, -0.004), ticks=400)
     free = palpate.Simulation(scene).run(path)
-    held = palpate.Simulation(palpate.Scene.read(tmp_path / "tame.toml")).run(path)
-    size, computed = np.linalg.norm(held, axis=1), np.linalg.norm(free, axis=1)
+    tame = palpate.Simulation(palpate.Scene.read(tmp_path / "tame.toml")).run(path)
+    size, computed = np.linalg.norm(tame, axis=1), np.linalg.norm(free, axis=1)
     assert computed.max() > 0.4
     assert size.max() == pytest.approx(0.3, rel=1e-12)
     assert np.diff(size).max() <= 5e-3 * (1 + 1e-9)

@@ -1,4 +1,4 @@
-"""The accuracy table of `palpate verify`, held."""
+"""The accuracy table of `palpate verify`: each figure within its tolerance."""
 
 from __future__ import annotations
 

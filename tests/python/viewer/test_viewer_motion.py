@@ -155,7 +155,7 @@ def test_the_default_blow_swings_a_body_visibly_and_honestly(moving):
         impulse = -blow.impulse * outward[node] / np.linalg.norm(outward[node])
         strikes = [(0, body.mesh.nodes[node], impulse, blow._duration)]
         played = session.simulation.play(np.full((300, 3), np.nan), strikes=strikes, watch=surface)
-        strains.append(max(moving.green.strain_gauge.largest(pose) for pose in played.displacements[::4]))
+        strains.append(max(moving.green.strain_measure.largest(pose) for pose in played.displacements[::4]))
         swings.append(np.linalg.norm(played.displacements, axis=2).max() / session.size)
     assert np.median(strains) < 0.1 and max(strains) < 0.25
     assert max(swings) > 0.03

@@ -21,7 +21,7 @@ from palpate.dynamics import ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.dynamics.matrices import Matrices
 from palpate.green import precompute
 from palpate.mesh import TetMesh
-from palpate.scene import YOUNGS_MODULUS, BuiltScene, Motion, Scene
+from palpate.scene import YOUNGS_MODULUS, BodyMotion, BuiltScene, Scene
 from palpate.simulation import RATE, Simulation
 from palpate.validation.bench import peers
 from palpate.validation.bench.paper import machine
@@ -105,7 +105,7 @@ def _measure(name: str, mesh: TetMesh, published: models.PaperModel | None, coun
     own = Newmark(body, DT, rayleigh=rayleigh, method="sparse")
     own_us = _per_call_us(lambda: own.step(force, 20), 20)
     modal = Newmark(body, DT, rayleigh=rayleigh, modes=basis)
-    tick, tapping, surface = _tick_us(body, Motion(basis, (DT, ALPHA, DELTA, *rayleigh), False, COUPLING))
+    tick, tapping, surface = _tick_us(body, BodyMotion(basis, (DT, ALPHA, DELTA, *rayleigh), False, COUPLING))
     ticks_per_frame = RATE / FRAME_RATE
     frame = tick + surface / ticks_per_frame
     return Row(
@@ -147,7 +147,7 @@ def _force(matrices: Matrices, body: Body) -> np.ndarray:
     return force[matrices.free]
 
 
-def _tick_us(body: Body, motion: Motion) -> tuple[float, float, float]:
+def _tick_us(body: Body, motion: BodyMotion) -> tuple[float, float, float]:
     """Time of a tick in contact, of one with a tool that lands and leaves in turn, and of the whole surface."""
     surface, top = body.mesh.surface_nodes, body.mesh.nodes[_top(body)]
     near = surface[np.linalg.norm(body.mesh.nodes[surface] - top, axis=1) < TOUCHED]

@@ -33,7 +33,7 @@ def cantilever() -> Outcome:
 
 
 def cook() -> Outcome:
-    """Cook's tapered panel, nearly incompressible, in plane strain: one layer held between two planes."""
+    """Cook's tapered panel, nearly incompressible, in plane strain: one layer between two planes."""
     checks = []
     for quadratic in (True, False):
         computed = _cook_deflection(24, quadratic)
@@ -52,7 +52,7 @@ def _beam_deflection(nu: float) -> float:
 def _cantilever_deflection(nu: float, quadratic: bool, glued: bool) -> float:
     """Deflection with an end that stays plane but may grow wider and thinner, as theory has it, or is glued to a wall.
 
-    Glue holds the section across too, which makes a beam 1 % stiffer at nu = 0.3 and 3 % at nu = 0.49.
+    Glue fixes the section across too, which makes a beam 1 % stiffer at nu = 0.3 and 3 % at nu = 0.49.
     """
     mesh = box((20, 2, 2), (LENGTH, DEPTH, DEPTH), quadratic=quadratic)
     end, middle = mesh.nodes[:, 0] < 1e-9, np.abs(mesh.nodes - DEPTH / 2) < 1e-9

@@ -21,7 +21,7 @@ ORDER_NAMES = {False: "4 nodes", True: "10 nodes"}
 
 
 def patch_test() -> Outcome:
-    """Impose a linear displacement on the surface of an irregular mesh: it must hold inside, at constant stress."""
+    """Impose a linear displacement on the surface of an irregular mesh: it must be found inside, at constant stress."""
     gradient = 1e-3 * np.random.default_rng(2).normal(size=(3, 3))
     strain = (gradient + gradient.T) / 2
     lam, mu = _lame(SOFT)

@@ -15,7 +15,7 @@ from palpate.validation.verify.exactness import ORDER_NAMES
 from palpate.validation.verify.grids import box, lattice, mapped
 from palpate.validation.verify.solution import green_of, quiet_body
 
-# A cube glued to a table, pressed in the middle of its top by a patch of a quarter of its width, nothing holding it
+# A cube glued to a table, pressed in the middle of its top by a patch of a quarter of its width, nothing fixing it
 # sideways.
 WIDTH, RADIUS, YOUNGS_MODULUS, NU = 0.06, 0.015, 10e3, 0.45
 TOP = (WIDTH / 2, WIDTH / 2, WIDTH)
@@ -49,7 +49,7 @@ def block(cells: int, quadratic: bool, nu: float) -> Body:
 
 
 def stiffness(green: GreensFunction, point: tuple[float, ...] = TOP, radius: float = RADIUS) -> float:
-    """Force over depth, N/m, pressing straight down and free to give way sideways."""
+    """Force over depth, N/m, pressing straight down and free to move sideways."""
     return -float(green.touch(point, (None, None, -PRESS), radius).force[2]) / PRESS
 
 

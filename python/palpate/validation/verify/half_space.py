@@ -1,7 +1,7 @@
 """The half-space pressed by a point force, a uniform pressure on a disc, and a rigid flat punch.
 
 A quarter of a half-space inside a hemisphere; the exact displacement is imposed on the hemisphere, for a rim that is
-simply held would have to lie some thirty disc radii away. The mesh follows oblate spheroidal coordinates,
+simply fixed would have to lie some thirty disc radii away. The mesh follows oblate spheroidal coordinates,
 
     r = a cosh s cos t,    z = a sinh s sin t,
 
@@ -123,13 +123,13 @@ def _exact(x: np.ndarray, at: np.ndarray, forces: np.ndarray) -> np.ndarray:
     shear = SOFT.youngs_modulus / (2 * (1 + SOFT.poissons_ratio))
     u = np.zeros_like(x)
     for source, force in zip(at, forces, strict=True):
-        way = x - source
-        distance = np.linalg.norm(way, axis=1)
+        offset = x - source
+        distance = np.linalg.norm(offset, axis=1)
         distance[distance == 0] = np.inf
-        z = way[:, 2]
+        z = offset[:, 2]
         along = z / distance**3 - (1 - 2 * SOFT.poissons_ratio) / (distance * (distance + z))
         down = z**2 / distance**3 + 2 * (1 - SOFT.poissons_ratio) / distance
-        u += force / (4 * np.pi * shear) * np.column_stack([along * way[:, 0], along * way[:, 1], down])
+        u += force / (4 * np.pi * shear) * np.column_stack([along * offset[:, 0], along * offset[:, 1], down])
     return u
 
 

@@ -43,7 +43,7 @@ def clamped_beam() -> Outcome:
 
 
 def free_beam() -> Outcome:
-    """Six rigid motions and the first bending frequencies of a beam that nothing holds."""
+    """Six rigid motions and the first bending frequencies of a beam without supports."""
     body = Body(box(BEAM_CELLS, (LENGTH, DEPTH, DEPTH), quadratic=True), material=RUBBER, fixed=None)
     basis = _modes(body, 20)
     rigid = int(np.count_nonzero(basis.frequencies == 0.0))
@@ -56,7 +56,7 @@ def free_beam() -> Outcome:
 def plate() -> Outcome:
     """NAFEMS FV52 with hard simple supports: on the sides nothing moves along them, neither up nor across.
 
-    With only the lower edges held, as in the original, solids do not converge to the closed form but 5 % below it.
+    With only the lower edges fixed, as in the original, solids do not converge to the closed form but 5 % below it.
     """
     mesh = box(PLATE_CELLS, PLATE, quadratic=True)
     sides = [(np.abs(x) < 1e-9) | (np.abs(x - 10.0) < 1e-9) for x in mesh.nodes.T[:2]]
@@ -176,7 +176,7 @@ def _along_the_axis(body: Body, basis: ModalBasis) -> tuple[np.ndarray, np.ndarr
 
 
 def _beam_checks(frequencies: np.ndarray, targets: np.ndarray) -> list[Check]:
-    """Compare the mean of each pair: a square section bends both ways at the same frequency."""
+    """Compare the mean of each pair: a square section bends along both axes at the same frequency."""
     pairs = frequencies[: 2 * len(targets)].reshape(-1, 2).mean(axis=1)
     return [
         Check(f"bending {k}", float(f), float(target), BEAM, 0.02, "Hz")

@@ -1,4 +1,4 @@
-"""The largest strain as frames and answers tell it, and a tool that is held back by it."""
+"""The largest strain as frames and answers tell it, and a tool whose displacement is limited by it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from conftest import box_mesh
 import palpate
 from palpate.fields import StressRecovery, extreme_values, largest_magnitude
 from palpate.scene import BuiltScene
-from palpate.simulation import HeldTool
+from palpate.simulation import LimitedTool
 
 TOP = np.array([0.041, 0.026, 0.05])
 RADIUS, LIMIT = 0.006, 0.1
@@ -38,7 +38,7 @@ def press(request, tmp_path):
         yield simulation
 
 
-def settle(tool: HeldTool, simulation: palpate.Simulation) -> palpate.Frame:
+def settle(tool: LimitedTool, simulation: palpate.Simulation) -> palpate.Frame:
     """Frame once the simulated hand has arrived."""
     for _ in range(12):
         tool.update()
@@ -71,28 +71,28 @@ def test_answers_and_frames_know_their_largest_strain(block, block_green, tmp_pa
     assert 0 < bare.largest_strain != touch.largest_strain
 
 
-def test_a_deep_press_is_held_at_the_limit(press):
-    tool = HeldTool(press, LIMIT)
+def test_a_deep_press_stops_at_the_limit(press):
+    tool = LimitedTool(press, LIMIT)
     over = TOP + [0, 0, RADIUS]
     tool.move(over - [0, 0, 0.001])
     shallow = settle(tool, press)
-    assert not tool.held and shallow.largest_strain < LIMIT
+    assert not tool.limited and shallow.largest_strain < LIMIT
     tool.move(over - [0.002, 0, 0.02])
     deep = settle(tool, press)
-    assert tool.held
+    assert tool.limited
     assert 0.995 * LIMIT <= deep.largest_strain <= 1.0001 * LIMIT
     tool.move(over - [0.004, 0, 0.04])
     deeper = settle(tool, press)
     assert deeper.forces[0] == pytest.approx(deep.forces[0], abs=0.01 * np.linalg.norm(deep.forces[0]))
-    # The way back is felt at once, and a tool that is lifted lets go.
+    # A tool that moves back is not limited, and a tool that is lifted lets go.
     tool.move(over - [0, 0, 0.001])
-    assert settle(tool, press).largest_strain < LIMIT and not tool.held
+    assert settle(tool, press).largest_strain < LIMIT and not tool.limited
     tool.move(over + [0, 0, 0.01])
-    assert settle(tool, press).contacts == [] and not tool.held
+    assert settle(tool, press).contacts == [] and not tool.limited
 
 
-def test_a_pull_sideways_is_held_too(press):
-    tool = HeldTool(press, LIMIT)
+def test_a_pull_sideways_is_limited_too(press):
+    tool = LimitedTool(press, LIMIT)
     surface = (
         TOP + press.green.free_displacements[np.argmin(np.linalg.norm(press.green.surface_positions - TOP, axis=1))]
     )
@@ -101,10 +101,10 @@ def test_a_pull_sideways_is_held_too(press):
     settle(tool, press)
     tool.move(surface + [0.03, 0.0, 0.03])
     frame = settle(tool, press)
-    assert frame.contacts[0].mode == "grab" and tool.held
+    assert frame.contacts[0].mode == "grab" and tool.limited
     assert frame.largest_strain == pytest.approx(LIMIT, rel=0.005)
-    way = frame.positions[0] - frame.contacts[0].anchor
-    assert np.cross(way, tool.wanted - frame.contacts[0].anchor) == pytest.approx(np.zeros(3), abs=1e-8)
+    displacement = frame.positions[0] - frame.contacts[0].anchor
+    assert np.cross(displacement, tool.wanted - frame.contacts[0].anchor) == pytest.approx(np.zeros(3), abs=1e-8)
 
 
 def test_the_response_is_that_of_a_touch(press):
@@ -112,8 +112,8 @@ def test_the_response_is_that_of_a_touch(press):
     time.sleep(0.1)
     contact, response = press.contact_response()
     frame = press.frame()
-    way = frame.positions[0] - contact.anchor
-    expected = press.green.free_displacements + np.tensordot(way, response, axes=1)
+    displacement = frame.positions[0] - contact.anchor
+    expected = press.green.free_displacements + np.tensordot(displacement, response, axes=1)
     assert np.abs(frame.displacements - expected).max() <= 1e-9 * np.abs(expected).max()
     press.remove()
     time.sleep(0.05)
@@ -121,7 +121,7 @@ def test_the_response_is_that_of_a_touch(press):
 
 
 def test_other_settings_are_noticed(press):
-    tool = HeldTool(press, LIMIT)
+    tool = LimitedTool(press, LIMIT)
     tool.move(TOP + [0, 0, RADIUS - 0.03])
     first = settle(tool, press).contacts[0]
     if press.youngs_modulus is not None:  # bodies with loads keep theirs
@@ -134,19 +134,25 @@ def test_other_settings_are_noticed(press):
     press.set_radius(0.008)
     tool.move(TOP + [0, 0, RADIUS - 0.03])
     smaller = settle(tool, press)
-    assert len(smaller.contacts[0].nodes) < len(first.nodes) and tool.held
+    assert len(smaller.contacts[0].nodes) < len(first.nodes) and tool.limited
     assert smaller.largest_strain == pytest.approx(LIMIT, rel=0.005)
 
 
-def test_without_a_limit_nothing_is_held(press):
-    tool = HeldTool(press, 0.0)
+def test_without_a_limit_a_tool_goes_anywhere(press):
+    tool = LimitedTool(press, 0.0)
     tool.move(TOP + [0, 0, RADIUS - 0.02])
     frame = settle(tool, press)
-    assert not tool.held and frame.largest_strain > LIMIT and not frame.within_linear_range
+    assert not tool.limited and frame.largest_strain > LIMIT and not frame.within_linear_range
 
 
 @pytest.mark.parametrize("value", ["-0.1", "1.5", "inf", "'much'"])
-def test_a_strain_that_cannot_be_held_at_is_refused_with_its_line(tmp_path, value):
-    (tmp_path / "a.toml").write_text(f'[body]\nmodel = "beam"\n[view]\nhold_strain = {value}\n')
-    with pytest.raises(palpate.SceneError, match=r"a.toml:4: view.hold_strain"):
+def test_a_limit_out_of_range_is_refused_with_its_line(tmp_path, value):
+    (tmp_path / "a.toml").write_text(f'[body]\nmodel = "beam"\n[view]\nstrain_limit = {value}\n')
+    with pytest.raises(palpate.SceneError, match=r"a.toml:4: view.strain_limit"):
+        palpate.Scene.read(tmp_path / "a.toml")
+
+
+def test_the_former_name_of_the_limit_is_refused_with_the_new_one(tmp_path):
+    (tmp_path / "a.toml").write_text('[body]\nmodel = "beam"\n[view]\nhold_strain = 0.1\n')
+    with pytest.raises(palpate.SceneError, match=r"a.toml:4: .*'view.hold_strain'; did you mean 'strain_limit'"):
         palpate.Scene.read(tmp_path / "a.toml")
