@@ -16,6 +16,7 @@ from palpate.errors import (
     MeshWarning,
     PalpateWarning,
     SceneError,
+    SimulationError,
     StoreError,
     StoreWarning,
     UnitError,
@@ -25,7 +26,7 @@ from palpate.fields import StressRecovery, SurfaceStress
 from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
 from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
-from palpate.simulation import Contact, Frame, Simulation
+from palpate.simulation import Contact, Frame, Recording, Simulation
 
 __version__ = version("palpate")
 
@@ -47,9 +48,11 @@ __all__ = [
     "Newmark",
     "PalpateWarning",
     "Plan",
+    "Recording",
     "Scene",
     "SceneError",
     "Simulation",
+    "SimulationError",
     "StoreError",
     "StoreWarning",
     "StressRecovery",

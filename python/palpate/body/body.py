@@ -61,6 +61,12 @@ class Body:
         self.fixed_mask = mask
         self.loads = loads
 
+    def __repr__(self) -> str:
+        mesh, fixed = self.mesh, len(self.fixed_nodes)
+        materials = 1 if isinstance(self.material, Material) else len(self.material)
+        counts = f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {mesh.tets.shape[1]}-node tets"
+        return f"Body({counts}, {materials} material{'s' if materials > 1 else ''}, {fixed} nodes fixed)"
+
     @property
     def fixed_nodes(self) -> np.ndarray:
         """Nodes with any fixed component, ascending (f,)."""

@@ -14,13 +14,15 @@ import numpy as np
 
 from palpate.body.assembly import mass_matrix
 from palpate.body.selection import Selection, node_indices, selected_nodes
+from palpate.equality import ComparedByValue
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
 from palpate.mesh.shape_functions import surface_integrals
+from palpate.vectors import three_numbers
 
 
-@dataclass(frozen=True)
-class Loads:
+@dataclass(frozen=True, eq=False)
+class Loads(ComparedByValue):
     """Loads that act on a body at rest.
 
     A part of the surface is named by node indices, an (n,) mask or a function of the (n, 3) positions; the faces all of
@@ -50,10 +52,10 @@ class Loads:
     forces: Mapping[int, Sequence[float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gravity", _vector(self.gravity, "gravity"))
+        object.__setattr__(self, "gravity", three_numbers(self.gravity, "gravity", BodyError))
         pressure = [(where, _number(value, "pressure")) for where, value in self.pressure]
-        spread = [(where, _vector(force, "spread")) for where, force in self.spread]
-        forces = {node: _vector(force, f"forces: node {node}") for node, force in self.forces.items()}
+        spread = [(where, three_numbers(force, "spread", BodyError)) for where, force in self.spread]
+        forces = {node: three_numbers(force, f"forces: node {node}", BodyError) for node, force in self.forces.items()}
         object.__setattr__(self, "pressure", tuple(pressure))
         object.__setattr__(self, "spread", tuple(spread))
         object.__setattr__(self, "forces", forces)
@@ -101,18 +103,6 @@ def _faces_of(mesh: TetMesh, where: Selection, what: str) -> np.ndarray:
     if len(faces) == 0:
         raise BodyError(f"{what}: no face of the surface has all its corners among the nodes named")
     return faces
-
-
-def _vector(values: Any, what: str) -> tuple[float, ...]:
-    try:
-        vector = tuple(float(v) for v in values)
-    except (TypeError, ValueError):
-        raise BodyError(f"{what} needs three numbers") from None
-    if len(vector) != 3:
-        raise BodyError(f"{what} needs three numbers, got {len(vector)}")
-    if not np.isfinite(vector).all():
-        raise BodyError(f"{what} has a number that is not finite")
-    return vector
 
 
 def _number(value: Any, what: str) -> float:

@@ -41,6 +41,8 @@ class ModalBasis:
         (n, 3, m), 1/sqrt(kg); zero at fixed dofs. The largest component of each is positive.
     key
         Hash of everything that determines the modes.
+    description
+        What they were made from.
 
     """
 
@@ -54,6 +56,10 @@ class ModalBasis:
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
+
+    def __repr__(self) -> str:
+        low, high = self.frequencies[[0, -1]]
+        return f"ModalBasis({len(self)} modes, {low:.4g} to {high:.4g} Hz, {self.mass} mass)"
 
     @property
     def frequencies(self) -> np.ndarray:

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.equality import ComparedByValue
 
-@dataclass(frozen=True)
-class Energy:
+
+@dataclass(frozen=True, eq=False)
+class Energy(ComparedByValue):
     """Energies of a body in motion, J: numbers, or arrays over the ticks of a recording.
 
     Attributes

@@ -14,6 +14,7 @@ from palpate.dynamics.energy import Energy
 from palpate.dynamics.matrices import Matrices, native
 from palpate.dynamics.residual import Residual
 from palpate.errors import BodyError
+from palpate.vectors import three_numbers
 
 METHODS = ("modal", "sparse", "dense", "exponential")
 
@@ -115,7 +116,7 @@ class Newmark:
         load = np.zeros_like(self._forces)
         for node, force in (forces or {}).items():
             first = 3 * self._node(node)
-            load[first : first + 3] += self._vector(node, force)
+            load[first : first + 3] += three_numbers(force, f"forces: node {node}", BodyError)
         load[self._body.fixed_dofs] = 0.0
         if count:
             loaded = np.flatnonzero(load)
@@ -237,16 +238,6 @@ class Newmark:
         if not isinstance(node, (int, np.integer)) or not 0 <= node < count:
             raise BodyError(f"forces: node {node!r} does not exist: the mesh has nodes 0 to {count - 1}")
         return int(node)
-
-    @staticmethod
-    def _vector(node: int, force: Sequence[float]) -> np.ndarray:
-        try:
-            vector = np.array(force, dtype=float)
-        except (TypeError, ValueError):
-            raise BodyError(f"forces: node {node} needs three numbers") from None
-        if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise BodyError(f"forces: node {node} needs three finite numbers")
-        return vector
 
 
 def _dofs(nodes: Sequence[int]) -> np.ndarray:

@@ -26,6 +26,7 @@ import numpy as np
 import scipy.sparse
 
 from palpate.body import Body
+from palpate.equality import ComparedByValue
 from palpate.fields.interior import Interior
 from palpate.mesh.shape_functions import tetrahedron_gradients
 
@@ -39,8 +40,8 @@ FIRST, SECOND = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
 TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
-@dataclass(frozen=True)
-class SurfaceStress:
+@dataclass(frozen=True, eq=False)
+class SurfaceStress(ComparedByValue):
     """Stress and strain at the surface nodes, or at those that the recovery was asked for.
 
     Attributes
@@ -89,6 +90,11 @@ class StressRecovery:
         Nodes at which they are recovered instead, inner ones too: a cut-away view shows them.
     interior
         Of the body, if it is there already: its factorisation is most of the work.
+
+    Attributes
+    ----------
+    largest_youngs_modulus
+        Over the materials at those nodes, Pa.
 
     """
 

@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from palpate.equality import ComparedByValue
 from palpate.fields import Strained, StrainSource
+from palpate.vectors import brief
 
 
-@dataclass(frozen=True)
-class Answer(Strained):
-    """Solution of a changed boundary value problem.
+@dataclass(frozen=True, eq=False, repr=False)
+class Answer(ComparedByValue, Strained):
+    """Solution of a changed boundary value problem. Compared by value, number by number; not hashable.
 
     Attributes
     ----------
@@ -29,11 +31,28 @@ class Answer(Strained):
     reactions: np.ndarray
     _source: StrainSource = field(repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        moved, force = (np.linalg.norm(field, axis=1).max() for field in (self.displacements, self.forces))
+        return f"Answer(largest displacement {1e3 * moved:.4g} mm, largest nodal force {force:.4g} N)"
 
-@dataclass(frozen=True)
-class Touch(Strained):
-    """Answer to a patch contact: force on the body (3,), N, and displacements (s, 3), m."""
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Touch(ComparedByValue, Strained):
+    """Answer to a patch contact. Compared by value, number by number; not hashable.
+
+    Attributes
+    ----------
+    force
+        On the body (3,), N.
+    displacements
+        (s, 3) m; rows follow the surface nodes.
+
+    """
 
     force: np.ndarray
     displacements: np.ndarray
     _source: StrainSource = field(repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        moved = np.linalg.norm(self.displacements, axis=1).max()
+        return f"Touch(force {brief(self.force)} N, largest displacement {1e3 * moved:.4g} mm)"

@@ -17,6 +17,7 @@ from palpate.body import Body, description, problem_arrays
 from palpate.errors import BodyError, StoreError
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
+from palpate.vectors import three_components, three_numbers
 
 Components = Sequence[float | None]
 
@@ -24,8 +25,24 @@ Components = Sequence[float | None]
 class GreensFunction:
     """Compliance of a body seen from its touchable surface.
 
-    Made by :func:`precompute` or :meth:`load`; immutable. ``body`` is what it was made for, None where only the store
-    is known.
+    Made by :func:`precompute` or :meth:`load`; immutable.
+
+    Attributes
+    ----------
+    body
+        What it was made for; None where only the store is known.
+    surface_nodes
+        (s,) nodes on the boundary, ascending; rows of answers follow them.
+    surface_positions
+        (s, 3) m, of the unloaded body.
+    surface_faces, surface_triangles
+        (k, 3 or 6) elements' faces on the boundary, and the flat triangles (t, 3) that they are drawn by; node indices,
+        outward.
+    touchable_nodes
+        Surface nodes that may be touched, ascending.
+    fixed_dofs, fixed_nodes
+        Fixed dofs, 3 * node + axis, and nodes with any fixed component; ascending.
+
     """
 
     def __init__(self, core: _native.GreenCore, body: Body | None = None):
@@ -43,6 +60,12 @@ class GreensFunction:
         self._fixed = frozenset(self.fixed_dofs.tolist())
         self._first_column = {int(n): 3 * i for i, n in enumerate(self.touchable_nodes)}
         self._surface_rank = {int(n): i for i, n in enumerate(self.surface_nodes)}
+
+    def __repr__(self) -> str:
+        touchable, surface = len(self.touchable_nodes), len(self.surface_nodes)
+        modulus = "" if self.youngs_modulus is None else f", E = {self.youngs_modulus:.4g} Pa"
+        file = "in memory" if self.path is None else str(self.path)
+        return f"GreensFunction({surface} surface nodes, {touchable} touchable, {self.precision}{modulus}, {file})"
 
     @property
     def precision(self) -> str:
@@ -175,10 +198,9 @@ class GreensFunction:
         """
         if not (np.isfinite(radius) and radius >= 0):
             raise BodyError(f"the contact radius must not be negative, got {radius}")
-        target = _components(point, None, "point")
-        if None in target:
-            raise BodyError("the touch point needs three numbers")
-        force, u = self._core.touch(target, _components(displacement, None, "displacement"), float(radius))
+        target = three_numbers(point, "the touch point", BodyError)
+        wanted = three_components(displacement, "displacement", BodyError)
+        force, u = self._core.touch(target, wanted, float(radius))
         return Touch(np.array(force), u.reshape(-1, 3), self)
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
@@ -198,7 +220,7 @@ class GreensFunction:
         columns = {}
         for node, components in (values or {}).items():
             first = self._column(node, argument)
-            for axis, value in enumerate(_components(components, node, argument)):
+            for axis, value in enumerate(three_components(components, f"{argument}: node {node}", BodyError)):
                 if value is not None:
                     columns[first + axis] = value
         return columns
@@ -233,16 +255,3 @@ def _difference(green: GreensFunction, body: Body) -> str:
     if not np.array_equal(green._core.loads, problem_arrays(body, None)[-1]):
         return "was made for another body (other loads)"
     return "was made for another body (node positions or elements differ)"
-
-
-def _components(values: Components, node: int | None, argument: str) -> tuple[float | None, ...]:
-    where = argument if node is None else f"{argument}: node {node}"
-    try:
-        result = tuple(None if v is None else float(v) for v in values)
-    except (TypeError, ValueError):
-        raise BodyError(f"{where} needs three numbers") from None
-    if len(result) != 3:
-        raise BodyError(f"{where} needs three numbers, got {len(result)}")
-    if not all(v is None or np.isfinite(v) for v in result):
-        raise BodyError(f"{where} has a number that is not finite")
-    return result

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import MeshError
+from palpate.vectors import three_numbers
 
 Shape = Callable[[np.ndarray], np.ndarray]
 
 
 class Sphere:
-    """Ball of a radius, m, around a centre (3,), m."""
+    """Ball of a ``radius``, m, around its ``center`` (3,), m."""
 
     def __init__(self, center: Sequence[float], radius: float):
         self.center = _point(center, "the centre of a sphere")
@@ -29,7 +30,7 @@ class Sphere:
 
 
 class Box:
-    """Block along the axes, from its lowest to its highest corner (3,), m."""
+    """Block along the axes, from its corner ``low`` to its corner ``high`` (3,), m."""
 
     def __init__(self, low: Sequence[float], high: Sequence[float]):
         self.low, self.high = _point(low, "the low corner of a box"), _point(high, "the high corner of a box")
@@ -42,7 +43,7 @@ class Box:
 
 
 class Cylinder:
-    """Round bar of a radius, m, with flat ends, along the line from start to end (3,), m."""
+    """Round bar of a ``radius``, m, with flat ends, along the line from ``start`` to ``end`` (3,), m."""
 
     def __init__(self, start: Sequence[float], end: Sequence[float], radius: float):
         self.start, self.end = _point(start, "the start of a cylinder"), _point(end, "the end of a cylinder")
@@ -59,7 +60,7 @@ class Cylinder:
 
 
 class HalfSpace:
-    """All that lies behind the plane through a point (3,), m, with a normal (3,) that points out of the half-space."""
+    """All behind the plane through a ``point`` (3,), m, whose ``normal`` (3,) points out of the half-space."""
 
     def __init__(self, point: Sequence[float], normal: Sequence[float]):
         self.point, self.normal = (
@@ -93,13 +94,7 @@ def elements_inside(shape: Shape, nodes: np.ndarray, tets: np.ndarray) -> np.nda
 
 
 def _point(values: Any, what: str) -> np.ndarray:
-    try:
-        point = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        point = np.empty(0)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise MeshError(f"{what} needs three finite numbers, got {values}")
-    return point
+    return np.array(three_numbers(values, what, MeshError))
 
 
 def _positive(value: float, what: str) -> float:

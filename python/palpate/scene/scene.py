@@ -135,6 +135,12 @@ class Scene(Table):
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: tuple[Path, str] | None = PrivateAttr(None)
 
+    def __repr__(self) -> str:
+        body = self.body
+        source = f"model {body.model}" if body.model else str(body.mesh or body.store)
+        moves = "" if self.dynamics is None else ", in motion"
+        return f"Scene({source}{moves}, tool of radius {1e3 * self.tool.radius:.4g} mm)"
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Scene:
         """Read a scene file.

@@ -7,14 +7,32 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from palpate.dynamics import Energy
+from palpate.equality import ComparedByValue
 from palpate.fields import Strained, StrainSource
+from palpate.vectors import brief
 
 
-@dataclass(frozen=True)
-class Contact:
-    """One tool's contact: positions in m, force on the body in N; nodes are mesh indices, weights sum to one.
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(ComparedByValue):
+    """Contact of one tool. Compared by value, number by number; not hashable.
 
-    ``anchor`` is where the tool carries no force: the tool's displacement from there is that of the patch.
+    Attributes
+    ----------
+    tool
+        Its number.
+    mode
+        ``"press"``, or ``"grab"`` for a tool that holds on.
+    point
+        Contact point on the deformed surface (3,), m.
+    normal
+        Outward normal of the surface there (3,).
+    force
+        On the body (3,), N.
+    anchor
+        Where the tool carries no force (3,), m: the tool's displacement from there is that of the patch.
+    nodes, weights
+        (k,) nodes of the mesh in the patch, and their weights (k,), which sum to one.
+
     """
 
     tool: int
@@ -26,10 +44,14 @@ class Contact:
     nodes: np.ndarray
     weights: np.ndarray
 
+    def __repr__(self) -> str:
+        place = f"{len(self.nodes)} nodes around {brief(self.point)} m"
+        return f"Contact(tool {self.tool}, {self.mode}, {place}, force {brief(self.force)} N)"
 
-@dataclass(frozen=True)
-class Frame(Strained):
-    """The latest tick.
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Frame(ComparedByValue, Strained):
+    """The latest tick. Compared by value, number by number; not hashable.
 
     Attributes
     ----------
@@ -55,7 +77,12 @@ class Frame(Strained):
     forces: np.ndarray
     positions: np.ndarray
     displacements: np.ndarray
-    contacts: list[Contact] = field(repr=False)
+    contacts: list[Contact]
     statistics: dict
     energy: Energy | None
-    _source: StrainSource = field(repr=False, compare=False)
+    _source: StrainSource = field(compare=False)
+
+    def __repr__(self) -> str:
+        forces = ", ".join(brief(force) for force in self.forces)
+        contacts = f"{len(self.contacts)} contact{'' if len(self.contacts) == 1 else 's'}"
+        return f"Frame({self.time:.3f} s, {contacts}, forces on the devices {forces} N)"

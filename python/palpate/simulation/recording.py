@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.dynamics import Energy
+from palpate.equality import ComparedByValue
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
@@ -17,9 +18,9 @@ LOG_DTYPE = np.dtype(
 RATE = 1000.0
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Ticks of an offline run.
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(ComparedByValue):
+    """Ticks of an offline run. Compared by value, number by number; not hashable.
 
     Attributes
     ----------
@@ -38,3 +39,8 @@ class Recording:
     forces: np.ndarray
     displacements: np.ndarray
     energy: Energy | None
+
+    def __repr__(self) -> str:
+        largest = np.linalg.norm(self.forces, axis=1).max(initial=0.0)
+        watched = f"{self.displacements.shape[1]} nodes watched"
+        return f"Recording({len(self.time)} ticks, largest force {largest:.4g} N, {watched})"

@@ -10,11 +10,12 @@ import numpy as np
 
 from palpate import _native
 from palpate.dynamics import Energy
-from palpate.errors import SceneError
+from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
 from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation.frame import Contact, Frame
 from palpate.simulation.recording import LOG_DTYPE, RATE, Recording
+from palpate.vectors import three_numbers
 
 PERCENTILES = ("p50", "p99", "p999", "max")
 
@@ -28,6 +29,15 @@ class Simulation:
     ----------
     scene
         What to touch, and with what.
+
+    Attributes
+    ----------
+    body
+        The body; None for a scene of a store, which knows only its surface.
+    green
+        Its Green's function.
+    motion
+        Its modes and time integration; None for a body at rest.
 
     Raises
     ------
@@ -57,6 +67,11 @@ class Simulation:
             None if built.motion is None else self._moving(built.motion),
         )
         self._running = False
+
+    def __repr__(self) -> str:
+        tools = f"{self._tools} tool{'s' if self._tools > 1 else ''}"
+        moves = "" if self.motion is None else ", a body in motion"
+        return f"Simulation({self.scene.name}, {tools}{moves}, {'running' if self._running else 'stopped'})"
 
     def __enter__(self) -> Simulation:
         self.start()
@@ -88,10 +103,7 @@ class Simulation:
 
         """
         del velocity  # the simulated hand has its own
-        target = np.asarray(position, dtype=float)
-        if target.shape != (3,) or not np.isfinite(target).all():
-            raise SceneError(f"a tool's position must be three finite numbers, got {position}")
-        self._targets[self._tool(tool)] = tuple(target.tolist())
+        self._targets[self._tool(tool)] = three_numbers(position, "a tool's position", SceneError)
         self._core.set_target(tool, self._targets[tool], True, self._grab[tool])
 
     def grab(self, on: bool, tool: int = 0) -> None:
@@ -191,10 +203,17 @@ class Simulation:
         self._core.configure(self._contact_radius, self._scale, True)
 
     def frame(self) -> Frame:
-        """Read the latest tick."""
+        """Read the latest tick.
+
+        Raises
+        ------
+        SimulationError
+            The loop does not run.
+
+        """
         raw = self._core.frame()
         if raw is None:
-            raise SceneError("the simulation does not run: use it in a with block, or call start()")
+            raise SimulationError("the simulation does not run: use it in a with block, or call start()")
         contacts = [self._contact(record) for record in raw["contacts"]]
         statistics = {k: raw[k] for k in ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused")}
         for name in ("compute_us", "wakeup_us"):
@@ -261,6 +280,8 @@ class Simulation:
         ------
         SceneError
             Positions that are not finite or of another shape.
+        SimulationError
+            A fault that latched within the run.
 
         """
         path = _path(positions)
@@ -290,6 +311,8 @@ class Simulation:
         ------
         SceneError
             Another shape, strikes on a body that does not move, or nodes that are not on the surface.
+        SimulationError
+            A fault that latched within the run.
 
         """
         path = _path(positions)
@@ -301,7 +324,7 @@ class Simulation:
             path, sorted(struck, key=lambda strike: strike[0]), ranks.tolist()
         )
         if fault is not None:
-            raise SceneError(fault)
+            raise SimulationError(fault)
         energy = Energy(*energies.reshape(-1, 5).T) if len(energies) else None
         time = np.arange(1, len(path) + 1) / RATE
         return Recording(time, forces.reshape(-1, 3), moved.reshape(len(path), len(ranks), 3), energy)
@@ -334,7 +357,8 @@ class Simulation:
 def _strike(point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> tuple:
     if not (np.isfinite(duration) and duration >= 0):
         raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
-    return _three(point, "a strike's point"), _three(impulse, "a strike's impulse"), float(duration)
+    where = three_numbers(point, "a strike's point", SceneError)
+    return where, three_numbers(impulse, "a strike's impulse", SceneError), float(duration)
 
 
 def _path(positions: np.ndarray) -> np.ndarray:
@@ -342,10 +366,3 @@ def _path(positions: np.ndarray) -> np.ndarray:
     if path.ndim != 2 or path.shape[1] != 3:
         raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
     return path
-
-
-def _three(values: Sequence[float], what: str) -> tuple[float, float, float]:
-    vector = np.asarray(values, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise SceneError(f"{what} must be three finite numbers, got {values}")
-    return tuple(vector.tolist())

@@ -227,7 +227,7 @@ def test_regions_by_name_from_gmsh(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda s: s.Sphere((0, 0), 1), "the centre of a sphere needs three finite numbers"),
+        (lambda s: s.Sphere((0, 0), 1), "the centre of a sphere needs three numbers, got 2"),
         (lambda s: s.Sphere((0, 0, 0), 0), "the radius of a sphere must be positive"),
         (lambda s: s.Box((0, 0, 0), (1, 0, 1)), "from its low to its high corner"),
         (lambda s: s.Cylinder((0, 0, 1), (0, 0, 1), 1), "must have a length"),
