@@ -1,4 +1,4 @@
-"""What the number of modes changes: a press that is held, and the peak of an impact; and what a time step changes.
+"""What the number of modes changes: a sustained press, and the peak of an impact; and what a time step changes.
 
 Usage: impact.py [plot.png]
 """
@@ -35,19 +35,19 @@ def with_modes(count):
 
 
 def fall(ticks):
-    """Positions of the tool: down at a constant speed, then held."""
+    """Positions of the tool: down at a constant speed, then at rest."""
     depth = np.minimum(SPEED * DT * np.arange(ticks) - 1e-3, DEPTH)
     return TOP + np.outer(scene.tool.radius - depth, [0, 0, 1])
 
 
-# Tool and patch are held DEPTH apart by the coupling and the body in series: f = (C + I/k_c)^-1 d.
+# Tool and patch are kept DEPTH apart by the coupling and the body in series: f = (C + I/k_c)^-1 d.
 reference = palpate.Simulation(built)
 basis, coupling = reference.motion.basis, reference.motion.coupling
 unit_presses = [reference.green.touch(TOP, axis, scene.tool.contact_radius).force for axis in np.eye(3)]
 compliance = np.linalg.inv(np.column_stack(unit_presses))
 
 
-def held(compliance):
+def sustained(compliance):
     """Force on the device, N, of a body at rest with this compliance under the tool."""
     return np.linalg.solve(compliance + np.eye(3) / coupling, [0, 0, DEPTH])[2]
 
@@ -58,22 +58,22 @@ with reference:
     time.sleep(0.5)
     contact = reference.frame().contacts[0]
 patch = np.einsum("p,pam->am", contact.weights, basis.shapes[contact.nodes])
-modes_alone = np.array([held((patch[:, :m] / basis.eigenvalues[:m]) @ patch[:, :m].T) for m in COUNTS])
+modes_alone = np.array([sustained((patch[:, :m] / basis.eigenvalues[:m]) @ patch[:, :m].T) for m in COUNTS])
 
-static, (peak, settled) = held(compliance), (np.zeros(len(COUNTS)) for _ in range(2))
+static, (peak, settled) = sustained(compliance), (np.zeros(len(COUNTS)) for _ in range(2))
 everything = reference.run(fall(4000))[:, 2]
 for i, count in enumerate(COUNTS):
     forces = with_modes(count).run(fall(4000))[:, 2]
     peak[i], settled[i] = forces.max(), forces[-1]
 
-held_error = np.abs(settled / static - 1)
+sustained_error = np.abs(settled / static - 1)
 alone_error = np.abs(modes_alone / static - 1)
 peak_error = np.abs(peak / everything.max() - 1)
 print(f"{reference.body.mesh}: {len(basis)} modes, {basis.frequencies[0]:.1f} to {basis.frequencies[-1]:.0f} Hz")
-print(f"held: {static:.3f} N; peak of the impact with all modes: {everything.max():.3f} N")
-print("modes  to [Hz]  held, modes alone  held, corrected  peak, corrected")
+print(f"sustained: {static:.3f} N; peak of the impact with all modes: {everything.max():.3f} N")
+print("modes  to [Hz]  sustained, modes alone  sustained, corrected  peak, corrected")
 for i, count in enumerate(COUNTS):
-    errors = f"{100 * alone_error[i]:15.1f} %  {100 * held_error[i]:13.5f} %  {100 * peak_error[i]:13.2f} %"
+    errors = f"{100 * alone_error[i]:20.1f} %  {100 * sustained_error[i]:18.5f} %  {100 * peak_error[i]:13.2f} %"
     print(f"{count:5}  {basis.frequencies[count - 1]:7.0f}  {errors}")
 
 
@@ -104,8 +104,8 @@ figure = Figure(figsize=(9, 3.8), dpi=120, layout="constrained")
 FigureCanvasAgg(figure)
 left, right = figure.subplots(1, 2)
 left.loglog(COUNTS, 100 * alone_error, "o-", color="0.45", label="modes alone")
-left.loglog(COUNTS, 100 * np.maximum(held_error, 1e-15), "o-", color="tab:red", label="with the static correction")
-left.set_title("a press that is held: error of the force")
+left.loglog(COUNTS, 100 * np.maximum(sustained_error, 1e-15), "o-", color="tab:red", label="with the static correction")
+left.set_title("a sustained press: error of the force")
 right.loglog(COUNTS, 100 * peak_error, "o-", color="tab:red", label="with the static correction")
 right.set_title(f"an impact at {SPEED:g} m/s: error of the peak")
 for axes in (left, right):
@@ -117,7 +117,7 @@ for axes in (left, right):
 figure.savefig(sys.argv[1] if len(sys.argv) > 1 else "truncation.png")
 
 # The correction makes rest exact for any number of modes, which alone miss much of a fingertip's compliance.
-assert held_error.max() < 1e-4
+assert sustained_error.max() < 1e-4
 assert alone_error[COUNTS.index(20)] > 0.1
 assert peak_error[COUNTS.index(200)] < 0.05
 # The usual estimates of Newmark's errors, for small steps.

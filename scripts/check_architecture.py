@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import tomllib
@@ -23,10 +25,17 @@ FORBIDDEN = {
     "servo": ({"pyo3", "numpy"}, "the loop runs without Python"),
 }
 
+# Folders of the Python package, lowest first: each imports from those before it. The modules at its top come before
+# all of them, the package itself, which exports the public names, where its name stands.
+PYTHON_ORDER = (
+    *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "simulation", "palpate"),
+    *("viewer", "validation/plots", "validation/verify", "validation/bench", "cli"),
+)
+
 
 def main() -> int:
     """Print every broken rule; the exit status is 1 if there is one."""
-    problems = [*page_problems(), *dependency_problems(), *length_problems()]
+    problems = [*page_problems(), *dependency_problems(), *python_import_problems(), *length_problems()]
     for problem in problems:
         print(f"check_architecture: {problem}", file=sys.stderr)
     return 1 if problems else 0
@@ -76,6 +85,91 @@ def dependency_problems() -> list[str]:
         f"crates/core uses {name}: it reads no clock" for name in ("Instant::now", "SystemTime") if name in core
     ]
     return problems
+
+
+def python_import_problems() -> list[str]:
+    """Circles among the modules of the Python package, and imports against the order of its folders.
+
+    Imports inside functions and for type checkers count too.
+    """
+    problems = []
+    order = ", ".join(f"`{name}`" for name in PYTHON_ORDER)
+    if order not in " ".join((ROOT / "ARCHITECTURE.md").read_text().split()):
+        problems.append(f"ARCHITECTURE.md does not give the order of the Python folders: {order}")
+    graph = python_import_graph(ROOT / "python")
+    for module, imported in graph.items():
+        problems += [
+            f"{module} imports {other}: {python_folder(other)} comes after {python_folder(module)}"
+            for other in sorted(imported)
+            if python_rank(other) > python_rank(module)
+        ]
+    circle = first_circle(graph)
+    if circle:
+        problems.append(f"modules import each other: {' -> '.join(circle)}")
+    return problems
+
+
+def python_import_graph(root: Path) -> dict[str, set[str]]:
+    """Modules of the package ``palpate`` below a folder, and the modules of it that each imports."""
+    files = {}
+    for path in sorted((root / "palpate").rglob("*.py")):
+        parts = path.relative_to(root).with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return {
+        module: {
+            known if known in files else known.rpartition(".")[0]
+            for known in imported_names(path, module if path.stem == "__init__" else module.rpartition(".")[0])
+            if known in files or known.rpartition(".")[0] in files
+        }
+        for module, path in files.items()
+    }
+
+
+def imported_names(path: Path, package: str) -> Iterator[str]:
+    """Everything of the package that a file imports, with the module it comes from; the compiled module aside."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            above = ".".join(package.split(".")[: len(package.split(".")) + 1 - node.level]) if node.level else ""
+            source = ".".join(part for part in (above, node.module) if part)
+            names = [f"{source}.{alias.name}" for alias in node.names]
+        yield from (name for name in names if name.split(".")[0] == "palpate" and name != "palpate._native")
+
+
+def python_folder(module: str) -> str:
+    """Folder of a module in the order; "top" for the modules at the top of the package."""
+    if module == "palpate":
+        return "palpate"
+    if module == "palpate.__main__":
+        return PYTHON_ORDER[-1]
+    path = "/".join(module.split(".")[1:])
+    known = next((name for name in PYTHON_ORDER if f"{path}/".startswith(f"{name}/")), None)
+    return known or (path if (ROOT / "python" / "palpate" / path).is_dir() else "top")
+
+
+def python_rank(module: str) -> int:
+    """Place of a module's folder in the order; an unknown folder comes first, so that whatever it imports is told."""
+    folder = python_folder(module)
+    return PYTHON_ORDER.index(folder) if folder in PYTHON_ORDER else -1
+
+
+def first_circle(graph: dict[str, set[str]]) -> list[str]:
+    """Modules of the first circle of imports, its first one again at the end; empty if there is none."""
+    finished: set[str] = set()
+
+    def visit(module: str, path: list[str]) -> list[str]:
+        if module in path:
+            return [*path[path.index(module) :], module]
+        if module not in finished:
+            for other in sorted(graph[module]):
+                if circle := visit(other, [*path, module]):
+                    return circle
+            finished.add(module)
+        return []
+
+    return next((circle for module in graph if (circle := visit(module, []))), [])
 
 
 def length_problems() -> list[str]:

@@ -5,8 +5,8 @@ SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
 
 from importlib.metadata import version
 
-from palpate import models, shapes
-from palpate.body import Body, Material
+from palpate import models
+from palpate.body import Body, Loads, Material
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
@@ -16,18 +16,17 @@ from palpate.errors import (
     MeshWarning,
     PalpateWarning,
     SceneError,
+    SimulationError,
     StoreError,
     StoreWarning,
     UnitError,
     ViewerError,
 )
-from palpate.green import Answer, GreensFunction, Touch, precompute
-from palpate.loads import Loads
-from palpate.mesh import TetMesh, tetrahedralize
-from palpate.plan import Plan, plan
+from palpate.fields import StressRecovery, SurfaceStress
+from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
+from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
-from palpate.simulation import Contact, Frame, Simulation
-from palpate.stress import StressRecovery, SurfaceStress
+from palpate.simulation import Contact, Frame, Recording, Simulation
 
 __version__ = version("palpate")
 
@@ -49,9 +48,11 @@ __all__ = [
     "Newmark",
     "PalpateWarning",
     "Plan",
+    "Recording",
     "Scene",
     "SceneError",
     "Simulation",
+    "SimulationError",
     "StoreError",
     "StoreWarning",
     "StressRecovery",

@@ -18,7 +18,11 @@ class StoreError(Error):
 
 
 class SceneError(Error):
-    """A scene file with a mistake in it."""
+    """A scene file with a mistake in it, or something asked of a scene that it does not have or cannot take."""
+
+
+class SimulationError(Error):
+    """A simulation that cannot go on: its loop does not run, or a fault has latched."""
 
 
 class UnitError(Error):

@@ -79,7 +79,7 @@ def skfem_stiffness(body: palpate.Body, points: int = 3):
     import skfem
     from skfem.helpers import ddot, eye, sym_grad, trace
 
-    e, nu = body._material_rows[:, 0], body._material_rows[:, 1]
+    e, nu = body.element_materials[:, 0], body.element_materials[:, 1]
     lam, mu = nu * e / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
     basis, order = skfem_basis(body.mesh, points)
 
@@ -97,7 +97,7 @@ def skfem_mass(body: palpate.Body, points: int = 3):
     import skfem
     from skfem.helpers import dot
 
-    density = body._material_rows[:, 2]
+    density = body.element_materials[:, 2]
     basis, order = skfem_basis(body.mesh, points)
     form = skfem.BilinearForm(lambda u, v, w: density[:, None] * dot(u, v))
     return form.assemble(basis).tocsc()[order][:, order]

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from palpate.body import Body, Material
-    from palpate.loads import Loads
+    from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
 
 app = typer.Typer(
@@ -106,7 +105,7 @@ def precompute(
     """
     import palpate
     from palpate import units
-    from palpate.predicate import parse
+    from palpate.body import parse
 
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
@@ -201,7 +200,7 @@ def models_command() -> None:
 @cache_app.command("list")
 def cache_list() -> None:
     """List the precomputed files in the cache."""
-    from palpate.green import cache_directory
+    from palpate.cache import cache_directory
 
     files = sorted(cache_directory().glob("*.palpate"))
     for file in files:
@@ -212,7 +211,7 @@ def cache_list() -> None:
 @cache_app.command("clear")
 def cache_clear() -> None:
     """Delete the precomputed files in the cache."""
-    from palpate.green import cache_directory
+    from palpate.cache import cache_directory
 
     files = sorted(cache_directory().glob("*.palpate*"))
     for file in files:
@@ -235,7 +234,7 @@ def _read_any(path: Path, unit: str, element: Element | None) -> TetMesh:
 
 def _body(mesh: TetMesh, material: Material, fix: str, loads: Loads | None) -> Body:
     import palpate
-    from palpate.predicate import parse
+    from palpate.body import parse
 
     mask = parse(fix)(mesh.nodes)
     if not mask.any():

@@ -11,10 +11,10 @@ import typer
 from palpate.cli.app import app
 
 if TYPE_CHECKING:
-    from palpate.bench import dynamics as dynamics_bench
-    from palpate.bench.elements import Row as ElementRow
-    from palpate.bench.paper import Row
-    from palpate.bench.precompute import Result
+    from palpate.validation.bench import dynamics as dynamics_bench
+    from palpate.validation.bench.elements import Row as ElementRow
+    from palpate.validation.bench.paper import Row
+    from palpate.validation.bench.precompute import Result
 
 bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
 app.add_typer(bench_app, name="bench")
@@ -28,8 +28,8 @@ def paper(
 
     Example: palpate bench paper --json > paper.json
     """
-    from palpate.bench import paper as bench
     from palpate.progress import narrated
+    from palpate.validation.bench import paper as bench
 
     with narrated("measuring doll, kidney and liver"):
         rows = bench.run()
@@ -50,8 +50,8 @@ def dynamics(
 
     Example: palpate bench dynamics --json > dynamics.json
     """
-    from palpate.bench import dynamics as bench
     from palpate.progress import narrated
+    from palpate.validation.bench import dynamics as bench
 
     with narrated("measuring beam and livers in motion"):
         rows = bench.run(large)
@@ -65,7 +65,7 @@ def _print_dynamics(rows: list[dynamics_bench.Row]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from palpate.bench.peers import SPARSE
+    from palpate.validation.bench.peers import SPARSE
 
     table = Table(title="Table 2 of the paper, and here: one step of 1 ms, in us")
     table.add_column("")
@@ -114,8 +114,8 @@ def elements(
 
     Example: palpate bench elements --out plots
     """
-    from palpate.bench import elements as bench
     from palpate.progress import narrated
+    from palpate.validation.bench import elements as bench
 
     with narrated("measuring both elements on a cube and on the liver"):
         rows = bench.run()
@@ -124,7 +124,7 @@ def elements(
     else:
         _print_elements(rows)
     if out is not None:
-        from palpate.plots import plot_elements
+        from palpate.validation.bench.elements import plot_elements
 
         out.mkdir(parents=True, exist_ok=True)
         plot_elements(rows, out / "elements.png")
@@ -158,8 +158,8 @@ def precompute(
 
     Peers: pip install 'palpate[bench]'. Example: palpate bench precompute --sizes 1k,2k --plot precompute.png
     """
-    from palpate.bench import precompute as bench
     from palpate.progress import narrated
+    from palpate.validation.bench import precompute as bench
 
     with narrated("measuring; the larger bodies take minutes"):
         results = bench.run(sizes.split(","), [int(count) for count in threads.split(",")])

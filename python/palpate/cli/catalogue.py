@@ -1,40 +1,9 @@
-"""The built-in models as scenes and as a table."""
+"""The built-in models as a table."""
 
 from __future__ import annotations
 
 from palpate import models
-from palpate.errors import SceneError
 from palpate.mesh import TetMesh
-from palpate.scene import Scene
-
-# Size of a fingertip against each model, m; and its stiffness, Pa: organs about as published for fresh tissue
-# (liver and kidney some kPa to tens of kPa), the others soft rubber.
-TOOLS = {"doll": 8e-3, "kidney": 5e-3, "liver": 8e-3, "beam": 5e-3}
-YOUNGS_MODULUS = {"doll": 10e3, "kidney": 15e3, "liver": 8e3, "beam": 20e3}
-# Modes of a body in motion, by whether it has the paper's size: all of a small one, the lowest of a fine one.
-MODES = {True: {"modes": "all"}, False: {"modes": 200}}
-# Parts of critical damping of the first and the tenth mode: a struck body swings for some seconds.
-DAMPING_RATIOS = (0.03, 0.03)
-
-
-def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
-    """Scene of a built-in model, held by its own supports; with ``motion`` it moves.
-
-    Raises
-    ------
-    SceneError
-        No model of that name.
-
-    """
-    if name not in models.NAMES:
-        raise SceneError(f"there is no model '{name}'; there are {', '.join(models.NAMES)}")
-    tool = {"radius": TOOLS[name], "contact_radius": TOOLS[name]}
-    return Scene(
-        body={"model": name, "paper": paper},
-        material={"youngs_modulus": YOUNGS_MODULUS[name]},
-        tool=tool,
-        dynamics={**MODES[paper], "damping_ratios": DAMPING_RATIOS} if motion else None,
-    )
 
 
 def print_models() -> None:

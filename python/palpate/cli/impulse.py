@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from palpate import models
-from palpate.body import Body, Material
-from palpate.cli.catalogue import MODES, TOOLS
+from palpate.body import Body, Material, free_end
 from palpate.dynamics import Newmark, rayleigh_from_ratios
 from palpate.errors import SceneError
-from palpate.plots import plot_history, write_columns
+from palpate.fields import HONEST_STRAIN, SurfaceStrain
 from palpate.progress import narrated
-from palpate.scene import Scene
-from palpate.selection import free_end
-from palpate.strain import HONEST_STRAIN, SurfaceStrain
+from palpate.scene import MODES, TOOLS, Scene
+from palpate.validation.plots import plot_history, write_columns
 
 # Force of the strike, N, along z, and the step at whose end it acts. The force rises and falls linearly over one step
 # each, so the impulse is force times step: 0.01 N s.
@@ -63,7 +61,7 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
 
 
 def impulse_scene(model: str, paper: bool) -> Scene:
-    """Scene of the same body and blow, for the viewer: on the node itself, by average acceleration as in the paper.
+    """Scene of the same body and strike, for the viewer: on the node itself, by average acceleration as in the paper.
 
     Raises
     ------

@@ -51,8 +51,8 @@ def demo(
     Example: palpate demo beam --impulse --paper --out results
     """
     from palpate import models
-    from palpate.cli.catalogue import model_scene
     from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
+    from palpate.scene import model_scene
 
     def scene_of(name: str) -> Scene:
         return impulse_scene(name, paper) if impulse else model_scene(name, paper, motion)
@@ -115,11 +115,11 @@ def _view(
     open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of), browser=browser)
 
 
-def _strain_line(record: PressRecord, hold_strain: float) -> str:
+def _strain_line(record: PressRecord, strain_limit: float) -> str:
     """Tell the largest strain, and what there is to say about it."""
     line = f"largest strain {100 * record.hardest.largest_strain:.1f} %"
-    if record.held:
-        line += f", where the tool was held back ([view] hold_strain = {hold_strain:g})"
+    if record.limited:
+        line += f", where the tool was limited ([view] strain_limit = {strain_limit:g})"
     if not record.hardest.within_linear_range:
         line += ": beyond 10 %, to which linear elasticity is honest"
     return line
@@ -127,7 +127,7 @@ def _strain_line(record: PressRecord, hold_strain: float) -> str:
 
 def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     from palpate.cli.scripted import scripted_press
-    from palpate.plots import plot_log, write_log
+    from palpate.validation.plots import plot_log, write_log
 
     out.mkdir(parents=True, exist_ok=True)
     record = scripted_press(built, seconds)
@@ -136,7 +136,7 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     plot_log(log, out / f"{name}.png", f"{name}: scripted press at 1 kHz")
     compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
     print(f"{len(log)} ticks, largest force {(log['force'] ** 2).sum(axis=1).max() ** 0.5:.3f} N")
-    print(_strain_line(record, built.scene.view.hold_strain))
+    print(_strain_line(record, built.scene.view.strain_limit))
     print("us            p50      p99    p99.9      max")
     for title, row in (("computing", compute), ("wake-up", wakeup)):
         print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")

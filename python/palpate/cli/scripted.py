@@ -1,4 +1,4 @@
-"""A press without a hand: down on the highest free point nearest the middle, held, and up again."""
+"""A press without a hand: down on the highest free point nearest the middle, and after a while up again."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import SceneError
-from palpate.hold import HeldTool
 from palpate.scene import BuiltScene
-from palpate.simulation import Frame, Simulation
+from palpate.simulation import Frame, LimitedTool, Simulation
 
 # Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
 POINTER_RATE = 120.0
@@ -20,16 +19,16 @@ DEPTH = 0.03
 
 @dataclass(frozen=True)
 class PressRecord:
-    """Log of the 1 kHz loop, the frame that was pressed hardest, the last one, and whether the tool was held back."""
+    """Log of the 1 kHz loop, the frame that was pressed hardest, the last one, and whether the tool was limited."""
 
     log: np.ndarray
     hardest: Frame
     last: Frame
-    held: bool
+    limited: bool
 
 
 def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
-    """Press for so many seconds, held back at the scene's strain."""
+    """Press for so many seconds, within the scene's limit of strain."""
     green = built.green
     nodes = green.surface_positions
     free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
@@ -41,19 +40,19 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
     depth = DEPTH * size
     rest = top + [0, 0, built.scene.tool.radius]
-    logs, held = [], False
+    logs, limited = [], False
     with Simulation(built) as simulation:
-        tool, hardest = HeldTool(simulation, built.scene.view.hold_strain), simulation.frame()
+        tool, hardest = LimitedTool(simulation, built.scene.view.strain_limit), simulation.frame()
         start = time.monotonic()
         while (elapsed := time.monotonic() - start) < seconds:
             phase = elapsed / seconds
             push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
             tool.move(rest - [0, 0, push])
-            held |= tool.held
+            limited |= tool.limited
             time.sleep(1.0 / POINTER_RATE)
             logs.append(simulation.drain_log())
             # The press is along a line: the largest force has the largest strain.
             hardest = max(hardest, simulation.frame(), key=lambda frame: np.linalg.norm(frame.forces[0]))
         last = simulation.frame()
         logs.append(simulation.drain_log())
-    return PressRecord(np.concatenate(logs), hardest, last, held)
+    return PressRecord(np.concatenate(logs), hardest, last, limited)

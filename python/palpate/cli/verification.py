@@ -11,7 +11,7 @@ import typer
 from palpate.cli.app import app
 
 if TYPE_CHECKING:
-    from palpate.verify import Benchmark, Check, Outcome
+    from palpate.validation.verify import Benchmark, Check, Outcome
 
 
 @app.command()
@@ -29,7 +29,7 @@ def verify(
     Example: palpate verify convergence felt --out plots
     """
     from palpate.progress import narrated
-    from palpate.verify import chosen
+    from palpate.validation.verify import chosen
 
     outcomes: list[tuple[Benchmark, Outcome]] = []
     for benchmark in chosen(names or []):

@@ -14,10 +14,10 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from palpate import _native
-from palpate.body import Body
+from palpate.body import Body, description
+from palpate.cache import cache_directory
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
-from palpate.green import _describe, cache_directory
 from palpate.progress import narrated, progress_reporter
 
 # Up to so many free dofs the dense solver is quicker than Lanczos for most counts.
@@ -41,6 +41,8 @@ class ModalBasis:
         (n, 3, m), 1/sqrt(kg); zero at fixed dofs. The largest component of each is positive.
     key
         Hash of everything that determines the modes.
+    description
+        What they were made from.
 
     """
 
@@ -54,6 +56,10 @@ class ModalBasis:
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
+
+    def __repr__(self) -> str:
+        low, high = self.frequencies[[0, -1]]
+        return f"ModalBasis({len(self)} modes, {low:.4g} to {high:.4g} Hz, {self.mass} mass)"
 
     @property
     def frequencies(self) -> np.ndarray:
@@ -175,7 +181,7 @@ def modes(
     else:
         with progress_reporter("computing modes", progress) as report:
             eigenvalues, vectors = _lanczos(body, matrices, wanted, report)
-    basis = _basis(matrices, eigenvalues, vectors, key, {**_describe(body), "mass": mass, "modes": wanted})
+    basis = _basis(matrices, eigenvalues, vectors, key, {**description(body), "mass": mass, "modes": wanted})
     basis.save(target)
     return basis
 
@@ -217,11 +223,11 @@ def _lanczos(
 
 
 def _shift(body: Body) -> float:
-    """Zero for a held body; else about minus the square of its first elastic frequency: `K - sigma M` is SPD."""
+    """Zero for a supported body; else about minus the square of its first elastic frequency: `K - sigma M` is SPD."""
     try:
         body.require_supported()
     except BodyError:
-        rows = body._material_rows
+        rows = body.element_materials
         length = np.linalg.norm(np.ptp(body.mesh.nodes, axis=0))
         return -float(rows[:, 0].min() / (rows[:, 2].max() * length**2))
     return 0.0
@@ -252,7 +258,7 @@ def basis_key(body: Body, mass: str) -> str:
 
 def _difference(basis: ModalBasis, body: Body) -> str:
     """First thing in which a file and a body are seen to differ."""
-    now = _describe(body)
+    now = description(body)
     for name in ("nodes", "tets", "surface_nodes", "fixed_nodes", "materials"):
         there = basis.description.get(name)
         if there != now[name]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,37 +10,13 @@ from palpate import _native
 from palpate.body import Body
 from palpate.dynamics.basis import ModalBasis, basis_key
 from palpate.dynamics.basis import modes as compute_modes
+from palpate.dynamics.energy import Energy
 from palpate.dynamics.matrices import Matrices, native
 from palpate.dynamics.residual import Residual
 from palpate.errors import BodyError
+from palpate.vectors import three_numbers
 
 METHODS = ("modal", "sparse", "dense", "exponential")
-
-
-@dataclass(frozen=True)
-class Energy:
-    """Energies of a motion, J.
-
-    Attributes
-    ----------
-    kinetic, strain
-        `v M v / 2` and `u K u / 2` now.
-    dissipated
-        Taken out by damping since the start.
-    work
-        Done by the forces since the start.
-
-    """
-
-    kinetic: float
-    strain: float
-    dissipated: float
-    work: float
-
-    @property
-    def total(self) -> float:
-        """Kinetic and strain energy."""
-        return self.kinetic + self.strain
 
 
 class Newmark:
@@ -141,7 +116,7 @@ class Newmark:
         load = np.zeros_like(self._forces)
         for node, force in (forces or {}).items():
             first = 3 * self._node(node)
-            load[first : first + 3] += self._vector(node, force)
+            load[first : first + 3] += three_numbers(force, f"forces: node {node}", BodyError)
         load[self._body.fixed_dofs] = 0.0
         if count:
             loaded = np.flatnonzero(load)
@@ -172,7 +147,7 @@ class Newmark:
         if history.ndim != 3 or history.shape[1:] != (len(loaded), 3) or len(set(loaded)) != len(loaded):
             raise BodyError(f"forces must have shape (steps, {len(loaded)}, 3) for as many different nodes")
         if not np.isfinite(history).all():
-            raise BodyError("forces hold a number that is not finite")
+            raise BodyError("forces have a number that is not finite")
         rows, columns = _dofs(loaded), _dofs(seen)
         history = np.where(np.isin(rows, self._body.fixed_dofs), 0.0, history.reshape(len(history), -1))
         moved = self._motion.play(rows.tolist(), history, columns.tolist())
@@ -212,7 +187,7 @@ class Newmark:
         kinetic, strain, dissipated, work = self._motion.energies()
         # The part left out follows the load statically: its strain energy is the work done on it.
         stored = 0.5 * float(self._forces @ self._left_out())
-        return Energy(kinetic, strain + stored, dissipated, work + stored)
+        return Energy(kinetic, strain + stored, 0.0, dissipated, work + stored)
 
     @property
     def largest_eigenvalue(self) -> float:
@@ -263,16 +238,6 @@ class Newmark:
         if not isinstance(node, (int, np.integer)) or not 0 <= node < count:
             raise BodyError(f"forces: node {node!r} does not exist: the mesh has nodes 0 to {count - 1}")
         return int(node)
-
-    @staticmethod
-    def _vector(node: int, force: Sequence[float]) -> np.ndarray:
-        try:
-            vector = np.array(force, dtype=float)
-        except (TypeError, ValueError):
-            raise BodyError(f"forces: node {node} needs three numbers") from None
-        if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise BodyError(f"forces: node {node} needs three finite numbers")
-        return vector
 
 
 def _dofs(nodes: Sequence[int]) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Residual flexibility: what a truncated basis leaves out, answered at once.
 
 `R = Psi - Phi diag(1/omega^2) Phi^T` over the elastic modes kept, `Psi` being the static compliance. Its modes are so
-fast against the load that they follow it statically; with it, a load held for ever ends at the static solution for any
+fast against the load that they follow it statically; with it, a constant load ends at the static solution for any
 number of modes. For a body that can move freely, `Psi` is the compliance to self-balanced loads, seen without rigid
 motion: the load is balanced by the inertia of the rigid motions first, and their share is removed from the answer.
 """
@@ -34,10 +34,11 @@ class Residual:
         rigid = basis.eigenvalues == 0.0
         self._rigid = self._shapes[:, rigid]
         self._mass_rigid = matrices.free_mass @ self._rigid
-        # As many dofs are held as there are rigid motions, those that determine them best (pivoted QR).
-        held = scipy.linalg.qr(self._rigid.T, mode="r", pivoting=True)[1][: self._rigid.shape[1]] if rigid.any() else []
-        self._kept = np.setdiff1d(np.arange(len(self._free)), held)
-        fixed = np.union1d(matrices.fixed, self._free[np.asarray(held, dtype=int)])
+        # As many dofs are fixed as there are rigid motions, those that determine them best (pivoted QR).
+        order = scipy.linalg.qr(self._rigid.T, mode="r", pivoting=True)[1] if rigid.any() else np.empty(0, dtype=int)
+        pinned = order[: self._rigid.shape[1]]
+        self._kept = np.setdiff1d(np.arange(len(self._free)), pinned)
+        fixed = np.union1d(matrices.fixed, self._free[pinned])
         try:
             self._factor = _native.SparseFactor(native(matrices.stiffness), fixed.tolist())
         except BodyError:

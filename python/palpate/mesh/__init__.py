@@ -1,6 +1,7 @@
-"""Meshes: tetrahedra, their files, and NETGEN to make them from surfaces."""
+"""Tetrahedra: nodes, elements, surface; their files; meshing of surfaces; solids that place regions in them."""
 
+from palpate.mesh import shapes
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.tetrahedralize import tetrahedralize
 
-__all__ = ["TetMesh", "tetrahedralize"]
+__all__ = ["TetMesh", "shapes", "tetrahedralize"]

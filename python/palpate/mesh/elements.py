@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.errors import MeshError
+
 # Corners of each edge, in the order of the mid-side nodes.
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 
@@ -55,3 +57,22 @@ def unique_edges(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = int(tets.max()) + 1
     keys, which = np.unique(ends[:, 0] * count + ends[:, 1], return_inverse=True)
     return np.stack([keys // count, keys % count], axis=1), which.reshape(-1, 6)
+
+
+def boundary_faces(tets: np.ndarray) -> np.ndarray:
+    """Faces of one element only, outward, in the elements' order: (k, 3), or (k, 6) of 10-node elements.
+
+    Raises
+    ------
+    MeshError
+        A face of more than two elements.
+
+    """
+    of_element = FACES[tets.shape[1]]
+    faces = tets[:, of_element].reshape(-1, of_element.shape[1])
+    ordered = np.sort(faces[:, :3], axis=1)
+    _, first, inverse, counts = np.unique(ordered, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    if counts.max() > 2:
+        face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
+        raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
+    return faces[np.sort(first[counts == 1])]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,11 @@ import numpy as np
 
 from palpate.atomic import written_beside
 from palpate.errors import MeshError
+from palpate.mesh.elements import boundary_faces
 from palpate.units import length_scale
 
 if TYPE_CHECKING:
     import meshio
-
-    from palpate.mesh.tetmesh import TetMesh
 
 # The format of each ending, in the words of meshio. Its ASCII Gmsh files with point data do
 # not read back, so Gmsh is written in binary.
@@ -40,21 +40,46 @@ FACE_FROM_NETGEN = {3: [0, 1, 2], 6: [0, 1, 2, 5, 3, 4]}
 REGION_NAMES = ("region", "gmsh:physical", "medit:ref")
 
 
-Volume = tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, int]]
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """What a volume mesh file holds, not checked.
+
+    Attributes
+    ----------
+    nodes
+        (n, 3), m in memory, in the file's unit of length on its way to or from it.
+    tets
+        (m, 4) or (m, 10) node indices.
+    regions
+        (m,) integer labels.
+    region_names
+        Labels by name.
+
+    """
+
+    nodes: np.ndarray
+    tets: np.ndarray
+    regions: np.ndarray
+    region_names: Mapping[str, int]
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether elements have 10 nodes."""
+        return self.tets.shape[1] == 10
 
 
 def read_volume(path: Path, unit: str) -> Volume:
-    """Nodes (n, 3) in m, tetrahedra (m, 4) or (m, 10), regions (m,) of a file, and their numbers by name."""
+    """Read nodes, tetrahedra and regions of a file whose unit of length is ``unit``; nodes are in m."""
     scale = length_scale(unit)
     if not path.is_file():
         raise MeshError(f"{path}: no such file")
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the file is empty")
     if path.suffix == ".vol":
-        nodes, tets, regions, names = _read_netgen(path)
+        volume = _read_netgen(path)
     else:
-        nodes, tets, regions, names = _tetrahedra(path, _read_meshio(path))
-    return nodes * scale, tets, regions, names
+        volume = _tetrahedra(path, _read_meshio(path))
+    return replace(volume, nodes=volume.nodes * scale)
 
 
 def _read_meshio(path: Path) -> meshio.Mesh:
@@ -94,7 +119,7 @@ def _tetrahedra(path: Path, mesh: meshio.Mesh) -> Volume:
     # Gmsh's physical names: the number of the group and its dimension.
     numbers = {name: np.asarray(value).ravel() for name, value in mesh.field_data.items()}
     names = {name: int(v[0]) for name, v in numbers.items() if chosen == "gmsh:physical" and len(v) == 2 and v[1] == 3}
-    return np.asarray(mesh.points, dtype=np.float64)[:, :3], tets, regions, names
+    return Volume(np.asarray(mesh.points, dtype=np.float64)[:, :3], tets, regions, names)
 
 
 def _read_netgen(path: Path) -> Volume:
@@ -114,7 +139,7 @@ def _read_netgen(path: Path) -> Volume:
         regions = np.array([int(e[0]) for e in elements])
     except (ValueError, IndexError) as error:
         raise MeshError(f"{path}: damaged Netgen mesh ({error})") from None
-    return nodes.reshape(-1, 3), tets[:, FROM_NETGEN[count]], regions, {}
+    return Volume(nodes.reshape(-1, 3), tets[:, FROM_NETGEN[count]], regions, {})
 
 
 def _section(lines: list[str], head: int) -> list[list[str]]:
@@ -125,7 +150,7 @@ def _section(lines: list[str], head: int) -> list[list[str]]:
     return rows
 
 
-def write_volume(mesh: TetMesh, path: Path, unit: str) -> None:
+def write_volume(mesh: Volume, path: Path, unit: str) -> None:
     """Write beside the file, then rename."""
     import meshio
 
@@ -182,9 +207,10 @@ def _write_abaqus(path: Path, content: meshio.Mesh) -> None:
     path.write_text(path.read_text().replace("TYPE=C3D10MH", "TYPE=C3D10"))
 
 
-def _write_netgen(path: Path, points: np.ndarray, mesh: TetMesh) -> None:
+def _write_netgen(path: Path, points: np.ndarray, mesh: Volume) -> None:
     """Points, volume elements and the outer surface as Netgen reads them."""
-    faces = mesh.surface_faces[:, np.argsort(FACE_FROM_NETGEN[mesh.surface_faces.shape[1]])] + 1
+    faces = boundary_faces(mesh.tets)
+    faces = faces[:, np.argsort(FACE_FROM_NETGEN[faces.shape[1]])] + 1
     tets = mesh.tets[:, np.argsort(FROM_NETGEN[mesh.tets.shape[1]])] + 1
     rows = np.column_stack([mesh.regions, np.full(len(tets), tets.shape[1]), tets])
     with path.open("w") as file:

@@ -12,8 +12,9 @@ import numpy as np
 
 from palpate import _native
 from palpate.errors import MeshError, MeshWarning
-from palpate.mesh.elements import EDGES, FACES, MIRRORED, drawing_triangles, unique_edges
-from palpate.shapes import Shape, elements_inside
+from palpate.mesh.elements import EDGES, FACES, MIRRORED, boundary_faces, drawing_triangles, unique_edges
+from palpate.mesh.files import Volume, read_volume, write_volume
+from palpate.mesh.shapes import Shape, elements_inside
 
 # An element flatter than this part of the cube of its longest edge has no usable shape functions.
 DEGENERATE = 1e-12
@@ -95,16 +96,7 @@ class TetMesh:
     @cached_property
     def surface_faces(self) -> np.ndarray:
         """Elements' faces on the boundary, outward: (k, 3), or (k, 6) with the middles of the edges 01, 12, 20."""
-        of_element = FACES[self.tets.shape[1]]
-        faces = self.tets[:, of_element].reshape(-1, of_element.shape[1])
-        ordered = np.sort(faces[:, :3], axis=1)
-        _, first, inverse, counts = np.unique(
-            ordered, axis=0, return_index=True, return_inverse=True, return_counts=True
-        )
-        if counts.max() > 2:
-            face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
-            raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
-        boundary = faces[np.sort(first[counts == 1])]
+        boundary = boundary_faces(self.tets)
         boundary.setflags(write=False)
         return boundary
 
@@ -161,9 +153,8 @@ class TetMesh:
             A file that is missing, not readable, or holds no tetrahedra.
 
         """
-        from palpate.mesh.files import read_volume
-
-        return cls(*read_volume(Path(path), unit))
+        volume = read_volume(Path(path), unit)
+        return cls(volume.nodes, volume.tets, volume.regions, volume.region_names)
 
     def with_regions(self, placed: Mapping[int | str, Shape | Iterable[Shape]]) -> TetMesh:
         """Return the same mesh with solids marked as regions, later ones over earlier ones.
@@ -196,9 +187,7 @@ class TetMesh:
 
     def write(self, path: str | os.PathLike[str], unit: str = "m") -> None:
         """Write the mesh and its regions in the format of the file's ending; replaced only when complete."""
-        from palpate.mesh.files import write_volume
-
-        write_volume(self, Path(path), unit)
+        write_volume(Volume(self.nodes, self.tets, self.regions, self.region_names), Path(path), unit)
 
 
 def _index_array(tets: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.tetmesh import TetMesh
 from palpate.units import length_scale
+from palpate.vectors import three_numbers
 
 if TYPE_CHECKING:
     import trimesh
@@ -109,8 +110,9 @@ def _fill(
     size = extent / PARTS[element] if max_element_size is None else float(max_element_size)
     if not (np.isfinite(size) and size > 0):
         raise MeshError(f"max_element_size must be positive, got {max_element_size}")
-    for (x, y, z), radius, ball_size in refine:
-        if not (np.isfinite([x, y, z, radius, ball_size]).all() and radius > 0 and ball_size > 0):
+    for center, radius, ball_size in refine:
+        three_numbers(center, "the centre of a ball in refine", MeshError)
+        if not (np.isfinite([radius, ball_size]).all() and radius > 0 and ball_size > 0):
             raise MeshError("refine takes ((x, y, z), radius, size) with positive radius and size in metres")
     if repair:
         if refine:

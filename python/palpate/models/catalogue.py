@@ -16,17 +16,34 @@ NAMES = ("doll", "kidney", "liver", "beam")
 
 @dataclass(frozen=True)
 class PaperModel:
-    """What the paper (Jun, Choi and Cho) prints about a model; None where it prints nothing."""
+    """What the paper (Jun, Choi and Cho) prints about a model; None where it prints nothing.
+
+    Attributes
+    ----------
+    nodes, tets, surface_nodes, surface_triangles
+        Counts of the mesh.
+    precompute_minutes
+        Table 1: all of Green's functions.
+    simulation_ms
+        Table 1: force and deformation of one contact.
+    step_seconds
+        Table 2: one Newmark step.
+    dofs
+        Table 2: degrees of freedom.
+    note
+        Where the counts contradict themselves, and what the model here keeps.
+
+    """
 
     nodes: int
     tets: int
     surface_nodes: int | None = None
     surface_triangles: int | None = None
-    precompute_minutes: float | None = None  # table 1: all of Green's functions
-    simulation_ms: float | None = None  # table 1: one contact's force and deformation
-    step_seconds: float | None = None  # table 2: one Newmark step
-    dofs: int | None = None  # table 2
-    note: str = ""  # where the counts contradict themselves, and what the model here holds to
+    precompute_minutes: float | None = None
+    simulation_ms: float | None = None
+    step_seconds: float | None = None
+    dofs: int | None = None
+    note: str = ""
 
 
 # Tables 1 and 2 of the paper. "liver_dynamic" is the coarser liver of table 2.
@@ -105,7 +122,7 @@ def beam(paper: bool = False) -> TetMesh:
 
 
 def fixed(name: str, mesh: TetMesh) -> np.ndarray:
-    """Return the nodes where a model is held, as a mask for :class:`palpate.Body`.
+    """Return the nodes where a model is fixed, as a mask for :class:`palpate.Body`.
 
     The doll stands on its seat and the under-sides of its legs; the kidney lies on its back, the liver hangs on the
     bare area at its back and top, where its ligaments are; the beam is clamped at x = 0.

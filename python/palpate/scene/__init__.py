@@ -1,5 +1,17 @@
-"""Scene files: what to touch, and with what."""
+"""Scenes: what to touch and with what, as read from a file."""
 
+from palpate.scene.dynamics import BodyMotion, DynamicsTable, StrikeTable
+from palpate.scene.model_scenes import MODES, TOOLS, YOUNGS_MODULUS, model_scene
 from palpate.scene.scene import BuiltScene, Scene
 
-__all__ = ["BuiltScene", "Scene"]
+__all__ = [
+    "MODES",
+    "TOOLS",
+    "YOUNGS_MODULUS",
+    "BodyMotion",
+    "BuiltScene",
+    "DynamicsTable",
+    "Scene",
+    "StrikeTable",
+    "model_scene",
+]

@@ -28,7 +28,7 @@ Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class StrikeTable(Table):
-    """A blow on the surface point closest to a point; ``impulse`` is in N s, ``duration`` 0 is a single time step."""
+    """A strike on the surface point closest to a point; ``impulse`` is in N s, ``duration`` 0 is a single time step."""
 
     point: Point
     impulse: Direction
@@ -40,7 +40,7 @@ class DynamicsTable(Table):
 
     ``delta`` above 1/2 damps what is too fast for the time step; ``alpha`` is ``(delta + 1/2)^2 / 4`` unless given.
     ``damping_ratios`` are those of the first and the tenth mode; or ``rayleigh`` gives the factors
-    of mass and stiffness. ``strike`` is the blow that the viewer gives when its page opens.
+    of mass and stiffness. ``strike`` is the one that the viewer gives when its page opens.
     """
 
     scheme: Literal["newmark", "exact"] = "newmark"
@@ -60,7 +60,7 @@ class DynamicsTable(Table):
             raise ValueError("give damping_ratios or rayleigh, not both")
         return self
 
-    def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> Motion:
+    def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> BodyMotion:
         """Modes and coefficients for a body.
 
         Raises
@@ -81,7 +81,7 @@ class DynamicsTable(Table):
         scheme = (self.dt, alpha, self.delta, *self._rayleigh(basis))
         if self.scheme == "newmark":
             _native.require_stable(scheme, float(basis.eigenvalues[-1]))
-        return Motion(basis, scheme, self.scheme == "exact", coupling)
+        return BodyMotion(basis, scheme, self.scheme == "exact", coupling)
 
     def _rayleigh(self, basis: ModalBasis) -> tuple[float, float]:
         if self.rayleigh is not None:
@@ -94,8 +94,8 @@ class DynamicsTable(Table):
 
 
 @dataclass(frozen=True)
-class Motion:
-    """What sets a body of a scene in motion.
+class BodyMotion:
+    """Modes and time integration of a body of a scene.
 
     Attributes
     ----------

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 
 from pydantic import model_validator
 
-from palpate.body import Body
+from palpate.body import Body, Loads, parse
 from palpate.errors import BodyError
-from palpate.loads import Loads
-from palpate.predicate import parse
 from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
 
 
@@ -56,7 +54,7 @@ class LoadTable(Table):
         """
         loads = together([self])
         assert loads is not None
-        loads.nodal(body)
+        loads.nodal(body.mesh, body.element_materials)
 
 
 def together(tables: Sequence[LoadTable]) -> Loads | None:

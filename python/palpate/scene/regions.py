@@ -7,10 +7,9 @@ from typing import Literal
 import numpy as np
 from pydantic import model_validator
 
-from palpate import shapes
 from palpate.body import Material
 from palpate.errors import MeshError
-from palpate.mesh import TetMesh
+from palpate.mesh import TetMesh, shapes
 from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table
 
 # The solid of each shape, and the keys that place it.

@@ -16,18 +16,17 @@ import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
 
 from palpate import models
-from palpate.body import Body
+from palpate.body import Body, parse
 from palpate.errors import Error, SceneError
+from palpate.fields import HONEST_STRAIN
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element, tetrahedralize_with
-from palpate.predicate import parse
-from palpate.scene.dynamics import DynamicsTable, Motion
+from palpate.scene.dynamics import BodyMotion, DynamicsTable
 from palpate.scene.loads import LoadTable, together
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Point, Radius, Stiffness, Table, Time
-from palpate.strain import HONEST_STRAIN
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -37,6 +36,8 @@ else:
 
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
 UNION_MEMBERS = {"str", "int", "list[int]"}
+# Keys of former versions, and what they are called now.
+RENAMED = {"view.hold_strain": "strain_limit"}
 
 
 class RefineTable(Table):
@@ -53,7 +54,7 @@ class BodyTable(Table):
     Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
     filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
     ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
-    hold the middles between them.
+    fix the middles between them.
     """
 
     mesh: str | None = None
@@ -86,7 +87,7 @@ class BodyTable(Table):
 
 
 class SupportsTable(Table):
-    """Where the body is held: a predicate over x, y, z, or node indices; a model has its own."""
+    """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
 
     fixed: str | list[int] | None = None
 
@@ -108,14 +109,14 @@ class DeviceTable(Table):
 
 
 class ViewTable(Table):
-    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that holds the tool.
+    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
 
-    Linear elasticity balloons beyond about 10 % strain; ``hold_strain = 0`` lets the pointer go on all the same.
+    Linear elasticity balloons beyond about 10 % strain; ``strain_limit = 0`` takes the limit away.
     """
 
     position: tuple[float, float, float] | None = None
     target: tuple[float, float, float] | None = None
-    hold_strain: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
+    strain_limit: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
 
 
 class Scene(Table):
@@ -133,6 +134,12 @@ class Scene(Table):
 
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: tuple[Path, str] | None = PrivateAttr(None)
+
+    def __repr__(self) -> str:
+        body = self.body
+        source = f"model {body.model}" if body.model else str(body.mesh or body.store)
+        moves = "" if self.dynamics is None else ", in motion"
+        return f"Scene({source}{moves}, tool of radius {1e3 * self.tool.radius:.4g} mm)"
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Scene:
@@ -188,7 +195,7 @@ class Scene(Table):
         Raises
         ------
         Error
-            A mesh that cannot be read or made, supports that hold nothing, a store that does not match.
+            A mesh that cannot be read or made, supports that leave it free to move, a store that does not match.
 
         """
         if self.body.store is not None:
@@ -250,11 +257,11 @@ class Scene(Table):
                 )
             return mask
         if self.body.adds_middles and max(fixed, default=0) < len(mesh.nodes):
-            held = np.zeros(len(mesh.nodes), dtype=bool)
-            held[fixed] = True
-            between = held[mesh.tets[:, EDGES]].all(axis=2)
-            held[mesh.tets[:, 4:][between]] = True
-            return held
+            mask = np.zeros(len(mesh.nodes), dtype=bool)
+            mask[fixed] = True
+            between = mask[mesh.tets[:, EDGES]].all(axis=2)
+            mask[mesh.tets[:, 4:][between]] = True
+            return mask
         return fixed
 
 
@@ -265,7 +272,7 @@ class BuiltScene:
     scene: Scene
     body: Body | None
     green: GreensFunction
-    motion: Motion | None = None
+    motion: BodyMotion | None = None
 
 
 def _explain(path: Path, text: str, error: ValidationError) -> str:
@@ -278,7 +285,7 @@ def _explain(path: Path, text: str, error: ValidationError) -> str:
     at = f"{path}:{line}" if line else str(path)
     if first["type"] == "extra_forbidden":
         known = _known_keys(keys[:-1])
-        near = difflib.get_close_matches(keys[-1], known, 1)
+        near = [RENAMED[where]] if where in RENAMED else difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
         return f"{at}: unknown key '{where}'; {hint}"
     if first["type"] == "missing" and isinstance(place[-1], int):

@@ -10,12 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from palpate.gauge import ElementStrain
-from palpate.interior import Interior
-from palpate.principal import extreme_values, largest_magnitude
+from palpate.fields import (
+    ElementStrain,
+    Interior,
+    StressRecovery,
+    SurfaceStrain,
+    SurfaceStress,
+    extreme_values,
+    largest_magnitude,
+)
 from palpate.simulation import Simulation
-from palpate.strain import SurfaceStrain
-from palpate.stress import StressRecovery, SurfaceStress
 
 # A range never spans less than this part of the body's size, as a strain, or of Young's modulus: rest is not noise
 # blown up.
@@ -65,9 +69,9 @@ class Fields:
 
     def __init__(self, simulation: Simulation, size: float):
         self._simulation, self._size = simulation, size
-        gauge = simulation.strain_gauge
-        self._surface = gauge if isinstance(gauge, SurfaceStrain) else None
-        self._recovery = gauge.recovery if isinstance(gauge, ElementStrain) else None
+        measure = simulation.strain_measure
+        self._surface = measure if isinstance(measure, SurfaceStrain) else None
+        self._recovery = measure.recovery if isinstance(measure, ElementStrain) else None
         self.offered = [DISPLACEMENT, SURFACE_STRAIN] if self._recovery is None else [DISPLACEMENT, STRAIN]
         if self._recovery is not None:
             self.offered += [VON_MISES, PRINCIPAL]
@@ -76,10 +80,10 @@ class Fields:
         self._inside: StressRecovery | None = None
 
     def largest_strain(self, displacements: np.ndarray) -> float:
-        """Largest strain of a pose (s, 3), m, as :mod:`palpate.gauge` has it."""
+        """Largest strain of a pose (s, 3), m, as :mod:`palpate.fields.strain_measure` has it."""
         pose = self._of(displacements)
         if self._recovery is None:
-            return pose.once("largest", lambda: self._simulation.strain_gauge.largest(displacements))
+            return pose.once("largest", lambda: self._simulation.strain_measure.largest(displacements))
         return float(largest_magnitude(self._stress(pose).strain).max())
 
     def picture(self, name: str, displacements: np.ndarray, interior: bool) -> Picture:

@@ -1,4 +1,4 @@
-"""Open the viewer and stay until the person has had enough."""
+"""Open the viewer and serve until interrupted."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
+from palpate.vectors import three_numbers
 
 VERSION = 3
 # Longest name in a client's message.
@@ -85,11 +86,7 @@ def whole(message: Mapping[str, Any], key: str, low: int, high: int) -> int:
 
 def vector(message: Mapping[str, Any], key: str) -> tuple[float, float, float]:
     """Three finite numbers of a client's message."""
-    values = message.get(key)
-    if not isinstance(values, list) or len(values) != 3:
-        raise ViewerError(f"{message['type']}: {key} must be three numbers")
-    x, y, z = (number({"type": message["type"], key: v}, key) for v in values)
-    return x, y, z
+    return three_numbers(message.get(key), f"{message['type']}: {key}", ViewerError)
 
 
 def word(message: Mapping[str, Any], key: str) -> str:

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from palpate.body import free_end
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
-from palpate.scene import BuiltScene
-from palpate.scene.dynamics import StrikeTable
-from palpate.selection import free_end
+from palpate.fields import HONEST_STRAIN
+from palpate.scene import BuiltScene, StrikeTable
 from palpate.simulation import Contact, Simulation
-from palpate.strain import HONEST_STRAIN
 from palpate.viewer.messages import vector, whole
 
 # So many of the lowest modes are offered.
@@ -171,8 +170,8 @@ class MovingBody:
 
     def _strain_of(self, displacements: np.ndarray) -> float:
         """Largest strain of displacements alone, without that of the body's own loads."""
-        gauge, free = self._simulation.strain_gauge, self._green.free_displacements
-        return float(gauge.magnitudes(gauge.sample(free + displacements) - gauge.sample(free)).max())
+        measure, free = self._simulation.strain_measure, self._green.free_displacements
+        return float(measure.magnitudes(measure.sample(free + displacements) - measure.sample(free)).max())
 
     def _default_impulse(self) -> float:
         """Blow along the normal, where the surface follows the first mode well, that stays within honest strain, N s.

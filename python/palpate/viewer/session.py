@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
-from palpate.hold import HeldTool
 from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltScene
-from palpate.simulation import Frame, Simulation
+from palpate.simulation import Frame, LimitedTool, Simulation
 from palpate.viewer.fields import Fields
 from palpate.viewer.messages import encode, number, vector
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
@@ -56,7 +55,7 @@ class Session:
         self._centre, self.size = 0.5 * (low + high), float((high - low).max())
         self.simulation = Simulation(built)
         self._fields = Fields(self.simulation, self.size)
-        self._tool = HeldTool(self.simulation, built.scene.view.hold_strain)
+        self._tool = LimitedTool(self.simulation, built.scene.view.strain_limit)
         self._max_radius = max(
             self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size), built.scene.tool.contact_radius
         )
@@ -136,7 +135,7 @@ class Session:
             "tool_radius": scene.tool.radius,
             "max_force": scene.device.max_force,
             "size": self.size,
-            "hold_strain": view.hold_strain,
+            "hold_strain": view.strain_limit,
             "fields": [{"name": field.name, "title": field.title} for field in self._fields.offered],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
@@ -156,7 +155,7 @@ class Session:
         frame = self._latest()
         shown = frame.displacements if self._moving is None else self._moving.pose(frame.displacements)
         picture = self._fields.picture(wants.field, shown, wants.cutaway)
-        wanted, held = self._tool.wanted, self._tool.held
+        wanted, limited = self._tool.wanted, self._tool.limited
         log, moved = self._log.since(log_seen[0]), self._history.since(log_seen[1])
         header = {
             "type": "frame",
@@ -165,8 +164,8 @@ class Session:
             "tool": {
                 "position": frame.positions[0].tolist(),
                 "active": self.active,
-                # Where the pointer is, while the tool is held back.
-                "wanted": wanted.tolist() if held and wanted is not None else None,
+                # Where the pointer is, while the tool is limited.
+                "wanted": wanted.tolist() if limited and wanted is not None else None,
             },
             "force": frame.forces[0].tolist(),
             "contacts": [
@@ -248,7 +247,7 @@ class Session:
     def _latest(self) -> Frame:
         now = time.monotonic()
         if self._frame is None or now - self._frame_time > FRAME_AGE:
-            # A contact that has begun since the pointer moved is held from here on.
+            # A contact that has begun since the pointer moved is limited from here on.
             self._tool.update()
             self._frame, self._frame_time = self.simulation.frame(), now
             self._keep_log()

@@ -1,0 +1,11 @@
+"""Bodies: a mesh with materials, supports and loads, and the parts of it that users name."""
+
+from palpate.body.body import Body
+from palpate.body.free_end import free_end
+from palpate.body.loads import Loads
+from palpate.body.material import Material
+from palpate.body.predicate import parse
+from palpate.body.problem import description, problem_arrays
+from palpate.body.supports import Fixed
+
+__all__ = ["Body", "Fixed", "Loads", "Material", "description", "free_end", "parse", "problem_arrays"]

@@ -1,0 +1,126 @@
+"""A mesh with materials and supports: what the finite element method solves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import scipy.sparse
+
+from palpate.body.assembly import element_arrays, mass_matrix, stiffness_matrix
+from palpate.body.loads import Loads
+from palpate.body.material import Material, material_rows, warn_of_locking
+from palpate.body.supports import Fixed, element_components, fixed_mask, rigid_constraint_rank
+from palpate.errors import BodyError
+from palpate.mesh import TetMesh
+
+
+class Body:
+    """A supported elastic body.
+
+    Parameters
+    ----------
+    mesh
+        The tetrahedra.
+    material
+        One :class:`Material`, or one for each region of the mesh, by number or name.
+    fixed
+        Supported nodes: indices, an (n,) mask, an (n, 3) mask of components, ``{"z": indices}``, a function of
+        the (n, 3) node positions that returns a mask, or None for a body without supports.
+    loads
+        What acts on it at rest, before it is touched: weight, pressure, forces.
+
+    Attributes
+    ----------
+    element_materials
+        (m, 3) Young's modulus, Pa, Poisson's ratio, and density, kg/m^3, of each element.
+    fixed_mask
+        (n, 3) whether each component is fixed.
+
+    Raises
+    ------
+    BodyError
+        An index out of range, a mask of the wrong length, a region without a material.
+
+    """
+
+    def __init__(
+        self,
+        mesh: TetMesh,
+        *,
+        material: Material | Mapping[int | str, Material],
+        fixed: Fixed = None,
+        loads: Loads | None = None,
+    ):
+        self.mesh = mesh
+        self.material = material
+        self.element_materials = material_rows(mesh, material)
+        warn_of_locking(mesh, self.element_materials[:, 1].max())
+        mask = fixed_mask(mesh.nodes, fixed)
+        mask.setflags(write=False)
+        self.fixed_mask = mask
+        self.loads = loads
+
+    def __repr__(self) -> str:
+        mesh, fixed = self.mesh, len(self.fixed_nodes)
+        materials = 1 if isinstance(self.material, Material) else len(self.material)
+        counts = f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {mesh.tets.shape[1]}-node tets"
+        return f"Body({counts}, {materials} material{'s' if materials > 1 else ''}, {fixed} nodes fixed)"
+
+    @property
+    def fixed_nodes(self) -> np.ndarray:
+        """Nodes with any fixed component, ascending (f,)."""
+        return np.flatnonzero(self.fixed_mask.any(axis=1))
+
+    @property
+    def fixed_dofs(self) -> np.ndarray:
+        """Fixed dofs, 3 * node + axis, ascending."""
+        return np.flatnonzero(self.fixed_mask.ravel())
+
+    def stiffness(self) -> scipy.sparse.csc_array:
+        """Stiffness matrix of all dofs, (3n, 3n), N/m."""
+        return stiffness_matrix(self.mesh, self.element_materials)
+
+    def mass(self, *, lumped: bool = False) -> scipy.sparse.csc_array:
+        """Mass matrix of all dofs, (3n, 3n), kg; consistent, or lumped to the diagonal."""
+        return mass_matrix(self.mesh, self.element_materials, lumped=lumped)
+
+    def load_vector(self) -> np.ndarray:
+        """Turn the reference loads into nodal forces, (n, 3) N; what falls on a support goes straight into it.
+
+        Raises
+        ------
+        BodyError
+            A node that does not exist, or a part of the surface without faces.
+
+        """
+        if self.loads is None:
+            return np.zeros((len(self.mesh.nodes), 3))
+        return self.loads.nodal(self.mesh, self.element_materials)
+
+    def _element_arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return element_arrays(self.mesh, self.element_materials)
+
+    def require_supported(self) -> None:
+        """Refuse a body that could move without deforming.
+
+        Raises
+        ------
+        BodyError
+            No support, nothing left free, or a part of the body that its supports leave free to move.
+
+        """
+        if not self.fixed_mask.any():
+            raise BodyError("the body has no support: fix some nodes, or it flies away when touched")
+        if self.fixed_mask.all():
+            raise BodyError("every node is fixed: nothing is left to deform")
+        labels = element_components(self.mesh.tets, len(self.mesh.nodes))
+        for part in np.unique(labels):
+            members = np.flatnonzero(labels == part)
+            rank = rigid_constraint_rank(self.mesh.nodes[members], self.fixed_mask[members])
+            if rank < 6:
+                supports = "no support" if rank == 0 else f"supports that leave {6 - rank} rigid motions free"
+                raise BodyError(
+                    f"the part of {len(members)} nodes around node {members[0]} has {supports}: "
+                    "fix at least three of its nodes that are not in line"
+                )

@@ -1,0 +1,111 @@
+"""Reference loads of a body: what acts on it before anyone touches it.
+
+All become nodal forces by the shape functions, `F_i = int N_i b dV + int N_i t dA`, the forces that do the same work as
+the load itself on any displacement that the elements can take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from palpate.body.assembly import mass_matrix
+from palpate.body.selection import Selection, node_indices, selected_nodes
+from palpate.equality import ComparedByValue
+from palpate.errors import BodyError
+from palpate.mesh import TetMesh
+from palpate.mesh.shape_functions import surface_integrals
+from palpate.vectors import three_numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Loads(ComparedByValue):
+    """Loads that act on a body at rest.
+
+    A part of the surface is named by node indices, an (n,) mask or a function of the (n, 3) positions; the faces all of
+    whose corners are named carry the load.
+
+    Parameters
+    ----------
+    gravity
+        Acceleration (3,), m/s^2; each element weighs by its material's density.
+    pressure
+        Pairs of a part of the surface and a pressure, Pa; positive pushes into the body.
+    spread
+        Pairs of a part of the surface and a total force (3,), N, spread evenly over its area.
+    forces
+        Force (3,), N, on single nodes, inside too.
+
+    Raises
+    ------
+    BodyError
+        A number that is not finite, or a wrong length.
+
+    """
+
+    gravity: Sequence[float] = (0.0, 0.0, 0.0)
+    pressure: Sequence[tuple[Selection, float]] = ()
+    spread: Sequence[tuple[Selection, Sequence[float]]] = ()
+    forces: Mapping[int, Sequence[float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gravity", three_numbers(self.gravity, "gravity", BodyError))
+        pressure = [(where, _number(value, "pressure")) for where, value in self.pressure]
+        spread = [(where, three_numbers(force, "spread", BodyError)) for where, force in self.spread]
+        forces = {node: three_numbers(force, f"forces: node {node}", BodyError) for node, force in self.forces.items()}
+        object.__setattr__(self, "pressure", tuple(pressure))
+        object.__setattr__(self, "spread", tuple(spread))
+        object.__setattr__(self, "forces", forces)
+
+    def nodal(self, mesh: TetMesh, materials: np.ndarray) -> np.ndarray:
+        """Nodal forces on the nodes of a mesh, (n, 3) N.
+
+        Parameters
+        ----------
+        mesh
+            Of the body.
+        materials
+            (m, 3) Young's modulus, Pa, Poisson's ratio, and density, kg/m^3, of each element.
+
+        Raises
+        ------
+        BodyError
+            A node that does not exist, or a part of the surface without faces.
+
+        """
+        nodes = mesh.nodes
+        total = np.zeros((len(nodes), 3))
+        if any(self.gravity):
+            # The row sums of the consistent mass are int rho N_i dV.
+            total += (mass_matrix(mesh, materials) @ np.tile(self.gravity, len(nodes))).reshape(-1, 3)
+        for where, value in self.pressure:
+            faces = _faces_of(mesh, where, "pressure")
+            _, along_normal = surface_integrals(nodes, faces)
+            np.add.at(total, faces, -value * along_normal)
+        for where, force in self.spread:
+            faces = _faces_of(mesh, where, "spread")
+            areas, _ = surface_integrals(nodes, faces)
+            np.add.at(total, faces, areas[:, :, None] / areas.sum() * np.array(force))
+        for node, force in self.forces.items():
+            total[node_indices([node], len(nodes), "forces")] += force
+        return total
+
+
+def _faces_of(mesh: TetMesh, where: Selection, what: str) -> np.ndarray:
+    """Boundary faces with all corners in a set of nodes, (k, 3 or 6), outward."""
+    chosen = np.zeros(len(mesh.nodes), dtype=bool)
+    chosen[selected_nodes(where, mesh.nodes, what)] = True
+    faces = mesh.surface_faces
+    faces = faces[chosen[faces[:, :3]].all(axis=1)]
+    if len(faces) == 0:
+        raise BodyError(f"{what}: no face of the surface has all its corners among the nodes named")
+    return faces
+
+
+def _number(value: Any, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+        raise BodyError(f"{what} must be a finite number, got {value!r}")
+    return float(value)

@@ -1,0 +1,85 @@
+"""Materials of a body, one or one for each region of its mesh."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import BodyError, LockingWarning
+from palpate.mesh import TetMesh
+
+# Largest Poisson's ratio without volumetric locking to speak of, by nodes an element: 4-node tetrahedra cannot keep
+# their volume without keeping their shape; 10-node ones can until the conditioning of K gives out.
+LOCKING = {4: 0.45, 10: 0.499}
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus
+        Pa, positive.
+    poissons_ratio
+        In (-1, 0.5). Nearly incompressible materials make elements lock: 4-node tetrahedra above about 0.45, 10-node
+        ones hardly; a :class:`palpate.LockingWarning` says so.
+    density
+        kg/m^3.
+
+    """
+
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float = 1000.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.youngs_modulus) and self.youngs_modulus > 0):
+            raise BodyError(f"Young's modulus must be positive, got {self.youngs_modulus} Pa")
+        if not -1 < self.poissons_ratio < 0.5:
+            raise BodyError(f"Poisson's ratio must lie in (-1, 0.5), got {self.poissons_ratio}")
+        if not (np.isfinite(self.density) and self.density >= 0):
+            raise BodyError(f"density must not be negative, got {self.density} kg/m^3")
+
+
+def material_rows(mesh: TetMesh, material: Material | Mapping[int | str, Material]) -> np.ndarray:
+    """Young's modulus, Poisson's ratio and density of each element, (m, 3)."""
+    if isinstance(material, Material):
+        table = {int(region): material for region in np.unique(mesh.regions)}
+    else:
+        table = {_region_number(mesh, region): m for region, m in material.items()}
+    missing = sorted(set(np.unique(mesh.regions).tolist()) - set(table))
+    if missing:
+        names = {number: name for name, number in mesh.region_names.items()}
+        region = names.get(missing[0], missing[0])
+        raise BodyError(f"region {region} of the mesh has no material; given are {', '.join(map(str, material))}")
+    rows = np.empty((len(mesh.tets), 3))
+    for region, m in table.items():
+        rows[mesh.regions == region] = (m.youngs_modulus, m.poissons_ratio, m.density)
+    return rows
+
+
+def _region_number(mesh: TetMesh, region: int | str) -> int:
+    if not isinstance(region, str):
+        return int(region)
+    if region not in mesh.region_names:
+        known = ", ".join(mesh.region_names) or "none"
+        raise BodyError(f"the mesh has no region called '{region}'; it has {known}")
+    return mesh.region_names[region]
+
+
+def warn_of_locking(mesh: TetMesh, poissons_ratio: float) -> None:
+    """Warn the caller of a body's constructor of elements too stiff for a ratio."""
+    count = mesh.tets.shape[1]
+    if poissons_ratio <= LOCKING[count]:
+        return
+    remedy = "10-node ones (mesh.to_quadratic()), " if count == 4 else ""
+    warnings.warn(
+        f"volumetric locking: {count}-node tetrahedra are too stiff at Poisson's ratio {poissons_ratio:g}, above "
+        f"{LOCKING[count]}; {remedy}a smaller ratio or a finer mesh help",
+        LockingWarning,
+        stacklevel=3,
+    )

@@ -1,0 +1,72 @@
+"""Supports of a body: which components of which nodes are fixed, and whether the body can still move rigidly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import scipy.sparse
+from scipy.sparse.csgraph import connected_components
+
+from palpate.body.selection import node_indices
+from palpate.errors import BodyError
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+Fixed = Sequence[int] | np.ndarray | Mapping[str, Sequence[int]] | Callable[[np.ndarray], np.ndarray] | None
+
+
+def fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
+    """Mask of the fixed components of each node, (n, 3).
+
+    Raises
+    ------
+    BodyError
+        An index out of range, a mask of the wrong length, an unknown axis.
+
+    """
+    count = len(nodes)
+    mask = np.zeros((count, 3), dtype=bool)
+    if fixed is None:
+        return mask
+    if callable(fixed):
+        fixed = np.asarray(fixed(nodes))
+        if fixed.shape not in {(count,), (count, 3)} or fixed.dtype != bool:
+            raise BodyError(f"the function for fixed must return a boolean mask of length {count}")
+    if isinstance(fixed, Mapping):
+        for name, nodes_of_axis in fixed.items():
+            if name not in AXES:
+                raise BodyError(f"unknown axis '{name}' in fixed: use 'x', 'y' or 'z'")
+            mask[node_indices(nodes_of_axis, count, "fixed"), AXES[name]] = True
+        return mask
+    array = np.asarray(fixed)
+    if array.dtype == bool:
+        if array.shape == (count, 3):
+            return array.copy()
+        if array.shape == (count,):
+            mask[array] = True
+            return mask
+        raise BodyError(f"a mask for fixed must have length {count}, got shape {array.shape}")
+    mask[node_indices(array, count, "fixed")] = True
+    return mask
+
+
+def element_components(tets: np.ndarray, node_count: int) -> np.ndarray:
+    """Label of the connected part each node belongs to, (n,)."""
+    first = np.repeat(tets[:, 0], tets.shape[1] - 1)
+    graph = scipy.sparse.coo_array(
+        (np.ones(len(first), dtype=np.int8), (first, tets[:, 1:].ravel())), shape=(node_count, node_count)
+    )
+    return connected_components(graph, directed=False)[1]
+
+
+def rigid_constraint_rank(nodes: np.ndarray, mask: np.ndarray) -> int:
+    """How many of the six rigid motions the fixed components prevent."""
+    where, axis = np.nonzero(mask)
+    if len(where) == 0:
+        return 0
+    size = max(float(np.ptp(nodes, axis=0).max()), 1e-30)
+    arm = (nodes[where] - nodes.mean(axis=0)) / size
+    direction = np.eye(3)[axis]
+    rows = np.hstack([direction, np.cross(arm, direction)])
+    return int(np.linalg.matrix_rank(rows.T @ rows, tol=1e-10 * len(where)))

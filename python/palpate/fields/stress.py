@@ -1,0 +1,188 @@
+"""Stress and strain on the surface of a body, from the displacements of its surface, at the rate of frames.
+
+Elements know strain where they approximate it best: a 4-node element, whose strain is constant, at its centroid; a
+10-node one at the four points of Gauss. A surface node takes the value there of the linear function that fits, by
+weighted least squares, the samples of the elements around it: the recovery of Zienkiewicz and Zhu (1992), which
+reproduces linear stress exactly where a plain average is off by half an element at every boundary (measured on a thick
+cylinder of 5000 nodes: 1.8 % against 2.6 %). With `x_i` the samples of a node's patch, `v_i` their weights, `m` their
+weighted mean and `C = sum v_i (x_i - m)(x_i - m)^T`, the value at `x` is `sum W_i s_i` with
+
+    W_i = v_i [ 1 / sum v + (x - m)^T C^-1 (x_i - m) ].
+
+Weights are volumes. Patches stay within one material, for strain jumps where the material does; stress follows from
+strain by Hooke's law at the node.
+
+The elements reach one layer below the surface; the displacements there are those of :class:`palpate.fields.Interior`.
+One sparse solve of 1 to 3 ms for 5000 nodes (measured; 4 to 7 ms with all the rest) beats rows of `Psi` for that layer,
+which would make a store larger by a third.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse
+
+from palpate.body import Body
+from palpate.equality import ComparedByValue
+from palpate.fields.interior import Interior
+from palpate.mesh.shape_functions import tetrahedron_gradients
+
+# Barycentric sample points of an element by its number of nodes.
+_FAR, _NEAR = (1 + 3 / 5**0.5) / 4, (1 - 1 / 5**0.5) / 4
+SAMPLES = {4: np.full((1, 4), 0.25), 10: np.full((4, 4), _NEAR) + (_FAR - _NEAR) * np.eye(4)}
+# A direction in which the samples spread less than this part of the widest (squared) is not extrapolated.
+FLAT = 1e-2
+# Components in the order xx, yy, zz, xy, yz, zx.
+FIRST, SECOND = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
+TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceStress(ComparedByValue):
+    """Stress and strain at the surface nodes, or at those that the recovery was asked for.
+
+    Attributes
+    ----------
+    stress
+        (s, 3, 3) Pa, tension positive.
+    strain
+        (s, 3, 3), infinitesimal, `(grad u + grad u^T) / 2`.
+
+    """
+
+    stress: np.ndarray
+    strain: np.ndarray
+
+    @cached_property
+    def von_mises(self) -> np.ndarray:
+        """Equivalent stress of von Mises, `sqrt(3/2 dev : dev)`, (s,) Pa."""
+        mean = np.trace(self.stress, axis1=1, axis2=2) / 3
+        deviator = self.stress - mean[:, None, None] * np.eye(3)
+        return np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))
+
+    @cached_property
+    def principal_stresses(self) -> np.ndarray:
+        """Principal stresses, the largest tension first, (s, 3) Pa."""
+        return np.linalg.eigvalsh(self.stress)[:, ::-1]
+
+    @cached_property
+    def principal_strains(self) -> np.ndarray:
+        """Principal strains, the largest stretch first, (s, 3)."""
+        return np.linalg.eigvalsh(self.strain)[:, ::-1]
+
+    @cached_property
+    def strain_magnitude(self) -> np.ndarray:
+        """Norm of the strain, `sqrt(e : e)`, (s,)."""
+        return np.sqrt(np.einsum("nij,nij->n", self.strain, self.strain))
+
+
+class StressRecovery:
+    """Stress and strain at the surface nodes of a body, for any displacements of its surface.
+
+    Parameters
+    ----------
+    body
+        A supported body.
+    nodes
+        Nodes at which they are recovered instead, inner ones too: a cut-away view shows them.
+    interior
+        Of the body, if it is there already: its factorisation is most of the work.
+
+    Attributes
+    ----------
+    largest_youngs_modulus
+        Over the materials at those nodes, Pa.
+
+    """
+
+    def __init__(self, body: Body, nodes: np.ndarray | None = None, interior: Interior | None = None):
+        mesh = body.mesh
+        nodes = mesh.surface_nodes if nodes is None else nodes
+        self.interior = interior or Interior(body)
+        patches, materials = _patches(body, nodes)
+        used = np.unique(patches.indices)
+        points = SAMPLES[mesh.tets.shape[1]]
+        tets = mesh.tets[used]
+        self._strain = _strain_operator(tetrahedron_gradients(mesh.nodes, tets, points), tets, len(mesh.nodes))
+        e, nu, _ = materials.T
+        self.largest_youngs_modulus = float(e.max())
+        self._lame = nu * e / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
+        corners = mesh.nodes[tets[:, :4]]
+        positions = np.einsum("pc,ecx->epx", points, corners).reshape(-1, 3)
+        weights = scipy.sparse.kron(patches[:, used], np.ones((1, len(points))), format="csr")
+        self._fit = _linear_fit(weights, positions, mesh.nodes[nodes])
+
+    def recover(self, displacements: np.ndarray) -> SurfaceStress:
+        """Stress and strain for displacements of the surface nodes, (s, 3) m.
+
+        Raises
+        ------
+        BodyError
+            Displacements that are not finite or of another shape.
+
+        """
+        return self.recover_inside(self.interior.extend(displacements))
+
+    def recover_inside(self, everywhere: np.ndarray) -> SurfaceStress:
+        """Stress and strain for displacements of all nodes, (n, 3) m, as the interior extends them."""
+        strain = self._fit @ (self._strain @ everywhere.ravel()).reshape(-1, 6)
+        lam, mu = self._lame
+        stress = 2 * mu[:, None] * strain
+        stress[:, :3] += (lam * strain[:, :3].sum(axis=1))[:, None]
+        return SurfaceStress(stress[:, TENSOR], strain[:, TENSOR])
+
+
+def _strain_operator(gradients: np.ndarray, tets: np.ndarray, node_count: int) -> scipy.sparse.csr_array:
+    """Strain, `e_ij = (du_i/dx_j + du_j/dx_i) / 2`, in six components at all samples, from all displacements."""
+    elements, samples, corners, _ = gradients.shape
+    rows = np.arange(6 * elements * samples).reshape(elements, samples, 1, 6)
+    nodes = tets[:, None, :, None]
+    shape = (elements, samples, corners, 6)
+    halves = [
+        (gradients[..., SECOND] / 2, 3 * nodes + FIRST),
+        (gradients[..., FIRST] / 2, 3 * nodes + SECOND),
+    ]
+    data = np.concatenate([values.ravel() for values, _ in halves])
+    columns = np.concatenate([np.broadcast_to(at, shape).ravel() for _, at in halves])
+    places = (np.tile(np.broadcast_to(rows, shape).ravel(), 2), columns)
+    size = (6 * elements * samples, 3 * node_count)
+    return scipy.sparse.coo_array((data, places), shape=size).tocsr()
+
+
+def _patches(body: Body, nodes: np.ndarray) -> tuple[scipy.sparse.csr_array, np.ndarray]:
+    """Volumes of the elements in the patch of each of the nodes, (s, m), and the material there, (s, 3).
+
+    A patch is the elements around the node, of 4-node elements (one sample each, too few) also those around their
+    nodes; of a node between materials, those of the material that has most of the volume around it.
+    """
+    mesh = body.mesh
+    count = len(mesh.tets)
+    flat = (np.repeat(np.arange(count), mesh.tets.shape[1]), mesh.tets.ravel())
+    incidence = scipy.sparse.coo_array((np.ones(mesh.tets.size), flat), shape=(count, len(mesh.nodes))).tocsr()
+    around = incidence.T.tocsr()[nodes]
+    kinds, kind = np.unique(body.element_materials, axis=0, return_inverse=True)
+    volume_by_kind = np.zeros((count, kind.max() + 1))
+    volume_by_kind[np.arange(count), kind.ravel()] = mesh.volumes
+    own = np.argmax(around @ volume_by_kind, axis=1)
+    patch = (around @ incidence @ incidence.T if mesh.tets.shape[1] == 4 else around).tocoo()
+    same = kind.ravel()[patch.col] == own[patch.row]
+    row, column = patch.row[same], patch.col[same]
+    return scipy.sparse.coo_array((mesh.volumes[column], (row, column)), shape=patch.shape).tocsr(), kinds[own]
+
+
+def _linear_fit(weights: scipy.sparse.csr_array, samples: np.ndarray, targets: np.ndarray) -> scipy.sparse.csr_array:
+    """`W` of the header: values of the fitted linear functions at the targets from those at the samples."""
+    total = np.asarray(weights.sum(axis=1)).ravel()
+    mean = (weights @ samples) / total[:, None]
+    squares = (weights @ np.einsum("ni,nj->nij", samples, samples).reshape(-1, 9)).reshape(-1, 3, 3)
+    covariance = squares / total[:, None, None] - np.einsum("ni,nj->nij", mean, mean)
+    spread, axes = np.linalg.eigh(covariance)
+    inverse = np.where(spread > FLAT * spread[:, -1:], 1 / np.maximum(spread, 1e-300), 0)
+    slope = np.einsum("nik,nk,njk,nj->ni", axes, inverse, axes, targets - mean)
+    fit = weights.tocoo()
+    arm = samples[fit.col] - mean[fit.row]
+    data = fit.data / total[fit.row] * (1 + np.einsum("ni,ni->n", slope[fit.row], arm))
+    return scipy.sparse.coo_array((data, (fit.row, fit.col)), shape=fit.shape).tocsr()

@@ -1,0 +1,257 @@
+"""The Green's function of a body: any touch answered by a small solve."""
+
+from __future__ import annotations
+
+import json
+import operator
+import os
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import _native
+from palpate.body import Body, description, problem_arrays
+from palpate.errors import BodyError, StoreError
+from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
+from palpate.green.answer import Answer, Touch
+from palpate.vectors import three_components, three_numbers
+
+Components = Sequence[float | None]
+
+
+class GreensFunction:
+    """Compliance of a body seen from its touchable surface.
+
+    Made by :func:`precompute` or :meth:`load`; immutable.
+
+    Attributes
+    ----------
+    body
+        What it was made for; None where only the store is known.
+    surface_nodes
+        (s,) nodes on the boundary, ascending; rows of answers follow them.
+    surface_positions
+        (s, 3) m, of the unloaded body.
+    surface_faces, surface_triangles
+        (k, 3 or 6) elements' faces on the boundary, and the flat triangles (t, 3) that they are drawn by; node indices,
+        outward.
+    touchable_nodes
+        Surface nodes that may be touched, ascending.
+    fixed_dofs, fixed_nodes
+        Fixed dofs, 3 * node + axis, and nodes with any fixed component; ascending.
+
+    """
+
+    def __init__(self, core: _native.GreenCore, body: Body | None = None):
+        self._core = core
+        self.body = body
+        self.surface_nodes = core.surface_nodes.astype(np.int64)
+        self.surface_positions = core.surface_positions.reshape(-1, 3)
+        faces, width = core.surface_faces
+        self.surface_faces = self.surface_nodes[faces.reshape(-1, width)]
+        self.surface_triangles = self.surface_nodes[core.surface_triangles.reshape(-1, 3)]
+        ranks = core.touch_ranks.astype(np.int64)
+        self.touchable_nodes = self.surface_nodes[ranks]
+        self.fixed_dofs = core.fixed_dofs.astype(np.int64)
+        self.fixed_nodes = np.unique(self.fixed_dofs // 3)
+        self._fixed = frozenset(self.fixed_dofs.tolist())
+        self._first_column = {int(n): 3 * i for i, n in enumerate(self.touchable_nodes)}
+        self._surface_rank = {int(n): i for i, n in enumerate(self.surface_nodes)}
+
+    def __repr__(self) -> str:
+        touchable, surface = len(self.touchable_nodes), len(self.surface_nodes)
+        modulus = "" if self.youngs_modulus is None else f", E = {self.youngs_modulus:.4g} Pa"
+        file = "in memory" if self.path is None else str(self.path)
+        return f"GreensFunction({surface} surface nodes, {touchable} touchable, {self.precision}{modulus}, {file})"
+
+    @property
+    def precision(self) -> str:
+        """Stored number format, ``"f16"``, ``"f32"`` or ``"f64"``."""
+        return self._core.precision
+
+    @property
+    def key(self) -> str:
+        """Hash of everything that determines the numbers."""
+        return self._core.key
+
+    @property
+    def path(self) -> Path | None:
+        """File behind it, if any."""
+        return None if self._core.path is None else Path(self._core.path)
+
+    @property
+    def youngs_modulus(self) -> float | None:
+        """Young's modulus, Pa, if the whole body has one and no loads: then it only scales forces."""
+        return self._core.youngs_modulus
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What it was made from."""
+        return json.loads(self._core.description or "{}")
+
+    @property
+    def free_displacements(self) -> np.ndarray:
+        """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
+        return self._core.free_displacements.reshape(-1, 3)
+
+    @cached_property
+    def strain_measure(self) -> StrainMeasure:
+        """Measure of the largest strain of answers: by the elements of the body; of a bare store, by its surface."""
+        if self.body is None:
+            return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
+        return ElementStrain(StressRecovery(self.body))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the store; an existing file is replaced only when the new one is complete."""
+        self._core.save(Path(path))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, body: Body | None = None) -> GreensFunction:
+        """Map a store and verify every block of it.
+
+        Parameters
+        ----------
+        path
+            The file.
+        body
+            If given, a store that was made for another body is refused.
+
+        Raises
+        ------
+        StoreError
+            Not a store, damaged, of another version, or made for another body.
+
+        """
+        path = Path(path)
+        if not path.exists():
+            raise StoreError(f"{path}: no such file")
+        green = cls(_native.GreenCore.load(path), body)
+        if body is not None:
+            touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
+            expected = _native.GreenCore.content_key(problem_arrays(body, touch), green.precision)
+            if expected != green.key:
+                raise StoreError(f"{path}: {_difference(green, body)}; compute it again")
+        return green
+
+    def solve(
+        self,
+        *,
+        displacements: Mapping[int, Components] | None = None,
+        forces: Mapping[int, Components] | None = None,
+        release: Sequence[int] = (),
+    ) -> Answer:
+        """Answer a change of boundary conditions by the capacitance matrix algorithm.
+
+        Parameters
+        ----------
+        displacements
+            Prescribed displacement of touchable nodes from the unloaded shape, m; None leaves a component as it is:
+            free, or fixed by its support. Fixed nodes may be named: their support moves.
+        forces
+            Forces on touchable nodes, N, besides the body's own loads; None is no force. On a support they go straight
+            into it.
+        release
+            Fixed nodes on the surface whose support is taken away, but for components that ``displacements``
+            prescribes.
+
+        Raises
+        ------
+        BodyError
+            A node that is not touchable, or in ``release`` not fixed; a wrong length; a number that is not finite;
+            a force and a displacement on the same component; released supports that leave the body free to move.
+
+        """
+        forced, placed = self._by_column(forces, "forces"), self._by_column(displacements, "displacements")
+        freed = {column for node in release for column in self._released_columns(node)}
+        known: dict[int, float] = {}
+        switched: dict[int, float] = {}
+        for column in {*forced, *placed, *freed}:
+            fixed = self._is_fixed(column)
+            if column in placed:
+                if forced.get(column) and (column in freed or not fixed):
+                    node, axis = self.touchable_nodes[column // 3], "xyz"[column % 3]
+                    raise BodyError(f"node {node} has both a force and a displacement along {axis}")
+                (known if fixed else switched)[column] = placed[column]
+            elif column in freed:
+                switched[column] = forced.get(column, 0.0)
+            elif not fixed:  # a force on a support goes straight into it and moves nothing
+                known[column] = forced[column]
+        u, f, reactions = self._core.solve(sorted(known.items()), sorted(switched.items()))
+        u, f = u.reshape(-1, 3), f.reshape(-1, 3)
+        return Answer(u, f, self._reactions(f, reactions), self)
+
+    def touch(self, point: Sequence[float], displacement: Components, radius: float = 0.0) -> Touch:
+        """Press a patch of the surface.
+
+        Parameters
+        ----------
+        point
+            Contact point, m, on the unloaded body; the closest point of the surface is taken.
+        displacement
+            Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
+        radius
+            Contact radius, m; 0 is a point contact.
+
+        """
+        if not (np.isfinite(radius) and radius >= 0):
+            raise BodyError(f"the contact radius must not be negative, got {radius}")
+        target = three_numbers(point, "the touch point", BodyError)
+        wanted = three_components(displacement, "displacement", BodyError)
+        force, u = self._core.touch(target, wanted, float(radius))
+        return Touch(np.array(force), u.reshape(-1, 3), self)
+
+    def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
+        """`K u` at the fixed nodes; a free component carries the loads on it."""
+        loads = self._core.loads.reshape(-1, 3)
+        reactions = loads[self.fixed_nodes] if len(loads) else np.zeros((len(self.fixed_nodes), 3))
+        for i, node in enumerate(self.fixed_nodes):
+            rank = self._surface_rank.get(int(node))
+            if rank is not None:
+                reactions[i] = surface_forces[rank]
+        rows = np.searchsorted(self.fixed_nodes, self.fixed_dofs // 3)
+        reactions[rows, self.fixed_dofs % 3] = fixed_dof_forces
+        return reactions
+
+    def _by_column(self, values: Mapping[int, Components] | None, argument: str) -> dict[int, float]:
+        """Given components by column of the operator."""
+        columns = {}
+        for node, components in (values or {}).items():
+            first = self._column(node, argument)
+            for axis, value in enumerate(three_components(components, f"{argument}: node {node}", BodyError)):
+                if value is not None:
+                    columns[first + axis] = value
+        return columns
+
+    def _column(self, node: int, argument: str) -> int:
+        try:
+            return self._first_column[operator.index(node)]
+        except (KeyError, TypeError):
+            raise BodyError(f"{argument}: node {node} is not touchable") from None
+
+    def _is_fixed(self, column: int) -> bool:
+        return 3 * int(self.touchable_nodes[column // 3]) + column % 3 in self._fixed
+
+    def _released_columns(self, node: int) -> list[int]:
+        """Columns of the fixed components of a node whose support is taken away."""
+        if not isinstance(node, (int, np.integer)) or not np.isin(node, self.fixed_nodes):
+            raise BodyError(f"release: node {node} is not fixed")
+        if int(node) not in self._surface_rank:
+            raise BodyError(f"release: fixed node {node} lies inside the body; only surface nodes can be released")
+        first = self._column(node, "release")
+        return [column for column in range(first, first + 3) if self._is_fixed(column)]
+
+
+def _difference(green: GreensFunction, body: Body) -> str:
+    """First thing in which a store and a body are seen to differ."""
+    stored, now = green.description, description(body)
+    for name in ("element", "nodes", "tets", "surface_nodes", "fixed_nodes", "materials", "load_N"):
+        if stored.get(name) != now[name]:
+            return f"was made for another body ({name.replace('_', ' ')}: {stored.get(name)} there, {now[name]} here)"
+    if not np.array_equal(green.fixed_dofs, body.fixed_dofs):
+        return "was made for another body (other nodes are fixed)"
+    if not np.array_equal(green._core.loads, problem_arrays(body, None)[-1]):
+        return "was made for another body (other loads)"
+    return "was made for another body (node positions or elements differ)"

@@ -1,0 +1,1 @@
+"""Accuracy beside known answers, speed beside other methods, and their plots."""

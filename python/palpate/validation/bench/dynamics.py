@@ -1,0 +1,205 @@
+"""Table 2 of the paper, side by side: its figures, its method on this machine, sparse solvers, and Palpate.
+
+All step the same matrices with the same damping. The others, by average acceleration, move every node at every step.
+Palpate's force tick is that of the 1 kHz loop, run offline: geometry, the contact of a patch through its coupling, the
+motion of every mode, energy, safety stage; the surface is evaluated as often as it is drawn.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate import models
+from palpate.body import Body, Material
+from palpate.dynamics import ModalBasis, Newmark, modes, rayleigh_from_ratios
+from palpate.dynamics.matrices import Matrices
+from palpate.green import precompute
+from palpate.mesh import TetMesh
+from palpate.scene import YOUNGS_MODULUS, BodyMotion, BuiltScene, Scene
+from palpate.simulation import RATE, Simulation
+from palpate.validation.bench import peers
+from palpate.validation.bench.paper import machine
+
+DT = 1e-3
+# A tenth of critical damping at 2 Hz and at 100 Hz: soft tissue comes to rest within a second.
+DAMPING = (0.1, 2.0, 0.1, 100.0)
+# The scenes' own weights and coupling, N/m.
+ALPHA, DELTA, COUPLING = 0.3025, 0.6, 5000.0
+TICKS = 1000
+# Radius of the touched part of the surface, m: a tick needs no other columns of Psi.
+TOUCHED = 0.02
+# Pictures a second of an ordinary screen.
+FRAME_RATE = 60.0
+# Above so many dofs the dense inverse would take hours and gigabytes.
+DENSE_DOFS = 6000
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model; None where something was not measured.
+
+    ``tick_us`` is a force tick in contact, ``tapping_us`` one of a tool that lands and leaves in turn, ``surface_us``
+    the whole surface for a frame. ``frame_times``: all steps between two frames, and for Palpate the surface too.
+    ``difference``: displacements against SuperLU's, relative.
+    """
+
+    model: str
+    paper_nodes: int | None
+    nodes: int
+    dofs: int
+    modes: int
+    modes_s: float
+    paper_step_ms: float | None
+    dense_step_us: float | None
+    sparse_step_us: dict[str, float]
+    own_sparse_step_us: float
+    modal_step_us: float
+    tick_us: float
+    tapping_us: float
+    surface_us: float
+    tick_times_dense: float | None
+    tick_times_sparse: float
+    frame_times_dense: float | None
+    frame_times_sparse: float
+    difference: float
+
+
+def run(large: bool = False, report: Callable[[str], None] = lambda _: None) -> list[Row]:
+    """Measure all models; ``large`` adds a liver of 20,000 nodes; ``report`` is told what is being done."""
+    rows = []
+    for name, published in (("beam", "beam"), ("liver_dynamic", "liver_dynamic"), ("liver", None)):
+        mesh = models.load(name, paper=True)
+        report(name)
+        rows.append(_measure(name, mesh, models.PAPER[published] if published else None, None))
+    if large:
+        report("liver of 20,000 nodes")
+        rows.append(_measure("liver", _large_liver(), None, 200))
+    return rows
+
+
+def as_json(rows: list[Row]) -> dict:
+    """Everything as plain data, with what it was measured on."""
+    return {"machine": machine(), "rows": [asdict(row) for row in rows]}
+
+
+def _measure(name: str, mesh: TetMesh, published: models.PaperModel | None, count: int | None) -> Row:
+    modulus = YOUNGS_MODULUS[name.removesuffix("_dynamic")]
+    body = Body(mesh, material=Material(modulus, 0.45), fixed=models.fixed(name, mesh))
+    rayleigh = rayleigh_from_ratios(*DAMPING)
+    with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:
+        started = time.perf_counter()
+        basis = modes(body, count, path=Path(folder) / "modes.palpate")
+        modes_s = time.perf_counter() - started
+    matrices, force = Matrices.of(body, "consistent"), {_top(body): (0, 0, -0.1)}
+    steppers = {n: _stepper(matrices, rayleigh, make) for n, make in peers.installed().items()}
+    sparse = {n: _step_us(stepper, matrices, body) for n, stepper in steppers.items()}
+    dense = None
+    if len(matrices.free) <= DENSE_DOFS:
+        dense = _step_us(_stepper(matrices, rayleigh, peers.dense_inverse), matrices, body)
+    own = Newmark(body, DT, rayleigh=rayleigh, method="sparse")
+    own_us = _per_call_us(lambda: own.step(force, 20), 20)
+    modal = Newmark(body, DT, rayleigh=rayleigh, modes=basis)
+    tick, tapping, surface = _tick_us(body, BodyMotion(basis, (DT, ALPHA, DELTA, *rayleigh), False, COUPLING))
+    ticks_per_frame = RATE / FRAME_RATE
+    frame = tick + surface / ticks_per_frame
+    return Row(
+        model=name,
+        paper_nodes=published.nodes if published else None,
+        nodes=len(mesh.nodes),
+        dofs=len(matrices.free),
+        modes=len(basis),
+        modes_s=modes_s,
+        paper_step_ms=1e3 * published.step_seconds if published else None,
+        dense_step_us=dense,
+        sparse_step_us=sparse,
+        own_sparse_step_us=own_us,
+        modal_step_us=_per_call_us(lambda: modal.step(force, TICKS), TICKS),
+        tick_us=tick,
+        tapping_us=tapping,
+        surface_us=surface,
+        tick_times_dense=dense / tick if dense else None,
+        tick_times_sparse=min(sparse.values()) / tick,
+        frame_times_dense=dense / frame if dense else None,
+        frame_times_sparse=min(sparse.values()) / frame,
+        difference=_difference(body, basis, rayleigh, matrices),
+    )
+
+
+def _stepper(matrices: Matrices, rayleigh: tuple[float, float], make) -> peers.Stepper:
+    return peers.Stepper(matrices.free_stiffness, matrices.free_mass, rayleigh, DT, make)
+
+
+def _step_us(stepper: peers.Stepper, matrices: Matrices, body: Body) -> float:
+    force = _force(matrices, body)
+    return _per_call_us(lambda: stepper.step(force), 1)
+
+
+def _force(matrices: Matrices, body: Body) -> np.ndarray:
+    """0.1 N downwards on the highest node; free dofs."""
+    force = np.zeros(matrices.stiffness.shape[0])
+    force[3 * _top(body) + 2] = -0.1
+    return force[matrices.free]
+
+
+def _tick_us(body: Body, motion: BodyMotion) -> tuple[float, float, float]:
+    """Time of a tick in contact, of one with a tool that lands and leaves in turn, and of the whole surface."""
+    surface, top = body.mesh.surface_nodes, body.mesh.nodes[_top(body)]
+    near = surface[np.linalg.norm(body.mesh.nodes[surface] - top, axis=1) < TOUCHED]
+    green = precompute(body, touch=near, progress=False)
+    scene = Scene.of_store(green.path)
+    simulation = Simulation(BuiltScene(scene, body, green, motion))
+    above = top + [0.0, 0.0, scene.tool.radius]
+    press = above - np.linspace(0.0, 2e-3, TICKS)[:, None] * [0.0, 0.0, 1.0]
+    tap = above + np.where(np.arange(TICKS) % 2, -1e-3, 1e-2)[:, None] * [0.0, 0.0, 1.0]
+    ticks = [_per_call_us(lambda path=path: simulation.run(path), TICKS) for path in (press, tap)]
+    with simulation:
+        simulation.move(press[-1])
+        time.sleep(0.3)
+        return *ticks, _per_call_us(simulation.frame, 1)
+
+
+def _difference(body: Body, basis: ModalBasis, rayleigh: tuple[float, float], matrices: Matrices) -> float:
+    """Displacements after 50 steps by the modes and by SuperLU."""
+    ours = Newmark(body, DT, rayleigh=rayleigh, modes=basis)
+    ours.step({_top(body): (0, 0, -0.1)}, 50)
+    theirs = _stepper(matrices, rayleigh, peers.superlu)
+    for _ in range(50):
+        theirs.step(_force(matrices, body))
+    moved = ours.displacements.ravel()[matrices.free]
+    return float(np.abs(moved - theirs.u).max() / np.abs(theirs.u).max())
+
+
+def _top(body: Body) -> int:
+    """Highest free surface node."""
+    free = np.setdiff1d(body.mesh.surface_nodes, body.fixed_nodes)
+    return int(free[np.argmax(body.mesh.nodes[free, 2])])
+
+
+def _large_liver() -> TetMesh:
+    """Return the liver filled again by NETGEN with about 20,000 nodes."""
+    import trimesh
+
+    from palpate.mesh import tetrahedralize
+
+    mesh = models.liver()
+    with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:
+        surface = Path(folder) / "liver.stl"
+        trimesh.Trimesh(mesh.nodes, mesh.surface_triangles).export(surface)
+        return tetrahedralize(surface, 0.0034)
+
+
+def _per_call_us(work: Callable[[], object], calls: int, rounds: int = 100) -> float:
+    """Shortest time of one of the ``calls`` that ``work`` makes, us: other programs only ever add to it."""
+    work()
+    times = []
+    for _ in range(rounds):
+        started = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - started)
+    return 1e6 * min(times) / calls

@@ -1,0 +1,65 @@
+"""Solutions for benchmarks, by the same calls a user has."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from palpate.body import Body, Fixed, Loads, Material
+from palpate.errors import LockingWarning
+from palpate.fields import Interior
+from palpate.green import GreensFunction, precompute
+from palpate.mesh import TetMesh
+
+
+def quiet_body(mesh: TetMesh, material: Material, fixed: Fixed, loads: Loads | None = None) -> Body:
+    """Make a body; locking is what some benchmarks show, so nobody needs to be warned of it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LockingWarning)
+        return Body(mesh, material=material, fixed=fixed, loads=loads)
+
+
+def green_of(body: Body, touch: Sequence[int] | np.ndarray | None = None, precision: str = "f64") -> GreensFunction:
+    """Green's function, always computed anew; its file is gone with its last user."""
+    with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
+        return precompute(body, precision=precision, touch=touch, path=Path(folder) / "green.palpate", progress=False)
+
+
+def surface_response(body: Body) -> np.ndarray:
+    """Displacements of the surface nodes under the body's loads, (s, 3) m."""
+    return green_of(body, touch=body.mesh.surface_nodes[:1]).free_displacements
+
+
+def response(body: Body) -> np.ndarray:
+    """Displacements of all nodes under the body's loads, (n, 3) m."""
+    return Interior(body).extend(surface_response(body))
+
+
+def with_moved_supports(body: Body, motion: np.ndarray) -> Body:
+    """Turn a motion of the supports into loads, besides those that the body has.
+
+    With `u_D` at the supports, `K_NN u_N = F_N - K_ND u_D`: the same free displacements follow from fixed supports and
+    the forces `-K_ND u_D`. This needs no columns of `Psi` for the supports.
+
+    Parameters
+    ----------
+    body
+        A supported body.
+    motion
+        (n, 3) m; read at fixed components only.
+
+    """
+    moved = np.where(body.fixed_mask, motion, 0.0)
+    forces = body.load_vector() - (body.stiffness() @ moved.ravel()).reshape(-1, 3)
+    forces[body.fixed_mask] = 0.0
+    named = {int(node): forces[node] for node in np.flatnonzero(forces.any(axis=1))}
+    return Body(body.mesh, material=body.material, fixed=body.fixed_mask, loads=Loads(forces=named))
+
+
+def at_node(mesh: TetMesh, position: Sequence[float]) -> int:
+    """Row, among the surface nodes, of the one nearest to a position."""
+    return int(np.linalg.norm(mesh.nodes[mesh.surface_nodes] - position, axis=1).argmin())

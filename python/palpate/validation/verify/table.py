@@ -1,0 +1,46 @@
+"""All benchmarks by name, in the order of the table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from palpate.errors import Error
+from palpate.validation.verify import bending, curved, exactness, felt, half_space, vibration
+from palpate.validation.verify.check import Benchmark
+
+BENCHMARKS = {
+    benchmark.name: benchmark
+    for benchmark in (
+        Benchmark("patch", "Patch test, irregular elements", exactness.patch_test),
+        Benchmark("rigid", "Rigid motions", exactness.rigid_motions),
+        Benchmark("convergence", "Orders of convergence, smooth displacement", exactness.convergence, slow=True),
+        Benchmark("cantilever", "Cantilever, length 10 depths", bending.cantilever),
+        Benchmark("cook", "Cook's membrane, plane strain", bending.cook),
+        Benchmark("le10", "NAFEMS LE10, thick elliptic plate", curved.thick_plate),
+        Benchmark("sphere", "Thick sphere under internal pressure, 10 nodes", curved.thick_sphere),
+        Benchmark("point", "Point force on a half-space, 10 nodes", half_space.point_force),
+        Benchmark("disc", "Uniform pressure on a half-space, 10 nodes", half_space.pressed_disc),
+        Benchmark("punch", "Rigid flat punch without friction, 10 nodes", half_space.flat_punch),
+        Benchmark(
+            "clamped", "Frequencies of a beam, clamped and free, length 10 depths, 10 nodes", vibration.clamped_beam
+        ),
+        Benchmark("free", "Frequencies of a free beam, length 10 depths, 10 nodes", vibration.free_beam),
+        Benchmark("fv52", "NAFEMS FV52, plate on hard simple supports, 10 nodes", vibration.plate, slow=True),
+        Benchmark("felt", "Stiffness felt on a block", felt.felt_stiffness, slow=True),
+    )
+}
+
+
+def chosen(names: Sequence[str]) -> list[Benchmark]:
+    """Benchmarks by name, all for no name.
+
+    Raises
+    ------
+    Error
+        A name that no benchmark has.
+
+    """
+    for name in names:
+        if name not in BENCHMARKS:
+            raise Error(f"no benchmark is called '{name}'; there are {', '.join(BENCHMARKS)}")
+    return [BENCHMARKS[name] for name in names or BENCHMARKS]

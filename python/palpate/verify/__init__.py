@@ -1,6 +1,0 @@
-"""Accuracy that anyone can repeat: figures beside closed forms and published values, by the calls a user has."""
-
-from palpate.verify.check import Benchmark, Check, Outcome
-from palpate.verify.table import BENCHMARKS, chosen
-
-__all__ = ["BENCHMARKS", "Benchmark", "Check", "Outcome", "chosen"]

@@ -1,0 +1,182 @@
+"""The viewer's server with a body in motion: blows, slow motion, mode shapes."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+
+import numpy as np
+import pytest
+from viewer_client import page, serving
+
+import palpate
+from palpate.cli.impulse import impulse_history, impulse_scene
+from palpate.scene import BuiltScene
+from palpate.viewer.session import Session
+
+TOP = [0.04, 0.025, 0.05]
+
+
+@pytest.fixture(scope="module")
+def built(block, block_green) -> BuiltScene:
+    return BuiltScene(palpate.Scene.of_store("block.palpate"), block, block_green)
+
+
+@pytest.fixture(scope="module")
+def moving(block, block_green) -> BuiltScene:
+    """The block in motion, with a blow of its own."""
+    blow = {"point": TOP, "impulse": [0, 0, -1e-3]}
+    scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": blow})
+    motion = scene.dynamics.build(block, scene.device.max_stiffness, progress=False)
+    return BuiltScene(scene, block, block_green, motion)
+
+
+def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
+    async def session():
+        async with serving(moving) as server, page(server) as client, page(server) as watcher:
+            scene, arrays = await client.receive("scene")
+            told = scene["motion"]
+            assert told["frequencies"] == pytest.approx(moving.motion.basis.frequencies[:20].tolist())
+            assert scene["youngs_modulus"] is None and told["youngs_modulus"] == pytest.approx(10e3)
+            assert 0 < told["impulse"] < told["max_impulse"]
+            assert not arrays["free"].any()
+            await client.say(type="set", time_scale=0.25)
+            settings, _ = await watcher.receive("settings")
+            assert settings["time_scale"] == 0.25
+            await client.say(type="strike", point=TOP, impulse=[0, 0, -told["impulse"]])
+            _, arrays = await watcher.frame_where(lambda h: h["motion"]["struck_at"] is not None and h["strain"] > 1e-3)
+            header, arrays = await client.frame_where(lambda h: h["motion"]["struck_at"] is not None)
+            top = np.argmin(np.linalg.norm(moving.green.surface_positions - TOP, axis=1))
+            assert header["motion"]["watched"] == top
+            while not len(arrays["history"]):
+                _, arrays = await client.receive("frame")
+            time, energy = arrays["history"][-1, 0], arrays["history"][-1, 4:]
+            assert time > 0 and 0 < energy[2] <= energy[3] * (1 + 1e-4)
+            # A mode is drawn in place of the motion, at a pace of its own; the body is at rest under it.
+            await client.say(type="mode", number=3)
+            swung = lambda h: h["motion"]["mode"] and h["strain"] > 0.05  # noqa: E731
+            header, arrays = await watcher.frame_where(swung)
+            assert header["motion"]["mode"]["frequency"] == pytest.approx(moving.motion.basis.frequencies[2])
+            assert header["strain"] <= 0.1 + 1e-6
+            shape = moving.motion.basis.shapes[moving.green.surface_nodes, :, 2]
+            alike = abs((shape * arrays["displacements"]).sum()) / np.linalg.norm(shape)
+            assert alike == pytest.approx(np.linalg.norm(arrays["displacements"]), rel=1e-5)
+            assert np.abs(server._session.simulation.frame().displacements).max() == 0
+            # Its own blow ends that.
+            await client.say(type="repeat")
+            await watcher.frame_where(lambda h: h["motion"]["mode"] is None and h["motion"]["struck_at"] is not None)
+            await client.say(type="mode", number=1)
+            await watcher.frame_where(lambda h: h["motion"]["mode"] is not None)
+            await client.say(type="press", position=[*TOP[:2], 0.054], grab=False)
+            await watcher.frame_where(lambda h: h["motion"]["mode"] is None and len(h["contacts"]) == 1)
+            await client.say(type="reset")
+            await watcher.frame_where(lambda h: h["contacts"] == [] and h["strain"] < 1e-6)
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ('{"type": "strike", "point": [0, 0, 0], "impulse": [0, 0, 1e9]}', "the impulse must lie between"),
+        ('{"type": "strike", "point": [0, 0, 0], "impulse": [0, 0, 0]}', "the impulse must lie between"),
+        ('{"type": "strike", "point": [9, 0, 0], "impulse": [0, 0, 1e-6]}', "far away"),
+        ('{"type": "strike", "point": [0, 0, NaN], "impulse": [0, 0, 1e-6]}', "not JSON"),
+        ('{"type": "strike", "point": [0, 0, 0], "impulse": 1e-6}', "three numbers"),
+        ('{"type": "mode"}', "whole number from 0 to 20"),
+        ('{"type": "mode", "number": 21}', "whole number from 0 to 20"),
+        ('{"type": "mode", "number": 1.5}', "whole number"),
+        ('{"type": "mode", "number": true}', "whole number"),
+        ('{"type": "set", "time_scale": 0}', r"\(0, 1\]"),
+        ('{"type": "set", "time_scale": 2}', r"\(0, 1\]"),
+        ('{"type": "set", "youngs_modulus": 1e4}', "moves"),
+    ],
+)
+def test_motion_messages_are_bounded(moving, text, reason):
+    async def session():
+        async with serving(moving) as server, page(server) as client, page(server) as watcher:
+            await client.receive("scene")
+            await client.socket.send(text)
+            error, _ = await client.receive("error")
+            assert re.search(reason, error["text"])
+            await watcher.receive("scene")
+            await watcher.socket.send(text.replace("NaN", "0"))
+            error, _ = await watcher.receive("error")
+            assert "another viewer has control" in error["text"]
+            assert server._session.simulation.frame().energy.work == 0
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"type": "strike", "point": TOP, "impulse": [0, 0, -1e-6]},
+        {"type": "repeat"},
+        {"type": "mode", "number": 1},
+        {"type": "set", "time_scale": 0.5},
+    ],
+)
+def test_a_body_at_rest_takes_no_motion_messages(built, message):
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            assert scene["motion"] is None
+            await client.say(**message)
+            error, _ = await client.receive("error")
+            assert "does not move" in error["text"]
+            header, arrays = await client.receive("frame")
+            assert header["motion"] is None and len(arrays["history"]) == 0
+
+    asyncio.run(session())
+
+
+def test_the_impulse_in_the_viewer_is_that_of_the_offline_history(tmp_path):
+    """The same node, blow and scheme by two ways: modes through the loop's ticks, and a sparse factor."""
+    impulse_history("beam", True, 0.1, tmp_path)
+    table = np.genfromtxt(tmp_path / "beam-paper-impulse.csv", delimiter=",", names=True)
+    built = impulse_scene("beam", True).build(False)
+    blow = built.scene.dynamics.strike
+    simulation = palpate.Simulation(built)
+    node = int(np.argmin(np.linalg.norm(built.body.mesh.nodes - blow.point, axis=1)))
+    played = simulation.play(np.full((100, 3), np.nan), strikes=[(0, blow.point, blow.impulse)], watch=[node])
+    there = np.column_stack([table[name] for name in ("ux_m", "uy_m", "uz_m")])[1:]
+    assert played.displacements[:, 0] == pytest.approx(there, abs=1e-6 * np.abs(there).max())
+
+
+def test_the_default_blow_swings_a_body_visibly_and_honestly(moving):
+    """Struck along the inward normal at places all over: some swing visibly, and few strain it beyond 10 %."""
+    session = Session(moving)
+    session.close()
+    body, surface, blow = moving.body, moving.green.surface_nodes, session._moving
+    outward = body.mesh.nodes - body.mesh.nodes.mean(axis=0)
+    strains, swings = [], []
+    for node in np.setdiff1d(surface, body.fixed_nodes)[::9]:
+        impulse = -blow.impulse * outward[node] / np.linalg.norm(outward[node])
+        strikes = [(0, body.mesh.nodes[node], impulse, blow._duration)]
+        played = session.simulation.play(np.full((300, 3), np.nan), strikes=strikes, watch=surface)
+        strains.append(max(moving.green.strain_measure.largest(pose) for pose in played.displacements[::4]))
+        swings.append(np.linalg.norm(played.displacements, axis=2).max() / session.size)
+    assert np.median(strains) < 0.1 and max(strains) < 0.25
+    assert max(swings) > 0.03
+
+
+def test_the_tool_is_held_back_in_motion(moving):
+    """By the static response: the body swings about a pose at the limit, and comes to rest there."""
+
+    async def session():
+        async with serving(moving) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            radius = scene["tool_radius"]
+            # Slow motion would only take longer.
+            await client.say(type="set", time_scale=1)
+            await client.say(type="press", position=[*TOP[:2], TOP[2] + radius + 1e-3], grab=False)
+            await client.receive("frame")
+            await client.say(type="press", position=[*TOP[:2], TOP[2] + radius - 0.02], grab=False)
+            header, _ = await client.frame_where(lambda h: h["tool"]["wanted"] is not None and h["time"] > 2.5)
+            assert 0.08 < header["strain"] < 0.105
+            assert header["force"][2] > 0.05
+            await client.say(type="release")
+            await client.frame_where(lambda h: h["contacts"] == [] and h["strain"] < 0.01)
+
+    asyncio.run(session())
