@@ -31,7 +31,7 @@ def test_a_message_is_read_back(kind):
 
 
 def shape_of(value, known):
-    """Keys of a header, lists as their first entry, numbers and texts as such; what may be null as the golden has it."""
+    """Keys of a header, the first entry of a list, and whether a value is a flag, a text or a number."""
     if value is None or known is None:
         return None
     if isinstance(known, dict):
