@@ -3,6 +3,8 @@ import { defineConfig } from "vite";
 // The Python server sends these files as they are; it may stand under any path, hence the relative base.
 export default defineConfig({
   base: "./",
+  // Messages that the tests take in.
+  assetsInclude: ["**/*.bin"],
   build: {
     outDir: "../python/palpate/viewer/static",
     emptyOutDir: true,

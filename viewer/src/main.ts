@@ -1,8 +1,8 @@
 // Starts the page with the token of its address. The token stands behind `#`, which browsers never send to a server.
 
-import "./style.css";
+import "./ui/style.css";
 
-import { showConnection, showPageMessage } from "./notices";
+import { showConnection, showPageMessage } from "./ui/notices";
 import { Viewer } from "./viewer";
 
 function start(): void {

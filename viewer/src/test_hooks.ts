@@ -2,10 +2,14 @@
 
 import * as THREE from "three";
 
-import type { BodyView } from "./body_view";
-import type { HistoryLog } from "./history_log";
-import type { FieldMessage, MotionFrame, Vec3 } from "./protocol";
-import type { Viewport } from "./viewport";
+import type { Pointer } from "./input/pointer";
+import type { FieldMessage, MotionFrame, ToolFrame, Vec3 } from "./net/protocol";
+import type { BodyView } from "./scene/body_view";
+import type { Stage } from "./scene/stage";
+import { drivenTool } from "./store";
+import type { Store } from "./store";
+import type { HistoryLog } from "./ui/history_log";
+import type { Statistics } from "./ui/statistics";
 
 /** How many of the best candidates are tried before giving up. */
 const CANDIDATES = 200;
@@ -14,19 +18,21 @@ export interface ViewerState {
   connected: boolean;
   role: string;
   scene: string | null;
+  /** Of the driven tool. */
   force: Vec3;
   forceMagnitude: number;
+  limited: boolean;
+  depth: number | null;
+  tools: ToolFrame[];
+  pinned: readonly number[];
   contacts: number;
   frames: number;
   frameNumber: number;
   framesPerSecond: number;
   pointerEvents: number;
   ticks: number;
-  toolPosition: Vec3 | null;
-  depth: number | null;
   strain: number;
-  /** Whether the tool is held back from where the pointer is. */
-  held: boolean;
+  /** Of the body that is chosen. */
   field: FieldMessage | null;
   fault: string | null;
   /** Of a body in motion, with the newest row of its history. */
@@ -38,41 +44,79 @@ declare global {
     palpate: {
       state(): ViewerState;
       project(point: Vec3): [number, number];
-      pickPoint(): [number, number] | null;
+      pickPoint(body?: number): [number, number] | null;
     };
   }
 }
 
-export function installTestHooks(viewport: Viewport, body: () => BodyView | null, state: () => ViewerState): void {
+export interface Parts {
+  store: Store;
+  stage: Stage;
+  pointer: Pointer;
+  statistics: Statistics;
+  history: HistoryLog;
+}
+
+export function installTestHooks(parts: Parts): void {
+  const { stage } = parts;
   window.palpate = {
-    state,
-    project: (point) => viewport.project(new THREE.Vector3(...point)),
-    pickPoint: () => {
-      const view = body();
-      return view ? pickPoint(viewport, view) : null;
+    state: () => viewerState(parts),
+    project: (point) => stage.viewport.project(new THREE.Vector3(...point)),
+    pickPoint: (body = 0) => {
+      const view = stage.bodies[body];
+      return view ? pickPoint(stage, view, body) : null;
     },
   };
 }
 
-/** Client coordinates of a point near the middle of the visible top that no control covers. */
-function pickPoint(viewport: Viewport, view: BodyView): [number, number] | null {
-  const { positions, normals, count } = view.surface;
-  const centre = view.bounds.getCenter(new THREE.Vector3());
-  const size = view.data.header.size;
-  const point = new THREE.Vector3();
-  const score = (i: number) => {
-    point.fromArray(positions, 3 * i).sub(centre);
-    // Higher and flatter is better, further from the middle is worse.
-    return point.z / size + 0.5 * normals[3 * i + 2]! - 2 * (Math.hypot(point.x, point.y) / size);
+function viewerState({ store, pointer, statistics, history }: Parts): ViewerState {
+  const state = store.get();
+  const { frame, scene } = state;
+  const driven = frame?.tools[drivenTool(state) ?? 0];
+  const force = driven?.force ?? [0, 0, 0];
+  return {
+    connected: state.connection === "open",
+    role: state.role,
+    scene: scene?.name ?? null,
+    force,
+    forceMagnitude: Math.hypot(...force),
+    limited: driven?.limited ?? false,
+    depth: pointer.wantedDepth,
+    tools: frame?.tools ?? [],
+    pinned: state.pinned,
+    contacts: frame?.contacts.length ?? 0,
+    frames: statistics.frames,
+    frameNumber: frame?.frame ?? 0,
+    framesPerSecond: statistics.framesPerSecond,
+    pointerEvents: pointer.events,
+    ticks: frame?.ticks ?? 0,
+    strain: frame?.strain ?? 0,
+    field: frame?.fields[state.body] ?? null,
+    fault: frame?.fault ?? null,
+    motion: frame?.motion ? { ...frame.motion, ...history.latest() } : null,
   };
-  const ranked = Array.from({ length: count }, (_, i) => [score(i), i] as const).sort((a, b) => b[0] - a[0]);
+}
+
+/** Client coordinates of a point near the middle of the visible top of a body that no control covers. */
+function pickPoint(stage: Stage, { surface, placed, bounds }: BodyView, body: number): [number, number] | null {
+  const { viewport } = stage;
+  const centre = bounds.getCenter(new THREE.Vector3());
+  const size = bounds.getSize(new THREE.Vector3()).length();
+  const place = (i: number) => new THREE.Vector3().fromArray(surface.positions, 3 * i).applyMatrix4(placed.matrix);
+  const score = (i: number) => {
+    const { x, y, z } = place(i).sub(centre);
+    const normal = new THREE.Vector3().fromArray(surface.normals, 3 * i).applyQuaternion(placed.quaternion);
+    // Higher and flatter is better, further from the middle is worse.
+    return z / size + 0.5 * normal.z - 2 * (Math.hypot(x, y) / size);
+  };
+  const ranked = Array.from({ length: surface.count }, (_, i) => [score(i), i] as const).sort((a, b) => b[0] - a[0]);
   for (const [, i] of ranked.slice(0, CANDIDATES)) {
-    point.fromArray(positions, 3 * i);
+    const point = place(i);
     // A mouse reports whole pixels: beside a cut the next one may be on the other side.
     const [x, y] = viewport.project(point).map(Math.round) as [number, number];
     if (document.elementFromPoint(x, y) !== viewport.canvas) continue;
-    const pick = view.pick(viewport.rayThrough(x, y));
-    if (pick && pick.shown.distanceTo(point) < 0.03 * size) return [x, y];
+    const pick = stage.pick(viewport.rayThrough(x, y));
+    if (pick?.body === body && pick.shown.distanceTo(point) < 0.03 * size) return [x, y];
   }
   return null;
 }

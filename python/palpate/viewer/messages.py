@@ -1,14 +1,16 @@
 """Messages of the viewer: text is JSON; binary is a JSON header and the arrays that it describes.
 
 A binary message is ``uint32`` header length, the header in UTF-8 padded with spaces so that the arrays start at a
-multiple of 8 bytes, then the arrays, little-endian, each at the offset after the header that its entry names.
+multiple of 8 bytes, then the arrays, little-endian, each at the offset after the header that its entry names. An array
+of one body is named ``<index of the body>/<what it is>`` and stands in the frame of that body; tools, forces and what
+clients send stand in that of the scene.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ import numpy as np
 from palpate.errors import ViewerError
 from palpate.vectors import three_numbers
 
-VERSION = 3
+VERSION = 4
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
@@ -84,9 +86,19 @@ def whole(message: Mapping[str, Any], key: str, low: int, high: int) -> int:
     return value
 
 
+def index(message: Mapping[str, Any], key: str, count: int) -> int:
+    """Take the index of one of ``count`` things of a client's message."""
+    return whole(message, key, 0, count - 1)
+
+
 def vector(message: Mapping[str, Any], key: str) -> tuple[float, float, float]:
     """Three finite numbers of a client's message."""
     return three_numbers(message.get(key), f"{message['type']}: {key}", ViewerError)
+
+
+def by_body(arrays: Sequence[Mapping[str, tuple[str, np.ndarray]]]) -> dict[str, tuple[str, np.ndarray]]:
+    """Arrays of several bodies under the names they have in a message."""
+    return {f"{body}/{name}": array for body, mine in enumerate(arrays) for name, array in mine.items()}
 
 
 def word(message: Mapping[str, Any], key: str) -> str:

@@ -1,4 +1,4 @@
-"""What the viewer does with a body in motion: blows, slow motion, the watched node, mode shapes one by one."""
+"""What the viewer does with a body in motion: strikes, slow motion, the watched node, mode shapes one by one."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ LISTED_MODES = 20
 SHOWN_HZ = 1.0
 # A mode shape swings by this part of the body's size, unless that would strain the body beyond what is honest.
 MODE_SWING = 0.08
-# A blow lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
-BLOW_PERIODS = 0.06
-# Strain that the default blow is seen to lead to at instants of the first period (peaks between them are higher, and so
-# are those of other places), how many, and parts the blow is cut into.
-DEFAULT_STRAIN, INSTANTS, BLOW_PARTS = 0.5 * HONEST_STRAIN, 24, 9
+# A strike lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
+STRIKE_PERIODS = 0.06
+# Strain that the default strike is seen to lead to at instants of the first period (peaks between them are higher, and
+# so are those of other places), how many, and parts the strike is cut into.
+DEFAULT_STRAIN, INSTANTS, STRIKE_PARTS = 0.5 * HONEST_STRAIN, 24, 9
 # It is tried where so large a part of the surface follows the first mode less, on at least so many nodes.
 FOLLOWING, NEIGHBOURS = 0.9, 6
-# Blows go up to this many times the default.
+# Impulses go up to this many times the default.
 STRONGEST = 10.0
 # Slow motion that the page offers, and the fastest swing that an eye follows.
 TIME_SCALES, FOLLOWED_HZ = (1.0, 0.25, 0.1), 4.0
@@ -50,16 +50,19 @@ class MovingBody:
         Its scene, with a motion and a body.
     size
         Of the body, m.
+    index
+        Which of the scene's bodies moves.
 
     """
 
-    def __init__(self, simulation: Simulation, built: BuiltScene, size: float):
+    def __init__(self, simulation: Simulation, built: BuiltScene, size: float, index: int = 0):
+        self.index = index
         assert built.motion is not None and built.body is not None and built.scene.dynamics is not None
         self._simulation, self._size = simulation, size
         self._green, self._motion = built.green, built.motion
         self._first_strike = built.scene.dynamics.strike
         self._patch_radius = built.scene.tool.contact_radius
-        self._duration = BLOW_PERIODS / float(built.motion.basis.frequencies[0])
+        self._duration = STRIKE_PERIODS / float(built.motion.basis.frequencies[0])
         self.watched = self._closest_node(self._first_strike.point) if self._first_strike else free_end(built.body)
         self.impulse = self._default_impulse()
         given = 0.0 if self._first_strike is None else float(np.linalg.norm(self._first_strike.impulse))
@@ -73,9 +76,10 @@ class MovingBody:
     def header(self) -> dict[str, Any]:
         """Return the part of the scene message that tells of the motion."""
         basis, strike = self._motion.basis, self._first_strike
-        # After the scene's own blow there is nothing before it to be seen.
+        # After the scene's own strike there is nothing before it to be seen.
         shown = (PERIODS if strike is None else 2 * PERIODS) / basis.frequencies[0]
         return {
+            "body": self.index,
             "frequencies": basis.frequencies[:LISTED_MODES].tolist(),
             "modes": len(basis),
             "time_scale": self.time_scale,
@@ -92,26 +96,27 @@ class MovingBody:
         mode = None if self._mode is None else self._mode.header
         return {"watched": rank, "struck_at": self.struck_at, "mode": mode}
 
-    def strike(self, message: Mapping[str, Any], reach: float, centre: np.ndarray, now: float) -> None:
-        """Give the blow of a message at the body time ``now``; it ends a mode that is shown."""
+    def strike(self, message: Mapping[str, Any], reach: float, now: float) -> None:
+        """Give the strike of a message, in the body's frame, at the body time ``now``; it ends a mode that is shown."""
         point, impulse = np.array(vector(message, "point")), np.array(vector(message, "impulse"))
         size = float(np.linalg.norm(impulse))
-        if np.abs(point - centre).max() > reach:
+        positions = self._green.surface_positions
+        if np.abs(point - 0.5 * (positions.min(axis=0) + positions.max(axis=0))).max() > reach:
             raise ViewerError("strike: the point is far away from the body")
         if not 0.0 < size <= self.max_impulse:
             raise ViewerError(f"strike: the impulse must lie between 0 and {self.max_impulse:.3g} N s on this body")
         self._give(StrikeTable(point=tuple(point), impulse=tuple(impulse), duration=self._duration), now)
 
     def repeat(self, now: float) -> None:
-        """Give the scene's own blow at the body time ``now``."""
+        """Give the scene's own strike at the body time ``now``."""
         if self._first_strike is None:
             raise ViewerError("repeat: the scene has no strike of its own")
         self._give(self._first_strike, now)
 
-    def _give(self, blow: StrikeTable, now: float) -> None:
+    def _give(self, strike: StrikeTable, now: float) -> None:
         self.end_mode()
-        self._watch(self._closest_node(blow.point))
-        self._simulation.strike(blow.point, blow.impulse, blow.duration)
+        self._watch(self._closest_node(strike.point))
+        self._simulation.strike(strike.point, strike.impulse, strike.duration)
         self.struck_at = now
 
     def set_time_scale(self, time_scale: float) -> None:
@@ -147,7 +152,7 @@ class MovingBody:
         self._touched = None if contact is None else contact.point
 
     def _first_time_scale(self) -> float:
-        """Slow enough for the scene's own blow to be followed by eye; a body without one moves at its own pace."""
+        """Slow enough for the scene's own strike to be followed by eye; a body without one moves at its own pace."""
         if self._first_strike is None:
             return 1.0
         frequency = self._motion.basis.frequencies[0]
@@ -174,24 +179,24 @@ class MovingBody:
         return float(measure.magnitudes(measure.sample(free + displacements) - measure.sample(free)).max())
 
     def _default_impulse(self) -> float:
-        """Blow along the normal, where the surface follows the first mode well, that stays within honest strain, N s.
+        """Impulse along the normal where the surface follows the first mode well that stays within honest strain, N s.
 
-        From rest a short blow `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from
-        then on it swings freely; a longer one is a row of short ones. The strain is proportional to the blow.
+        From rest a short strike `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from
+        then on it swings freely; a longer one is a row of short ones. The strain is proportional to the impulse.
         """
         basis, surface = self._motion.basis, self._green.surface_nodes
         shapes, normals = basis.shapes[surface], self._normals()
         follows = np.abs(np.einsum("ij,ij->i", shapes[:, :, 0], normals))
         node = int(np.argsort(follows)[int(FOLLOWING * (len(surface) - 1))])
-        blow = normals[node] @ np.tensordot(self._patch_around(node), shapes, axes=1)
+        modal_impulse = normals[node] @ np.tensordot(self._patch_around(node), shapes, axes=1)
         instants = np.geomspace(0.2 * self._duration, 1.0 / basis.frequencies[0], INSTANTS)
-        parts = (np.arange(BLOW_PARTS) + 1) / (BLOW_PARTS + 1)
+        parts = (np.arange(STRIKE_PARTS) + 1) / (STRIKE_PARTS + 1)
         shares = np.sin(np.pi * parts) / np.sin(np.pi * parts).sum()
         swings = np.zeros((len(basis), INSTANTS))
         for part, share in zip(parts, shares, strict=True):
             since = instants - part * self._duration
             after = since > 0
-            swings[:, after] += share * _ringing(basis, self._motion.scheme, blow, since[after])
+            swings[:, after] += share * _ringing(basis, self._motion.scheme, modal_impulse, since[after])
         poses = shapes.reshape(-1, len(basis)) @ swings
         return DEFAULT_STRAIN / max(self._strain_of(pose.reshape(-1, 3)) for pose in poses.T)
 

@@ -93,6 +93,7 @@ class ViewerServer:
         self._clients: list[Client] = []
         self._controller: Client | None = None
         self._building = False
+        self._cancelled = False
         self._server: Server | None = None
 
     @property
@@ -216,6 +217,8 @@ class ViewerServer:
                 client.wants = replace(client.wants, field=messages.word(message, "name"))
             elif client is not self._controller:
                 raise ViewerError("another viewer has control; this one watches")
+            elif message["type"] == "cancel":
+                self._cancelled = True
             elif message["type"] == "model":
                 await self._choose(message.get("name"))
             elif self._session.handle(message):
@@ -266,7 +269,7 @@ class ViewerServer:
             raise ViewerError(f"there is no model '{str(name)[:40]}'")
         if self._building:
             raise ViewerError("another model is being prepared")
-        self._building = True
+        self._building, self._cancelled = True, False
         self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name)))
 
     async def _switch(self, name: str, scene: Scene) -> None:
@@ -276,6 +279,7 @@ class ViewerServer:
             await self._tell_all({"type": "status", "text": f"Loading the {name}", "progress": None, "left_s": None})
             self._session.release()
             built = await asyncio.to_thread(scene.build, solving, modes)
+            self._refuse_cancelled()
             session = await asyncio.to_thread(Session, built)
             old, self._session = self._session, session
             old.close()
@@ -285,12 +289,20 @@ class ViewerServer:
             self._building = False
             await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
 
+    def _refuse_cancelled(self) -> None:
+        if self._cancelled:
+            raise ViewerError("cancelled: the body shown before stays")
+
     def _reporter(self, text: str) -> Callable[[int, int], None]:
-        """Tell all pages how far a long work is, from any thread; it begins with the first call."""
+        """Tell all pages how far a long work is, from any thread; it begins with the first call.
+
+        The work stops where a page has cancelled it.
+        """
         loop, started = asyncio.get_running_loop(), None
 
         def report(done: int, total: int) -> None:
             nonlocal started
+            self._refuse_cancelled()
             started = started or time.monotonic()
             part = done / max(total, 1)
             left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
-from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltScene
-from palpate.simulation import Frame, LimitedTool, Simulation
+from palpate.simulation import Contact, Frame, LimitedTool, Simulation
 from palpate.viewer.fields import Fields
-from palpate.viewer.messages import encode, number, vector
+from palpate.viewer.messages import by_body, encode, index, number, vector
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
+from palpate.viewer.shown_body import ShownBody, titled
 
 # The contact radius slider ends at this part of the body's longest side.
 LARGEST_RADIUS = 0.12
@@ -24,6 +24,8 @@ REACH = 10.0
 # Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
 LOG_KEPT = 4000
 LOG_SENT = 64
+# What a tool is told where no contact begins.
+REFUSED = "No contact here: outside the region that may be touched, or too many nodes under the tool"
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -48,23 +50,24 @@ class Session:
 
     def __init__(self, built: BuiltScene):
         self.built = built
-        green = built.green
-        self._positions = green.surface_positions
-        self._triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
-        low, high = self._positions.min(axis=0), self._positions.max(axis=0)
-        self._centre, self.size = 0.5 * (low + high), float((high - low).max())
+        scene = built.scene
         self.simulation = Simulation(built)
-        self._fields = Fields(self.simulation, self.size)
-        self._tool = LimitedTool(self.simulation, built.scene.view.strain_limit)
-        self._max_radius = max(
-            self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size), built.scene.tool.contact_radius
-        )
+        extent = np.ptp(built.green.surface_positions, axis=0)
+        ratio = None if built.body is None else scene.material.poissons_ratio
+        fields = Fields(self.simulation, float(extent.max()))
+        self._bodies = [ShownBody(scene.name, built.body, built.green, fields, ratio)]
+        placed = np.vstack([body.placed(body.green.surface_positions) for body in self._bodies])
+        low, high = placed.min(axis=0), placed.max(axis=0)
+        self._centre, self.size = 0.5 * (low + high), float((high - low).max())
+        self._tools = [LimitedTool(self.simulation, scene.view.strain_limit, tool) for tool in range(1)]
+        self._active = [False] * len(self._tools)
+        largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
+        self._max_radii = [max(largest, scene.tool.contact_radius) for _ in self._tools]
         self._moving = None if built.motion is None else MovingBody(self.simulation, built, self.size)
         self._log, self._history = _Tail(3), _Tail(HISTORY_COLUMNS)
         self._body_time = 0.0
         self._frame: Frame | None = None
         self._frame_time = 0.0
-        self.active = False
         self.simulation.start()
 
     def close(self) -> None:
@@ -72,19 +75,20 @@ class Session:
         self.simulation.stop()
 
     def settings(self) -> dict[str, Any]:
-        """Message with what the sliders show."""
+        """Message with what the sliders show: a value for each body, or for each tool."""
         return {
             "type": "settings",
-            "youngs_modulus": self.simulation.youngs_modulus,
-            "contact_radius": self.simulation.contact_radius,
+            "youngs_modulus": [self._youngs_modulus(body) for body in range(len(self._bodies))],
+            "contact_radius": [self._contact_radius(tool) for tool in range(len(self._tools))],
             "time_scale": None if self._moving is None else self._moving.time_scale,
         }
 
-    def release(self) -> None:
-        """Take the tool out of the scene."""
-        if self.active:
-            self._tool.remove()
-            self.active = False
+    def release(self, tool: int | None = None) -> None:
+        """Take a tool out of the scene, or all of them."""
+        for released in range(len(self._tools)) if tool is None else [tool]:
+            if self._active[released]:
+                self._tools[released].remove()
+                self._active[released] = False
 
     def handle(self, message: Mapping[str, Any]) -> bool:
         """Do what a controlling client says. Returns whether settings changed.
@@ -111,90 +115,82 @@ class Session:
 
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
-        green, scene, body = self.built.green, self.built.scene, self.built.body
-        if body is None:  # from a store, which knows only the surface
-            nodes, tets, count = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4)), 0
-            nodes[green.surface_nodes] = self._positions
-            fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)
-        else:
-            nodes, tets, fixed = body.mesh.nodes, drawing_tets(body.mesh.tets), green.fixed_nodes
-            count = len(body.mesh.tets)
+        scene = self.built.scene
         view = scene.view
         header = {
             "type": "scene",
             "name": scene.name,
-            "title": scene.name.replace("_", " ").capitalize(),
-            "nodes": len(nodes),
-            "tets": count,
-            "surface_nodes": len(green.surface_nodes),
-            "triangles": len(self._triangles),
-            "youngs_modulus": self.simulation.youngs_modulus,
-            "poissons_ratio": None if body is None else scene.material.poissons_ratio,
-            "contact_radius": self.simulation.contact_radius,
-            "max_contact_radius": self._max_radius,
-            "tool_radius": scene.tool.radius,
-            "max_force": scene.device.max_force,
+            "title": titled(scene.name),
             "size": self.size,
-            "hold_strain": view.strain_limit,
-            "fields": [{"name": field.name, "title": field.title} for field in self._fields.offered],
+            "strain_limit": view.strain_limit,
+            "max_force": scene.device.max_force,
+            "bodies": [body.header(self._youngs_modulus(i)) for i, body in enumerate(self._bodies)],
+            "tools": [
+                {
+                    "radius": scene.tool.radius,
+                    "contact_radius": self._contact_radius(tool),
+                    "max_contact_radius": self._max_radii[tool],
+                }
+                for tool in range(len(self._tools))
+            ],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
         }
-        arrays = {
-            "nodes": ("f4", nodes),
-            "tets": ("u4", tets),
-            "surface_triangles": ("u4", green.surface_triangles),
-            "surface_nodes": ("u4", green.surface_nodes),
-            "fixed_nodes": ("u4", fixed),
-            "free": ("f4", green.free_displacements),
-        }
-        return encode(header, arrays)
+        return encode(header, by_body([body.arrays() for body in self._bodies]))
 
     def frame_message(self, number: int, log_seen: tuple[int, int], wants: Wants) -> tuple[bytes, tuple[int, int]]:
         """Binary message of the latest tick, and up to where it carries log and history."""
         frame = self._latest()
-        shown = frame.displacements if self._moving is None else self._moving.pose(frame.displacements)
-        picture = self._fields.picture(wants.field, shown, wants.cutaway)
-        wanted, limited = self._tool.wanted, self._tool.limited
+        poses = [self._pose(frame, body) for body in range(len(self._bodies))]
+        pairs = list(zip(self._bodies, poses, strict=True))
+        pictures = [body.fields.picture(wants.field, pose, wants.cutaway) for body, pose in pairs]
+        strains = [body.fields.largest_strain(pose) for body, pose in pairs]
         log, moved = self._log.since(log_seen[0]), self._history.since(log_seen[1])
         header = {
             "type": "frame",
             "frame": number,
             "time": frame.time,
-            "tool": {
-                "position": frame.positions[0].tolist(),
-                "active": self.active,
-                # Where the pointer is, while the tool is limited.
-                "wanted": wanted.tolist() if limited and wanted is not None else None,
-            },
-            "force": frame.forces[0].tolist(),
-            "contacts": [
-                {
-                    "mode": contact.mode,
-                    "point": contact.point.tolist(),
-                    "normal": contact.normal.tolist(),
-                    "force": contact.force.tolist(),
-                }
-                for contact in frame.contacts
-            ],
+            "tools": [self._tool_header(frame, tool) for tool in range(len(self._tools))],
+            "contacts": [_contact_header(contact) for contact in frame.contacts],
             **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
             "realtime": all(frame.statistics["realtime"]),
-            "refused": bool(frame.statistics["refused"][0]),
-            "strain": self._fields.largest_strain(shown),
+            "strain": max(strains),
+            "bodies": [{"strain": strain} for strain in strains],
             "motion": None if self._moving is None else self._moving.frame_header(),
-            "field": picture.header,
-            "interior": picture.interior,
+            "fields": [picture.header for picture in pictures],
+            "interior": [picture.interior for picture in pictures],
         }
-        arrays = {
-            "displacements": ("f4", picture.displacements),
-            "scalar": ("u1", picture.scalar),
-            "log": ("f4", _thin(log, 2)),
-            "history": ("f4", _thin(moved)),
+        arrays = by_body([{"displacements": ("f4", p.displacements), "scalar": ("u1", p.scalar)} for p in pictures])
+        rows = {"log": ("f4", _thin(log, 2)), "history": ("f4", _thin(moved))}
+        return encode(header, {**arrays, **rows}), (self._log.end, self._history.end)
+
+    def _pose(self, frame: Frame, body: int) -> np.ndarray:
+        """Displacements (s, 3), m, that are drawn of a body."""
+        moves = self._moving is not None and self._moving.index == body
+        return self._moving.pose(frame.displacements) if moves else frame.displacements
+
+    def _tool_header(self, frame: Frame, tool: int) -> dict[str, Any]:
+        limited = self._tools[tool]
+        wanted = limited.wanted if limited.limited else None
+        return {
+            "position": frame.positions[tool].tolist(),
+            "orientation": [1.0, 0.0, 0.0, 0.0],
+            "active": self._active[tool],
+            "limited": wanted is not None,
+            # Where the device is, while the tool does not follow it.
+            "wanted": None if wanted is None else wanted.tolist(),
+            "force": frame.forces[tool].tolist(),
+            "refused": REFUSED if frame.statistics["refused"][tool] else None,
         }
-        return encode(header, arrays), (self._log.end, self._history.end)
+
+    def _youngs_modulus(self, _body: int) -> float | None:
+        return self.simulation.youngs_modulus
+
+    def _contact_radius(self, _tool: int) -> float:
+        return self.simulation.contact_radius
 
     def _press(self, message: Mapping[str, Any]) -> bool:
-        position = np.array(vector(message, "position"))
+        tool, position = index(message, "tool", len(self._tools)), np.array(vector(message, "position"))
         grab = message.get("grab", False)
         if not isinstance(grab, bool):
             raise ViewerError("press: grab must be true or false")
@@ -203,35 +199,42 @@ class Session:
         if self._moving is not None:
             self._moving.end_mode()
             self._moving.struck_at = None
-        self._tool.move(position)
-        self.simulation.grab(grab)
-        self.active = True
+        self._tools[tool].move(position)
+        self.simulation.grab(grab, tool)
+        self._active[tool] = True
         return False
 
-    def _release(self, _message: Mapping[str, Any]) -> bool:
-        self.release()
+    def _release(self, message: Mapping[str, Any]) -> bool:
+        self.release(index(message, "tool", len(self._tools)) if "tool" in message else None)
         return False
 
     def _set(self, message: Mapping[str, Any]) -> bool:
-        known = {
-            "youngs_modulus": self.simulation.set_youngs_modulus,
+        known: dict[str, Callable[[float, Mapping[str, Any]], None]] = {
+            "youngs_modulus": self._set_youngs_modulus,
             "contact_radius": self._set_radius,
             "time_scale": self._set_time_scale,
         }
-        keys = set(message) - {"type"}
+        keys = set(message) - {"type", "body", "tool"}
         if not keys or not keys <= set(known):
             raise ViewerError(f"set takes {' or '.join(known)}")
         for key in sorted(keys):
-            known[key](number(message, key))
+            known[key](number(message, key), message)
         return True
 
-    def _set_time_scale(self, time_scale: float) -> None:
+    def _set_youngs_modulus(self, youngs_modulus: float, message: Mapping[str, Any]) -> None:
+        index(message, "body", len(self._bodies))
+        self.simulation.set_youngs_modulus(youngs_modulus)
+
+    def _set_time_scale(self, time_scale: float, _message: Mapping[str, Any]) -> None:
         self._in_motion("slow motion").set_time_scale(time_scale)
 
-    def _set_radius(self, radius: float) -> None:
-        if radius > self._max_radius:
-            raise ViewerError(f"the contact radius goes up to {1e3 * self._max_radius:.3g} mm on this body")
-        self.simulation.set_radius(radius)
+    def _set_radius(self, radius: float, message: Mapping[str, Any]) -> None:
+        tools = [index(message, "tool", len(self._tools))] if "tool" in message else range(len(self._tools))
+        largest = min(self._max_radii[tool] for tool in tools)
+        if radius > largest:
+            raise ViewerError(f"the contact radius goes up to {1e3 * largest:.3g} mm on this body")
+        for _tool in tools:
+            self.simulation.set_radius(radius)
 
     def _reset(self, _message: Mapping[str, Any]) -> bool:
         self.release()
@@ -247,8 +250,9 @@ class Session:
     def _latest(self) -> Frame:
         now = time.monotonic()
         if self._frame is None or now - self._frame_time > FRAME_AGE:
-            # A contact that has begun since the pointer moved is limited from here on.
-            self._tool.update()
+            # A contact that has begun since the device moved is limited from here on.
+            for tool in self._tools:
+                tool.update()
             self._frame, self._frame_time = self.simulation.frame(), now
             self._keep_log()
             if self._moving is not None:
@@ -265,7 +269,9 @@ class Session:
 
     def _strike(self, message: Mapping[str, Any]) -> bool:
         moving = self._in_motion("strike")
-        moving.strike(message, REACH * self.size, self._centre, self._now())
+        if "body" in message and index(message, "body", len(self._bodies)) != moving.index:
+            raise ViewerError("strike: this body does not move")
+        moving.strike(message, REACH * self.size, self._now())
         return False
 
     def _repeat(self, _message: Mapping[str, Any]) -> bool:
@@ -291,6 +297,18 @@ class Session:
         if self._moving is None:
             raise ViewerError(f"{what}: this body does not move")
         return self._moving
+
+
+def _contact_header(contact: Contact) -> dict[str, Any]:
+    """Entry of a frame message: the place in the body's frame, the force on the body in that of the scene."""
+    return {
+        "tool": contact.tool,
+        "body": 0,
+        "mode": contact.mode,
+        "point": contact.point.tolist(),
+        "normal": contact.normal.tolist(),
+        "force": contact.force.tolist(),
+    }
 
 
 class _Tail:
@@ -319,4 +337,4 @@ def _thin(rows: np.ndarray, peaks: int | None = None) -> np.ndarray:
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:
     """Entries of the model chooser."""
-    return [{"name": name, "title": name.replace("_", " ").capitalize()} for name in names]
+    return [{"name": name, "title": titled(name)} for name in names]

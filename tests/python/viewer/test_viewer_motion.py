@@ -1,4 +1,4 @@
-"""The viewer's server with a body in motion: blows, slow motion, mode shapes."""
+"""The viewer's server with a body in motion: strikes, slow motion, mode shapes."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def built(block, block_green) -> BuiltScene:
 
 @pytest.fixture(scope="module")
 def moving(block, block_green) -> BuiltScene:
-    """The block in motion, with a blow of its own."""
-    blow = {"point": TOP, "impulse": [0, 0, -1e-3]}
-    scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": blow})
+    """The block in motion, with a strike of its own."""
+    strike = {"point": TOP, "impulse": [0, 0, -1e-3]}
+    scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": strike})
     motion = scene.dynamics.build(block, scene.device.max_stiffness, progress=False)
     return BuiltScene(scene, block, block_green, motion)
 
@@ -37,9 +37,9 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
             scene, arrays = await client.receive("scene")
             told = scene["motion"]
             assert told["frequencies"] == pytest.approx(moving.motion.basis.frequencies[:20].tolist())
-            assert scene["youngs_modulus"] is None and told["youngs_modulus"] == pytest.approx(10e3)
+            assert scene["bodies"][0]["youngs_modulus"] is None and told["youngs_modulus"] == pytest.approx(10e3)
             assert 0 < told["impulse"] < told["max_impulse"]
-            assert not arrays["free"].any()
+            assert not arrays["0/free"].any()
             await client.say(type="set", time_scale=0.25)
             settings, _ = await watcher.receive("settings")
             assert settings["time_scale"] == 0.25
@@ -59,15 +59,15 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
             assert header["motion"]["mode"]["frequency"] == pytest.approx(moving.motion.basis.frequencies[2])
             assert header["strain"] <= 0.1 + 1e-6
             shape = moving.motion.basis.shapes[moving.green.surface_nodes, :, 2]
-            alike = abs((shape * arrays["displacements"]).sum()) / np.linalg.norm(shape)
-            assert alike == pytest.approx(np.linalg.norm(arrays["displacements"]), rel=1e-5)
+            alike = abs((shape * arrays["0/displacements"]).sum()) / np.linalg.norm(shape)
+            assert alike == pytest.approx(np.linalg.norm(arrays["0/displacements"]), rel=1e-5)
             assert np.abs(server._session.simulation.frame().displacements).max() == 0
-            # Its own blow ends that.
+            # Its own strike ends that.
             await client.say(type="repeat")
             await watcher.frame_where(lambda h: h["motion"]["mode"] is None and h["motion"]["struck_at"] is not None)
             await client.say(type="mode", number=1)
             await watcher.frame_where(lambda h: h["motion"]["mode"] is not None)
-            await client.say(type="press", position=[*TOP[:2], 0.054], grab=False)
+            await client.say(type="press", tool=0, position=[*TOP[:2], 0.054], grab=False)
             await watcher.frame_where(lambda h: h["motion"]["mode"] is None and len(h["contacts"]) == 1)
             await client.say(type="reset")
             await watcher.frame_where(lambda h: h["contacts"] == [] and h["strain"] < 1e-6)
@@ -83,13 +83,14 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
         ('{"type": "strike", "point": [9, 0, 0], "impulse": [0, 0, 1e-6]}', "far away"),
         ('{"type": "strike", "point": [0, 0, NaN], "impulse": [0, 0, 1e-6]}', "not JSON"),
         ('{"type": "strike", "point": [0, 0, 0], "impulse": 1e-6}', "three numbers"),
+        ('{"type": "strike", "body": 1, "point": [0, 0, 0], "impulse": [0, 0, 1e-6]}', "body must be"),
         ('{"type": "mode"}', "whole number from 0 to 20"),
         ('{"type": "mode", "number": 21}', "whole number from 0 to 20"),
         ('{"type": "mode", "number": 1.5}', "whole number"),
         ('{"type": "mode", "number": true}', "whole number"),
         ('{"type": "set", "time_scale": 0}', r"\(0, 1\]"),
         ('{"type": "set", "time_scale": 2}', r"\(0, 1\]"),
-        ('{"type": "set", "youngs_modulus": 1e4}', "moves"),
+        ('{"type": "set", "body": 0, "youngs_modulus": 1e4}', "moves"),
     ],
 )
 def test_motion_messages_are_bounded(moving, text, reason):
@@ -132,28 +133,28 @@ def test_a_body_at_rest_takes_no_motion_messages(built, message):
 
 
 def test_the_impulse_in_the_viewer_is_that_of_the_offline_history(tmp_path):
-    """The same node, blow and scheme by two ways: modes through the loop's ticks, and a sparse factor."""
+    """The same node, strike and scheme by two ways: modes through the loop's ticks, and a sparse factor."""
     impulse_history("beam", True, 0.1, tmp_path)
     table = np.genfromtxt(tmp_path / "beam-paper-impulse.csv", delimiter=",", names=True)
     built = impulse_scene("beam", True).build(False)
-    blow = built.scene.dynamics.strike
+    strike = built.scene.dynamics.strike
     simulation = palpate.Simulation(built)
-    node = int(np.argmin(np.linalg.norm(built.body.mesh.nodes - blow.point, axis=1)))
-    played = simulation.play(np.full((100, 3), np.nan), strikes=[(0, blow.point, blow.impulse)], watch=[node])
+    node = int(np.argmin(np.linalg.norm(built.body.mesh.nodes - strike.point, axis=1)))
+    played = simulation.play(np.full((100, 3), np.nan), strikes=[(0, strike.point, strike.impulse)], watch=[node])
     there = np.column_stack([table[name] for name in ("ux_m", "uy_m", "uz_m")])[1:]
     assert played.displacements[:, 0] == pytest.approx(there, abs=1e-6 * np.abs(there).max())
 
 
-def test_the_default_blow_swings_a_body_visibly_and_honestly(moving):
+def test_the_default_strike_swings_a_body_visibly_and_honestly(moving):
     """Struck along the inward normal at places all over: some swing visibly, and few strain it beyond 10 %."""
     session = Session(moving)
     session.close()
-    body, surface, blow = moving.body, moving.green.surface_nodes, session._moving
+    body, surface, mover = moving.body, moving.green.surface_nodes, session._moving
     outward = body.mesh.nodes - body.mesh.nodes.mean(axis=0)
     strains, swings = [], []
     for node in np.setdiff1d(surface, body.fixed_nodes)[::9]:
-        impulse = -blow.impulse * outward[node] / np.linalg.norm(outward[node])
-        strikes = [(0, body.mesh.nodes[node], impulse, blow._duration)]
+        impulse = -mover.impulse * outward[node] / np.linalg.norm(outward[node])
+        strikes = [(0, body.mesh.nodes[node], impulse, mover._duration)]
         played = session.simulation.play(np.full((300, 3), np.nan), strikes=strikes, watch=surface)
         strains.append(max(moving.green.strain_measure.largest(pose) for pose in played.displacements[::4]))
         swings.append(np.linalg.norm(played.displacements, axis=2).max() / session.size)
@@ -161,21 +162,21 @@ def test_the_default_blow_swings_a_body_visibly_and_honestly(moving):
     assert max(swings) > 0.03
 
 
-def test_the_tool_is_held_back_in_motion(moving):
+def test_the_tool_is_limited_in_motion(moving):
     """By the static response: the body swings about a pose at the limit, and comes to rest there."""
 
     async def session():
         async with serving(moving) as server, page(server) as client:
             scene, _ = await client.receive("scene")
-            radius = scene["tool_radius"]
+            radius = scene["tools"][0]["radius"]
             # Slow motion would only take longer.
             await client.say(type="set", time_scale=1)
-            await client.say(type="press", position=[*TOP[:2], TOP[2] + radius + 1e-3], grab=False)
+            await client.say(type="press", tool=0, position=[*TOP[:2], TOP[2] + radius + 1e-3], grab=False)
             await client.receive("frame")
-            await client.say(type="press", position=[*TOP[:2], TOP[2] + radius - 0.02], grab=False)
-            header, _ = await client.frame_where(lambda h: h["tool"]["wanted"] is not None and h["time"] > 2.5)
+            await client.say(type="press", tool=0, position=[*TOP[:2], TOP[2] + radius - 0.02], grab=False)
+            header, _ = await client.frame_where(lambda h: h["tools"][0]["wanted"] is not None and h["time"] > 2.5)
             assert 0.08 < header["strain"] < 0.105
-            assert header["force"][2] > 0.05
+            assert header["tools"][0]["force"][2] > 0.05
             await client.say(type="release")
             await client.frame_where(lambda h: h["contacts"] == [] and h["strain"] < 0.01)
 

@@ -190,14 +190,14 @@ def choose_field(page, name: str) -> dict:
     return until(page, lambda s: s["field"] and s["field"]["name"] == name)["field"]
 
 
-def test_a_press_is_held_at_ten_per_cent(page):
-    notice, strain = page.get_by_test_id("hold-notice"), page.get_by_test_id("strain-value")
+def test_a_press_is_limited_to_ten_per_cent(page):
+    notice, strain = page.get_by_test_id("limit-notice"), page.get_by_test_id("strain-value")
     assert notice.is_hidden()
     x, y = page.evaluate("window.palpate.pickPoint()")
     press(page, 100)
-    until(page, lambda s: s["held"] and s["strain"] > 0.099)
+    until(page, lambda s: s["limited"] and s["strain"] > 0.099)
     first = settled_force(page)
-    assert notice.inner_text() == "Held at 10 % strain"
+    assert notice.inner_text() == "Limited to 10 % strain"
     assert 9.5 <= float(strain.inner_text()) <= 10.5
     wanted = state(page)["depth"]
     page.mouse.move(x, y + 160)
@@ -205,7 +205,7 @@ def test_a_press_is_held_at_ten_per_cent(page):
     assert np.linalg.norm(settled_force(page) - first) < 0.02 * np.linalg.norm(first)
     assert state(page)["strain"] <= 0.105
     page.mouse.up()
-    until(page, lambda s: not s["held"] and s["contacts"] == 0)
+    until(page, lambda s: not s["limited"] and s["contacts"] == 0)
     assert notice.is_hidden()
 
 
@@ -262,7 +262,7 @@ def test_cut_away_and_another_model(page):
     page.locator("#show-cutaway").click()
     page.get_by_test_id("model-select").select_option("beam")
     # The beam is cut along its middle, where its highest points are; the field is kept.
-    until(page, lambda s: s["scene"] == "beam" and s["field"]["name"] == "von_mises", 60)
+    until(page, lambda s: s["scene"] == "beam" and s["field"] and s["field"]["name"] == "von_mises", 60)
     page.locator("#show-cutaway").click()
     press(page, 10)
     page.mouse.up()
@@ -312,7 +312,7 @@ def test_the_impulse_is_given_and_repeated(moving_page):
 def test_a_click_strikes_in_motion(moving_page):
     page = moving_page
     until(page, lambda s: s["motion"]["struck_at"] is not None)
-    time.sleep(1.0)  # the page gives the scene's own blow when it opens
+    time.sleep(1.0)  # the page gives the scene's own strike when it opens
     before = state(page)["motion"]
     x, y = page.evaluate("window.palpate.pickPoint()")
     page.get_by_test_id("strike").click()

@@ -1,0 +1,252 @@
+// What the person may do and what the server says, each as a change of the state and, where it concerns the body, a
+// message. Buttons, keys and the pointer all go through here.
+
+import { RateLimit } from "./net/rate_limit";
+import type { ClientMessage, FrameMessage, Role, SceneMessage, SettingsMessage, TextMessage, Vec3 } from "./net/protocol";
+import { drivenTool, inControl } from "./store";
+import type { Axis, Layer, Store } from "./store";
+
+/** A slider dragged quickly sends no more often than this. */
+const SEND_INTERVAL_MS = 40;
+/** For so long after the person moved a slider, values from the server do not move it back. */
+const OWN_VALUE_MS = 400;
+/** More than so many notices hide the picture. */
+const NOTICES_MAX = 3;
+
+export class Control {
+  private changedMs = -Infinity;
+  private readonly limits = new Map<string, { limit: RateLimit; message: ClientMessage }>();
+
+  constructor(private readonly store: Store, private readonly send: (message: ClientMessage) => void) {}
+
+  // What the server says.
+
+  takeText(message: TextMessage): void {
+    switch (message.type) {
+      case "welcome":
+        this.store.update({ version: message.version, models: message.models });
+        return this.takeRole(message.role);
+      case "role":
+        return this.takeRole(message.role);
+      case "settings":
+        return this.takeSettings(message);
+      case "status":
+        return this.store.update({ status: message });
+      case "error":
+        return this.notice(message.text);
+    }
+  }
+
+  /** A new scene: what was touched is let go, and choices that it does not offer are dropped. */
+  takeScene(scene: SceneMessage): void {
+    this.release();
+    const { field, strike, layers } = this.store.get();
+    const offered = scene.bodies[0]?.fields.some(({ name }) => name === field) ?? false;
+    this.changedMs = -Infinity;
+    this.store.update({
+      scene,
+      settings: {
+        type: "settings",
+        youngs_modulus: scene.bodies.map((body) => body.youngs_modulus),
+        contact_radius: scene.tools.map((tool) => tool.contact_radius),
+        time_scale: scene.motion?.time_scale ?? null,
+      },
+      frame: null,
+      body: scene.motion?.body ?? 0,
+      field: offered ? field : null,
+      tab: scene.motion ? "motion" : "loop",
+      strike: strike && scene.motion !== null,
+      impulse: scene.motion?.impulse ?? 0,
+    });
+    // A bare store has no tetrahedra to be shown.
+    if (layers.cutaway && !hasInside(scene)) this.toggleLayer("cutaway");
+  }
+
+  /** A pinned tool that has left the scene, by a fault or another way, is pinned no more. */
+  takeFrame(frame: FrameMessage): void {
+    const { pinned, frame: before } = this.store.get();
+    const left = (tool: number) => before?.tools[tool]?.active && !frame.tools[tool]?.active;
+    this.store.update({ frame, pinned: pinned.some(left) ? pinned.filter((tool) => !left(tool)) : pinned });
+  }
+
+  /** What this page looks at, told again after a connection was lost. */
+  tellWishes(): void {
+    const { layers, field } = this.store.get();
+    if (layers.cutaway) this.send({ type: "cutaway", on: true });
+    if (field !== null) this.send({ type: "field", name: field });
+  }
+
+  notice(text: string): void {
+    const { notices } = this.store.get();
+    if (!notices.includes(text)) this.store.update({ notices: [...notices, text].slice(-NOTICES_MAX) });
+  }
+
+  dismiss(text: string): void {
+    this.store.update({ notices: this.store.get().notices.filter((notice) => notice !== text) });
+  }
+
+  // What is shown.
+
+  toggleLayer(layer: Layer): void {
+    const { layers, scene } = this.store.get();
+    const on = !layers[layer];
+    if (layer === "cutaway") {
+      if (on && !(scene && hasInside(scene))) return;
+      this.send({ type: "cutaway", on });
+    }
+    this.store.update({ layers: { ...layers, [layer]: on } });
+  }
+
+  cutAcross(axis: Axis): void {
+    this.store.update({ cut: { ...this.store.get().cut, axis } });
+  }
+
+  cutShare(share: number): void {
+    this.store.update({ cut: { ...this.store.get().cut, share } });
+  }
+
+  /** A field that is chosen wants to be seen. */
+  chooseField(field: string): void {
+    const { layers } = this.store.get();
+    this.store.update({ field, layers: { ...layers, colors: true } });
+    this.send({ type: "field", name: field });
+  }
+
+  /** The next field of the body, after the last one the first. */
+  nextField(): void {
+    const { scene, body, field } = this.store.get();
+    const fields = scene?.bodies[body]?.fields ?? [];
+    if (fields.length === 0) return;
+    const at = Math.max(0, fields.findIndex(({ name }) => name === field));
+    this.chooseField(fields[(at + 1) % fields.length]!.name);
+  }
+
+  chooseBody(body: number): void {
+    this.store.update({ body });
+  }
+
+  // What the tools do.
+
+  press(tool: number, position: Vec3, grab: boolean): void {
+    this.send({ type: "press", tool, position, grab });
+  }
+
+  /** The pointer was let go, or lost: its tool leaves the body, unless it may stay and was to. */
+  letGo(mayStay: boolean): void {
+    const { pressing, pinNext } = this.store.get();
+    if (!pressing) return;
+    if (mayStay && pinNext) return this.pin(pressing.tool);
+    this.store.update({ pressing: null });
+    this.send({ type: "release", tool: pressing.tool });
+  }
+
+  /** Leaves the driven tool where it is; with none driven, lets pinned ones go, or says that the next one is to stay. */
+  togglePin(): void {
+    const state = this.store.get();
+    if (!inControl(state) || (state.scene?.tools.length ?? 0) < 2) return;
+    if (state.pressing) this.pin(state.pressing.tool);
+    else if (state.pinned.length > 0) this.release();
+    else this.store.update({ pinNext: !state.pinNext });
+  }
+
+  /** Takes all tools out of the scene. */
+  release(): void {
+    const { pressing, pinned } = this.store.get();
+    this.store.update({ pressing: null, pinned: [], pinNext: false });
+    if (pressing || pinned.length > 0) this.send({ type: "release" });
+  }
+
+  strikeAt(body: number, point: Vec3, inward: Vec3): void {
+    const { impulse } = this.store.get();
+    this.send({ type: "strike", body, point, impulse: inward.map((share) => share * impulse) as Vec3 });
+  }
+
+  repeatStrike(): void {
+    if (inControl(this.store.get())) this.send({ type: "repeat" });
+  }
+
+  toggleGrab(): void {
+    const state = this.store.get();
+    if (inControl(state)) this.store.update({ grab: !state.grab });
+  }
+
+  toggleStrike(): void {
+    const state = this.store.get();
+    if (state.strike || (inControl(state) && state.scene?.motion)) this.store.update({ strike: !state.strike });
+  }
+
+  /** The mode that is shown ends at a second click, and at 0. */
+  showMode(number: number): void {
+    const { frame } = this.store.get();
+    const shown = frame?.motion?.mode?.number ?? 0;
+    const wanted = number === shown ? 0 : number;
+    if (inControl(this.store.get()) && wanted !== shown) this.send({ type: "mode", number: wanted });
+  }
+
+  // Settings and long work.
+
+  setStiffness(modulus: number): void {
+    const { settings, body } = this.store.get();
+    if (!settings) return;
+    this.changedMs = performance.now();
+    this.store.update({ settings: { ...settings, youngs_modulus: settings.youngs_modulus.with(body, modulus) } });
+    this.sendLimited(`stiffness ${body}`, { type: "set", youngs_modulus: modulus, body });
+  }
+
+  /** Of the tool that is driven, or that the next press drives. */
+  setContactRadius(radius: number): void {
+    const { settings } = this.store.get();
+    const tool = drivenTool(this.store.get()) ?? 0;
+    if (!settings) return;
+    this.changedMs = performance.now();
+    this.store.update({ settings: { ...settings, contact_radius: settings.contact_radius.with(tool, radius) } });
+    this.sendLimited(`radius ${tool}`, { type: "set", contact_radius: radius, tool });
+  }
+
+  setTimeScale(scale: number): void {
+    this.send({ type: "set", time_scale: scale });
+  }
+
+  chooseModel(name: string): void {
+    this.send({ type: "model", name });
+  }
+
+  cancel(): void {
+    this.send({ type: "cancel" });
+  }
+
+  reset(): void {
+    this.release();
+    if (inControl(this.store.get())) this.send({ type: "reset" });
+  }
+
+  private pin(tool: number): void {
+    this.store.update({ pressing: null, pinned: [...this.store.get().pinned, tool], pinNext: false });
+  }
+
+  private takeRole(role: Role): void {
+    if (role === "watch") this.release();
+    this.store.update(role === "watch" ? { role, strike: false } : { role });
+  }
+
+  private takeSettings(settings: SettingsMessage): void {
+    const own = performance.now() - this.changedMs < OWN_VALUE_MS ? this.store.get().settings : null;
+    this.store.update({ settings: own ? { ...own, time_scale: settings.time_scale } : settings });
+  }
+
+  /** Sends the newest message under a name, not too often. */
+  private sendLimited(name: string, message: ClientMessage): void {
+    const waiting = this.limits.get(name) ?? {
+      limit: new RateLimit(SEND_INTERVAL_MS, () => this.send(this.limits.get(name)!.message)),
+      message,
+    };
+    waiting.message = message;
+    this.limits.set(name, waiting);
+    waiting.limit.request();
+  }
+}
+
+/** Whether any body can be cut open. */
+export function hasInside(scene: SceneMessage): boolean {
+  return scene.bodies.some(({ tets }) => tets > 0);
+}

@@ -1,0 +1,319 @@
+// Messages of the websocket, version 4. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
+// A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
+// the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
+// is named "<index of the body>/<what it is>".
+
+export const PROTOCOL_VERSION = 4;
+
+export type Vec3 = [number, number, number];
+/** w x y z, of length one. */
+export type Quaternion = [number, number, number, number];
+export type Role = "control" | "watch";
+
+/** Something to choose from a list. */
+export interface Choice {
+  name: string;
+  title: string;
+}
+
+export interface Percentiles {
+  p50: number;
+  p99: number;
+  p999: number;
+  max: number;
+}
+
+export interface SceneMessage {
+  type: "scene";
+  name: string;
+  title: string;
+  /** Longest side of what all bodies fill. */
+  size: number;
+  /** A tool is limited where a body would be strained more; 0 for never. */
+  strain_limit: number;
+  /** Of every tool. */
+  max_force: number;
+  bodies: BodyMessage[];
+  tools: ToolMessage[];
+  motion: MotionScene | null;
+  view: { position: Vec3; target: Vec3 } | null;
+}
+
+export interface BodyMessage {
+  name: string;
+  title: string;
+  nodes: number;
+  tets: number;
+  surface_nodes: number;
+  triangles: number;
+  /** null where it cannot be changed. */
+  youngs_modulus: number | null;
+  poissons_ratio: number | null;
+  /** Of the body's frame. */
+  position: Vec3;
+  orientation: Quaternion;
+  fields: Choice[];
+}
+
+export interface ToolMessage {
+  radius: number;
+  contact_radius: number;
+  max_contact_radius: number;
+}
+
+/** Of a body that moves. */
+export interface MotionScene {
+  /** Which one it is. */
+  body: number;
+  /** Hz, of the lowest modes. */
+  frequencies: number[];
+  /** How many modes there are. */
+  modes: number;
+  /** Seconds that it moves in a second. */
+  time_scale: number;
+  /** An impulse that the body stands well, and the strongest that is taken, N s. */
+  impulse: number;
+  max_impulse: number;
+  /** Body time that the plots of the motion show, s. */
+  span: number;
+  youngs_modulus: number | null;
+  /** The scene's own strike, N s, in the body's frame. */
+  strike: { point: Vec3; impulse: Vec3 } | null;
+}
+
+/** Geometry of one body, in its frame. */
+export interface BodyArrays {
+  nodes: Float32Array;
+  tets: Uint32Array;
+  surface_triangles: Uint32Array;
+  surface_nodes: Uint32Array;
+  fixed_nodes: Uint32Array;
+  /** Displacements of the surface under the body's own loads, a row for each surface node. */
+  free: Float32Array;
+}
+
+export interface ToolFrame {
+  position: Vec3;
+  orientation: Quaternion;
+  active: boolean;
+  /** Whether the tool is not let go where the device is. */
+  limited: boolean;
+  /** Where the device is while the tool is limited. */
+  wanted: Vec3 | null;
+  /** On the device. */
+  force: Vec3;
+  /** Why there is no contact, where one was refused. */
+  refused: string | null;
+}
+
+export interface ContactMessage {
+  tool: number;
+  body: number;
+  mode: "press" | "grab";
+  /** On the rest surface, in the body's frame. */
+  point: Vec3;
+  normal: Vec3;
+  /** On the body, in the frame of the scene. */
+  force: Vec3;
+}
+
+/** What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa. */
+export interface FieldMessage {
+  name: string;
+  title: string;
+  unit: "mm" | "%" | "Pa";
+  max: number;
+  signed: boolean;
+}
+
+/** A mode shape that is drawn in place of the motion, counted from 1; amplitude is its largest displacement. */
+export interface ModeMessage {
+  number: number;
+  frequency: number;
+  shown_hz: number;
+  amplitude: number;
+}
+
+export interface MotionFrame {
+  /** Surface node, by its row, whose displacement is in the history. */
+  watched: number;
+  /** Body time of the last strike, until something else touches the body. */
+  struck_at: number | null;
+  mode: ModeMessage | null;
+}
+
+export interface FrameMessage {
+  type: "frame";
+  frame: number;
+  time: number;
+  tools: ToolFrame[];
+  contacts: ContactMessage[];
+  compute_us: Percentiles;
+  wakeup_us: Percentiles;
+  ticks: number;
+  missed_deadlines: number;
+  fault: string | null;
+  realtime: boolean;
+  /** The largest over all bodies, and that of each. */
+  strain: number;
+  bodies: { strain: number }[];
+  motion: MotionFrame | null;
+  /** For each body, what its colours show and whether all of its nodes are sent. */
+  fields: FieldMessage[];
+  interior: boolean[];
+}
+
+/** Of one body; a row of displacements and scalar is a surface node, or any node if the inside is shown. */
+export interface PoseArrays {
+  displacements: Float32Array;
+  scalar: Uint8Array;
+}
+
+export interface SceneData {
+  header: SceneMessage;
+  bodies: BodyArrays[];
+}
+
+export interface FrameData {
+  header: FrameMessage;
+  bodies: PoseArrays[];
+  /** Rows of time, force of the first tool, computing time in us. */
+  log: Float32Array;
+  /** Body time, displacement of the watched node, kinetic, strain and total energy in J, work on the body since the start. */
+  history: Float32Array;
+}
+
+export interface SettingsMessage {
+  type: "settings";
+  /** Of each body. */
+  youngs_modulus: (number | null)[];
+  /** Of each tool. */
+  contact_radius: number[];
+  time_scale: number | null;
+}
+
+/** How far a long work is; an empty text when it has ended. */
+export interface StatusMessage {
+  type: "status";
+  text: string;
+  progress: number | null;
+  left_s: number | null;
+}
+
+export type TextMessage =
+  | { type: "welcome"; role: Role; version: string; models: Choice[] }
+  | { type: "role"; role: Role }
+  | SettingsMessage
+  | StatusMessage
+  | { type: "error"; text: string };
+
+export type ClientMessage =
+  | { type: "hello"; token: string; version: number }
+  | { type: "press"; tool: number; position: Vec3; grab: boolean }
+  | { type: "release"; tool?: number }
+  | { type: "set"; youngs_modulus: number; body: number }
+  | { type: "set"; contact_radius: number; tool?: number }
+  | { type: "set"; time_scale: number }
+  | { type: "reset" }
+  | { type: "strike"; body: number; point: Vec3; impulse: Vec3 }
+  | { type: "repeat" }
+  | { type: "mode"; number: number }
+  | { type: "model"; name: string }
+  | { type: "cancel" }
+  | { type: "cutaway"; on: boolean }
+  | { type: "field"; name: string }
+  | { type: "ack"; frame: number };
+
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "error"];
+const BODY_ARRAYS = {
+  nodes: Float32Array,
+  tets: Uint32Array,
+  surface_triangles: Uint32Array,
+  surface_nodes: Uint32Array,
+  fixed_nodes: Uint32Array,
+  free: Float32Array,
+};
+const POSE_ARRAYS = { displacements: Float32Array, scalar: Uint8Array };
+
+interface ArrayEntry {
+  name: string;
+  dtype: string;
+  shape: number[];
+  offset: number;
+}
+
+type AnyArray = Float32Array | Uint32Array | Uint8Array;
+type ArrayKind = Float32ArrayConstructor | Uint32ArrayConstructor | Uint8ArrayConstructor;
+const KINDS: Record<string, ArrayKind> = { f4: Float32Array, u4: Uint32Array, u1: Uint8Array };
+
+/** Reads a text message; throws on anything else. */
+export function decodeText(text: string): TextMessage {
+  const message: unknown = JSON.parse(text);
+  const type = isRecord(message) ? message["type"] : undefined;
+  if (typeof type !== "string" || !TEXT_TYPES.includes(type)) throw new Error("a text message of an unknown type");
+  return message as TextMessage;
+}
+
+/** Reads a scene or a frame; throws on a message that is neither, lacks an array, or is shorter than it says. */
+export function decodeBinary(buffer: ArrayBuffer): SceneData | FrameData {
+  const { header, start } = readHeader(buffer);
+  const { type, bodies, arrays: entries } = header;
+  if (type !== "scene" && type !== "frame") throw new Error("a binary message of an unknown type");
+  if (!Array.isArray(bodies) || !Array.isArray(header["tools"]) || !Array.isArray(entries)) {
+    throw new Error(`a ${type} without bodies, tools or arrays`);
+  }
+  const arrays = new Map<string, AnyArray>();
+  for (const entry of entries as ArrayEntry[]) arrays.set(entry.name, viewArray(buffer, start, entry));
+  delete header["arrays"];
+  if (type === "scene") {
+    return { header: header as unknown as SceneMessage, bodies: bodies.map((_, i) => group(arrays, `${i}/`, BODY_ARRAYS)) };
+  }
+  return {
+    header: header as unknown as FrameMessage,
+    bodies: bodies.map((_, i) => group(arrays, `${i}/`, POSE_ARRAYS)),
+    ...group(arrays, "", { log: Float32Array, history: Float32Array }),
+  };
+}
+
+export function isScene(data: SceneData | FrameData): data is SceneData {
+  return data.header.type === "scene";
+}
+
+function readHeader(buffer: ArrayBuffer): { header: Record<string, unknown>; start: number } {
+  if (buffer.byteLength < 4) throw new Error("a binary message without a header");
+  const length = new DataView(buffer).getUint32(0, true);
+  if (4 + length > buffer.byteLength) throw new Error("a binary message shorter than its header");
+  const header: unknown = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  if (!isRecord(header)) throw new Error("a binary message whose header is no object");
+  return { header, start: 4 + length };
+}
+
+/** Views an array of a binary message in place. */
+function viewArray(buffer: ArrayBuffer, start: number, { name, dtype, shape, offset }: ArrayEntry): AnyArray {
+  const kind = KINDS[dtype];
+  if (!kind) throw new Error(`array '${name}' of an unknown type '${dtype}'`);
+  const whole = [offset, ...shape].every((value) => Number.isSafeInteger(value) && value >= 0);
+  const count = shape.reduce((product, extent) => product * extent, 1);
+  const end = start + offset + count * kind.BYTES_PER_ELEMENT;
+  if (!whole || end > buffer.byteLength) throw new Error(`array '${name}' goes beyond its message`);
+  return new kind(buffer, start + offset, count);
+}
+
+/** Arrays whose names have a prefix, each of the kind that it must have. */
+function group<Kinds extends Record<string, ArrayKind>>(
+  arrays: Map<string, AnyArray>,
+  prefix: string,
+  kinds: Kinds,
+): { [Name in keyof Kinds]: InstanceType<Kinds[Name]> } {
+  const entries = Object.entries(kinds).map(([name, kind]) => {
+    const array = arrays.get(prefix + name);
+    if (!(array instanceof kind)) throw new Error(`a message without the array '${prefix}${name}'`);
+    return [name, array];
+  });
+  return Object.fromEntries(entries) as { [Name in keyof Kinds]: InstanceType<Kinds[Name]> };
+}
+
+function isRecord(value: unknown): value is Record<string, unknown> {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}

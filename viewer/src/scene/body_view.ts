@@ -1,0 +1,176 @@
+// Everything drawn of a body, where it stands in the scene: solid or cut-away, rest wire frame, supports, and the shadow.
+
+import * as THREE from "three";
+
+import type { BodyArrays, BodyMessage, PoseArrays, Vec3 } from "../net/protocol";
+import type { Layer } from "../store";
+import { ColorMap } from "./color_map";
+import { CutawayView } from "./cutaway_view";
+import { tissueColor } from "./field_material";
+import { createGroundShadow } from "./ground_shadow";
+import { SolidView } from "./solid_view";
+import { SupportsView } from "./supports_view";
+import { Surface } from "./surface";
+import { WireframeView } from "./wireframe_view";
+
+/** A touched point in the scene: where it is seen, and while nothing is touched with the outward normal there. */
+export interface Pick {
+  body: number;
+  shown: THREE.Vector3;
+  untouched: THREE.Vector3;
+  normal: THREE.Vector3;
+  /** In the body's frame: the same point at rest under the body's own loads, and that normal. */
+  inBody: { settled: Vec3; normal: Vec3 };
+}
+
+/** What a ray meets of a body; no pick where that is the inside that a cut shows. */
+export interface Hit {
+  distance: number;
+  pick: Pick | null;
+}
+
+/** A body in a frame: what moves it, and whether anything touches it. */
+export interface Pose {
+  arrays: PoseArrays;
+  interior: boolean;
+  signed: boolean;
+  touched: boolean;
+  /** A mode shape is drawn in place of its motion. */
+  showsMode: boolean;
+}
+
+export class BodyView {
+  readonly group = new THREE.Group();
+  /** In the frame of the body. */
+  readonly placed = new THREE.Group();
+  readonly surface: Surface;
+  /** At rest, in the scene. */
+  readonly restInScene: Float32Array;
+  readonly bounds = new THREE.Box3();
+  private readonly uniforms = { colorMap: { value: ColorMap.sequential.texture }, fieldShown: { value: 1 } };
+  private readonly solid: SolidView;
+  /** The solid as picking sees it: where a ray leaves the body tells what it has passed. */
+  private readonly bothSides: THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
+  private readonly wireframe: WireframeView;
+  private readonly supports: SupportsView;
+  private readonly shadow: THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial>;
+  /** Made on first use: a large mesh has many tetrahedra, and most people never cut. */
+  private cutaway: CutawayView | null = null;
+  private cutawayShown = false;
+  private drawn: Pose | null = null;
+
+  /** size is that of the scene, m. */
+  constructor(
+    private readonly index: number,
+    private readonly header: BodyMessage,
+    private readonly arrays: BodyArrays,
+    size: number,
+  ) {
+    const [w, x, y, z] = header.orientation;
+    this.placed.position.set(...header.position);
+    this.placed.quaternion.set(x, y, z, w);
+    this.placed.updateMatrix();
+    this.surface = new Surface(arrays);
+    this.restInScene = transformed(this.surface.rest, this.placed.matrix);
+    this.bounds.setFromArray(this.restInScene);
+    this.solid = new SolidView(this.surface, tissueColor(header.name), size, this.uniforms);
+    this.bothSides = new THREE.Mesh(this.solid.mesh.geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
+    this.bothSides.matrixWorld.copy(this.placed.matrix);
+    this.wireframe = new WireframeView(this.surface);
+    this.supports = new SupportsView(arrays, size);
+    this.shadow = createGroundShadow(this.bounds, size);
+    this.placed.add(this.solid.mesh, this.wireframe.lines, this.supports.markers);
+    this.group.add(this.shadow, this.placed);
+  }
+
+  show(layers: Readonly<Record<Layer, boolean>>): void {
+    this.uniforms.fieldShown.value = layers.colors ? 1 : 0;
+    this.wireframe.lines.visible = layers.wireframe;
+    this.supports.markers.visible = layers.supports;
+    // A body from a bare store has no inside.
+    this.cutawayShown = layers.cutaway && this.arrays.tets.length > 0;
+    this.solid.mesh.visible = !this.cutawayShown;
+    if (this.cutawayShown && !this.cutaway) {
+      this.cutaway = new CutawayView(this.arrays, tissueColor(this.header.name), this.uniforms);
+      this.placed.add(this.cutaway.mesh);
+    }
+    if (this.cutaway) this.cutaway.mesh.visible = this.cutawayShown;
+    // What is shown from now on has not seen the frames before.
+    this.drawn = null;
+  }
+
+  /** Removes what lies beyond a plane of the scene, at rest. */
+  cut(plane: THREE.Plane): void {
+    const { normal, constant } = plane.clone().applyMatrix4(this.placed.matrix.clone().invert());
+    this.cutaway?.setPlane(normal, -constant);
+  }
+
+  /** Moves to a pose and tells whether the picture changes; one that belongs to another mesh is left out. */
+  update(pose: Pose): boolean {
+    const { displacements, scalar } = pose.arrays;
+    const { arrays, drawn } = this;
+    const expected = pose.interior ? arrays.nodes.length : arrays.surface_nodes.length * 3;
+    if (displacements.length !== expected || displacements.length !== 3 * scalar.length) return false;
+    if (drawn?.signed === pose.signed && same(drawn.arrays.displacements, displacements)) {
+      if (same(drawn.arrays.scalar, scalar)) return false;
+    }
+    this.drawn = pose;
+    this.uniforms.colorMap.value = (pose.signed ? ColorMap.diverging : ColorMap.sequential).texture;
+    this.surface.displace(displacements, pose.interior ? arrays.surface_nodes : null);
+    // A mode shape is only shown: a tool meets the body at rest.
+    if (pose.showsMode) this.surface.settle();
+    else if (!pose.touched) this.surface.keepAsUntouched();
+    this.solid.update(scalar);
+    if (this.cutawayShown) this.cutaway?.displaceAll(displacements, scalar, pose.interior ? null : arrays.surface_nodes);
+    return true;
+  }
+
+  /** The point of the surface that is seen along a ray of the scene; null beside the body. */
+  pick(raycaster: THREE.Raycaster): Hit | null {
+    const cutaway = this.cutawayShown ? this.cutaway : null;
+    const direction = raycaster.ray.direction.clone().applyQuaternion(this.placed.quaternion.clone().invert());
+    for (const { faceIndex, face, barycoord, point, distance } of raycaster.intersectObject(this.bothSides, false)) {
+      if (faceIndex == null || !face || !barycoord) continue;
+      const entering = face.normal.dot(direction) < 0;
+      const removed = cutaway?.removes(faceIndex) ?? false;
+      // A ray that comes out of what is left, and went in where the surface is gone, met a face of the cut between.
+      if (!entering && !removed) return { distance, pick: null };
+      if (!entering || removed) continue;
+      return { distance, pick: this.pickAt(point, faceIndex, barycoord.toArray()) };
+    }
+    return null;
+  }
+
+  dispose(): void {
+    this.group.removeFromParent();
+    this.solid.dispose();
+    this.bothSides.material.dispose();
+    this.wireframe.dispose();
+    this.supports.dispose();
+    this.cutaway?.dispose();
+    this.shadow.material.map?.dispose();
+    this.shadow.material.dispose();
+    this.shadow.geometry.dispose();
+  }
+
+  private pickAt(shown: THREE.Vector3, triangle: number, weights: Vec3): Pick {
+    const { surface, placed } = this;
+    const place = { corners: surface.cornersOf(triangle), weights };
+    const normal = new THREE.Vector3(...surface.at(surface.untouchedNormals, place)).normalize();
+    return {
+      body: this.index,
+      shown: shown.clone(),
+      untouched: new THREE.Vector3(...surface.at(surface.untouched, place)).applyMatrix4(placed.matrix),
+      normal: normal.clone().applyQuaternion(placed.quaternion),
+      inBody: { settled: surface.at(surface.settled, place), normal: normal.toArray() },
+    };
+  }
+}
+
+function transformed(points: Float32Array, matrix: THREE.Matrix4): Float32Array {
+  return new Float32Array(new THREE.BufferAttribute(points.slice(), 3).applyMatrix4(matrix).array);
+}
+
+function same(a: Float32Array | Uint8Array, b: Float32Array | Uint8Array): boolean {
+  return a.length === b.length && a.every((value, i) => value === b[i]);
+}

@@ -1,0 +1,54 @@
+// A pin in a tool that stays where it was left.
+
+import * as THREE from "three";
+
+const COLOR = "#6fc3ff";
+const EDGE = "#14171c";
+const PIXELS = 128;
+/** Height of the mark over the radius of the tool. */
+const HEIGHT = 3;
+
+export class PinView {
+  readonly sprite: THREE.Sprite;
+
+  constructor(toolRadius: number) {
+    // Seen through the body: a pinned tool may be deep in a dent.
+    const material = new THREE.SpriteMaterial({ map: pinTexture(), depthTest: false, depthWrite: false });
+    this.sprite = new THREE.Sprite(material);
+    // The tip is at the tool's centre.
+    this.sprite.center.set(0.5, 0.04);
+    this.sprite.scale.setScalar(HEIGHT * toolRadius);
+    this.sprite.renderOrder = 3;
+    this.sprite.visible = false;
+  }
+
+  dispose(): void {
+    this.sprite.material.map?.dispose();
+    this.sprite.material.dispose();
+  }
+}
+
+/** A drop upside down with a hole, as on maps. */
+function pinTexture(): THREE.CanvasTexture {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = PIXELS;
+  const context = canvas.getContext("2d")!;
+  const [middle, top, radius] = [PIXELS / 2, 0.36 * PIXELS, 0.27 * PIXELS];
+  context.beginPath();
+  context.arc(middle, top, radius, 0.85 * Math.PI, 0.15 * Math.PI);
+  context.lineTo(middle, 0.96 * PIXELS);
+  context.closePath();
+  context.fillStyle = COLOR;
+  context.strokeStyle = EDGE;
+  context.lineWidth = 0.04 * PIXELS;
+  context.lineJoin = "round";
+  context.fill();
+  context.stroke();
+  context.beginPath();
+  context.arc(middle, top, 0.4 * radius, 0, 2 * Math.PI);
+  context.fillStyle = EDGE;
+  context.fill();
+  const texture = new THREE.CanvasTexture(canvas);
+  texture.colorSpace = THREE.SRGBColorSpace;
+  return texture;
+}

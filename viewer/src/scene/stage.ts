@@ -1,0 +1,128 @@
+// The scene as it is drawn: bodies where they stand, tools, and the watched node; and what a pointer meets of it.
+
+import * as THREE from "three";
+
+import type { FrameData, FrameMessage, SceneData } from "../net/protocol";
+import type { Store } from "../store";
+import { BodyView } from "./body_view";
+import type { Pick } from "./body_view";
+import { cutPlane, facingAxis } from "./cut_plane";
+import { ToolView } from "./tool_view";
+import type { Viewport } from "./viewport";
+import { WatchedView } from "./watched_view";
+
+export class Stage {
+  bodies: BodyView[] = [];
+  readonly bounds = new THREE.Box3();
+  private tools: ToolView[] = [];
+  private watched: { view: WatchedView; body: number } | null = null;
+
+  constructor(readonly viewport: Viewport, private readonly store: Store) {
+    let opened = false;
+    store.subscribe(["layers"], ({ layers }) => {
+      // A body that is cut open is cut on the side that is looked at.
+      if (layers.cutaway && !opened) this.faceCut();
+      opened = layers.cutaway;
+      this.show();
+    });
+    store.subscribe(["cut"], () => this.cut());
+    store.subscribe(["settings", "pinned"], ({ frame }) => {
+      if (frame && this.updateTools(frame)) viewport.invalidate();
+    });
+  }
+
+  setScene({ header, bodies }: SceneData): void {
+    this.dispose();
+    this.bodies = header.bodies.map((body, i) => new BodyView(i, body, bodies[i]!, header.size));
+    this.tools = header.tools.map((tool) => new ToolView(header, tool, this.bodies));
+    for (const { group } of [...this.bodies, ...this.tools]) this.viewport.scene.add(group);
+    const moving = header.motion && this.bodies[header.motion.body];
+    if (header.motion && moving) {
+      this.watched = { view: new WatchedView(moving.surface, header.size), body: header.motion.body };
+      moving.placed.add(this.watched.view.dot);
+    }
+    this.bounds.makeEmpty();
+    for (const body of this.bodies) this.bounds.union(body.bounds);
+    this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
+    if (this.store.get().layers.cutaway) this.faceCut();
+    this.show();
+  }
+
+  /** Moves to a frame and tells whether the picture changes: bodies at rest are not drawn again and again. */
+  update({ header, bodies }: FrameData): boolean {
+    const { motion } = header;
+    let changed = false;
+    this.bodies.forEach((body, i) => {
+      const arrays = bodies[i];
+      const field = header.fields[i];
+      if (!arrays || !field) return;
+      const moved = body.update({
+        arrays,
+        interior: header.interior[i] ?? false,
+        signed: field.signed,
+        touched: header.contacts.some((contact) => contact.body === i),
+        showsMode: motion?.mode != null && this.watched?.body === i,
+      });
+      changed = moved || changed;
+    });
+    changed = this.updateTools(header) || changed;
+    // A tool would hide the dot.
+    const touched = header.tools.some(({ active }) => active);
+    this.watched?.view.update(motion && !touched ? motion.watched : null);
+    return changed;
+  }
+
+  /** The point of a body that is seen along a ray; null beside all, and on the inside that a cut shows. */
+  pick(raycaster: THREE.Raycaster): Pick | null {
+    const hits = this.bodies.map((body) => body.pick(raycaster)).filter((hit) => hit !== null);
+    hits.sort((a, b) => a.distance - b.distance);
+    return hits[0]?.pick ?? null;
+  }
+
+  private updateTools(frame: FrameMessage): boolean {
+    const { settings, pinned } = this.store.get();
+    let changed = false;
+    this.tools.forEach((view, i) => {
+      const tool = frame.tools[i];
+      if (!tool) return;
+      const contact = frame.contacts.find((one) => one.tool === i) ?? null;
+      const contactRadius = settings?.contact_radius[i] ?? 0;
+      changed = view.update({ tool, contact, contactRadius, pinned: pinned.includes(i) }) || changed;
+    });
+    return changed;
+  }
+
+  private show(): void {
+    const { layers } = this.store.get();
+    for (const body of this.bodies) body.show(layers);
+    this.cut();
+  }
+
+  private faceCut(): void {
+    const axis = facingAxis(this.viewport.towardsViewer());
+    this.store.update({ cut: { ...this.store.get().cut, axis } });
+  }
+
+  private cut(): void {
+    const { axis, share } = this.store.get().cut;
+    const plane = cutPlane(this.bounds, axis, share, this.viewport.towardsViewer());
+    for (const body of this.bodies) body.cut(plane);
+    this.viewport.invalidate();
+  }
+
+  private dispose(): void {
+    for (const view of [...this.bodies, ...this.tools]) view.dispose();
+    this.watched?.view.dispose();
+    this.watched = null;
+  }
+}
+
+function joined(parts: Float32Array[]): Float32Array {
+  const whole = new Float32Array(parts.reduce((length, part) => length + part.length, 0));
+  let at = 0;
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.length;
+  }
+  return whole;
+}

@@ -1,0 +1,123 @@
+// The state of the page, in one place: what the server said last, and what the person has chosen. Parts of the page read
+// it, change it by `update`, and hear of changes of the keys they name.
+
+import type { ConnectionState } from "./net/connection";
+import type {
+  Choice,
+  FrameMessage,
+  Role,
+  SceneMessage,
+  SettingsMessage,
+  StatusMessage,
+} from "./net/protocol";
+
+export type Axis = "x" | "y" | "z";
+export type Layer = "colors" | "wireframe" | "supports" | "cutaway" | "plots";
+export type Tab = "motion" | "loop" | "modes";
+
+/** The tool that the pointer drives: depth of a press or length of a pull, m. */
+export interface Pressing {
+  tool: number;
+  grab: boolean;
+  depth: number;
+}
+
+export interface State {
+  connection: ConnectionState;
+  role: Role;
+  /** Of the program. */
+  version: string;
+  models: Choice[];
+  status: StatusMessage | null;
+  scene: SceneMessage | null;
+  settings: SettingsMessage | null;
+  /** The newest one that is drawn. */
+  frame: FrameMessage | null;
+  notices: readonly string[];
+
+  layers: Readonly<Record<Layer, boolean>>;
+  /** The axis across which the body is cut open, and the share of its extent that is taken away. */
+  cut: Readonly<{ axis: Axis; share: number }>;
+  /** Name of the field in colours; null until one is chosen. */
+  field: string | null;
+  /** The body that stiffness and legend belong to. */
+  body: number;
+  tab: Tab;
+
+  /** Whether a press holds on to the surface; whether a click strikes; the impulse of a strike, N s. */
+  grab: boolean;
+  strike: boolean;
+  impulse: number;
+  pressing: Readonly<Pressing> | null;
+  /** Tools that stay where they were left. */
+  pinned: readonly number[];
+  /** Whether the next press stays where it is let go. */
+  pinNext: boolean;
+}
+
+export function initialState(): State {
+  return {
+    connection: "connecting",
+    role: "watch",
+    version: "",
+    models: [],
+    status: null,
+    scene: null,
+    settings: null,
+    frame: null,
+    notices: [],
+    layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
+    cut: { axis: "y", share: 0.5 },
+    field: null,
+    body: 0,
+    tab: "loop",
+    grab: false,
+    strike: false,
+    impulse: 0,
+    pressing: null,
+    pinned: [],
+    pinNext: false,
+  };
+}
+
+type Listener = (state: Readonly<State>) => void;
+
+export class Store {
+  private state = initialState();
+  private readonly listeners = new Map<keyof State, Set<Listener>>();
+
+  get(): Readonly<State> {
+    return this.state;
+  }
+
+  /** Takes over what differs; listeners hear of it before this returns, each once. */
+  update(change: Partial<State>): void {
+    const changed = (Object.keys(change) as (keyof State)[]).filter((key) => change[key] !== this.state[key]);
+    if (changed.length === 0) return;
+    this.state = { ...this.state, ...change };
+    const concerned = new Set(changed.flatMap((key) => [...(this.listeners.get(key) ?? [])]));
+    // A listener may change the state itself: each gets it as it is by then.
+    for (const listener of concerned) listener(this.state);
+  }
+
+  /** Calls a listener now and after every change of one of the keys. */
+  subscribe(keys: readonly (keyof State)[], listener: Listener): void {
+    for (const key of keys) {
+      const listeners = this.listeners.get(key) ?? new Set();
+      this.listeners.set(key, listeners.add(listener));
+    }
+    listener(this.state);
+  }
+}
+
+/** Whether this page may touch the body. */
+export function inControl({ role, connection }: Readonly<State>): boolean {
+  return role === "control" && connection === "open";
+}
+
+/** The tool that is driven, or that the next press drives; null where all are pinned. */
+export function drivenTool({ scene, pressing, pinned }: Readonly<State>): number | null {
+  if (pressing) return pressing.tool;
+  const free = (scene?.tools ?? []).findIndex((_, tool) => !pinned.includes(tool));
+  return free < 0 ? null : free;
+}

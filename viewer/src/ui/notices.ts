@@ -1,0 +1,86 @@
+// What the page has to say: progress, errors, faults, and the state of the connection.
+
+import type { Control } from "../control";
+import type { ConnectionState } from "../net/connection";
+import type { StatusMessage } from "../net/protocol";
+import { inControl } from "../store";
+import type { Store } from "../store";
+import { byId, setText } from "./dom";
+
+const CONNECTION_WORDS: Record<ConnectionState, string> = {
+  connecting: "Connecting",
+  open: "Connected",
+  lost: "Disconnected",
+  refused: "Refused",
+};
+
+export function showConnection(state: ConnectionState): void {
+  const element = byId("connection");
+  element.dataset["state"] = state;
+  setText(element, CONNECTION_WORDS[state]);
+  // It stays while trying again, so that it does not blink.
+  if (state !== "connecting") byId("connection-banner").hidden = state !== "lost";
+  if (state === "refused") {
+    showPageMessage("This address has no valid token: use the address that palpate printed.");
+  }
+}
+
+export function showPageMessage(text: string): void {
+  byId("page-message").hidden = false;
+  setText(byId("page-message-text"), text);
+  for (const part of ["panel", "canvas"]) byId(part).inert = true;
+}
+
+/** Keeps all of them as the state has them. */
+export function followNotices(store: Store, control: Control): void {
+  byId("status-cancel").onclick = () => control.cancel();
+  store.subscribe(["connection"], ({ connection }) => showConnection(connection));
+  store.subscribe(["version"], ({ version }) => setText(byId("version"), version));
+  store.subscribe(["role", "version"], ({ role, version }) => {
+    byId("watching").hidden = version === "" || role !== "watch";
+  });
+  store.subscribe(["status"], ({ status }) => showStatus(status));
+  store.subscribe(["status", "role", "connection"], (state) => {
+    byId<HTMLButtonElement>("status-cancel").hidden = !inControl(state);
+  });
+  store.subscribe(["frame"], ({ frame }) => showFault(frame?.fault ?? null));
+  store.subscribe(["notices"], ({ notices }) => {
+    byId("notices").replaceChildren(...notices.map((text) => noticeBanner(text, () => control.dismiss(text))));
+  });
+}
+
+function showStatus(status: StatusMessage | null): void {
+  byId("status").hidden = !status?.text;
+  if (!status) return;
+  setText(byId("status-text"), status.text);
+  const progress = byId<HTMLProgressElement>("status-progress");
+  // Without a value the bar shows that something goes on, but not how far it is.
+  if (status.progress === null) progress.removeAttribute("value");
+  else progress.value = status.progress;
+  setText(byId("status-left"), status.left_s === null ? "" : `${duration(status.left_s)} left`);
+}
+
+function showFault(fault: string | null): void {
+  byId("fault").hidden = fault === null;
+  if (fault !== null) setText(byId("fault-text"), fault);
+}
+
+function noticeBanner(text: string, dismiss: () => void): HTMLElement {
+  const notice = document.createElement("div");
+  notice.className = "banner banner-notice";
+  const words = document.createElement("span");
+  words.textContent = text;
+  const close = document.createElement("button");
+  close.type = "button";
+  close.className = "close";
+  close.textContent = "×";
+  close.setAttribute("aria-label", "Dismiss this message");
+  close.onclick = dismiss;
+  notice.append(words, close);
+  return notice;
+}
+
+function duration(seconds: number): string {
+  if (seconds < 90) return `about ${Math.max(1, Math.round(seconds))} s`;
+  return `about ${Math.round(seconds / 60)} min`;
+}

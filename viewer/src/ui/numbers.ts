@@ -1,0 +1,37 @@
+// Numbers as people read them.
+
+export const MINUS = "\u2212";
+
+/** With its sign, two places: +0.42. */
+export function signed(value: number): string {
+  const text = Math.abs(value).toFixed(2);
+  if (Number(text) === 0) return text;
+  return (value < 0 ? MINUS : "+") + text;
+}
+
+/** Three digits where the number has them: 0.42, 3.14, 12.5. */
+export function threeDigits(value: number): string {
+  return value.toFixed(value >= 9.995 ? 1 : 2);
+}
+
+/** A frequency, with its unit. */
+export function hertz(value: number): string {
+  return `${value >= 999.5 ? value.toFixed(0) : value.toPrecision(3)} Hz`;
+}
+
+/** An impulse, with its unit. */
+export function newtonSeconds(value: number): string {
+  return value >= 0.9995e-3 ? `${(1e3 * value).toPrecision(3)} mN s` : `${(1e6 * value).toPrecision(3)} µN s`;
+}
+
+/** A stiffness, with its unit. */
+export function pascals(value: number): string {
+  if (value >= 0.9995e6) return `${(value / 1e6).toPrecision(3)} MPa`;
+  if (value >= 0.9995e3) return `${(value / 1e3).toPrecision(3)} kPa`;
+  return `${value.toPrecision(3)} Pa`;
+}
+
+/** A length in m, told in mm. */
+export function millimetres(metres: number): string {
+  return `${(1000 * metres).toFixed(1)} mm`;
+}

@@ -1,0 +1,165 @@
+// Live plots against time: force and computing time of the loop; displacement and energy of a body in motion.
+
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+
+import type { FrameData } from "../net/protocol";
+import type { Store } from "../store";
+import { byId } from "./dom";
+import { HistoryLog } from "./history_log";
+import { LogWindow, WINDOW_S } from "./log_window";
+
+/** The eye does not follow faster, and every redraw costs the page time. */
+const REDRAW_INTERVAL_MS = 80;
+const HEIGHT_PX = 112;
+/** Above these stands what their lines mean. */
+const MOTION_HEIGHT_PX = 102;
+// Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
+const FONT = "11px system-ui, sans-serif";
+const TEXT_COLOR = "#9aa5b4";
+const GRID = { stroke: "#2a303a", width: 1 };
+/** Spans below these are noise, and would only dance: N, us, mm. */
+const FORCE_SPAN_MIN = 0.5;
+const COMPUTE_SPAN_MIN = 50;
+const DISPLACEMENT_SPAN_MIN = 0.02;
+/** Energies of soft bodies are small. */
+const ENERGY_UNITS: [unit: string, joules: number][] = [
+  ["J", 1],
+  ["mJ", 1e-3],
+  ["µJ", 1e-6],
+  ["nJ", 1e-9],
+];
+
+export class Plots {
+  readonly history = new HistoryLog();
+  private readonly log = new LogWindow();
+  private shown = true;
+  /** Body time shown of a motion, s, and where it begins; null for what has just been. */
+  private span = 1;
+  private origin: number | null = null;
+  private pair: "loop" | "motion" = "loop";
+  private readonly plots: Record<"force" | "compute" | "displacement" | "energy", uPlot>;
+  private drawnMs = 0;
+
+  constructor(store: Store) {
+    const recent = { range: (): [number, number] => [-WINDOW_S, 0], label: () => "time before now (s)" };
+    const moved = {
+      range: (): [number, number] => (this.origin === null ? [-this.span, 0] : [0, this.span]),
+      label: () => (this.origin === null ? "body time before now (s)" : "body time since the strike (s)"),
+    };
+    this.plots = {
+      force: createPlot("plot-force", recent, "force (N)", ["#ffb454"], above(FORCE_SPAN_MIN)),
+      compute: createPlot("plot-compute", recent, "per tick (µs)", ["#6fc3ff"], above(COMPUTE_SPAN_MIN)),
+      displacement: createPlot("plot-displacement", moved, "moved (mm)", ["#ff8f80", "#7ddc9a", "#6fc3ff"], around),
+      energy: createPlot("plot-energy", moved, "energy (µJ)", ["#8d97a6", "#c9a2ff", "#6fc3ff", "#ffb454"], above(0)),
+    };
+    new ResizeObserver(() => this.resize()).observe(byId("plots"));
+    this.follow(store);
+  }
+
+  /** Takes in what a frame carries, drawn or not. */
+  append({ log, history }: FrameData): void {
+    this.log.append(log);
+    this.history.append(history);
+  }
+
+  private follow(store: Store): void {
+    store.subscribe(["layers"], ({ layers }) => (this.shown = layers.plots));
+    store.subscribe(["scene"], ({ scene }) => {
+      this.log.clear();
+      this.history.clear();
+      this.span = scene?.motion?.span ?? 1;
+    });
+    store.subscribe(["tab"], ({ tab }) => {
+      if (tab === "modes") return;
+      this.pair = tab;
+      byId("plots-loop").hidden = tab !== "loop";
+      byId("plots-motion").hidden = tab !== "motion";
+      this.resize();
+      this.refresh(true);
+    });
+    store.subscribe(["frame"], ({ frame, scene }) => {
+      this.origin = scene?.motion?.strike ? (frame?.motion?.struck_at ?? null) : null;
+      this.refresh();
+    });
+  }
+
+  /** Draws what has arrived, if it is time. */
+  private refresh(force = false): void {
+    const nowMs = performance.now();
+    if (!this.shown || (!force && nowMs - this.drawnMs < REDRAW_INTERVAL_MS)) return;
+    this.drawnMs = nowMs;
+    if (this.pair === "motion") return this.drawMotion();
+    const { time, force: newtons, compute } = this.log.read();
+    this.plots.force.setData([time, newtons]);
+    this.plots.compute.setData([time, compute]);
+  }
+
+  private drawMotion(): void {
+    const { time, displacement, kinetic, strain, total, supplied } = this.history.read(this.span, this.origin);
+    this.plots.displacement.setData([time, ...displacement]);
+    const largest = Math.max(1e-9, supplied.reduce((a, b) => Math.max(a, b), 0), total.reduce((a, b) => Math.max(a, b), 0));
+    const [unit, joules] = ENERGY_UNITS.find(([, size]) => largest >= size) ?? ENERGY_UNITS.at(-1)!;
+    this.plots.energy.axes[1]!.label = `energy (${unit})`;
+    const energies = [supplied, kinetic, strain, total].map((column) => column.map((value) => value / joules));
+    this.plots.energy.setData([time, ...energies]);
+  }
+
+  private resize(): void {
+    const { force, compute, displacement, energy } = this.plots;
+    for (const plot of [force, compute, displacement, energy]) {
+      const width = plot.root.parentElement!.clientWidth;
+      const height = plot === force || plot === compute ? HEIGHT_PX : MOTION_HEIGHT_PX;
+      if (width > 0 && width !== plot.width) plot.setSize({ width, height });
+    }
+  }
+}
+
+/** From zero up. */
+function above(spanMin: number): uPlot.Scale.Range {
+  return (_plot, _low, high) => [0, Math.max(spanMin, 1.15 * (high ?? 0)) || 1];
+}
+
+/** To both sides of zero. */
+const around: uPlot.Scale.Range = (_plot, low, high) => {
+  const largest = Math.max(DISPLACEMENT_SPAN_MIN, Math.abs(low ?? 0), Math.abs(high ?? 0));
+  return [-1.15 * largest, 1.15 * largest];
+};
+
+interface TimeAxis {
+  range(): [number, number];
+  label(): string;
+}
+
+function createPlot(id: string, time: TimeAxis, label: string, colors: string[], range: uPlot.Scale.Range): uPlot {
+  const box = byId(id);
+  const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
+  const options: uPlot.Options = {
+    width: 0,
+    height: HEIGHT_PX,
+    padding: [8, 10, 0, 0],
+    legend: { show: false },
+    cursor: { show: false },
+    scales: { x: { time: false, range: () => time.range() }, y: { range } },
+    axes: [
+      {
+        ...axis,
+        size: 17,
+        label: time.label(),
+        labelSize: 13,
+        labelGap: 0,
+        splits: () => fifths(...time.range()),
+        values: (_plot, splits) => splits.map((split) => String(Number(Math.abs(split).toPrecision(3)))),
+      },
+      { ...axis, size: 38, space: 20, label, labelSize: 14, labelGap: 0 },
+    ],
+    series: [{}, ...colors.map((stroke) => ({ stroke, width: 1.25, points: { show: false } }))],
+    hooks: { drawClear: [(plot) => void (plot.axes[0]!.label = time.label())] },
+  };
+  const nothing = [[], ...colors.map(() => [])] as unknown as uPlot.AlignedData;
+  return new uPlot(options, nothing, box);
+}
+
+function fifths(low: number, high: number): number[] {
+  return Array.from({ length: 6 }, (_, i) => low + ((high - low) * i) / 5);
+}

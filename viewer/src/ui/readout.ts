@@ -1,0 +1,60 @@
+// Force, depth and strain over the picture.
+
+import { drivenTool } from "../store";
+import type { State, Store } from "../store";
+import { byId, setText } from "./dom";
+import { MINUS, signed, threeDigits } from "./numbers";
+
+/** Linear elasticity leaves out the square of the gradient; beyond about 10 % that shows. */
+const STRAIN_HONEST_MAX = 0.1;
+/** Strain is told to a tenth of a per cent: what rounds to the limit is not beyond it. */
+const STRAIN_ROUNDING = 0.0005;
+
+export class Readout {
+  private readonly magnitude = byId("force-value");
+  private readonly components = [byId("force-x"), byId("force-y"), byId("force-z")];
+  private readonly pinned = byId("pinned-value");
+  private readonly depthLabel = byId("depth-label");
+  private readonly depth = byId("depth-value");
+  private readonly strain = byId("strain-value");
+  private readonly warning = byId("strain-warning");
+  private readonly limit = byId("limit-notice");
+  private readonly refused = byId("refused-notice");
+
+  constructor(store: Store) {
+    store.subscribe(["frame", "pinned", "pressing"], (state) => this.showForces(state));
+    store.subscribe(["frame"], (state) => this.showStrain(state));
+    store.subscribe(["pressing"], ({ pressing }) => {
+      setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
+      setText(this.depth, pressing ? `${(1000 * pressing.depth).toFixed(1).replace("-", MINUS)} mm` : "–");
+    });
+  }
+
+  /** The force on the device of the driven tool, and in a second line those of pinned ones. */
+  private showForces(state: Readonly<State>): void {
+    const { frame, pinned } = state;
+    const tool = drivenTool(state);
+    const driven = tool === null ? undefined : frame?.tools[tool];
+    const force = driven?.force ?? [0, 0, 0];
+    setText(this.magnitude, threeDigits(Math.hypot(...force)));
+    force.forEach((component, axis) => setText(this.components[axis]!, signed(component)));
+    byId("pinned-line").hidden = pinned.length === 0;
+    const others = pinned.map((other) => threeDigits(Math.hypot(...(frame?.tools[other]?.force ?? [0]))));
+    setText(this.pinned, `${others.join(" · ")} N`);
+    this.refused.hidden = !driven?.active || driven.refused === null;
+    if (driven?.refused) setText(this.refused, driven.refused);
+  }
+
+  private showStrain({ frame, scene }: Readonly<State>): void {
+    const strain = frame?.strain ?? 0;
+    setText(this.strain, (100 * strain).toFixed(1));
+    const limited = frame?.tools.some((tool) => tool.limited) ?? false;
+    this.limit.hidden = !limited;
+    if (scene && limited) setText(this.limit, `Limited to ${Number((100 * scene.strain_limit).toFixed(1))} % strain`);
+    this.warning.hidden = strain < STRAIN_HONEST_MAX + STRAIN_ROUNDING;
+    if (!this.warning.hidden) {
+      const percent = Math.round(100 * strain);
+      setText(this.warning, `${percent} % strain: linear elasticity is honest to about 10 %`);
+    }
+  }
+}
