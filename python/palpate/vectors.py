@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from numbers import Real
 from typing import Any
 
@@ -51,3 +51,16 @@ def three_components(values: Any, what: str, error: type[Error]) -> tuple[float 
 def brief(values: Iterable[float]) -> str:
     """Write numbers to four digits, such as ``[0.012, 0, -1.5]``."""
     return f"[{', '.join(f'{value:.4g}' for value in values)}]"
+
+
+def rotated(vectors: np.ndarray, orientation: Sequence[float]) -> np.ndarray:
+    """Rotate vectors (..., 3) by a unit quaternion `w + v`: `p + 2 v x (v x p + w p)`."""
+    w, v = orientation[0], np.array(orientation[1:])
+    vectors = np.asarray(vectors, dtype=float)
+    return vectors + 2.0 * np.cross(v, np.cross(v, vectors) + w * vectors)
+
+
+def conjugate(orientation: Sequence[float]) -> tuple[float, float, float, float]:
+    """Turn back what a unit quaternion w x y z turns."""
+    w, x, y, z = orientation
+    return w, -x, -y, -z

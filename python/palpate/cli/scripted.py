@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene
-from palpate.simulation import Frame, LimitedTool, Simulation
+from palpate.simulation import Frame, Simulation
 
 # Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
 POINTER_RATE = 120.0
@@ -29,8 +29,8 @@ class PressRecord:
 
 def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     """Press for so many seconds, within the scene's limit of strain."""
-    green = built.green
-    nodes = green.surface_positions
+    body = built.bodies[0]
+    green, nodes = body.green, body.points_to_scene(body.green.surface_positions)
     free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
     if len(free) == 0:
         raise SceneError("the whole surface is fixed: nothing can be pressed")
@@ -39,20 +39,21 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     middle = nodes[:, :2].mean(axis=0)
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
     depth = DEPTH * size
-    rest = top + [0, 0, built.scene.tool.radius]
+    rest = top + [0, 0, built.scene.tools[0].radius]
     logs, limited = [], False
     with Simulation(built) as simulation:
-        tool, hardest = LimitedTool(simulation, built.scene.view.strain_limit), simulation.frame()
+        hardest = simulation.frame()
         start = time.monotonic()
         while (elapsed := time.monotonic() - start) < seconds:
             phase = elapsed / seconds
             push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
-            tool.move(rest - [0, 0, push])
-            limited |= tool.limited
+            simulation.move(rest - [0, 0, push])
             time.sleep(1.0 / POINTER_RATE)
             logs.append(simulation.drain_log())
             # The press is along a line: the largest force has the largest strain.
-            hardest = max(hardest, simulation.frame(), key=lambda frame: np.linalg.norm(frame.forces[0]))
+            frame = simulation.frame()
+            limited |= bool(frame.limited[0])
+            hardest = max(hardest, frame, key=lambda frame: np.linalg.norm(frame.forces[0]))
         last = simulation.frame()
         logs.append(simulation.drain_log())
     return PressRecord(np.concatenate(logs), hardest, last, limited)

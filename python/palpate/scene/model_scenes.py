@@ -17,7 +17,7 @@ DAMPING_RATIOS = (0.03, 0.03)
 
 
 def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
-    """Scene of a built-in model, on its own supports; with ``motion`` it moves.
+    """Scene of a built-in model and two fingers, on its own supports; with ``motion`` it moves.
 
     Raises
     ------
@@ -27,10 +27,10 @@ def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
     """
     if name not in models.NAMES:
         raise SceneError(f"there is no model '{name}'; there are {', '.join(models.NAMES)}")
-    tool = {"radius": TOOLS[name], "contact_radius": TOOLS[name]}
+    finger = {"radius": TOOLS[name], "contact_radius": TOOLS[name]}
     return Scene(
         body={"model": name, "paper": paper},
         material={"youngs_modulus": YOUNGS_MODULUS[name]},
-        tool=tool,
+        tool=[finger, finger],
         dynamics={**MODES[paper], "damping_ratios": DAMPING_RATIOS} if motion else None,
     )

@@ -1,4 +1,4 @@
-"""What is read of a running loop: the latest tick and its contacts."""
+"""What is read of a running loop: the latest tick, its bodies and its contacts."""
 
 from __future__ import annotations
 
@@ -14,33 +14,39 @@ from palpate.vectors import brief
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contact(ComparedByValue):
-    """Contact of one tool. Compared by value, number by number; not hashable.
+    """Contact of a tool with a body. Compared by value, number by number; not hashable.
 
     Attributes
     ----------
-    tool
-        Its number.
+    tool, body
+        Their numbers.
     mode
         ``"press"``, or ``"grab"`` for a tool that holds on.
-    point
-        Contact point on the deformed surface (3,), m.
-    normal
-        Outward normal of the surface there (3,).
-    force
-        On the body (3,), N.
+    point, normal
+        Contact point on the untouched surface (3,), m, and its outward normal (3,), in the world.
+    force, torque
+        On the body (3,), N, and about the tip (3,), N m, in the world.
     anchor
-        Where the tool carries no force (3,), m: the tool's displacement from there is that of the patch.
+        Where the tool carries no force (3,), m, in the world: the tool's displacement from there is that of the patch.
+    displacement
+        Of the tool from the anchor (3,), m, in the world, as far as the limit of strain lets it.
+    limited
+        Whether the tool goes farther than that.
     nodes, weights
-        (k,) nodes of the mesh in the patch, and their weights (k,), which sum to one.
+        (k,) nodes of the body's mesh in the patch, and their weights (k,), which sum to one.
 
     """
 
     tool: int
+    body: int
     mode: str
     point: np.ndarray
     normal: np.ndarray
     force: np.ndarray
+    torque: np.ndarray
     anchor: np.ndarray
+    displacement: np.ndarray
+    limited: bool
     nodes: np.ndarray
     weights: np.ndarray
 
@@ -50,39 +56,83 @@ class Contact(ComparedByValue):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Frame(ComparedByValue, Strained):
+class BodyFrame(ComparedByValue, Strained):
+    """A body at the latest tick. Compared by value, number by number; not hashable.
+
+    Attributes
+    ----------
+    displacements
+        (s, 3) m, in the body's own frame; rows follow the surface nodes.
+    energy
+        Of a body in motion, else None.
+
+    """
+
+    displacements: np.ndarray
+    energy: Energy | None
+    _source: StrainSource = field(compare=False)
+
+    def __repr__(self) -> str:
+        largest = np.linalg.norm(self.displacements, axis=1).max(initial=0.0)
+        return f"BodyFrame({len(self.displacements)} surface nodes, largest displacement {1e3 * largest:.4g} mm)"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Frame(ComparedByValue):
     """The latest tick. Compared by value, number by number; not hashable.
 
     Attributes
     ----------
     time
         Since the start, s.
-    forces
-        (tools, 3) N on the devices.
-    positions
-        (tools, 3) m of the tools.
-    displacements
-        (s, 3) m; rows follow the surface nodes.
+    forces, torques
+        (tools, 3) N on the devices, and (tools, 3) N m about the tips.
+    positions, orientations
+        (tools, 3) m of the devices, and (tools, 4) unit quaternions w x y z.
+    limited
+        (tools,) whether each tool is kept from following its device by the limit of strain.
     contacts
         Of the tools that touch.
+    bodies
+        One a body of the scene.
     statistics
-        ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, ``fault`` (None or
-        what is wrong) and ``realtime`` (priority granted, memory locked).
-    energy
-        Of a body in motion, else None.
+        ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, ``refused`` (for each
+        tool None or why no contact began), ``fault`` (None or what is wrong) and ``realtime`` (priority granted, memory
+        locked).
 
     """
 
     time: float
     forces: np.ndarray
+    torques: np.ndarray
     positions: np.ndarray
-    displacements: np.ndarray
+    orientations: np.ndarray
+    limited: np.ndarray
     contacts: list[Contact]
+    bodies: tuple[BodyFrame, ...]
     statistics: dict
-    energy: Energy | None
-    _source: StrainSource = field(compare=False)
 
     def __repr__(self) -> str:
         forces = ", ".join(brief(force) for force in self.forces)
         contacts = f"{len(self.contacts)} contact{'' if len(self.contacts) == 1 else 's'}"
         return f"Frame({self.time:.3f} s, {contacts}, forces on the devices {forces} N)"
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """Of the first body, (s, 3) m."""
+        return self.bodies[0].displacements
+
+    @property
+    def energy(self) -> Energy | None:
+        """Of the first body that moves; None if none does."""
+        return next((body.energy for body in self.bodies if body.energy is not None), None)
+
+    @property
+    def largest_strain(self) -> float:
+        """Largest principal strain in magnitude over the surfaces of all bodies; milliseconds, when read."""
+        return max(body.largest_strain for body in self.bodies)
+
+    @property
+    def within_linear_range(self) -> bool:
+        """Whether the largest strain is within the 10 % to which linear elasticity is honest."""
+        return all(body.within_linear_range for body in self.bodies)

@@ -14,8 +14,6 @@ LOG_DTYPE = np.dtype(
     + [("watched", "f8", 3), ("body_time", "f8")]
     + [(name, "f8") for name in ("kinetic", "strain", "coupling", "dissipated", "work")]
 )
-# Ticks a second.
-RATE = 1000.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,21 +24,30 @@ class Recording(ComparedByValue):
     ----------
     time
         (t,) s.
-    forces
-        (t, 3) N on the device.
+    forces, torques
+        On the device, (t, 3) N and N m about the tip, for positions (t, 3); (t, tools, 3) for positions (t, tools, 3).
     displacements
-        (t, watched nodes, 3) m.
-    energy
-        Over the ticks; None for a body that does not move.
+        (t, watched nodes, 3) m, in the frames of the bodies.
+    limited
+        (t,) or (t, tools): whether the limit of strain kept a tool from following its device.
+    energies
+        For each body over the ticks; None for one that does not move.
 
     """
 
     time: np.ndarray
     forces: np.ndarray
+    torques: np.ndarray
     displacements: np.ndarray
-    energy: Energy | None
+    limited: np.ndarray
+    energies: tuple[Energy | None, ...]
+
+    @property
+    def energy(self) -> Energy | None:
+        """Of the first body that moves; None if none does."""
+        return next((energy for energy in self.energies if energy is not None), None)
 
     def __repr__(self) -> str:
-        largest = np.linalg.norm(self.forces, axis=1).max(initial=0.0)
+        largest = np.linalg.norm(self.forces, axis=-1).max(initial=0.0)
         watched = f"{self.displacements.shape[1]} nodes watched"
         return f"Recording({len(self.time)} ticks, largest force {largest:.4g} N, {watched})"

@@ -9,15 +9,19 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
+from palpate.body import Body
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
-from palpate.scene import BodyMotion, BuiltScene, Scene
-from palpate.simulation.frame import Contact, Frame
-from palpate.simulation.recording import LOG_DTYPE, RATE, Recording
+from palpate.green import GreensFunction
+from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
+from palpate.simulation.frame import BodyFrame, Contact, Frame
+from palpate.simulation.recording import LOG_DTYPE, Recording
+from palpate.simulation.script import grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
 PERCENTILES = ("p50", "p99", "p999", "max")
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
 class Simulation:
@@ -32,12 +36,10 @@ class Simulation:
 
     Attributes
     ----------
-    body
-        The body; None for a scene of a store, which knows only its surface.
-    green
-        Its Green's function.
-    motion
-        Its modes and time integration; None for a body at rest.
+    scene
+        Its tables.
+    bodies
+        Its bodies, with their Green's functions.
 
     Raises
     ------
@@ -48,29 +50,25 @@ class Simulation:
 
     def __init__(self, scene: Scene | BuiltScene):
         built = scene if isinstance(scene, BuiltScene) else scene.build()
-        self.scene, self.body, self.green = built.scene, built.body, built.green
-        tool, device = self.scene.tool, self.scene.device
-        self._scale = 1.0
-        self._tools = 1
-        self._targets = [(0.0, 0.0, 0.0)] * self._tools
-        self._grab = [False] * self._tools
-        limits = (device.max_force, device.max_slew, device.ramp)
-        self._contact_radius = tool.contact_radius
-        self.motion = built.motion
+        self.scene, self.bodies = built.scene, built.bodies
+        device, tools = self.scene.device, self.scene.tools
+        self._scales = [1.0] * len(self.bodies)
+        self._radii = [tool.contact_radius for tool in tools]
+        self._targets: list[tuple[Any, Any]] = [((0.0, 0.0, 0.0), UPRIGHT)] * len(tools)
+        self._grab = [False] * len(tools)
         self._core = _native.SimulationCore(
-            self.green._core,
-            self._tools,
-            tool.radius,
-            tool.contact_radius,
-            device.max_stiffness,
-            limits,
-            None if built.motion is None else self._moving(built.motion),
+            [_body_arguments(body) for body in self.bodies],
+            [(tool.radius, tool.contact_radius, tool.contact, device.max_stiffness) for tool in tools],
+            (device.max_force, device.max_slew, device.ramp),
+            self.scene.view.strain_limit,
+            device.rate,
         )
+        self._strain_limit, self._armed = self.scene.view.strain_limit, False
         self._running = False
 
     def __repr__(self) -> str:
-        tools = f"{self._tools} tool{'s' if self._tools > 1 else ''}"
-        moves = "" if self.motion is None else ", a body in motion"
+        tools = f"{len(self._radii)} tool{'s' if len(self._radii) > 1 else ''}"
+        moves = ", a body in motion" if any(body.motion for body in self.bodies) else ""
         return f"Simulation({self.scene.name}, {tools}{moves}, {'running' if self._running else 'stopped'})"
 
     def __enter__(self) -> Simulation:
@@ -82,9 +80,25 @@ class Simulation:
     ) -> None:
         self.stop()
 
+    @property
+    def body(self) -> Body | None:
+        """The first body; None for one from a store, which knows only its surface."""
+        return self.bodies[0].body
+
+    @property
+    def green(self) -> GreensFunction:
+        """Green's function of the first body."""
+        return self.bodies[0].green
+
+    @property
+    def motion(self) -> BodyMotion | None:
+        """Modes and time integration of the first body; None at rest."""
+        return self.bodies[0].motion
+
     def start(self) -> None:
         """Start the loop; tools are out of the scene until moved."""
         if not self._running:
+            self._arm_strain_limit()
             self._core.start()
             self._running = True
 
@@ -93,49 +107,64 @@ class Simulation:
         self._core.stop()
         self._running = False
 
-    def move(self, position: Sequence[float], velocity: Sequence[float] | None = None, tool: int = 0) -> None:
-        """Send a simulated tool to a position, m. It follows smoothly; ``velocity`` is derived from its path.
+    def move(
+        self,
+        position: Sequence[float],
+        velocity: Sequence[float] | None = None,
+        tool: int = 0,
+        orientation: Sequence[float] | None = None,
+    ) -> None:
+        """Send a simulated tool to a position, m, and an orientation, a unit quaternion w x y z.
+
+        It follows smoothly. With a ``velocity``, m/s, the target goes on from there at that velocity until the next
+        call, for a tenth of a second at most, so that a moving pointer is followed without delay.
 
         Raises
         ------
         SceneError
-            No such tool, or a position that is not three finite numbers.
+            No such tool, or numbers that are not finite.
 
         """
-        del velocity  # the simulated hand has its own
-        self._targets[self._tool(tool)] = three_numbers(position, "a tool's position", SceneError)
-        self._core.set_target(tool, self._targets[tool], True, self._grab[tool])
+        place = three_numbers(position, "a tool's position", SceneError)
+        moving = (0.0, 0.0, 0.0) if velocity is None else three_numbers(velocity, "a tool's velocity", SceneError)
+        turned = self._targets[self._tool(tool)][1]
+        if orientation is not None:
+            turned = tuple(orientations_of([orientation], np.array([[place]]))[0, 0].tolist())
+        self._targets[tool] = (place, turned)
+        self._core.set_target(tool, place, turned, moving, True, self._grab[tool])
 
     def grab(self, on: bool, tool: int = 0) -> None:
         """Grab the surface near the tool, or let go."""
         self._grab[self._tool(tool)] = bool(on)
-        self._core.set_target(tool, self._targets[tool], True, bool(on))
+        self._core.set_target(tool, *self._targets[tool], (0.0, 0.0, 0.0), True, bool(on))
 
     def remove(self, tool: int = 0) -> None:
         """Take a tool out of the scene until it is moved again."""
         self._grab[self._tool(tool)] = False
-        self._core.set_target(tool, self._targets[tool], False, False)
+        self._core.set_target(tool, *self._targets[tool], (0.0, 0.0, 0.0), False, False)
 
-    def set_radius(self, contact_radius: float) -> None:
-        """Contact radius of contacts that begin from now on, m."""
-        self._core.configure(float(contact_radius), self._scale, False)
-        self._contact_radius = float(contact_radius)
+    def set_radius(self, contact_radius: float, tool: int | None = None) -> None:
+        """Contact radius of contacts that begin from now on, m, of one tool or of all.
+
+        Raises
+        ------
+        Error
+            A radius under which a contact would cover more nodes than a tick can weigh.
+
+        """
+        tools = range(len(self._radii)) if tool is None else [self._tool(tool)]
+        for changed in tools:
+            self._core.set_contact_radius(changed, float(contact_radius))
+            self._radii[changed] = float(contact_radius)
+
+    def contact_radius_of(self, tool: int = 0) -> float:
+        """Contact radius of contacts of a tool that begin from now on, m."""
+        return self._radii[self._tool(tool)]
 
     @property
     def contact_radius(self) -> float:
-        """Contact radius of contacts that begin from now on, m."""
-        return self._contact_radius
-
-    @property
-    def youngs_modulus(self) -> float | None:
-        """Young's modulus now, Pa; None for a body of several materials, with loads, or in motion."""
-        reference = self.green.youngs_modulus
-        return None if reference is None or self.motion is not None else reference * self._scale
-
-    @property
-    def stiffness_scale(self) -> float:
-        """Young's modulus now over that of the Green's function."""
-        return self._scale
+        """Contact radius of contacts of the first tool that begin from now on, m."""
+        return self._radii[0]
 
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
@@ -147,22 +176,74 @@ class Simulation:
             low, high = (middle, high) if self._core.accepts_contact_radius(middle) else (low, middle)
         return low
 
-    def set_youngs_modulus(self, youngs_modulus: float) -> None:
-        """Change the stiffness of a body of one material at rest, without loads, Pa: it only scales the compliance."""
-        reference = self.green.youngs_modulus
-        if reference is None or self.motion is not None:
+    def youngs_modulus_of(self, body: int = 0) -> float | None:
+        """Young's modulus of a body now, Pa; None for one of several materials, with loads, or in motion."""
+        reference = self.bodies[self._body(body)].green.youngs_modulus
+        fixed = reference is None or self.bodies[body].motion is not None
+        return None if fixed else reference * self._scales[body]
+
+    @property
+    def youngs_modulus(self) -> float | None:
+        """Young's modulus of the first body now, Pa, as of :meth:`youngs_modulus_of`."""
+        return self.youngs_modulus_of()
+
+    def stiffness_scale_of(self, body: int = 0) -> float:
+        """Young's modulus of a body now over that of its Green's function."""
+        return self._scales[self._body(body)]
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Young's modulus of the first body now over that of its Green's function."""
+        return self._scales[0]
+
+    def set_youngs_modulus(self, youngs_modulus: float, body: int = 0) -> None:
+        """Change the stiffness of a body of one material at rest, without loads, Pa: it only scales the compliance.
+
+        Raises
+        ------
+        SceneError
+            A body whose stiffness is part of what was computed, or a modulus that is not positive.
+
+        """
+        reference = self.bodies[self._body(body)].green.youngs_modulus
+        if reference is None or self.bodies[body].motion is not None:
             raise SceneError(
                 "the body has several materials, or loads, or moves: its stiffness cannot be changed while running"
             )
         if not (np.isfinite(youngs_modulus) and youngs_modulus > 0):
             raise SceneError(f"Young's modulus must be positive, got {youngs_modulus} Pa")
-        self._scale = youngs_modulus / reference
-        self._core.configure(self._contact_radius, self._scale, False)
+        self._scales[body] = youngs_modulus / reference
+        self._core.set_stiffness_scale(body, self._scales[body])
 
-    def strike(self, point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> None:
+    def set_strain_limit(self, strain_limit: float) -> None:
+        """Largest strain to which tools may take the bodies from now on; 0 takes the limit away.
+
+        Raises
+        ------
+        SceneError
+            A limit below 0 or above 1.
+
+        """
+        if not 0.0 <= strain_limit <= 1.0:
+            raise SceneError(f"the limit of strain must lie in [0, 1], got {strain_limit}")
+        self._strain_limit = float(strain_limit)
+        self._arm_strain_limit()
+        self._core.set_strain_limit(self._strain_limit)
+
+    def _arm_strain_limit(self) -> None:
+        """Give the loop what measures strain, once it is asked to limit it: it takes a factor of every body."""
+        if self._strain_limit > 0 and not self._armed:
+            for rank, body in enumerate(self.bodies):
+                self._core.set_strain_measure(rank, body.green.strain_measure.native)
+            self._armed = True
+
+    def strike(
+        self, point: Sequence[float], impulse: Sequence[float], duration: float = 0.0, body: int | None = None
+    ) -> None:
         """Strike a body in motion: an impulse (3,), N s, on the patch around the surface point closest to ``point``, m.
 
-        The force is half a wave of ``duration``, s; it takes one time step at least and a thousand at most.
+        The patch has the contact radius of the first tool. The force is half a wave of ``duration``, s; it takes one
+        time step at least and a thousand at most. ``body`` is the first that moves unless it is given.
 
         Raises
         ------
@@ -170,24 +251,24 @@ class Simulation:
             A body that does not move, or numbers that are not finite.
 
         """
-        self._require_motion("strike")
-        self._core.strike(*_strike(point, impulse, duration))
+        struck = self._moving_body("strike", body)
+        self._core.strike(struck, *strike_of(point, impulse, duration), self._radii[0])
 
     def set_time_scale(self, time_scale: float) -> None:
-        """Seconds that a body in motion advances in a second, in (0, 1]: below one is slow motion.
+        """Seconds that bodies in motion advance in a second, in (0, 1]: below one is slow motion.
 
         Raises
         ------
         SceneError
-            A body that does not move, or a scale outside of (0, 1].
+            No body moves, or a scale outside of (0, 1].
 
         """
-        self._require_motion("slow motion")
+        self._moving_body("slow motion", None)
         if not 0 < time_scale <= 1:
             raise SceneError(f"the time scale must lie in (0, 1], got {time_scale}")
         self._core.set_time_scale(float(time_scale))
 
-    def watch(self, node: int) -> None:
+    def watch(self, node: int, body: int = 0) -> None:
         """Log the displacement of a surface node (mesh index) from now on; at first it is the lowest one's.
 
         Raises
@@ -196,11 +277,11 @@ class Simulation:
             A node that is not on the surface.
 
         """
-        self._core.watch(int(self._ranks_of([node])[0]))
+        self._core.watch(self._body(body), self._rank_of(node, body))
 
     def reset(self) -> None:
         """Let go of everything and clear a latched fault; forces ramp in anew."""
-        self._core.configure(self._contact_radius, self._scale, True)
+        self._core.reset()
 
     def frame(self) -> Frame:
         """Read the latest tick.
@@ -214,26 +295,29 @@ class Simulation:
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
-        contacts = [self._contact(record) for record in raw["contacts"]]
         statistics = {k: raw[k] for k in ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused")}
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
-        displacements = raw["displacements"].reshape(-1, 3)
-        forces, positions = np.array(raw["forces"]), np.array(raw["positions"])
-        energy = None if raw["energy"] is None else Energy(*raw["energy"])
-        return Frame(raw["time"], forces, positions, displacements, contacts, statistics, energy, self)
+        bodies = tuple(
+            BodyFrame(displacements.reshape(-1, 3), None if energy is None else Energy(*energy), body.green)
+            for body, (displacements, energy) in zip(self.bodies, raw["bodies"], strict=True)
+        )
+        tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "limited")]
+        contacts = [self._contact(record) for record in raw["contacts"]]
+        return Frame(raw["time"], *tools, contacts, bodies, statistics)
 
     def contacts(self) -> list[Contact]:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
         return [self._contact(record) for record in self._core.contacts() or []]
 
-    def contact_response(self, tool: int = 0) -> tuple[Contact, np.ndarray] | None:
+    def contact_response(self, tool: int = 0, body: int = 0) -> tuple[Contact, np.ndarray] | None:
         """Contact of a tool, and the surface's displacements (3, s, 3) per unit displacement of the tool along an axis.
 
-        The tool's displacement counts from the anchor; the surface is at `u_free` plus these fields times its
-        components, with the stiffness of contacts limited as in the force loop; None for a tool that does not touch.
+        The tool's displacement counts from the anchor, along the axes of the body's own frame; the surface is at
+        `u_free` plus these fields times its components, with the stiffness of contacts limited as in the force loop; None
+        for a tool that does not touch the body.
         """
-        answer = self._core.contact_response(self._tool(tool))
+        answer = self._core.contact_response(self._tool(tool), self._body(body))
         if answer is None:
             return None
         record, fields = answer
@@ -241,10 +325,10 @@ class Simulation:
 
     @property
     def strain_measure(self) -> StrainMeasure:
-        """Measure of the largest strain of frames."""
+        """Measure of the largest strain of the first body."""
         return self.green.strain_measure
 
-    def stress(self, displacements: np.ndarray) -> SurfaceStress:
+    def stress(self, displacements: np.ndarray, body: int = 0) -> SurfaceStress:
         """Stress and strain at the surface nodes, for a frame's or an answer's displacements (s, 3), m; milliseconds.
 
         Raises
@@ -253,28 +337,36 @@ class Simulation:
             A body from a store, which knows only its surface.
 
         """
-        measure = self.strain_measure
+        measure = self.bodies[self._body(body)].green.strain_measure
         if not isinstance(measure, ElementStrain):
             raise SceneError("a body from a store knows only its surface: stress needs its elements")
         field = measure.recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
-        return SurfaceStress(self._scale * field.stress, field.strain)
+        return SurfaceStress(self._scales[body] * field.stress, field.strain)
 
     def drain_log(self) -> np.ndarray:
         """Rows of the 1 kHz log since the last call.
 
-        ``time``, ``position``, ``force``, ``compute_us``, ``wakeup_us``; ``watched``, the displacement of the node of
-        :meth:`watch`, m; and of a body in motion ``body_time``, s, and its energies, J, as in :class:`palpate.Energy`.
+        ``time``; ``position`` and ``force`` of the first tool, ``compute_us``, ``wakeup_us``; ``watched``, the
+        displacement of the node of :meth:`watch`, m; and of the body of that node, if it moves, ``body_time``, s, and
+        its energies, J, as in :class:`palpate.Energy`.
         """
         return np.ascontiguousarray(self._core.drain_log()).view(LOG_DTYPE)
 
-    def run(self, positions: np.ndarray) -> np.ndarray:
-        """Move the tool through (t, 3) positions, m, one tick each, without a clock; the same path gives the same bits.
+    def run(self, positions: np.ndarray, orientations: np.ndarray | None = None) -> np.ndarray:
+        """Move the tools through positions, one tick a row, without a clock; the same path gives the same bits.
+
+        Parameters
+        ----------
+        positions
+            (t, 3) m of the first tool, or (t, tools, 3).
+        orientations
+            Unit quaternions w x y z (t, 4) or (t, tools, 4); left out, tools do not turn.
 
         Returns
         -------
         numpy.ndarray
-            (t, 3) force on the device after the safety stage, N.
+            (t, 3) or (t, tools, 3) force on the devices after the safety stage, N.
 
         Raises
         ------
@@ -284,28 +376,34 @@ class Simulation:
             A fault that latched within the run.
 
         """
-        path = _path(positions)
-        bad = np.flatnonzero(~np.isfinite(path).all(axis=1))
-        if bad.size:
-            raise SceneError(f"position {bad[0]} is not finite")
-        return self.play(path).forces
+        path = positions_of(positions, len(self._radii))
+        bad = np.argwhere(~np.isfinite(path).all(axis=2))
+        if len(bad):
+            raise SceneError(f"position {bad[0, 0]} is not finite")
+        return self.play(positions, orientations).forces
 
     def play(
         self,
         positions: np.ndarray,
+        orientations: np.ndarray | None = None,
         strikes: Sequence[tuple] = (),
-        watch: Sequence[int] = (),
+        watch: Sequence[int | tuple[int, int]] = (),
+        grabs: np.ndarray | None = None,
     ) -> Recording:
         """Run a script of ticks without a clock; the same script gives the same bits.
 
         Parameters
         ----------
         positions
-            (t, 3) m of the tool; a row of NaN takes it out of the scene.
+            (t, 3) m of the first tool, or (t, tools, 3); a row of NaN takes a tool out of the scene.
+        orientations
+            Unit quaternions w x y z (t, 4) or (t, tools, 4); left out, tools do not turn.
         strikes
             Strikes ``(tick, point, impulse)`` or ``(tick, point, impulse, duration)``, as of :meth:`strike`.
         watch
-            Surface nodes whose displacements are recorded.
+            Surface nodes of the first body, or pairs of a body and its node, whose displacements are recorded.
+        grabs
+            (t,) or (t, tools): whether a tool holds on to what it touches.
 
         Raises
         ------
@@ -315,54 +413,59 @@ class Simulation:
             A fault that latched within the run.
 
         """
-        path = _path(positions)
-        if strikes:
-            self._require_motion("strike")
-        struck = [(int(tick), *_strike(*strike)) for tick, *strike in strikes]
-        ranks = self._ranks_of(watch)
-        forces, energies, moved, fault = self._core.run(
-            path, sorted(struck, key=lambda strike: strike[0]), ranks.tolist()
-        )
-        if fault is not None:
-            raise SimulationError(fault)
-        energy = Energy(*energies.reshape(-1, 5).T) if len(energies) else None
-        time = np.arange(1, len(path) + 1) / RATE
-        return Recording(time, forces.reshape(-1, 3), moved.reshape(len(path), len(ranks), 3), energy)
+        path = positions_of(positions, len(self._radii))
+        turned, held = orientations_of(orientations, path), grabs_of(grabs, path)
+        body = self._moving_body("strike", None) if strikes else 0
+        struck = [(int(tick), body, *strike_of(*strike), self._radii[0]) for tick, *strike in strikes]
+        nodes = [(0, node) if np.ndim(node) == 0 else tuple(node) for node in watch]
+        ranks = [(self._body(body), self._rank_of(node, body)) for body, node in nodes]
+        self._arm_strain_limit()
+        raw = self._core.run(path, turned, held, sorted(struck, key=lambda strike: strike[0]), ranks)
+        if raw["fault"] is not None:
+            raise SimulationError(raw["fault"])
+        ticks, tools = path.shape[:2]
+        shape = (ticks, 3) if np.ndim(positions) == 2 else (ticks, tools, 3)
+        forces, torques = (raw[name].reshape(shape) for name in ("forces", "torques"))
+        energies = tuple(Energy(*rows.reshape(-1, 5).T) if len(rows) else None for rows in raw["energies"])
+        time = np.arange(1, ticks + 1) / self.scene.device.rate
+        limited = raw["limited"].astype(bool).reshape(shape[:-1])
+        return Recording(time, forces, torques, raw["watched"].reshape(ticks, len(ranks), 3), limited, energies)
 
-    def _moving(self, motion: BodyMotion) -> tuple:
-        shapes = motion.basis.shapes[self.green.surface_nodes].reshape(-1, len(motion.basis))
-        return motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling
+    def _rank_of(self, node: int, body: int) -> int:
+        surface = self.bodies[body].green.surface_nodes
+        rank = int(np.searchsorted(surface, node))
+        if rank == len(surface) or surface[rank] != node:
+            raise SceneError(f"node {node} is not on the surface: it cannot be watched")
+        return rank
 
-    def _ranks_of(self, nodes: Sequence[int]) -> np.ndarray:
-        watched = np.asarray(nodes, dtype=np.int64)
-        absent = np.setdiff1d(watched, self.green.surface_nodes)
-        if absent.size:
-            raise SceneError(f"node {absent[0]} is not on the surface: it cannot be watched")
-        return np.searchsorted(self.green.surface_nodes, watched)
-
-    def _require_motion(self, what: str) -> None:
-        if self.motion is None:
+    def _moving_body(self, what: str, body: int | None) -> int:
+        moving = [rank for rank, one in enumerate(self.bodies) if one.motion is not None]
+        chosen = next(iter(moving), None) if body is None else self._body(body)
+        if chosen not in moving:
             raise SceneError(f"{what}: the body does not move; give the scene a [dynamics] table")
+        return chosen
 
     def _contact(self, record: tuple[Any, ...]) -> Contact:
-        tool, mode, vectors, nodes, weights = record
-        return Contact(tool, mode, *map(np.array, vectors), self.green.surface_nodes[nodes], np.array(weights))
+        tool, body, mode, vectors, limited, nodes, weights = record
+        nodes = self.bodies[body].green.surface_nodes[nodes]
+        return Contact(tool, body, mode, *map(np.array, vectors), limited, nodes, np.array(weights))
 
     def _tool(self, tool: int) -> int:
-        if not 0 <= tool < self._tools:
-            raise SceneError(f"there is no tool {tool}: the scene has {self._tools}")
+        if not 0 <= tool < len(self._radii):
+            raise SceneError(f"there is no tool {tool}: the scene has {len(self._radii)}")
         return tool
 
-
-def _strike(point: Sequence[float], impulse: Sequence[float], duration: float = 0.0) -> tuple:
-    if not (np.isfinite(duration) and duration >= 0):
-        raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
-    where = three_numbers(point, "a strike's point", SceneError)
-    return where, three_numbers(impulse, "a strike's impulse", SceneError), float(duration)
+    def _body(self, body: int) -> int:
+        if not 0 <= body < len(self.bodies):
+            raise SceneError(f"there is no body {body}: the scene has {len(self.bodies)}")
+        return body
 
 
-def _path(positions: np.ndarray) -> np.ndarray:
-    path = np.ascontiguousarray(positions, dtype=np.float64)
-    if path.ndim != 2 or path.shape[1] != 3:
-        raise SceneError(f"positions must have shape (ticks, 3), got {path.shape}")
-    return path
+def _body_arguments(body: BuiltBody) -> tuple[Any, ...]:
+    """Arrays of one body in the order of the native module."""
+    motion = body.motion
+    moving = None
+    if motion is not None:
+        shapes = motion.basis.shapes[body.green.surface_nodes].reshape(-1, len(motion.basis))
+        moving = (motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling)
+    return body.green._core, body.position, body.orientation, moving

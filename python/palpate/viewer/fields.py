@@ -64,12 +64,14 @@ class Fields:
         Where displacements come from.
     size
         Of the body, m.
+    body
+        Which of the simulation's bodies.
 
     """
 
-    def __init__(self, simulation: Simulation, size: float):
-        self._simulation, self._size = simulation, size
-        measure = simulation.strain_measure
+    def __init__(self, simulation: Simulation, size: float, body: int = 0):
+        self._simulation, self._size, self._body = simulation, size, body
+        self._measure = measure = simulation.bodies[body].green.strain_measure
         self._surface = measure if isinstance(measure, SurfaceStrain) else None
         self._recovery = measure.recovery if isinstance(measure, ElementStrain) else None
         self.offered = [DISPLACEMENT, SURFACE_STRAIN] if self._recovery is None else [DISPLACEMENT, STRAIN]
@@ -83,7 +85,7 @@ class Fields:
         """Largest strain of a pose (s, 3), m, as :mod:`palpate.fields.strain_measure` has it."""
         pose = self._of(displacements)
         if self._recovery is None:
-            return pose.once("largest", lambda: self._simulation.strain_measure.largest(displacements))
+            return pose.once("largest", lambda: self._measure.largest(displacements))
         return float(largest_magnitude(self._stress(pose).strain).max())
 
     def picture(self, name: str, displacements: np.ndarray, interior: bool) -> Picture:
@@ -109,7 +111,7 @@ class Fields:
         if field is STRAIN:
             return 100.0 * largest_magnitude(found.strain)
         # A stiffness changed while running scales stress, not strain.
-        scale = self._simulation.stiffness_scale
+        scale = self._simulation.stiffness_scale_of(self._body)
         return scale * (found.von_mises if field is VON_MISES else extreme_values(found.stress)[0])
 
     def _range(self, field: Field, largest: float) -> float:
@@ -126,7 +128,7 @@ class Fields:
         if field.unit == "%":
             return 100.0 * LEAST
         assert self._recovery is not None
-        return LEAST * self._recovery.largest_youngs_modulus * self._simulation.stiffness_scale
+        return LEAST * self._recovery.largest_youngs_modulus * self._simulation.stiffness_scale_of(self._body)
 
     def _of(self, displacements: np.ndarray) -> _Pose:
         """Keep what is known already of a pose that is the one before."""
@@ -144,7 +146,7 @@ class Fields:
 
     def _stress_inside(self, pose: _Pose) -> SurfaceStress:
         if self._inside is None:  # most people never cut
-            body = self._simulation.body
+            body = self._simulation.bodies[self._body].body
             assert body is not None
             self._inside = StressRecovery(body, np.arange(len(body.mesh.nodes)), self._interior)
         recover = self._inside.recover_inside

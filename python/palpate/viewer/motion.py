@@ -12,7 +12,7 @@ from palpate.body import free_end
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
 from palpate.fields import HONEST_STRAIN
-from palpate.scene import BuiltScene, StrikeTable
+from palpate.scene import StrikeTable
 from palpate.simulation import Contact, Simulation
 from palpate.viewer.messages import vector, whole
 
@@ -46,8 +46,6 @@ class MovingBody:
     ----------
     simulation
         The running loop.
-    built
-        Its scene, with a motion and a body.
     size
         Of the body, m.
     index
@@ -55,13 +53,15 @@ class MovingBody:
 
     """
 
-    def __init__(self, simulation: Simulation, built: BuiltScene, size: float, index: int = 0):
+    def __init__(self, simulation: Simulation, size: float, index: int = 0):
+        built, scene = simulation.bodies[index], simulation.scene
+        dynamics = scene.bodies[index].dynamics or scene.dynamics
+        assert built.motion is not None and built.body is not None and dynamics is not None
         self.index = index
-        assert built.motion is not None and built.body is not None and built.scene.dynamics is not None
-        self._simulation, self._size = simulation, size
+        self._simulation, self._size, self._built = simulation, size, built
         self._green, self._motion = built.green, built.motion
-        self._first_strike = built.scene.dynamics.strike
-        self._patch_radius = built.scene.tool.contact_radius
+        self._first_strike = dynamics.strike
+        self._patch_radius = scene.tools[0].contact_radius
         self._duration = STRIKE_PERIODS / float(built.motion.basis.frequencies[0])
         self.watched = self._closest_node(self._first_strike.point) if self._first_strike else free_end(built.body)
         self.impulse = self._default_impulse()
@@ -70,7 +70,7 @@ class MovingBody:
         self.struck_at: float | None = None
         self._mode: _ShownMode | None = None
         self._touched: np.ndarray | None = None
-        simulation.watch(self.watched)
+        simulation.watch(self.watched, index)
         self.set_time_scale(self._first_time_scale())
 
     def header(self) -> dict[str, Any]:
@@ -116,7 +116,9 @@ class MovingBody:
     def _give(self, strike: StrikeTable, now: float) -> None:
         self.end_mode()
         self._watch(self._closest_node(strike.point))
-        self._simulation.strike(strike.point, strike.impulse, strike.duration)
+        point = self._built.points_to_scene(np.array(strike.point))
+        impulse = self._built.vectors_to_scene(np.array(strike.impulse))
+        self._simulation.strike(point.tolist(), impulse.tolist(), strike.duration, self.index)
         self.struck_at = now
 
     def set_time_scale(self, time_scale: float) -> None:
@@ -146,7 +148,7 @@ class MovingBody:
 
     def follow(self, contacts: list[Contact]) -> None:
         """Watch the node in the middle of a contact that has begun."""
-        contact = contacts[0] if contacts else None
+        contact = next((contact for contact in contacts if contact.body == self.index), None)
         if contact is not None and not np.array_equal(contact.point, self._touched):
             self._watch(int(contact.nodes[np.argmax(contact.weights)]))
         self._touched = None if contact is None else contact.point
@@ -160,7 +162,7 @@ class MovingBody:
 
     def _watch(self, node: int) -> None:
         self.watched = node
-        self._simulation.watch(node)
+        self._simulation.watch(node, self.index)
 
     def _closest_node(self, point: Any) -> int:
         positions = self._green.surface_positions + self._green.free_displacements
@@ -175,7 +177,7 @@ class MovingBody:
 
     def _strain_of(self, displacements: np.ndarray) -> float:
         """Largest strain of displacements alone, without that of the body's own loads."""
-        measure, free = self._simulation.strain_measure, self._green.free_displacements
+        measure, free = self._green.strain_measure, self._green.free_displacements
         return float(measure.magnitudes(measure.sample(free + displacements) - measure.sample(free)).max())
 
     def _default_impulse(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import ViewerError
 from palpate.scene import BuiltScene
-from palpate.simulation import Contact, Frame, LimitedTool, Simulation
+from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
 from palpate.viewer.messages import by_body, encode, index, number, vector
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
@@ -24,8 +24,6 @@ REACH = 10.0
 # Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
 LOG_KEPT = 4000
 LOG_SENT = 64
-# What a tool is told where no contact begins.
-REFUSED = "No contact here: outside the region that may be touched, or too many nodes under the tool"
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -52,23 +50,30 @@ class Session:
         self.built = built
         scene = built.scene
         self.simulation = Simulation(built)
-        extent = np.ptp(built.green.surface_positions, axis=0)
-        ratio = None if built.body is None else scene.material.poissons_ratio
-        fields = Fields(self.simulation, float(extent.max()))
-        self._bodies = [ShownBody(scene.name, built.body, built.green, fields, ratio)]
-        placed = np.vstack([body.placed(body.green.surface_positions) for body in self._bodies])
+        self._bodies = [self._shown(body) for body in range(len(built.bodies))]
+        placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
         low, high = placed.min(axis=0), placed.max(axis=0)
         self._centre, self.size = 0.5 * (low + high), float((high - low).max())
-        self._tools = [LimitedTool(self.simulation, scene.view.strain_limit, tool) for tool in range(1)]
-        self._active = [False] * len(self._tools)
+        self._active = [False] * len(scene.tools)
         largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
-        self._max_radii = [max(largest, scene.tool.contact_radius) for _ in self._tools]
-        self._moving = None if built.motion is None else MovingBody(self.simulation, built, self.size)
+        self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
+        moving = next((body for body, one in enumerate(built.bodies) if one.motion is not None), None)
+        self._moving = None if moving is None else MovingBody(self.simulation, self._extent(moving), moving)
         self._log, self._history = _Tail(3), _Tail(HISTORY_COLUMNS)
         self._body_time = 0.0
         self._frame: Frame | None = None
         self._frame_time = 0.0
         self.simulation.start()
+
+    def _extent(self, body: int) -> float:
+        """Longest side of a body, m."""
+        return float(np.ptp(self.built.bodies[body].green.surface_positions, axis=0).max())
+
+    def _shown(self, body: int) -> ShownBody:
+        built, scene = self.built.bodies[body], self.built.scene
+        material = scene.bodies[body].material or scene.material
+        ratio = None if built.body is None else material.poissons_ratio
+        return ShownBody(built, Fields(self.simulation, self._extent(body), body), ratio)
 
     def close(self) -> None:
         """Stop the loop."""
@@ -78,16 +83,16 @@ class Session:
         """Message with what the sliders show: a value for each body, or for each tool."""
         return {
             "type": "settings",
-            "youngs_modulus": [self._youngs_modulus(body) for body in range(len(self._bodies))],
-            "contact_radius": [self._contact_radius(tool) for tool in range(len(self._tools))],
+            "youngs_modulus": [self.simulation.youngs_modulus_of(body) for body in range(len(self._bodies))],
+            "contact_radius": [self.simulation.contact_radius_of(tool) for tool in range(len(self._active))],
             "time_scale": None if self._moving is None else self._moving.time_scale,
         }
 
     def release(self, tool: int | None = None) -> None:
         """Take a tool out of the scene, or all of them."""
-        for released in range(len(self._tools)) if tool is None else [tool]:
+        for released in range(len(self._active)) if tool is None else [tool]:
             if self._active[released]:
-                self._tools[released].remove()
+                self.simulation.remove(released)
                 self._active[released] = False
 
     def handle(self, message: Mapping[str, Any]) -> bool:
@@ -124,14 +129,14 @@ class Session:
             "size": self.size,
             "strain_limit": view.strain_limit,
             "max_force": scene.device.max_force,
-            "bodies": [body.header(self._youngs_modulus(i)) for i, body in enumerate(self._bodies)],
+            "bodies": [body.header(self.simulation.youngs_modulus_of(i)) for i, body in enumerate(self._bodies)],
             "tools": [
                 {
-                    "radius": scene.tool.radius,
-                    "contact_radius": self._contact_radius(tool),
+                    "radius": table.radius,
+                    "contact_radius": self.simulation.contact_radius_of(tool),
                     "max_contact_radius": self._max_radii[tool],
                 }
-                for tool in range(len(self._tools))
+                for tool, table in enumerate(scene.tools)
             ],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
@@ -150,8 +155,8 @@ class Session:
             "type": "frame",
             "frame": number,
             "time": frame.time,
-            "tools": [self._tool_header(frame, tool) for tool in range(len(self._tools))],
-            "contacts": [_contact_header(contact) for contact in frame.contacts],
+            "tools": [self._tool_header(frame, tool) for tool in range(len(self._active))],
+            "contacts": [self._contact_header(contact) for contact in frame.contacts],
             **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
             "realtime": all(frame.statistics["realtime"]),
             "strain": max(strains),
@@ -166,31 +171,40 @@ class Session:
 
     def _pose(self, frame: Frame, body: int) -> np.ndarray:
         """Displacements (s, 3), m, that are drawn of a body."""
-        moves = self._moving is not None and self._moving.index == body
-        return self._moving.pose(frame.displacements) if moves else frame.displacements
+        displacements = frame.bodies[body].displacements
+        moving = self._moving
+        return displacements if moving is None or moving.index != body else moving.pose(displacements)
 
-    def _tool_header(self, frame: Frame, tool: int) -> dict[str, Any]:
-        limited = self._tools[tool]
-        wanted = limited.wanted if limited.limited else None
+    def _contact_header(self, contact: Contact) -> dict[str, Any]:
+        """Entry of a frame message: the place in the body's frame, the force on the body in that of the scene."""
+        body = self.built.bodies[contact.body]
         return {
-            "position": frame.positions[tool].tolist(),
-            "orientation": [1.0, 0.0, 0.0, 0.0],
-            "active": self._active[tool],
-            "limited": wanted is not None,
-            # Where the device is, while the tool does not follow it.
-            "wanted": None if wanted is None else wanted.tolist(),
-            "force": frame.forces[tool].tolist(),
-            "refused": REFUSED if frame.statistics["refused"][tool] else None,
+            "tool": contact.tool,
+            "body": contact.body,
+            "mode": contact.mode,
+            "point": body.points_to_body(contact.point).tolist(),
+            "normal": body.vectors_to_body(contact.normal).tolist(),
+            "force": contact.force.tolist(),
         }
 
-    def _youngs_modulus(self, _body: int) -> float | None:
-        return self.simulation.youngs_modulus
-
-    def _contact_radius(self, _tool: int) -> float:
-        return self.simulation.contact_radius
+    def _tool_header(self, frame: Frame, tool: int) -> dict[str, Any]:
+        device, limited = frame.positions[tool], bool(frame.limited[tool])
+        # A tool that is limited stays where its contact has it; the device goes on.
+        contact = next((c for c in frame.contacts if c.tool == tool and c.limited), None)
+        position = device if contact is None else contact.anchor + contact.displacement
+        return {
+            "position": position.tolist(),
+            "orientation": frame.orientations[tool].tolist(),
+            "active": self._active[tool],
+            "limited": limited,
+            # Where the device is, while the tool does not follow it.
+            "wanted": device.tolist() if limited else None,
+            "force": frame.forces[tool].tolist(),
+            "refused": frame.statistics["refused"][tool],
+        }
 
     def _press(self, message: Mapping[str, Any]) -> bool:
-        tool, position = index(message, "tool", len(self._tools)), np.array(vector(message, "position"))
+        tool, position = index(message, "tool", len(self._active)), np.array(vector(message, "position"))
         grab = message.get("grab", False)
         if not isinstance(grab, bool):
             raise ViewerError("press: grab must be true or false")
@@ -199,13 +213,13 @@ class Session:
         if self._moving is not None:
             self._moving.end_mode()
             self._moving.struck_at = None
-        self._tools[tool].move(position)
+        self.simulation.move(position.tolist(), tool=tool)
         self.simulation.grab(grab, tool)
         self._active[tool] = True
         return False
 
     def _release(self, message: Mapping[str, Any]) -> bool:
-        self.release(index(message, "tool", len(self._tools)) if "tool" in message else None)
+        self.release(index(message, "tool", len(self._active)) if "tool" in message else None)
         return False
 
     def _set(self, message: Mapping[str, Any]) -> bool:
@@ -222,37 +236,35 @@ class Session:
         return True
 
     def _set_youngs_modulus(self, youngs_modulus: float, message: Mapping[str, Any]) -> None:
-        index(message, "body", len(self._bodies))
-        self.simulation.set_youngs_modulus(youngs_modulus)
+        body = index(message, "body", len(self._bodies)) if "body" in message else 0
+        self.simulation.set_youngs_modulus(youngs_modulus, body)
 
     def _set_time_scale(self, time_scale: float, _message: Mapping[str, Any]) -> None:
         self._in_motion("slow motion").set_time_scale(time_scale)
 
     def _set_radius(self, radius: float, message: Mapping[str, Any]) -> None:
-        tools = [index(message, "tool", len(self._tools))] if "tool" in message else range(len(self._tools))
+        tools = [index(message, "tool", len(self._active))] if "tool" in message else range(len(self._active))
         largest = min(self._max_radii[tool] for tool in tools)
         if radius > largest:
             raise ViewerError(f"the contact radius goes up to {1e3 * largest:.3g} mm on this body")
-        for _tool in tools:
-            self.simulation.set_radius(radius)
+        for tool in tools:
+            self.simulation.set_radius(radius, tool)
 
     def _reset(self, _message: Mapping[str, Any]) -> bool:
         self.release()
-        tool, reference = self.built.scene.tool, self.built.green.youngs_modulus
-        self.simulation.set_radius(tool.contact_radius)
+        for rank, tool in enumerate(self.built.scene.tools):
+            self.simulation.set_radius(tool.contact_radius, rank)
+        for rank in range(len(self._bodies)):
+            if self.simulation.youngs_modulus_of(rank) is not None:
+                self.simulation.set_youngs_modulus(self.built.bodies[rank].green.youngs_modulus, rank)
         if self._moving is not None:
             self._moving.end_mode()
-        elif reference is not None:
-            self.simulation.set_youngs_modulus(reference)
         self.simulation.reset()
         return True
 
     def _latest(self) -> Frame:
         now = time.monotonic()
         if self._frame is None or now - self._frame_time > FRAME_AGE:
-            # A contact that has begun since the device moved is limited from here on.
-            for tool in self._tools:
-                tool.update()
             self._frame, self._frame_time = self.simulation.frame(), now
             self._keep_log()
             if self._moving is not None:
@@ -297,18 +309,6 @@ class Session:
         if self._moving is None:
             raise ViewerError(f"{what}: this body does not move")
         return self._moving
-
-
-def _contact_header(contact: Contact) -> dict[str, Any]:
-    """Entry of a frame message: the place in the body's frame, the force on the body in that of the scene."""
-    return {
-        "tool": contact.tool,
-        "body": 0,
-        "mode": contact.mode,
-        "point": contact.point.tolist(),
-        "normal": contact.normal.tolist(),
-        "force": contact.force.tolist(),
-    }
 
 
 class _Tail:

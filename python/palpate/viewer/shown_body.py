@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.body import Body
-from palpate.green import GreensFunction
 from palpate.mesh.elements import drawing_tets
+from palpate.scene import BuiltBody
 from palpate.viewer.fields import Fields
 
 
@@ -19,51 +18,39 @@ class ShownBody:
 
     Attributes
     ----------
-    name
-        As the page lists it.
-    body
-        None for one from a store, which knows only the surface.
-    green, fields
-        Its Green's function, and what may be drawn in colours.
+    built
+        The body, its Green's function, its place.
+    fields
+        What may be drawn in colours.
     poissons_ratio
         None for several materials or a bare store.
-    position, orientation
-        Of its own frame in the scene: m, and a unit quaternion w x y z.
 
     """
 
-    name: str
-    body: Body | None
-    green: GreensFunction
+    built: BuiltBody
     fields: Fields
     poissons_ratio: float | None = None
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-
-    def placed(self, points: np.ndarray) -> np.ndarray:
-        """Points (n, 3) of the body's frame in that of the scene, m."""
-        return placed(points, self.position, self.orientation)
 
     def header(self, youngs_modulus: float | None) -> dict[str, Any]:
         """Entry of the scene message; the modulus, Pa, is None where it cannot be changed."""
-        green, body = self.green, self.body
+        green, body = self.built.green, self.built.body
         return {
-            "name": self.name,
-            "title": titled(self.name),
+            "name": self.built.name,
+            "title": titled(self.built.name),
             "nodes": int(green.surface_nodes.max()) + 1 if body is None else len(body.mesh.nodes),
             "tets": 0 if body is None else len(body.mesh.tets),
             "surface_nodes": len(green.surface_nodes),
             "triangles": len(green.surface_triangles),
             "youngs_modulus": youngs_modulus,
             "poissons_ratio": self.poissons_ratio,
-            "position": list(self.position),
-            "orientation": list(self.orientation),
+            "position": list(self.built.position),
+            "orientation": list(self.built.orientation),
             "fields": [{"name": field.name, "title": field.title} for field in self.fields.offered],
         }
 
     def arrays(self) -> dict[str, tuple[str, np.ndarray]]:
         """Arrays of the scene message, in the body's frame."""
-        green, body = self.green, self.body
+        green, body = self.built.green, self.built.body
         if body is None:
             nodes, tets = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4))
             nodes[green.surface_nodes] = green.surface_positions
@@ -78,12 +65,6 @@ class ShownBody:
             "fixed_nodes": ("u4", fixed),
             "free": ("f4", green.free_displacements),
         }
-
-
-def placed(points: np.ndarray, position: tuple[float, ...], orientation: tuple[float, ...]) -> np.ndarray:
-    """Rotate points (n, 3) by a unit quaternion `w + v`, `p + 2 v x (v x p + w p)`, and move them."""
-    w, v = orientation[0], np.array(orientation[1:])
-    return points + 2.0 * np.cross(v, np.cross(v, points) + w * points) + np.array(position)
 
 
 def titled(name: str) -> str:

@@ -150,9 +150,9 @@ def _dense_contact(green: GreensFunction, inverse: np.ndarray, rank: np.ndarray)
 def _tick_times(green: GreensFunction, store: Path) -> tuple[float, float]:
     """Time of one 1 kHz tick with a contact, safety stage included, and of the whole surface of a frame, us."""
     scene = Scene.of_store(store)
-    simulation = Simulation(BuiltScene(scene, None, green))
+    simulation = Simulation(BuiltScene.of(scene, None, green))
     top = green.surface_positions[np.searchsorted(green.surface_nodes, _pressed_node(green))]
-    centre = top + [0.0, 0.0, scene.tool.radius]
+    centre = top + [0.0, 0.0, scene.tools[0].radius]
     depth = np.linspace(0.0, 2e-3, TICKS)
     path = centre - depth[:, None] * [0.0, 0.0, 1.0]
     simulation.run(path[:100])

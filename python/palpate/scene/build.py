@@ -1,0 +1,184 @@
+"""A scene made ready: meshes, bodies, their Green's functions, and what moves them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate import models
+from palpate.body import Body, parse
+from palpate.errors import Error, SceneError
+from palpate.green import GreensFunction, precompute
+from palpate.mesh import TetMesh
+from palpate.mesh.elements import EDGES
+from palpate.mesh.tetrahedralize import tetrahedralize_with
+from palpate.scene.dynamics import BodyMotion
+from palpate.scene.loads import together
+from palpate.scene.mistakes import located
+from palpate.scene.regions import MaterialTable
+from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
+from palpate.vectors import conjugate, rotated
+
+Progress = bool | Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class BuiltBody:
+    """A body of a scene, ready to be touched.
+
+    Attributes
+    ----------
+    body
+        None for one from a store, which knows only the surface.
+    green
+        Its Green's function.
+    motion
+        What moves it; None at rest.
+    name
+        What it is called.
+    position, orientation
+        Of its own frame in the scene: m, and a unit quaternion w x y z.
+
+    """
+
+    body: Body | None
+    green: GreensFunction
+    motion: BodyMotion | None = None
+    name: str = "body"
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def points_to_scene(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the body's own frame in the scene, m."""
+        return rotated(points, self.orientation) + np.array(self.position)
+
+    def points_to_body(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the scene in the body's own frame, m."""
+        return rotated(np.asarray(points) - np.array(self.position), conjugate(self.orientation))
+
+    def vectors_to_scene(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (..., 3) of the body's own frame in the scene."""
+        return rotated(vectors, self.orientation)
+
+    def vectors_to_body(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (..., 3) of the scene in the body's own frame."""
+        return rotated(vectors, conjugate(self.orientation))
+
+
+@dataclass(frozen=True)
+class BuiltScene:
+    """A scene with its bodies."""
+
+    scene: SceneTables
+    bodies: tuple[BuiltBody, ...]
+
+    @classmethod
+    def of(
+        cls, scene: SceneTables, body: Body | None, green: GreensFunction, motion: BodyMotion | None = None
+    ) -> BuiltScene:
+        """Scene of a single body that is there already, where the scene's own body stands."""
+        table = scene.bodies[0]
+        return cls(scene, (BuiltBody(body, green, motion, table.title, table.position, table.orientation),))
+
+
+def build(scene: SceneTables, progress: Progress, modes_progress: Progress | None) -> BuiltScene:
+    """See :meth:`palpate.Scene.build`."""
+    builders = [_Builder(scene, rank) for rank in range(len(scene.bodies))]
+    return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
+
+
+class _Builder:
+    """Builds one body of a scene."""
+
+    def __init__(self, scene: SceneTables, rank: int):
+        self._scene, self._rank = scene, rank
+        self._table: BodyTable = scene.bodies[rank]
+
+    def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
+        table = self._table
+        place = (table.title, table.position, table.orientation)
+        if table.store is not None:
+            return BuiltBody(None, GreensFunction.load(self._scene.folder / table.store), None, *place)
+        body = self._body()
+        green = precompute(body, precision=table.precision, progress=progress)
+        dynamics, where = self._own("dynamics")
+        if dynamics is None:
+            return BuiltBody(body, green, None, *place)
+        with self._blaming(where):
+            report = progress if modes_progress is None else modes_progress
+            motion = dynamics.build(body, self._scene.device.max_stiffness, report)
+        return BuiltBody(body, green, motion, *place)
+
+    def _own(self, key: str) -> tuple[Any, list[str | int]]:
+        """Table of the body, or that of the whole scene; and its place in the file."""
+        own = getattr(self._table, key)
+        if own is not None:
+            return own, ["body", self._rank, key]
+        return getattr(self._scene, key), [key]
+
+    def _body(self) -> Body:
+        table, mesh = self._table, self._mesh()
+        if table.element == "linear" and mesh.is_quadratic:
+            source = table.mesh or table.title
+            raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
+        if table.adds_middles:
+            mesh = mesh.to_quadratic()
+        base: MaterialTable = self._own("material")[0]
+        labels, materials = np.zeros(len(mesh.tets), dtype=np.int64), {0: base.material()}
+        regions, where = self._own("region")
+        for rank, region in enumerate(regions):
+            with self._blaming([*where, rank]):
+                labels[region.elements(mesh)] = rank + 1
+                materials[rank + 1] = region.material(base)
+        mesh = TetMesh(mesh.nodes, mesh.tets, labels)
+        loads, where = self._own("loads")
+        body = Body(mesh, material=materials, fixed=self._fixed(mesh), loads=together(loads))
+        for rank, load in enumerate(loads):
+            with self._blaming([*where, rank]):
+                load.check(body)
+        return body
+
+    @contextlib.contextmanager
+    def _blaming(self, place: Sequence[str | int]) -> Iterator[None]:
+        """Name the line of a table, or of an entry of an array of tables, in an error of the body."""
+        try:
+            yield
+        except Error as error:
+            path, text = self._scene.source
+            table = next(key for key in reversed(place) if isinstance(key, str))
+            raise SceneError(f"{located(path, text, place)}: {table}: {error}") from None
+
+    def _mesh(self) -> TetMesh:
+        table = self._table
+        if table.model is not None:
+            return models.load(table.model, paper=table.paper)
+        source = self._scene.folder / str(table.mesh)
+        if table.fills_a_surface:
+            finer = [(ball.center, ball.radius, ball.size) for ball in table.refine]
+            return tetrahedralize_with(table.element or "quadratic", source, table.max_element_size, table.unit, finer)
+        return TetMesh.read(source, table.unit)
+
+    def _fixed(self, mesh: TetMesh) -> Any:
+        supports: SupportsTable = self._own("supports")[0]
+        fixed = supports.fixed
+        if fixed is None and self._table.model is not None:
+            return models.fixed(self._table.model, mesh)
+        if isinstance(fixed, str):
+            mask = parse(fixed)(mesh.nodes)
+            if not np.any(mask):
+                low, high = mesh.bounds.round(4).tolist()
+                raise SceneError(
+                    f"no node satisfies supports.fixed = '{fixed}': the body reaches from {low} to {high} m"
+                )
+            return mask
+        if self._table.adds_middles and max(fixed, default=0) < len(mesh.nodes):
+            mask = np.zeros(len(mesh.nodes), dtype=bool)
+            mask[fixed] = True
+            between = mask[mesh.tets[:, EDGES]].all(axis=2)
+            mask[mesh.tets[:, 4:][between]] = True
+            return mask
+        return fixed

@@ -1,0 +1,114 @@
+"""A mistake in a scene file, told with its line and the nearest known key."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+from pydantic import BaseModel, ValidationError
+
+# What pydantic adds to the place of a mistake in a value that may be of several kinds.
+UNION_MEMBERS = {"str", "int", "list[int]"}
+# Keys of former versions, and what they are called now.
+RENAMED = {"view.hold_strain": "strain_limit"}
+
+Place = Sequence[str | int]
+
+
+def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel]) -> str:
+    """First mistake of the file, with its line and the nearest known key of ``model``'s tables."""
+    first = error.errors()[0]
+    place = [k for k in first["loc"] if isinstance(k, int) or k not in UNION_MEMBERS]
+    keys = [k for k in place if isinstance(k, str)]
+    where = ".".join(keys)
+    at = located(path, text, place)
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(model, keys[:-1])
+        near = [RENAMED[where]] if where in RENAMED else difflib.get_close_matches(keys[-1], known, 1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+        return f"{at}: unknown key '{where}'; {hint}"
+    if first["type"] == "missing" and isinstance(place[-1], int):
+        return f"{at}: {where} has too few entries"
+    if first["type"] == "missing":
+        return f"{at}: the key '{where}' is missing"
+    message = first["msg"].removeprefix("Value error, ")
+    return f"{at}: {where}: {message}" + ("" if first["type"] == "value_error" else f", got {first['input']!r}")
+
+
+def located(path: Path, text: str, place: Place) -> str:
+    """File and line of a place in it, as far as it is written there."""
+    line = line_of(text, place)
+    return f"{path}:{line}" if line else str(path)
+
+
+def line_of(text: str, place: Place) -> int | None:
+    """Line of a table, of an entry of an array of tables, or of a key in it; the deepest of them that is there."""
+    counts: dict[tuple[str | int, ...], int] = {}
+    table: list[str | int] = []
+    found, depth = None, 0
+    for number, line in enumerate(text.splitlines(), 1):
+        head = re.match(r"\s*(\[\[?)\s*([\w.-]+)\s*\]", line)
+        pair = re.match(r"\s*([\w.-]+)\s*=", line)
+        if head:
+            table = _entered(head[2].split("."), head[1] == "[[", counts)
+            here = table
+        elif pair:
+            here = [*table, *pair[1].split(".")]
+        else:
+            continue
+        shared = _leads_to(here, place)
+        if shared > depth:
+            found, depth = number, shared
+    return found
+
+
+def _entered(parts: Sequence[str], entry: bool, counts: dict[tuple[str | int, ...], int]) -> list[str | int]:
+    """Place of a table's head, given how many entries each array of tables has so far."""
+    place: list[str | int] = []
+    for rank, part in enumerate(parts):
+        place.append(part)
+        key = tuple(place)
+        if entry and rank == len(parts) - 1:
+            counts[key] = counts.get(key, -1) + 1
+        if key in counts:
+            place.append(counts[key])
+    return place
+
+
+def _leads_to(here: Place, wanted: Place) -> int:
+    """How many keys of ``wanted`` are those of ``here``; 0 if ``here`` leads elsewhere.
+
+    A single table stands for the first entry of an array.
+    """
+    rest, keys = list(wanted), 0
+    for step in here:
+        if isinstance(step, int):
+            entry = rest.pop(0) if rest and isinstance(rest[0], int) else 0
+            if entry != step:
+                return 0
+            continue
+        if rest and isinstance(rest[0], int) and rest.pop(0) != 0:
+            return 0
+        if not rest or rest.pop(0) != step:
+            return 0
+        keys += 1
+    return keys
+
+
+def _known_keys(model: type[BaseModel], parents: Sequence[str]) -> list[str]:
+    """Keys of the table that ``parents`` lead to."""
+    for key in parents:
+        field = next(field for name, field in model.model_fields.items() if key in (name, field.alias))
+        model = next(
+            kind for kind in _kinds(field.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)
+        )
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _kinds(annotation: object) -> list[object]:
+    """Flatten an annotation: the members of unions, and the entries of lists."""
+    members = get_args(annotation)
+    return [annotation] if not members else [kind for member in members for kind in _kinds(member)]

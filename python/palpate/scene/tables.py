@@ -1,0 +1,173 @@
+"""Tables of the scene file: bodies, supports, tools, the device's limits, the view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, PrivateAttr, field_validator, model_validator
+
+from palpate import models
+from palpate.fields import HONEST_STRAIN
+from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
+from palpate.scene.dynamics import DynamicsTable
+from palpate.scene.loads import LoadTable
+from palpate.scene.regions import MaterialTable, RegionTable
+from palpate.scene.table import Force, Length, Number, Point, Radius, Stiffness, Table, Time
+
+# As many as the force loop takes.
+MOST_BODIES, MOST_TOOLS = 4, 4
+
+Quaternion = tuple[Number, Number, Number, Number]
+
+
+class RefineTable(Table):
+    """A ball of finer elements in a mesh made from a surface."""
+
+    center: Point
+    radius: Length
+    size: Length
+
+
+class SupportsTable(Table):
+    """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
+
+    fixed: str | list[int] | None = None
+
+
+class BodyTable(Table):
+    """A solid, one of: a mesh file (volume, or surface to be filled), a built-in model, a precomputed store.
+
+    Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
+    filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
+    ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
+    fix the middles between them.
+
+    ``position`` (m) and ``orientation`` (unit quaternion w x y z) place the body's own frame in the scene; predicates
+    and shapes speak of the body's own frame. ``material``, ``supports``, ``region``, ``loads`` and ``dynamics`` of the
+    body come before those of the whole scene.
+    """
+
+    name: str | None = None
+    mesh: str | None = None
+    model: str | None = None
+    store: str | None = None
+    paper: bool = False
+    unit: str = "m"
+    max_element_size: Length | None = None
+    element: Element | None = None
+    refine: list[RefineTable] = Field(default_factory=list)
+    precision: str = Field("f32", pattern="^f(16|32|64)$")
+    position: Point = (0.0, 0.0, 0.0)
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    supports: SupportsTable | None = None
+    material: MaterialTable | None = None
+    region: list[RegionTable] | None = None
+    loads: list[LoadTable] | None = None
+    dynamics: DynamicsTable | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> BodyTable:
+        if sum(source is not None for source in (self.mesh, self.model, self.store)) != 1:
+            raise ValueError("give exactly one of mesh, model and store")
+        if self.model is not None and self.model not in models.NAMES:
+            raise ValueError(f"unknown model '{self.model}'; there are {', '.join(models.NAMES)}")
+        if abs(np.linalg.norm(self.orientation) - 1.0) > 1e-6:
+            raise ValueError(f"orientation must be a unit quaternion w x y z, got {list(self.orientation)}")
+        return self
+
+    @property
+    def title(self) -> str:
+        """What the body is called: its name, the model, or the file without its ending."""
+        return self.name or self.model or Path(self.mesh or self.store or "").stem
+
+    @property
+    def fills_a_surface(self) -> bool:
+        """Whether the mesh is yet to be made."""
+        return Path(self.mesh or "").suffix.lower() in SURFACE_ENDINGS
+
+    @property
+    def adds_middles(self) -> bool:
+        """Whether 4-node tetrahedra become 10-node ones."""
+        return self.element == "quadratic" or (self.element is None and self.fills_a_surface)
+
+
+class ToolTable(Table):
+    """A spherical tool: its radius, how it touches, and the radius of the patch it presses.
+
+    ``contact = "patch"`` spreads the force over a disc of ``contact_radius``; ``"node"`` takes the closest node, as the
+    paper does, whose stiffness goes to zero with the size of the elements.
+    """
+
+    shape: Literal["sphere"] = "sphere"
+    radius: Length = 5e-3
+    contact: Literal["patch", "node"] = "patch"
+    contact_radius: Radius = 5e-3
+
+
+class DeviceTable(Table):
+    """Limits of the device, kept by the safety stage, and ticks a second."""
+
+    max_force: Force = 8.0
+    max_slew: Annotated[float, Field(gt=0)] = 500.0
+    ramp: Time = 0.25
+    max_stiffness: Stiffness = 5000.0
+    rate: Annotated[float, Field(ge=100, le=10_000)] = 1000.0
+
+
+class ViewTable(Table):
+    """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
+
+    Linear elasticity balloons beyond about 10 % strain; ``strain_limit = 0`` takes the limit away.
+    """
+
+    position: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+    strain_limit: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
+
+
+class SceneTables(Table):
+    """All tables of a scene, and the file that they were read from."""
+
+    bodies: list[BodyTable] = Field(alias="body", min_length=1, max_length=MOST_BODIES)
+    supports: SupportsTable = SupportsTable()
+    material: MaterialTable = MaterialTable()
+    region: list[RegionTable] = Field(default_factory=list)
+    loads: list[LoadTable] = Field(default_factory=list)
+    tools: list[ToolTable] = Field(default=[ToolTable()], alias="tool", min_length=1, max_length=MOST_TOOLS)
+    device: DeviceTable = DeviceTable()
+    dynamics: DynamicsTable | None = None
+    view: ViewTable = ViewTable()
+
+    _source: tuple[Path, str] | None = PrivateAttr(None)
+
+    @field_validator("bodies", "tools", mode="before")
+    @classmethod
+    def _single(cls, tables: Any) -> Any:
+        """Take a single table as the only entry."""
+        return tables if isinstance(tables, list) else [tables]
+
+    def __repr__(self) -> str:
+        bodies = ", ".join(
+            f"model {body.model}" if body.model else str(body.mesh or body.store) for body in self.bodies
+        )
+        moves = any(body.dynamics or self.dynamics for body in self.bodies)
+        radii = ", ".join(f"{1e3 * tool.radius:.4g} mm" for tool in self.tools)
+        tools = f"tool of radius {radii}" if len(self.tools) == 1 else f"tools of radius {radii}"
+        return f"{type(self).__name__}({bodies}{', in motion' if moves else ''}, {tools})"
+
+    @property
+    def name(self) -> str:
+        """What the scene is called: after its bodies."""
+        return "-".join(body.title for body in self.bodies)
+
+    @property
+    def source(self) -> tuple[Path, str]:
+        """File behind the scene and its text; of a scene made by a program its name, and no text."""
+        return self._source or (Path(self.name), "")
+
+    @property
+    def folder(self) -> Path:
+        """Where the paths of the scene start."""
+        return Path() if self._source is None else self._source[0].parent

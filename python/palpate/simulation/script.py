@@ -1,0 +1,93 @@
+"""What is told to ticks without a clock: paths of the tools, strikes, nodes that are watched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import SceneError
+from palpate.vectors import three_numbers
+
+# How far from one the length of an orientation may be.
+UNIT_LENGTH = 1e-6
+
+
+def positions_of(positions: Any, tools: int) -> np.ndarray:
+    """Positions (t, tools, 3), m, from those of the first tool (t, 3) or of some tools (t, some, 3).
+
+    Raises
+    ------
+    SceneError
+        Another shape, or more tools than the scene has.
+
+    """
+    path = np.ascontiguousarray(positions, dtype=np.float64)
+    if path.ndim not in (2, 3) or path.shape[-1] != 3:
+        raise SceneError(f"positions must have shape (ticks, 3) or (ticks, tools, 3), got {path.shape}")
+    path = path[:, None] if path.ndim == 2 else path
+    if path.shape[1] > tools:
+        raise SceneError(f"positions of {path.shape[1]} tools, the scene has {tools}")
+    return path
+
+
+def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
+    """Check unit quaternions w x y z (t, tools, 4) for positions (t, tools, 3); None does not turn the tools.
+
+    Raises
+    ------
+    SceneError
+        Another shape, or a quaternion of a tool in the scene that is not of length one.
+
+    """
+    shape = (*positions.shape[:2], 4)
+    if orientations is None:
+        return np.broadcast_to([1.0, 0.0, 0.0, 0.0], shape).copy()
+    turned = np.ascontiguousarray(orientations, dtype=np.float64)
+    turned = turned[:, None] if turned.ndim == 2 else turned
+    if turned.shape != shape:
+        raise SceneError(f"orientations must have shape {shape}, as the positions, got {turned.shape}")
+    present = np.isfinite(positions).all(axis=2)
+    length = np.linalg.norm(turned, axis=2)
+    bad = np.argwhere(present & ~(np.abs(length - 1.0) <= UNIT_LENGTH))
+    if len(bad):
+        tick, tool = bad[0]
+        raise SceneError(f"the orientation of tool {tool} at tick {tick} is not a unit quaternion w x y z")
+    return turned
+
+
+def grabs_of(grabs: Any, positions: np.ndarray) -> np.ndarray:
+    """Whether each tool holds on to what it touches (t, tools); None: never.
+
+    Raises
+    ------
+    SceneError
+        Another shape.
+
+    """
+    shape = positions.shape[:2]
+    if grabs is None:
+        return np.zeros(shape, dtype=bool)
+    held = np.ascontiguousarray(grabs, dtype=bool)
+    held = held[:, None] if held.ndim == 1 else held
+    if held.shape != shape:
+        raise SceneError(f"grabs must have shape {shape}, as the positions, got {held.shape}")
+    return held
+
+
+def strike_of(
+    point: Sequence[float], impulse: Sequence[float], duration: float = 0.0
+) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
+    """Point (m), impulse (N s) and duration (s) of a strike.
+
+    Raises
+    ------
+    SceneError
+        Numbers that are not finite, or a duration below zero.
+
+    """
+    if not (np.isfinite(duration) and duration >= 0):
+        raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
+    where = three_numbers(point, "a strike's point", SceneError)
+    return where, three_numbers(impulse, "a strike's impulse", SceneError), float(duration)
