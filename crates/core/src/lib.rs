@@ -1,7 +1,7 @@
 //! Finite elements, Green's functions, capacitance and contact: the numerics and physics of Palpate.
 //!
 //! The folders are the chapters of the theory, in order: [`element`], [`mesh`], [`fem`], [`green`], [`capacitance`],
-//! [`contact`], [`dynamics`], [`simulation`]. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
+//! [`contact`], [`strain`], [`dynamics`], [`simulation`]. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
 //!
 //! Nothing here reads a clock, starts threads of its own (rayon in the offline part apart) or touches a file other than
 //! the stores of Green's functions and modes.
@@ -15,5 +15,6 @@ pub mod fem;
 pub mod green;
 pub mod mesh;
 pub mod simulation;
+pub mod strain;
 
 pub use error::{Error, Result};

@@ -62,7 +62,7 @@ fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
 /// Displacements inside a body from those of its surface.
 #[pyclass(module = "palpate._native", frozen)]
 pub struct Interior {
-    interior: palpate_core::green::Interior,
+    pub(crate) interior: Arc<palpate_core::green::Interior>,
 }
 
 #[pymethods]
@@ -72,7 +72,7 @@ impl Interior {
     fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
         let problem = problem(arguments)?;
         let interior = py.detach(|| palpate_core::green::Interior::new(&problem)).map_err(|e| to_python(py, e))?;
-        Ok(Self { interior })
+        Ok(Self { interior: Arc::new(interior) })
     }
 
     /// Displacements (3n) of all nodes, m, for those (3s) of the surface nodes.

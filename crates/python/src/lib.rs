@@ -6,6 +6,7 @@ mod dynamics;
 mod errors;
 mod green;
 mod simulation;
+mod strain;
 
 use pyo3::prelude::*;
 
@@ -28,5 +29,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_class::<strain::StrainMeasure>()?;
+    module.add_class::<strain::StrainResponse>()?;
+    module.add_function(wrap_pyfunction!(strain::provisional_displacement, module)?)?;
     Ok(())
 }

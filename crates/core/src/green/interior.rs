@@ -72,33 +72,65 @@ impl Interior {
     /// # Errors
     /// A length that is not three a surface node.
     pub fn extend(&self, surface: &[f64]) -> Result<Vec<f64>> {
-        if surface.len() != 3 * self.surface_nodes.len() {
+        let rows = 3 * self.surface_nodes.len();
+        if surface.len() != rows {
+            let (count, given) = (self.surface_nodes.len(), surface.len());
             return Err(Error::Invalid(format!(
-                "displacements of {} surface nodes are needed, got {} numbers",
-                self.surface_nodes.len(),
-                surface.len()
+                "displacements of {count} surface nodes are needed, got {given} numbers"
             )));
         }
-        let mut all = vec![0.0; self.dof_count];
-        for (&node, u) in self.surface_nodes.iter().zip(surface.chunks_exact(3)) {
-            all[3 * node as usize..3 * node as usize + 3].copy_from_slice(u);
+        Ok(self.extended(surface, true))
+    }
+
+    /// Changes of the displacements of all dofs for changes of those of the surface dofs, the reference loads staying as
+    /// they are: several fields (3s each) one after the other, in a single solve.
+    ///
+    /// # Errors
+    /// A length that is not a multiple of three a surface node.
+    pub fn extend_responses(&self, fields: &[f64]) -> Result<Vec<f64>> {
+        let rows = 3 * self.surface_nodes.len();
+        if fields.is_empty() || fields.len() % rows != 0 {
+            let given = fields.len();
+            return Err(Error::Invalid(format!("fields of {rows} surface dofs are needed, got {given} numbers")));
         }
-        let Some(factor) = &self.factor else { return Ok(all) };
-        let mut load: Vec<f64> = self
-            .coupling_start
-            .windows(2)
-            .zip(&self.loads)
-            .map(|(range, own)| {
+        Ok(self.extended(fields, false))
+    }
+
+    /// Number of surface nodes.
+    pub fn surface_count(&self) -> usize {
+        self.surface_nodes.len()
+    }
+
+    /// Number of dofs of the whole mesh.
+    pub fn dof_count(&self) -> usize {
+        self.dof_count
+    }
+
+    fn extended(&self, fields: &[f64], loaded: bool) -> Vec<f64> {
+        let count = fields.len() / (3 * self.surface_nodes.len());
+        let mut all = vec![0.0; count * self.dof_count];
+        for (field, surface) in all.chunks_exact_mut(self.dof_count).zip(fields.chunks_exact(fields.len() / count)) {
+            for (&node, u) in self.surface_nodes.iter().zip(surface.chunks_exact(3)) {
+                field[3 * node as usize..3 * node as usize + 3].copy_from_slice(u);
+            }
+        }
+        let Some(factor) = &self.factor else { return all };
+        let rows = self.inner.len();
+        let mut right = vec![0.0; count * rows];
+        for (field, right) in all.chunks_exact(self.dof_count).zip(right.chunks_exact_mut(rows)) {
+            for ((range, &own), right) in self.coupling_start.windows(2).zip(&self.loads).zip(right) {
                 let row = &self.coupling[range[0]..range[1]];
-                own - row.iter().map(|&(dof, k)| k * all[dof as usize]).sum::<f64>()
-            })
-            .collect();
-        let mut memory: MemBuffer = factor.solve_scratch(1);
-        let rows = load.len();
-        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut load, rows, 1), &mut memory);
-        for (&dof, u) in self.inner.iter().zip(load) {
-            all[dof as usize] = u;
+                let load = if loaded { own } else { 0.0 };
+                *right = load - row.iter().map(|&(dof, k)| k * field[dof as usize]).sum::<f64>();
+            }
         }
-        Ok(all)
+        let mut memory: MemBuffer = factor.solve_scratch(count);
+        factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, count), &mut memory);
+        for (field, right) in all.chunks_exact_mut(self.dof_count).zip(right.chunks_exact(rows)) {
+            for (&dof, &u) in self.inner.iter().zip(right) {
+                field[dof as usize] = u;
+            }
+        }
+        all
     }
 }

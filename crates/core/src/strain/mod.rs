@@ -1,0 +1,29 @@
+//! The strain of a pose, and how much of a contact's force keeps it within a limit.
+//!
+//! Linear elasticity is honest to about 10 % strain. While a contact sticks, the displacements are affine in the forces on
+//! the patches, `u = u_free + sum_c Psi W_c f_c`, and so is the displacement gradient at any place of the body: a place is
+//! [`GradientOperator`] rows applied to `u_free` (its base) and to the columns of `Psi W_c` (its slopes per newton). Two
+//! measures follow from a gradient ([`StrainKind`]): the infinitesimal strain where the elements are known, and the Green
+//! strain in the plane of the surface where they are not.
+//!
+//! Evaluating all places takes milliseconds: [`StrainMeasure::prepare`] does it once a contact, outside the tick, and
+//! keeps the few places that are strained most under some force. [`StrainResponse`] holds them; the tick asks it which
+//! share of its forces is within the limit. Until it is prepared, [`provisional_displacement`] bounds the motion of the
+//! patch instead.
+//!
+//! [`response`](StrainResponse), [`tensor`](StrainKind) and [`provisional_displacement`] need nothing but vectors; the rest
+//! needs the interior solution and rayon.
+
+mod gradient;
+mod loading;
+mod measure;
+mod places;
+mod provisional;
+mod response;
+mod tensor;
+
+pub use gradient::GradientOperator;
+pub use measure::{StrainMeasure, StrainOperator};
+pub use provisional::provisional_displacement;
+pub use response::{MAX_CONTACTS_WATCHED, MAX_STRAIN_PLACES, StrainResponse};
+pub use tensor::StrainKind;
