@@ -31,7 +31,8 @@ use glam::DVec3;
 const SAFE_PART: f64 = 0.15;
 
 /// Displacement (m) of a patch, from where it is without force, that keeps the strain within `limit`, from its `weights`
-/// at `positions` (m) alone; weights of supported nodes are given as zero. `floor` (m) is the mean length of the surface's edges: elements spread what acts on less.
+/// at `positions` (m) alone; weights of supported nodes are given as zero. `floor` (m) is the mean length of the surface's
+/// edges: elements spread what acts on less.
 ///
 /// The effective radius is `2 sqrt(sum w |x - m|^2)` with the weights' centroid `m`: the radius `a` of a flat disc under
 /// the mask `(1 - r^2/a^2)^2`, for which the mean of `r^2` is `a^2 / 4`.
