@@ -31,6 +31,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::SimulationCore>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;
+    module.add_function(wrap_pyfunction!(strain::contact_patch, module)?)?;
     module.add_function(wrap_pyfunction!(strain::provisional_displacement, module)?)?;
     Ok(())
 }

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use numpy::PyReadonlyArray1;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_core::Error;
+use palpate_core::contact::{Patch, PatchScratch, SurfaceQuery, patch_weights};
 use palpate_core::strain::{self, MAX_CONTACTS_WATCHED, StrainOperator};
 use pyo3::prelude::*;
 
@@ -104,8 +105,8 @@ impl StrainResponse {
     }
 }
 
-/// Displacement (m) of a patch that keeps the strain within `limit`, from weights (k), positions (3k), m, and the mean
-/// length of the surface's edges, m.
+/// Displacement (m) of a patch that keeps the strain within `limit`, from weights (k; zero of supported nodes), positions
+/// (3k), m, and the mean length of the surface's edges, m.
 #[pyfunction]
 pub fn provisional_displacement(
     weights: PyReadonlyArray1<'_, f64>,
@@ -115,4 +116,22 @@ pub fn provisional_displacement(
 ) -> PyResult<f64> {
     let positions: Vec<DVec3> = positions.as_slice()?.chunks_exact(3).map(DVec3::from_slice).collect();
     Ok(strain::provisional_displacement(weights.as_slice()?, &positions, floor, limit))
+}
+
+/// Nodes (ranks, k) and weights (k) of a patch of radius `radius` (m) around the surface point closest to `point` (m).
+#[pyfunction]
+pub fn contact_patch<'py>(
+    py: Python<'py>,
+    green: &GreenCore,
+    point: [f64; 3],
+    radius: f64,
+) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
+    let surface = &green.green.surface;
+    let mut patch = Patch::default();
+    let query = SurfaceQuery::new(surface).map_err(|e| to_python(py, e))?;
+    if let Some(centre) = query.closest(surface, point.into()) {
+        patch_weights(surface, &centre, radius, &mut PatchScratch::new(surface), &mut patch);
+    }
+    let count = patch.count;
+    Ok((patch.nodes[..count].to_vec().into_pyarray(py), patch.weights[..count].to_vec().into_pyarray(py)))
 }

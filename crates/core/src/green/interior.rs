@@ -118,12 +118,9 @@ impl Interior {
         let rows = self.inner.len();
         let mut right = vec![0.0; count * rows];
         for (field, right) in all.chunks_exact(self.dof_count).zip(right.chunks_exact_mut(rows)) {
-            for ((range, &own), right) in self.coupling_start.windows(2).zip(&self.loads).zip(right) {
-                let row = &self.coupling[range[0]..range[1]];
-                let load = if loaded { own } else { 0.0 };
-                *right = load - row.iter().map(|&(dof, k)| k * field[dof as usize]).sum::<f64>();
-            }
+            self.load(field, loaded, right);
         }
+        // One solve for all fields: the factor, which is larger than the caches, is read once.
         let mut memory: MemBuffer = factor.solve_scratch(count);
         factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, count), &mut memory);
         for (field, right) in all.chunks_exact_mut(self.dof_count).zip(right.chunks_exact(rows)) {
@@ -132,5 +129,14 @@ impl Interior {
             }
         }
         all
+    }
+
+    /// `F_I - K_IS u_S`, of a response without `F_I`.
+    fn load(&self, field: &[f64], loaded: bool, right: &mut [f64]) {
+        for ((range, &own), right) in self.coupling_start.windows(2).zip(&self.loads).zip(right) {
+            let row = &self.coupling[range[0]..range[1]];
+            let load = if loaded { own } else { 0.0 };
+            *right = load - row.iter().map(|&(dof, k)| k * field[dof as usize]).sum::<f64>();
+        }
     }
 }

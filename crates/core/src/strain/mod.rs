@@ -11,7 +11,7 @@
 //! share of its forces is within the limit. Until it is prepared, [`provisional_displacement`] bounds the motion of the
 //! patch instead.
 //!
-//! [`response`](StrainResponse), [`tensor`](StrainKind) and [`provisional_displacement`] need nothing but vectors; the rest
+//! The tick's side ([`StrainResponse`], [`StrainKind`], [`provisional_displacement`]) needs nothing but vectors; the rest
 //! needs the interior solution and rayon.
 
 mod gradient;

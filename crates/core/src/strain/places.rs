@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::StrainKind;
 use super::loading::Loading;
 use super::response::{MARGIN, MAX_CONTACTS_WATCHED, MAX_STRAIN_PLACES, Place, StrainResponse, largest_share};
+use super::tensor::tensor_product;
 
 /// Part of the largest strain that the chosen places show under every loading that was sampled.
 const ENOUGH: f64 = 0.998;
@@ -22,8 +23,18 @@ struct Candidate {
     place: usize,
     /// Strain under the body's own loads.
     base: f64,
-    /// Most change per newton on each contact, by the norm of [`StrainKind::product`].
+    /// Most change of strain per newton on each contact, to first order, and the root of what is beyond.
     slope: [f64; MAX_CONTACTS_WATCHED],
+    curvature: [f64; MAX_CONTACTS_WATCHED],
+}
+
+impl Candidate {
+    /// Upper bound of the strain under forces of these norms.
+    fn bound(&self, forces: &[f64; MAX_CONTACTS_WATCHED]) -> f64 {
+        let sum =
+            |per_newton: &[f64; MAX_CONTACTS_WATCHED]| per_newton.iter().zip(forces).map(|(x, f)| x * f).sum::<f64>();
+        self.base + sum(&self.slope) + 0.5 * sum(&self.curvature).powi(2)
+    }
 }
 
 /// At most [`MAX_STRAIN_PLACES`] of the places; none if none counts or none is strained.
@@ -49,17 +60,19 @@ pub fn choose(
     for (force, factor) in forces.iter().zip(&factors) {
         (0..contacts).for_each(|c| most[c] = most[c].max(factor * force[c].length()));
     }
-    candidates.retain(|candidate| {
-        let change = (0..contacts).map(|c| most[c] * candidate.slope[c]).sum();
-        kind.bound(candidate.base, change) >= NEAR * limit
-    });
-    let near: Vec<Place> = candidates.iter().map(|c| places[c.place]).collect();
+    candidates.retain(|candidate| candidate.bound(&most) >= NEAR * limit);
+    let near: Vec<(Candidate, Place)> = candidates.into_iter().map(|c| with_place(places, c)).collect();
     let critical: Vec<(Loading, usize)> = forces
         .par_iter()
         .zip(&factors)
         .filter_map(|(force, &factor)| first_to_reach(kind, contacts, &near, force, factor, limit))
         .collect();
     greedy(kind, contacts, &near, &critical, limit)
+}
+
+fn with_place(places: &[Place], candidate: Candidate) -> (Candidate, Place) {
+    let place = places[candidate.place];
+    (candidate, place)
 }
 
 /// Places that count, the ones strained most per newton first.
@@ -70,21 +83,30 @@ fn candidates(kind: StrainKind, contacts: usize, places: &[Place], limit: f64) -
         .enumerate()
         .filter_map(|(place, p)| {
             let base = kind.magnitude(&p.base);
-            let slope = std::array::from_fn(|c| if c < contacts { largest_slope(kind, &p.slope[c]) } else { 0.0 });
+            let of_each = |bound: fn(StrainKind, &Place, usize) -> f64| {
+                std::array::from_fn(|c| if c < contacts { bound(kind, p, c) } else { 0.0 })
+            };
+            let (slope, curvature) = (of_each(largest_slope), of_each(largest_curvature));
             let steepest = slope.iter().fold(0.0, |m: f64, &s| m.max(s));
             let counts = room(base) > 0.0 && steepest > 0.0;
-            counts.then(|| (steepest / room(base), Candidate { place, base, slope }))
+            counts.then(|| (steepest / room(base), Candidate { place, base, slope, curvature }))
         })
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.place.cmp(&b.1.place)));
     candidates.into_iter().map(|(_, candidate)| candidate).collect()
 }
 
-/// Bound of the change for a force of one newton in any direction: the root of the largest eigenvalue of the Gram matrix of
-/// the slopes, which is not above its largest row sum.
-fn largest_slope(kind: StrainKind, slope: &[[f64; 6]; 3]) -> f64 {
-    let row = |i: usize| (0..3).map(|j| kind.product(&slope[i], &slope[j]).abs()).sum::<f64>();
+/// Bound of the change of strain, to first order, for a force of one newton in any direction: the root of the largest
+/// eigenvalue of the Gram matrix of the slopes, which is not above its largest row sum.
+fn largest_slope(kind: StrainKind, place: &Place, contact: usize) -> f64 {
+    let slope = place.slope[contact].map(|change| kind.linearised(&place.base, &change));
+    let row = |i: usize| (0..3).map(|j| tensor_product(&slope[i], &slope[j]).abs()).sum::<f64>();
     row(0).max(row(1)).max(row(2)).sqrt()
+}
+
+/// The same of the root of what is beyond first order.
+fn largest_curvature(kind: StrainKind, place: &Place, contact: usize) -> f64 {
+    place.slope[contact].iter().map(|change| kind.squared_curvature(change)).sum::<f64>().sqrt()
 }
 
 /// A force on each contact, N, that strains its own places about to the limit, so that combinations are of like parts.
@@ -116,7 +138,7 @@ fn factor(response: &StrainResponse, forces: &Loading, limit: f64) -> f64 {
 fn first_to_reach(
     kind: StrainKind,
     contacts: usize,
-    places: &[Place],
+    places: &[(Candidate, Place)],
     forces: &Loading,
     factor: f64,
     limit: f64,
@@ -124,7 +146,10 @@ fn first_to_reach(
     let mut factor = 1.01 * factor;
     let mut first = None;
     // A place that passes the limit takes over at a smaller factor: few do, for the steepest come first.
-    for (at, place) in places.iter().enumerate() {
+    for (at, (candidate, place)) in places.iter().enumerate() {
+        if candidate.bound(&forces.map(|f| factor * f.length())) <= limit {
+            continue;
+        }
         let step = place.step(forces, contacts);
         let largest_at = |share: f64| {
             let sample = std::array::from_fn(|k| place.base[k] + share * factor * step[k]);
@@ -143,7 +168,7 @@ fn first_to_reach(
 fn greedy(
     kind: StrainKind,
     contacts: usize,
-    places: &[Place],
+    places: &[(Candidate, Place)],
     critical: &[(Loading, usize)],
     limit: f64,
 ) -> Vec<Place> {
@@ -156,12 +181,12 @@ fn greedy(
             break;
         }
         chosen.push(next);
-        let place = &places[next];
+        let place = &places[next].1;
         for (shown, (forces, _)) in shown.iter_mut().zip(critical) {
             let step = place.step(forces, contacts);
             let sample: [f64; 6] = std::array::from_fn(|k| place.base[k] + step[k]);
             *shown = kind.magnitude_above(&sample, *shown);
         }
     }
-    chosen.into_iter().map(|at| places[at]).collect()
+    chosen.into_iter().map(|at| places[at].1).collect()
 }

@@ -25,21 +25,30 @@ impl StrainKind {
         self.magnitude_above(sample, 0.0)
     }
 
-    /// Upper bound of the magnitude at `sample + x` for a change of norm at most `change`, `base` being the magnitude at
-    /// `sample`. With `|F|_2 <= sqrt(1 + 2 base)`, `E(F + X) = E(F) + sym(F^T X) + X^T X / 2`.
-    pub(super) fn bound(self, base: f64, change: f64) -> f64 {
+    /// Change of the strain (six components) with the sample, to first order about `base`: `sym(F^T X)`.
+    pub(super) fn linearised(self, base: &[f64; 6], change: &[f64; 6]) -> [f64; 6] {
+        let dot = |a: &[f64], b: &[f64]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         match self {
-            StrainKind::Infinitesimal => base + change,
-            StrainKind::InPlane => base + (1.0 + 2.0 * base).sqrt() * change + 0.5 * change * change,
+            StrainKind::Infinitesimal => *change,
+            StrainKind::InPlane => {
+                let ((f1, f2), (x1, x2)) = (base.split_at(3), change.split_at(3));
+                [dot(f1, x1), dot(f2, x2), 0.0, 0.5 * (dot(f1, x2) + dot(f2, x1)), 0.0, 0.0]
+            }
         }
     }
 
-    /// Scalar product of two changes of the sample, in whose norm [`StrainKind::bound`] holds: that of Frobenius, which is
-    /// not below the largest principal value.
-    pub(super) fn product(self, a: &[f64; 6], b: &[f64; 6]) -> f64 {
-        let shear = if self == StrainKind::Infinitesimal { 2.0 } else { 1.0 };
-        a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + shear * (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
+    /// Squared norm of what the strain changes by beyond first order: `|X^T X| / 2` is not above half of it.
+    pub(super) fn squared_curvature(self, change: &[f64; 6]) -> f64 {
+        match self {
+            StrainKind::Infinitesimal => 0.0,
+            StrainKind::InPlane => change.iter().map(|x| x * x).sum(),
+        }
     }
+}
+
+/// Scalar product of two symmetric tensors; in its norm, that of Frobenius, none of the principal values is larger.
+pub(super) fn tensor_product(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + 2.0 * (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
 }
 
 /// Largest magnitude among the eigenvalues of a symmetric tensor, by the angle of the characteristic cubic (Smith, 1961).
