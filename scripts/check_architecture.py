@@ -32,10 +32,22 @@ PYTHON_ORDER = (
     *("viewer", "validation/plots", "validation/verify", "validation/bench", "cli"),
 )
 
+# What in backquotes can only be a name of code: with `::` or a dot, in CamelCase, or words joined by underscores;
+# symbols of formulas are shorter.
+CODE_NAME = re.compile(
+    r"\w+((::|\.)[A-Za-z_]\w*)+(\(\))?|[A-Z][a-z0-9]+([A-Z][a-z0-9]*)+|[a-z0-9]{2,}(_[a-z0-9]{2,})+(\(\))?"
+)
+
 
 def main() -> int:
     """Print every broken rule; the exit status is 1 if there is one."""
-    problems = [*page_problems(), *dependency_problems(), *python_import_problems(), *length_problems()]
+    problems = [
+        *page_problems(),
+        *dependency_problems(),
+        *python_import_problems(),
+        *dead_name_problems(),
+        *length_problems(),
+    ]
     for problem in problems:
         print(f"check_architecture: {problem}", file=sys.stderr)
     return 1 if problems else 0
@@ -170,6 +182,30 @@ def first_circle(graph: dict[str, set[str]]) -> list[str]:
         return []
 
     return next((circle for module in graph if (circle := visit(module, []))), [])
+
+
+def dead_name_problems() -> list[str]:
+    """Names of code and files in backquotes on the pages for people that no source has any more.
+
+    Fenced examples are left out.
+    """
+    sources = [ROOT / name for name in tracked_files() if name.endswith((".rs", ".py", ".pyi", ".ts", ".toml"))]
+    sources = [path for path in sources if path.exists()]
+    files = {path.relative_to(ROOT).as_posix() for path in sources}
+    words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
+    problems = []
+    for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")]:
+        if page.name == "CHANGELOG.md":
+            continue  # it tells of what was, too
+        text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+        for name in sorted(set(re.findall(r"`([^`\n]+)`", text))):
+            if re.fullmatch(r"[\w./-]+\.(rs|py|ts)", name):
+                dead = not any(f"/{file}".endswith(f"/{name}") for file in files)
+            else:
+                dead = bool(CODE_NAME.fullmatch(name)) and not set(re.findall(r"\w+", name)) <= words
+            if dead:
+                problems.append(f"{page.relative_to(ROOT)} names {name}, which no source has")
+    return problems
 
 
 def length_problems() -> list[str]:

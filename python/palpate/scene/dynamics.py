@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from palpate import _native
+from palpate.body import Body
 from palpate.dynamics import ModalBasis, modes, rayleigh_from_ratios
 from palpate.errors import SceneError
 from palpate.scene.table import Direction, Point, Stiffness, Table, Time
-
-if TYPE_CHECKING:
-    from palpate.body import Body
 
 # All modes of so many free dofs are quick to compute and to step; larger bodies take the lowest ones.
 ALL_MODES_DOFS = 3000

@@ -20,7 +20,7 @@ from palpate.body import Body, Material
 from palpate.dynamics import ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.dynamics.matrices import Matrices
 from palpate.green import precompute
-from palpate.mesh import TetMesh
+from palpate.mesh import TetMesh, tetrahedralize
 from palpate.scene import YOUNGS_MODULUS, BodyMotion, BuiltScene, Scene
 from palpate.simulation import RATE, Simulation
 from palpate.validation.bench import peers
@@ -184,8 +184,6 @@ def _top(body: Body) -> int:
 def _large_liver() -> TetMesh:
     """Return the liver filled again by NETGEN with about 20,000 nodes."""
     import trimesh
-
-    from palpate.mesh import tetrahedralize
 
     mesh = models.liver()
     with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:

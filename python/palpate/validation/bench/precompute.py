@@ -24,8 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate import models
-from palpate.body import Body, Material
+from palpate import _native, models
+from palpate.body import Body, Material, problem_arrays
 from palpate.cache import cache_directory
 from palpate.errors import BodyError
 from palpate.green import GreensFunction
@@ -170,9 +170,6 @@ class System:
 
 def palpate_columns(body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Seconds for the operator in memory, and for writing, verifying and mapping its file."""
-    from palpate import _native
-    from palpate.body import problem_arrays
-
     started = now()
     core = _native.GreenCore.precompute(problem_arrays(body, None), "f32", "{}", None)
     computed = now()
