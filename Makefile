@@ -26,12 +26,18 @@ $(VENV)/.installed: $(BIN)/python pyproject.toml Cargo.toml Cargo.lock $(shell f
 
 # The page of the viewer, served by the package.
 PAGE := python/palpate/viewer/static/index.html
+NPM_CI := npm ci --no-audit --no-fund --loglevel=error
 viewer/node_modules/.package-lock.json: viewer/package.json viewer/package-lock.json | check-tools
-	cd viewer && npm ci --no-audit --no-fund --loglevel=error
+	cd viewer && $(NPM_CI) --omit=dev
 	@touch $@
 
-$(PAGE): $(BIN)/python viewer/node_modules/.package-lock.json $(shell find viewer/src viewer/public -type f) viewer/index.html viewer/vite.config.ts viewer/tsconfig.json
+$(PAGE): $(BIN)/python viewer/node_modules/.package-lock.json $(shell find viewer/src viewer/public -type f) viewer/index.html viewer/vite.config.ts $(wildcard viewer/tsconfig*.json)
 	cd viewer && npm run --silent build >../$(VENV)/viewer.log 2>&1 || { cat ../$(VENV)/viewer.log; exit 1; }
+
+# The linter and the tests of the page take five times as many packages as building it, which is not to be done again.
+viewer/node_modules/.checks: viewer/node_modules/.package-lock.json | $(PAGE)
+	cd viewer && $(NPM_CI)
+	@touch -r $(PAGE) $< && touch $@
 
 viewer: $(PAGE)
 
@@ -42,7 +48,7 @@ test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace --exclude palpate-python
 	$(BIN)/python -m pytest --quiet $(ARGS)
 
-lint: $(VENV)/.installed viewer/node_modules/.package-lock.json
+lint: $(VENV)/.installed viewer/node_modules/.checks
 	cargo fmt --all --check
 	cargo clippy --release --quiet --workspace --all-targets -- -D warnings
 	$(BIN)/ruff check .

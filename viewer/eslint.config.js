@@ -1,7 +1,7 @@
-// Rules of typescript-eslint that know the types, no circles among files, and folders that import in one direction.
+// Rules of typescript-eslint that know the types, and folders that import in one direction. Circles among files of one
+// folder are found by `src/imports.test.ts`.
 
 import eslint from "@eslint/js";
-import { createNodeResolver, importX } from "eslint-plugin-import-x";
 import tseslint from "typescript-eslint";
 
 /** Each may import from those before it. Files beside these folders and beside this list (main, viewer) may import all. */
@@ -29,14 +29,7 @@ export default tseslint.config(
   tseslint.configs.recommendedTypeChecked,
   {
     languageOptions: { parserOptions: { projectService: true, tsconfigRootDir: import.meta.dirname } },
-    plugins: { "import-x": importX },
-    settings: {
-      "import-x/resolver-next": [createNodeResolver({ extensions: [".ts", ".js"] })],
-      "import-x/extensions": [".ts", ".js"],
-      "import-x/parsers": { "@typescript-eslint/parser": [".ts"] },
-    },
     rules: {
-      "import-x/no-cycle": "error",
       "@typescript-eslint/consistent-type-imports": "error",
       "@typescript-eslint/switch-exhaustiveness-check": "error",
     },

@@ -132,3 +132,20 @@ def block() -> palpate.Body:
 @pytest.fixture(scope="session")
 def block_green(block, tmp_path_factory) -> palpate.GreensFunction:
     return palpate.precompute(block, precision="f64", path=tmp_path_factory.mktemp("green") / "block.palpate")
+
+
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """Of a module: while it is open, its event loop is that of the thread, and no other can run."""
+    from browser import CHROMIUM, FLAGS
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()

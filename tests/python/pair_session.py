@@ -64,7 +64,8 @@ class PairSession:
 
     def frame_message(self, number: int, log_seen: Any, wants: Wants) -> tuple[bytes, Any]:
         seen = log_seen if isinstance(log_seen[0], tuple) else (log_seen, log_seen)
-        sent = [session.frame_message(number, *pair) for session, *pair in zip(self.sessions, seen, [wants] * 2)]
+        pairs = zip(self.sessions, seen, strict=True)
+        sent = [session.frame_message(number, mine, wants) for session, mine in pairs]
         (first, arrays), (second, others) = (decode(message) for message, _ in sent)
         for tool in second["tools"]:
             tool["position"] = self._in_scene(tool["position"])

@@ -5,7 +5,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use glam::{DMat3, DVec3};
-use palpate_core::dynamics::{Account, Held, Lanes, Model, Newmark, Projection, Rayleigh, exact_step};
+use palpate_core::dynamics::{
+    EnergyAccount, Lanes, LoadedPatch, ModalModel, Newmark, Projection, Rayleigh, exact_step,
+};
 
 thread_local! {
     static COUNT: Cell<u64> = const { Cell::new(0) };
@@ -34,13 +36,13 @@ const MODES: usize = 37;
 const ROWS: usize = 30;
 
 /// Modes with made-up shapes; their number fills no group of lanes.
-fn model(exact: bool) -> Model {
+fn model(exact: bool) -> ModalModel {
     let eigenvalues: Vec<f64> = (0..MODES).map(|i| if i == 0 { 0.0 } else { 300.0 * (i * i) as f64 }).collect();
     let shapes: Vec<f64> = (0..MODES * ROWS).map(|i| ((i * 7919 % 1000) as f64 / 500.0 - 1.0) * 3.0).collect();
     let scheme = Newmark::new(1e-3, 0.3025, 0.6).expect("a valid scheme");
     let rayleigh = Rayleigh { mass: 1.0, stiffness: 1e-4 };
     let step = |k, c| if exact { exact_step(k, c, scheme.dt) } else { scheme.mode_step(k, c) };
-    Model::new(&eigenvalues, &shapes, &rayleigh, scheme.dt, step).expect("a valid model")
+    ModalModel::new(&eigenvalues, &shapes, &rayleigh, scheme.dt, step).expect("a valid model")
 }
 
 fn bits(x: &[Lanes]) -> Vec<u64> {
@@ -54,8 +56,8 @@ fn steps_never_allocate_and_repeat_their_bits() {
     let mut ends = [Vec::new(), Vec::new()];
     for end in &mut ends {
         let (mut state, mut scratch) = (model.state(), model.scratch());
-        let (mut account, mut held) = (Account::new(&state), Projection::new(&model));
-        let mut ahead = model.ahead();
+        let (mut account, mut pressed) = (EnergyAccount::new(&state), Projection::new(&model));
+        let mut predicted = model.predicted_state();
         let mut seen = [0.0; 2];
         let before = COUNT.with(Cell::get);
         for tick in 0..500 {
@@ -63,13 +65,13 @@ fn steps_never_allocate_and_repeat_their_bits() {
             // A row that does not exist is left out, never a panic.
             model.step(&mut state, &mut scratch, &[(4, (9.0 * t).sin()), (5, 0.1), (u32::MAX, 1.0)]);
             account.book(&model, &state);
-            held.gather(&model, patch.iter().copied());
-            model.advance(&mut ahead, &mut [Held::new(&held, DVec3::new(0.0, 1e-3, -t * 1e-2))]);
+            pressed.gather(&model, patch.iter().copied());
+            model.advance(&mut predicted, &mut [LoadedPatch::new(&pressed, DVec3::new(0.0, 1e-3, -t * 1e-2))]);
             model.read(&state.q, [0, 5].into_iter(), &mut seen);
         }
         assert_eq!(COUNT.with(Cell::get), before, "a step allocated");
         assert!(seen.iter().all(|x| x.is_finite() && *x != 0.0));
-        *end = [bits(&state.q), bits(&ahead.free_q)].concat();
+        *end = [bits(&state.q), bits(&predicted.free_q)].concat();
     }
     assert_eq!(ends[0], ends[1]);
 }
@@ -78,11 +80,11 @@ fn steps_never_allocate_and_repeat_their_bits() {
 fn bad_numbers_never_panic() {
     let model = model(false);
     let (mut state, mut scratch) = (model.state(), model.scratch());
-    let (mut patch, mut ahead) = (Projection::new(&model), model.ahead());
+    let (mut patch, mut predicted) = (Projection::new(&model), model.predicted_state());
     patch.gather(&model, [(0, f64::NAN), (usize::MAX - 2, 1.0)].into_iter());
-    let mut held = [Held::new(&patch, DVec3::NAN)];
-    model.advance(&mut ahead, &mut held);
-    assert!(held[0].free.is_nan());
+    let mut loaded = [LoadedPatch::new(&patch, DVec3::NAN)];
+    model.advance(&mut predicted, &mut loaded);
+    assert!(loaded[0].free.is_nan());
     model.step(&mut state, &mut scratch, &[(0, f64::INFINITY)]);
 }
 
@@ -115,7 +117,7 @@ fn a_patch_moves_by_its_free_motion_and_its_compliance() {
 
 /// The pass that keeps one step ahead is `predict` and `correct`, for any number of patches that carry a force.
 #[test]
-fn a_motion_kept_ahead_is_the_same_motion() {
+fn a_predicted_motion_is_the_same_motion() {
     let model = model(false);
     let patches: Vec<Projection> = (0..5)
         .map(|i| {
@@ -125,15 +127,15 @@ fn a_motion_kept_ahead_is_the_same_motion() {
         })
         .collect();
     for count in 0..=patches.len() {
-        let (mut state, mut scratch, mut ahead) = (model.state(), model.scratch(), model.ahead());
-        let mut account = Account::new(&state);
+        let (mut state, mut scratch, mut predicted) = (model.state(), model.scratch(), model.predicted_state());
+        let mut account = EnergyAccount::new(&state);
         let mut dissipated = 0.0;
         for tick in 0..50 {
             let forces: Vec<DVec3> =
                 (0..count).map(|i| DVec3::new(0.3, -0.1, (0.2 * f64::from(tick) + i as f64).sin())).collect();
-            let mut held: Vec<Held> =
-                patches.iter().zip(&forces).map(|(patch, &force)| Held::new(patch, force)).collect();
-            let advanced = model.advance(&mut ahead, &mut held);
+            let mut loaded: Vec<LoadedPatch> =
+                patches.iter().zip(&forces).map(|(patch, &force)| LoadedPatch::new(patch, force)).collect();
+            let advanced = model.advance(&mut predicted, &mut loaded);
             model.predict(&mut state);
             scratch.load.fill(Lanes::default());
             for (patch, &force) in patches.iter().zip(&forces) {
@@ -142,8 +144,8 @@ fn a_motion_kept_ahead_is_the_same_motion() {
             model.correct(&mut state, &scratch.load);
             account.book(&model, &state);
             dissipated += advanced.dissipated;
-            assert_eq!(bits(&ahead.q), bits(&state.q));
-            assert_eq!(bits(&ahead.v), bits(&state.v));
+            assert_eq!(bits(&predicted.q), bits(&state.q));
+            assert_eq!(bits(&predicted.v), bits(&state.v));
             let energies = account.energies(&model, &state);
             for (got, want) in [
                 (advanced.kinetic, energies.kinetic),
@@ -152,9 +154,9 @@ fn a_motion_kept_ahead_is_the_same_motion() {
             ] {
                 assert!((got - want).abs() <= 1e-12 * want, "{got} {want}");
             }
-            for held in &held {
-                let expected = held.patch.read(&model, &ahead.free_q);
-                assert!((held.free - expected).length() <= 1e-12 * expected.length());
+            for patch in &loaded {
+                let expected = patch.projection.read(&model, &predicted.free_q);
+                assert!((patch.free - expected).length() <= 1e-12 * expected.length());
             }
         }
     }

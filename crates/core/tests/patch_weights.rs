@@ -1,7 +1,7 @@
 //! Contact weights `int N_i phi dA / int phi dA` against integrals done another way, on flat and curved faces.
 
 use glam::DVec3;
-use palpate_core::contact::{Patch, PatchScratch, SurfacePoint, SurfaceQuery, patch_weights};
+use palpate_core::contact::{Patch, PatchGeometry, PatchScratch, SurfacePoint, SurfaceQuery, patch_weights};
 use palpate_core::element::{Face, Tri6};
 use palpate_core::mesh::{Faces, Surface};
 
@@ -31,10 +31,15 @@ fn sheet(quadratic: bool, bend: f64) -> Surface {
     Surface::new(positions, faces).expect("a valid surface")
 }
 
+fn weigh(surface: &Surface, centre: &SurfacePoint, radius: f64) -> Patch {
+    let (geometry, mut scratch, mut patch) =
+        (PatchGeometry::new(surface), PatchScratch::new(surface), Patch::default());
+    patch_weights(surface, &geometry, centre, radius, &mut scratch, &mut patch).expect("not too many nodes");
+    patch
+}
+
 fn weights(surface: &Surface, centre: &SurfacePoint, radius: f64) -> Vec<(DVec3, f64)> {
-    let mut patch = Patch::default();
-    patch_weights(surface, centre, radius, &mut PatchScratch::new(surface), &mut patch);
-    patch.iter().map(|(node, weight)| (surface.positions[node], weight)).collect()
+    weigh(surface, centre, radius).iter().map(|(node, weight)| (surface.positions[node], weight)).collect()
 }
 
 fn touch(surface: &Surface, x: f64, y: f64, z: f64) -> SurfacePoint {
@@ -111,8 +116,7 @@ fn weights_become_the_shape_functions_as_the_radius_vanishes() {
             let shapes = Tri6::shapes(corners[0] * 0.2 + corners[1] * 0.5 + corners[2] * 0.3);
             let mut previous = f64::INFINITY;
             for radius in [1e-2, 1e-3, 1e-6, 0.0] {
-                let mut patch = Patch::default();
-                patch_weights(&surface, &centre, radius, &mut PatchScratch::new(&surface), &mut patch);
+                let patch = weigh(&surface, &centre, radius);
                 let expected = |node| faces[31].iter().position(|&n| n as usize == node).map_or(0.0, |k| shapes[k]);
                 let error = patch.iter().map(|(node, w)| (w - expected(node)).abs()).fold(0.0, f64::max);
                 assert!(error < 30.0 * radius + 1e-12, "radius {radius}: {error:e}");
@@ -131,9 +135,8 @@ fn weights_are_continuous_where_drawn_triangles_and_faces_meet() {
         // Across a drawn triangle's edge inside a face, and across a face's own.
         for x in [0.5 + 1.0 / 24.0, 0.5] {
             let sides = [-step, step].map(|d| {
-                let mut patch = Patch::default();
                 let centre = touch(&surface, x + d, 0.53, 0.5 * ((x + d) * (x + d) + 0.53 * 0.53));
-                patch_weights(&surface, &centre, radius, &mut PatchScratch::new(&surface), &mut patch);
+                let patch = weigh(&surface, &centre, radius);
                 let mut of_node = vec![0.0; surface.positions.len()];
                 patch.iter().for_each(|(node, w)| of_node[node] = w);
                 of_node

@@ -2,62 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import http.server
-import os
-import re
-import shutil
-import signal
-import subprocess
-import sys
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import MARKS, Program, opened, press, settled_force, state, until
 
-CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(
-        not Path(CHROMIUM).exists(), reason="no Chromium at /usr/bin/chromium (Debian: apt install chromium)"
-    ),
-]
-
-
-class Program:
-    """`palpate demo`, as a user starts it."""
-
-    def __init__(self, cache: Path, *arguments: str):
-        command = [sys.executable, "-m", "palpate", "demo", *arguments, "--port", "0", "--no-browser"]
-        environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
-        self.address = re.search(r"http://\S+", self.process.stdout.readline())[0]
-
-    def stop(self) -> int:
-        """Exit status after Ctrl-C."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        self.process.stdout.close()
-        return self.process.wait(20)
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("cache")
+pytestmark = MARKS
 
 
 @pytest.fixture(scope="module")
@@ -68,39 +21,11 @@ def program(cache):
 
 
 @pytest.fixture(scope="module")
-def chromium():
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture(scope="module")
 def struck(cache):
     """The paper's beam in motion, struck by itself when a page opens."""
     started = Program(cache, "beam", "--paper", "--impulse")
     yield started
     assert started.stop() == 0
-
-
-@contextlib.contextmanager
-def opened(chromium, program):
-    """The page with a scene on it; anything on its console is a failure."""
-    context = chromium.new_context(viewport={"width": 1280, "height": 720})
-    page = context.new_page()
-    complaints = []
-    page.on(
-        "console", lambda message: complaints.append(message.text) if message.type in {"error", "warning"} else None
-    )
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.goto(program.address)
-    until(page, lambda s: s["frames"] > 3)
-    yield page
-    context.close()
-    # Software rendering tells of its own slowness; that is the test machine's affair.
-    assert [text for text in complaints if "GPU stall" not in text] == []
 
 
 @pytest.fixture
@@ -113,43 +38,6 @@ def page(chromium, program):
 def moving_page(chromium, struck):
     with opened(chromium, struck) as page:
         yield page
-
-
-def state(page) -> dict:
-    return page.evaluate("window.palpate ? window.palpate.state() : {frames: 0, connected: false}")
-
-
-def until(page, condition, seconds: float = 30.0) -> dict:
-    """State of the page once a condition holds (its policy forbids Playwright's own waiting by eval)."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        seen = state(page)
-        if condition(seen):
-            return seen
-        time.sleep(0.02)
-    raise AssertionError(f"waited {seconds} s in vain; the last state was {seen}")
-
-
-def press(page, pixels: float = 40.0, steps: int = 20) -> dict:
-    """Press on the visible top and push deeper by dragging down; the button stays down."""
-    x, y = page.evaluate("window.palpate.pickPoint()")
-    page.mouse.move(x, y)
-    page.mouse.down()
-    for step in range(1, steps + 1):
-        page.mouse.move(x, y + pixels * step / steps)
-    return until(page, lambda s: s["contacts"] == 1 and s["forceMagnitude"] > 0.05)
-
-
-def settled_force(page) -> np.ndarray:
-    """Force once it stands still."""
-    before = np.zeros(3)
-    for _ in range(100):
-        now = np.array(state(page)["force"])
-        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= 1e-6 * np.linalg.norm(now):
-            return now
-        before = now
-        time.sleep(0.3)
-    raise AssertionError("the force does not settle")
 
 
 def displayed(page) -> float:
@@ -355,6 +243,29 @@ def test_modes_swing_one_by_one(moving_page):
     page.mouse.up()
     until(page, lambda s: s["motion"]["mode"] is None)
     assert not banner.is_visible()
+
+
+def test_no_second_tool_is_offered_where_there_is_one(page):
+    assert not page.locator("#fingers").is_visible() and not page.locator("#body-row").is_visible()
+    press(page, 10)
+    page.keyboard.press("n")
+    time.sleep(0.2)
+    assert state(page)["pinned"] == [] and state(page)["contacts"] == 1
+    page.mouse.up()
+
+
+def test_long_work_has_a_cancel_button(chromium, tmp_path):
+    """With an empty cache the next body has to be solved first."""
+    started = Program(tmp_path, "beam", "--paper")
+    with opened(chromium, started) as page:
+        page.get_by_test_id("model-select").select_option("doll")
+        page.get_by_test_id("status-cancel").click(timeout=20_000)
+        page.get_by_text("cancelled").wait_for(timeout=20_000)
+        page.get_by_test_id("status").wait_for(state="hidden", timeout=20_000)
+        assert page.get_by_test_id("model-select").input_value() == "beam" and state(page)["scene"] == "beam"
+        press(page, 10)
+        page.mouse.up()
+    assert started.stop() == 0
 
 
 def test_leaving_the_page_lets_go(chromium, program, page):

@@ -5,19 +5,25 @@ import * as THREE from "three";
 const COLOR = "#6fc3ff";
 const EDGE = "#14171c";
 const PIXELS = 128;
-/** Height of the mark over the radius of the tool. */
-const HEIGHT = 3;
+/** Height at a distance of one; the picture is 2 tan(35 deg / 2) = 0.63 high there. */
+const HEIGHT = 0.035;
 
 export class PinView {
   readonly sprite: THREE.Sprite;
 
-  constructor(toolRadius: number) {
+  constructor() {
     // Seen through the body: a pinned tool may be deep in a dent.
-    const material = new THREE.SpriteMaterial({ map: pinTexture(), depthTest: false, depthWrite: false });
+    const material = new THREE.SpriteMaterial({
+      map: pinTexture(),
+      depthTest: false,
+      depthWrite: false,
+      // As large on the screen from wherever it is seen.
+      sizeAttenuation: false,
+    });
     this.sprite = new THREE.Sprite(material);
     // The tip is at the tool's centre.
     this.sprite.center.set(0.5, 0.04);
-    this.sprite.scale.setScalar(HEIGHT * toolRadius);
+    this.sprite.scale.setScalar(HEIGHT);
     this.sprite.renderOrder = 3;
     this.sprite.visible = false;
   }

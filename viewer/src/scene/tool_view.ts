@@ -67,7 +67,7 @@ export class ToolView {
     this.head = new THREE.Mesh(new THREE.ConeGeometry(0.0115 * size, 0.036 * size, 24), material);
     this.arrow.add(this.shaft, this.head);
     this.limit = new LimitView(tool.radius);
-    this.pin = new PinView(tool.radius);
+    this.pin = new PinView();
     this.group.add(this.sphere, this.ring, this.arrow, this.limit.group, this.pin.sprite);
     this.group.visible = false;
   }

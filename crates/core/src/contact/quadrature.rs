@@ -97,8 +97,7 @@ impl FaceGeometry {
         if bent.iter().all(|c| c.length() <= FLAT * size) {
             return Self::linear([x0, x1, x2]);
         }
-        let coefficients =
-            [x0, 4.0 * x01 - 3.0 * x0 - x1, 4.0 * x20 - 3.0 * x0 - x2, bent[0], bent[1], bent[2]];
+        let coefficients = [x0, 4.0 * x01 - 3.0 * x0 - x1, 4.0 * x20 - 3.0 * x0 - x2, bent[0], bent[1], bent[2]];
         Self { coefficients, flat: false, stretch: 0.0 }
     }
 
@@ -174,8 +173,14 @@ impl Lattice {
         let origin = closest_point(a - centre, u, v, size);
         let [i, j] = origin.map(|index| index as f64);
         let (w, u, v) = ((a + u * i + v * j - centre) / radius, u / radius, v / radius);
-        let distance =
-            [w.length_squared(), 2.0 * w.dot(u), 2.0 * w.dot(v), u.length_squared(), 2.0 * u.dot(v), v.length_squared()];
+        let distance = [
+            w.length_squared(),
+            2.0 * w.dot(u),
+            2.0 * w.dot(v),
+            u.length_squared(),
+            2.0 * u.dot(v),
+            v.length_squared(),
+        ];
         let increment = |to: Coordinates| [(to[0] - corners[0][0]) * step, (to[1] - corners[0][1]) * step];
         let (along_i, along_j) = (increment(corners[1]), increment(corners[2]));
         // A cell has `4 step^2` of the triangle's area; the rule gives a third of it to each of its mid-edges.

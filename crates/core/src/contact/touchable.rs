@@ -78,8 +78,12 @@ impl TouchPatch {
 
     /// Adds `Psi W f` to the displacements of all surface dofs (3s), m.
     pub fn add_response(&self, green: &GreensFunction, force: DVec3, displacements: &mut [f64]) {
-        let forces: Vec<(TouchNode, DVec3)> =
-            self.columns().iter().zip(self.patch.weights()).map(|(&column, &weight)| (column, weight * force)).collect();
+        let forces: Vec<(TouchNode, DVec3)> = self
+            .columns()
+            .iter()
+            .zip(self.patch.weights())
+            .map(|(&column, &weight)| (column, weight * force))
+            .collect();
         green.add_forces(&forces, displacements);
     }
 

@@ -20,7 +20,8 @@ pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
 pub use energy::Energy;
 pub use exponential::exact_step;
 pub use modal::{
-    EnergyAccount, LANES, Lanes, LoadedPatch, ModalModel, ModalScratch, ModalState, PredictedState, Projection, StepEnergy,
+    EnergyAccount, LANES, Lanes, LoadedPatch, ModalModel, ModalScratch, ModalState, PredictedState, Projection,
+    StepEnergy,
 };
 pub use scheme::{ModeStep, Newmark, Rayleigh};
 pub use store::{BASIS_VERSION, Basis, basis_key};

@@ -78,8 +78,8 @@ pub struct Controls {
     pub contact_radius: [f64; MAX_TOOLS],
     /// Young's modulus of each body over that of its Green's function: it only scales forces.
     pub stiffness_scale: [f64; MAX_BODIES],
-    /// Largest strain to which tools may take a body; zero for any.
-    pub strain_limit: f64,
+    /// Largest strain to which tools may take each body; zero for any.
+    pub strain_limit: [f64; MAX_BODIES],
     /// Let go of everything, and bring moving bodies to rest.
     pub reset: bool,
     /// How far bodies in motion advance in this tick, s.
@@ -93,7 +93,7 @@ impl Default for Controls {
         Self {
             contact_radius: [0.0; MAX_TOOLS],
             stiffness_scale: [1.0; MAX_BODIES],
-            strain_limit: 0.0,
+            strain_limit: [0.0; MAX_BODIES],
             reset: false,
             advance: 1e-3,
             strike: None,

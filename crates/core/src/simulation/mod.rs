@@ -2,13 +2,15 @@
 //! or panics on bad numbers; the same input gives the same bits.
 //!
 //! `input` is what comes from outside, `model` what is fixed, `state` what evolves. `law` says when a contact begins, how it
-//! follows its tool and when it ends; `solve` finds the forces of all contacts of a body together. A body that moves has a
+//! follows its tool and when it ends; `limit` keeps strain within what linear elasticity can say; `solve` finds the forces of
+//! all contacts of a body together. A body that moves has a
 //! `motion`, which a `strike` may set going, and an `energy` that is accounted for. `snapshot` is what is drawn.
 
 mod body;
 mod energy;
 mod input;
 mod law;
+mod limit;
 mod model;
 mod motion;
 mod snapshot;
@@ -20,6 +22,7 @@ mod strike;
 pub use body::{BodyDynamics, BodyModel};
 pub use input::{Controls, Input, Output, Placement, Pose, Strike, ToolInput, Twist, Wrench};
 pub use law::LawKind;
+pub use limit::{Rebound, StrainWatch};
 pub use model::{Model, Scratch, ToolModel};
 pub use snapshot::Snapshot;
 pub use state::{BodyState, Contact, Contacts, Mode, State, ToolState};

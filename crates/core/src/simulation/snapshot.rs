@@ -50,11 +50,7 @@ impl Snapshot {
             stiffness_scale: 1.0,
             modal: body.dynamics.as_ref().map_or_else(Vec::new, |dynamics| dynamics.modes.state().q),
         };
-        Self {
-            contacts: model.contacts(),
-            tools: Default::default(),
-            bodies: model.bodies.iter().map(body).collect(),
-        }
+        Self { contacts: model.contacts(), tools: Default::default(), bodies: model.bodies.iter().map(body).collect() }
     }
 
     /// Where the energy of a body in motion is.
@@ -134,7 +130,8 @@ impl Snapshot {
         let mut blocks = vec![[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS];
         for &a in &slots {
             for &b in &slots {
-                blocks[a][b] = if a == b { self.contacts.patches[a].own_compliance(green) * (1.0 / scale) } else { block(a, b) };
+                blocks[a][b] =
+                    if a == b { self.contacts.patches[a].own_compliance(green) * (1.0 / scale) } else { block(a, b) };
             }
         }
         let mut system = Box::<System>::default();

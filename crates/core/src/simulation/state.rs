@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::limit::{Rebound, StrainWatch};
 use super::motion::Motion;
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Model};
 use crate::contact::{Refusal, TouchPatch};
@@ -38,8 +39,12 @@ pub struct Contact {
     pub anchor: DVec3,
 
     // Written every tick.
-    /// Displacement of the tool from the anchor, m.
+    /// Displacement of the tool from the anchor, as far as the limit of strain lets it, m.
     pub displacement: DVec3,
+    /// Which part that is of the whole displacement.
+    pub share: f64,
+    /// Bound on its length while the limit is not known yet, m.
+    pub(super) bound: f64,
     /// Force on the body, N.
     pub force: DVec3,
 }
@@ -102,6 +107,8 @@ pub struct ToolState {
     /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
     /// the least reached since for one that was released inside, so that a force always starts from zero.
     pub entry_depth: [f64; MAX_BODIES],
+    /// Where a limited tool was left by a body in motion.
+    pub rebound: [Option<Rebound>; MAX_BODIES],
     /// Why no contact began where the tool reaches the body.
     pub refused: [Option<Refusal>; MAX_BODIES],
 }
@@ -113,6 +120,8 @@ pub struct BodyState {
     pub stiffness_scale: f64,
     /// How the body moves, if it does.
     pub motion: Option<Motion>,
+    /// Strain under the contacts, once it is prepared.
+    pub strain: Option<Box<StrainWatch>>,
 }
 
 /// State of a simulation.
@@ -133,12 +142,22 @@ impl State {
         let body = |body: &super::BodyModel| BodyState {
             stiffness_scale: 1.0,
             motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
+            strain: None,
         };
         Self {
             bodies: model.bodies.iter().map(body).collect(),
             tools: Default::default(),
             contacts: model.contacts(),
             compliance: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
+        }
+    }
+
+    /// Takes up strain responses that were prepared; the one before is handed back, for its memory must not be freed in a
+    /// tick.
+    pub fn watch_strain(&mut self, body: usize, watch: Box<StrainWatch>) -> Option<Box<StrainWatch>> {
+        match self.bodies.get_mut(body) {
+            Some(state) => state.strain.replace(watch),
+            None => Some(watch),
         }
     }
 

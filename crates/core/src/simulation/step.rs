@@ -1,7 +1,8 @@
 //! The tick, in stages.
 
 use super::law::Approach;
-use super::{Input, Mode, Model, Output, Scratch, State, motion, solve, strike};
+use super::limit::Rebound;
+use super::{Input, Mode, Model, Output, Scratch, State, limit, motion, solve, strike};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) -> Output {
@@ -14,6 +15,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
         while motion::begin_step(model, state, body) {
             // 2. Contacts begin, follow their tools, and push.
             follow_tools(model, state, scratch, body, input);
+            limit::apply(model, state, scratch, body, input.controls.strain_limit[body]);
             push(model, state, scratch, body);
 
             // 3. Their forces go into the motion.
@@ -36,10 +38,16 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         state.tools[tool].refused[body] = None;
         if !said.active || input.controls.reset || !said.pose.is_finite() {
             state.tools[tool].entry_depth[body] = 0.0;
+            state.tools[tool].rebound[body] = None;
             place.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
-        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), tool, body, input);
+        let mut approach = Approach::new(model, state.bodies[body].motion.as_ref(), tool, body, input);
+        let rebound = state.tools[tool].rebound[body].and_then(|rebound| rebound.position(approach.position));
+        match rebound {
+            Some(position) => approach.position = position,
+            None => state.tools[tool].rebound[body] = None,
+        }
         match place {
             Some(slot) => {
                 if !law.update(&approach, &mut state.contacts.slots[slot]) {
@@ -48,7 +56,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                 }
             }
             None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], scratch) {
-                Ok(Some(begun)) => solve::add_contact(model, state, begun, scratch),
+                Ok(Some(begun)) => solve::add_contact(model, state, begun, scratch, input.controls.strain_limit[body]),
                 Ok(None) => {}
                 Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
             },
@@ -69,7 +77,11 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
             }
             let tool = contact.tool;
             if model.tools[tool].law.law().end(contact) {
-                let position = contact.anchor + contact.displacement;
+                let position = contact.anchor + contact.displacement / contact.share;
+                if model.bodies[body].moves() && state.tools[tool].rebound[body].is_none() {
+                    state.tools[tool].rebound[body] = Rebound::of(contact);
+                }
+                let position = state.tools[tool].rebound[body].and_then(|r| r.position(position)).unwrap_or(position);
                 let motion = state.bodies[body].motion.as_ref();
                 let approach = Approach::at(model, motion, tool, body, position);
                 state.tools[tool].entry_depth[body] = approach.depth();
@@ -89,6 +101,7 @@ fn answer(model: &Model, state: &State) -> Output {
         let placement = &model.bodies[contact.body].placement;
         output.wrench_on_device[contact.tool].force -= placement.vector_to_world(contact.force);
         output.in_contact[contact.tool] = true;
+        output.limited[contact.tool] |= contact.share < 1.0;
     }
     output
 }

@@ -10,7 +10,7 @@ use super::places::choose;
 use super::response::{MAX_CONTACTS_WATCHED, Place, StrainResponse};
 use super::{GradientOperator, StrainKind};
 use crate::element::{Face, Tri3, Tri6};
-use crate::green::{GreensFunction, Interior};
+use crate::green::{GreensFunction, Interior, TouchNode};
 use crate::mesh::{Faces, Surface};
 use crate::{Error, Result};
 
@@ -157,7 +157,7 @@ impl StrainMeasure {
                 let (nodes, weights) = (nodes.len(), weights.len());
                 return Err(Error::Invalid(format!("a patch of {nodes} nodes has {weights} weights")));
             }
-            let touchable = |&&n: &&u32| (n as usize) < self.surface_count && green.first_column(n as usize).is_some();
+            let touchable = |&&n: &&u32| (n as usize) < self.surface_count && green.touchable(n as usize).is_some();
             if let Some(node) = nodes.iter().find(|n| !touchable(n)) {
                 return Err(Error::Invalid(format!("surface node {node} under a contact is not touchable")));
             }
@@ -168,17 +168,13 @@ impl StrainMeasure {
 
 /// Adds `Psi W e_axis` to displacements of the surface (3s), m/N.
 fn patch_response(green: &GreensFunction, (nodes, weights): PatchNodes<'_>, axis: usize, field: &mut [f64]) {
-    for (&node, &weight) in nodes.iter().zip(weights) {
-        let Some(first) = green.first_column(node as usize) else { continue };
-        if !green.row_is_fixed[3 * node as usize + axis] {
-            green.add_column(first + axis, weight, field);
-        }
-    }
-    for (u, &fixed) in field.iter_mut().zip(&green.row_is_fixed) {
-        if fixed {
-            *u = 0.0;
-        }
-    }
+    let column = |&node: &u32| green.touchable(node as usize);
+    let forces: Vec<(TouchNode, DVec3)> = nodes
+        .iter()
+        .zip(weights)
+        .filter_map(|(node, &weight)| column(node).map(|column| (column, weight * DVec3::AXES[axis])))
+        .collect();
+    green.add_forces(&forces, field);
 }
 
 /// `F` fields one after the other, as vectors of all fields at each node.

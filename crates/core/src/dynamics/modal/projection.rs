@@ -7,9 +7,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::model::ModalModel;
 use super::kernels::{AddRows, Compliance, Dot};
 use super::lanes::Lanes;
+use super::model::ModalModel;
 
 /// Nodes taken at once when a patch is gathered: few enough streams for the processor to fetch ahead.
 const NODES_AT_ONCE: usize = 5;

@@ -4,7 +4,7 @@
 //! net work. The anchor lies where the surface, sagged under the reference loads, was met: the tool's displacement from it
 //! is the whole `d - W^T u_free`. A press lets go where it would pull; its tangential energy is then lost, never gained.
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 
 use super::{Approach, Law};
 use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
@@ -55,8 +55,8 @@ impl<F: Footprint> Law for Sticking<F> {
             normal: closest.normal,
             anchor,
             displacement: approach.position - anchor,
-            force: DVec3::ZERO,
-            serial: 0,
+            share: 1.0,
+            ..Contact::default()
         }))
     }
 

@@ -1,12 +1,14 @@
 //! Rows and columns of the compliance between contacts: worked out once, when a contact begins.
 
+use crate::simulation::limit::first_bound;
 use crate::simulation::{Contact, Model, Scratch, State};
 
 /// Takes up a contact that begins, whose patch is `scratch.candidate`: a slot, its compliance with every other contact of
 /// the body, and of a body in motion where the moving patch is met. Refused where a node may not be touched.
-pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &Scratch) {
+pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &Scratch, strain_limit: f64) {
     let (tool, body) = (begun.tool, begun.body);
-    let (green, State { bodies, contacts, compliance, tools }) = (&model.bodies[body].green, state);
+    let green = &model.bodies[body].green;
+    let State { bodies, contacts, compliance, tools } = &mut *state;
     // There are as many slots as pairs of a tool and a body.
     let Some(slot) = contacts.empty() else { return };
     if let Err(refusal) = contacts.patches[slot].admit(green, &scratch.candidate) {
@@ -28,4 +30,6 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
         contacts.slots[slot].anchor -= met;
         contacts.slots[slot].displacement += met;
     }
+    let bound = first_bound(model, state, slot, strain_limit);
+    state.contacts.slots[slot].bound = bound;
 }

@@ -11,13 +11,20 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
     let moving = state.bodies[body].motion.as_ref();
     let mut slots = [0; MAX_CONTACTS];
     let count = gather(state, body, &mut slots);
-    solve_with(model, state, system, &slots[..count], |a, b| match moving {
-        Some(motion) => motion.compliance(a, b),
-        None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
-    }, |slot| {
-        let free = moving.map_or(DVec3::ZERO, |motion| motion.free_displacement(slot));
-        state.contacts.slots[slot].displacement - free
-    });
+    solve_with(
+        model,
+        state,
+        system,
+        &slots[..count],
+        |a, b| match moving {
+            Some(motion) => motion.compliance(a, b),
+            None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
+        },
+        |slot| {
+            let free = moving.map_or(DVec3::ZERO, |motion| motion.free_displacement(slot));
+            state.contacts.slots[slot].displacement - free
+        },
+    );
     for (i, &slot) in slots[..count].iter().enumerate() {
         state.contacts.slots[slot].force = DVec3::from_slice(&system.right[3 * i..3 * i + 3]);
     }

@@ -6,4 +6,4 @@ mod forces;
 
 pub use cholesky::System;
 pub use compliance::add_contact;
-pub use forces::{contact_forces, solve_with};
+pub use forces::{contact_forces, gather, solve_with};

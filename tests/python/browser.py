@@ -1,0 +1,110 @@
+"""What the tests of the page share: the program a user starts, a page in a real Chromium, and how it is pressed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+MARKS = [
+    pytest.mark.browser,
+    pytest.mark.skipif(
+        not Path(CHROMIUM).exists(), reason="no Chromium at /usr/bin/chromium (Debian: apt install chromium)"
+    ),
+]
+
+
+class Program:
+    """`palpate demo`, as a user starts it."""
+
+    def __init__(self, cache: Path, *arguments: str):
+        command = [sys.executable, "-m", "palpate", "demo", *arguments, "--port", "0", "--no-browser"]
+        environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        self.address = re.search(r"http://\S+", self.process.stdout.readline())[0]
+
+    def stop(self) -> int:
+        """Exit status after Ctrl-C."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        self.process.stdout.close()
+        return self.process.wait(20)
+
+
+@contextlib.contextmanager
+def opened(chromium, program):
+    """The page with a scene on it; anything on its console is a failure."""
+    context = chromium.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    complaints = []
+    page.on(
+        "console", lambda message: complaints.append(message.text) if message.type in {"error", "warning"} else None
+    )
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    try:
+        page.goto(program.address)
+        until(page, lambda s: s["frames"] > 3)
+        yield page
+    finally:  # another page would only watch
+        context.close()
+    # Software rendering tells of its own slowness; that is the test machine's affair.
+    assert [text for text in complaints if "GPU stall" not in text] == []
+
+
+def state(page) -> dict:
+    return page.evaluate("window.palpate ? window.palpate.state() : {frames: 0, connected: false}")
+
+
+def until(page, condition, seconds: float = 30.0) -> dict:
+    """State of the page once a condition holds (its policy forbids Playwright's own waiting by eval)."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        seen = state(page)
+        if condition(seen):
+            return seen
+        time.sleep(0.02)
+    raise AssertionError(f"waited {seconds} s in vain; the last state was {seen}")
+
+
+def press(page, pixels: float = 40.0, steps: int = 20) -> dict:
+    """Press on the visible top and push deeper by dragging down; the button stays down."""
+    x, y = page.evaluate("window.palpate.pickPoint()")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, steps + 1):
+        page.mouse.move(x, y + pixels * step / steps)
+    return until(page, lambda s: s["contacts"] == 1 and s["forceMagnitude"] > 0.05)
+
+
+def settled_force(page) -> np.ndarray:
+    """Force once it stands still."""
+    before = np.zeros(3)
+    for _ in range(100):
+        now = np.array(state(page)["force"])
+        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= 1e-6 * np.linalg.norm(now):
+            return now
+        before = now
+        time.sleep(0.3)
+    raise AssertionError("the force does not settle")
