@@ -1,36 +1,25 @@
 //! A simulation: the loop with simulated devices, and the same ticks offline.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use glam::DVec3;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
-use palpate_core::dynamics::{Model as Modes, exact_step};
-use palpate_core::simulation::{Dynamics, Energy, Input, Mode, Model, Snapshot, Strike};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use palpate_core::simulation::{MAX_BODIES, Model, Pose, Snapshot, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{Handle, Target, simulated};
-use palpate_servo::{Published, SafetyLimits, Script, Servo, Settings};
+use palpate_servo::{Published, SafetyLimits, Script, Servo, Settings, StrainPreparer};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 
-use crate::body::vectors;
-use crate::dynamics::{SchemeArguments, scheme};
 use crate::errors::to_python;
-use crate::green::GreenCore;
+use crate::scene::{
+    BodyArguments, ContactRecord, ToolArguments, body_parts, contact_records, energy_array, poses, quaternion, tool,
+    wxyz,
+};
+use crate::strain::StrainMeasure;
 
-/// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
-/// and the spring between tools and patches, N/m.
-type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
-
-fn dynamics(arguments: DynamicsArguments<'_>) -> PyResult<palpate_core::Result<Dynamics>> {
-    let (eigenvalues, shapes, (dt, ..), exact, coupling) = &arguments;
-    let (eigenvalues, shapes) = (eigenvalues.as_slice()?, shapes.as_slice()?);
-    let make = || {
-        let (newmark, rayleigh) = scheme(arguments.2)?;
-        let step = |k, c| if *exact { exact_step(k, c, *dt) } else { newmark.mode_step(k, c) };
-        Dynamics::new(Modes::new(eigenvalues, shapes, &rayleigh, *dt, step)?, *coupling)
-    };
-    Ok(make())
-}
+/// Tick, body, point (m), impulse (N s), duration (s) and radius of the patch (m) of a strike.
+type StrikeArguments = (usize, usize, [f64; 3], [f64; 3], f64, f64);
 
 /// Model, limits and settings of a simulation, and its loop while it runs.
 #[pyclass(module = "palpate._native")]
@@ -38,54 +27,51 @@ pub struct SimulationCore {
     model: Arc<Model>,
     limits: SafetyLimits,
     settings: Settings,
+    rate: f64,
+    strain: StrainPreparer,
     handles: Vec<Handle>,
     targets: Vec<Target>,
-    /// Locked by callers from Python among themselves; the loop knows nothing of it.
-    servo: Mutex<Option<Servo>>,
+    servo: Option<Servo>,
 }
 
 #[pymethods]
 impl SimulationCore {
-    /// Prepares a body's surface for contact with `tools` spherical tools; with `motion` the body moves.
+    /// Prepares bodies and tools, with limits of force (N), slew (N/s) and ramp (s), and a rate, Hz.
     #[new]
-    #[allow(clippy::too_many_arguments)] // called in one place, by name
     fn new(
         py: Python<'_>,
-        green: &GreenCore,
-        tools: usize,
-        tool_radius: f64,
-        contact_radius: f64,
-        max_stiffness: f64,
+        bodies: Vec<BodyArguments<'_>>,
+        tools: Vec<ToolArguments>,
         limits: (f64, f64, f64),
-        motion: Option<DynamicsArguments<'_>>,
+        strain_limit: f64,
+        rate: f64,
     ) -> PyResult<Self> {
-        let green = green.green.clone();
-        let motion = motion.map(dynamics).transpose()?;
+        let parts = bodies.iter().map(body_parts).collect::<PyResult<Vec<_>>>()?;
         let prepare = || {
-            let mut model = Model::new(green, tool_radius, max_stiffness)?;
-            if let Some(motion) = motion {
-                model = model.with_dynamics(motion?)?;
-            }
-            model.check_contact_radius(contact_radius)?;
-            Ok(Arc::new(model))
+            let bodies = parts.into_iter().map(|part| part.build()).collect::<palpate_core::Result<Vec<_>>>()?;
+            let tools = tools.into_iter().map(tool).collect::<palpate_core::Result<Vec<_>>>()?;
+            let mut settings = Settings { strain_limit, ..Settings::default() };
+            settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius))| *to = *radius);
+            let model = Model::new(bodies, tools.into_iter().map(|(tool, _)| tool).collect())?;
+            settings.contact_radius[..model.tools.len()].iter().try_for_each(|&r| model.check_contact_radius(r))?;
+            Ok((Arc::new(model), settings))
         };
-        let model = py.detach(prepare).map_err(|e| to_python(py, e))?;
+        let (model, settings) = py.detach(prepare).map_err(|e| to_python(py, e))?;
         Ok(Self {
-            model,
-            limits: SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2 },
-            settings: Settings {
-                contact_radius,
-                stiffness_scale: 1.0,
-                resets: 0,
-                time_scale: 1.0,
-                strike: Strike::default(),
-                strikes: 0,
-                watch: 0,
-            },
+            limits: SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..SafetyLimits::default() },
+            settings,
+            rate,
+            strain: StrainPreparer::new(&model),
             handles: Vec::new(),
-            targets: vec![Target::default(); tools],
-            servo: Mutex::new(None),
+            targets: vec![Target::default(); model.tools.len()],
+            servo: None,
+            model,
         })
+    }
+
+    /// What measures the strain of a body; before the loop starts.
+    fn set_strain_measure(&mut self, body: usize, measure: &StrainMeasure) {
+        self.strain.set_measure(body, measure.measure.clone());
     }
 
     /// Starts the loop.
@@ -99,192 +85,235 @@ impl SimulationCore {
             })
             .unzip();
         self.handles = handles;
-        let (model, limits, settings) = (self.model.clone(), self.limits, self.settings);
-        *self.servo() = Some(py.detach(|| Servo::start(model, devices, limits, settings))?);
+        let (model, limits, settings, rate, strain) =
+            (self.model.clone(), self.limits, self.settings, self.rate, self.strain.clone());
+        let started = py.detach(|| Servo::start(model, devices, limits, settings, rate, strain));
+        self.servo = Some(started.map_err(|e| to_python(py, e))?);
         Ok(())
     }
 
     /// Stops the loop.
     fn stop(&mut self, py: Python<'_>) {
-        if let Some(mut servo) = self.servo().take() {
+        if let Some(mut servo) = self.servo.take() {
             py.detach(|| servo.stop());
         }
     }
 
-    /// Sets where a simulated tool should go; `active` false takes it out of the scene.
-    fn set_target(&mut self, tool: usize, position: [f64; 3], active: bool, grab: bool) {
-        let target = Target { position: DVec3::from(position), active, grab };
-        self.targets[tool] = target;
+    /// Sets where a simulated tool should go, and its velocity there; `active` false takes it out of the scene.
+    fn set_target(
+        &mut self,
+        tool: usize,
+        position: [f64; 3],
+        orientation: [f64; 4],
+        velocity: [f64; 3],
+        active: bool,
+        grab: bool,
+    ) {
+        let pose = Pose { position: position.into(), orientation: quaternion(orientation) };
+        let target = Target { pose, velocity: velocity.into(), active, grab };
+        let Some(place) = self.targets.get_mut(tool) else { return };
+        *place = target;
         if let Some(handle) = self.handles.get_mut(tool) {
             handle.set(target);
         }
     }
 
-    /// Changes contact radius (m) and stiffness scale; `reset` lets go of everything and clears a fault.
-    fn configure(&mut self, py: Python<'_>, contact_radius: f64, stiffness_scale: f64, reset: bool) -> PyResult<()> {
-        if contact_radius != self.settings.contact_radius {
-            self.model.check_contact_radius(contact_radius).map_err(|e| to_python(py, e))?;
-        }
-        let resets = self.settings.resets.wrapping_add(u32::from(reset));
-        self.settings = Settings { contact_radius, stiffness_scale, resets, ..self.settings };
-        self.tell();
-        Ok(())
+    /// Changes the contact radius (m) of a tool.
+    fn set_contact_radius(&mut self, py: Python<'_>, tool: usize, radius: f64) -> PyResult<()> {
+        let model = self.model.clone();
+        py.detach(|| model.check_contact_radius(radius)).map_err(|e| to_python(py, e))?;
+        self.change(py, |settings| {
+            settings.contact_radius.iter_mut().skip(tool).take(1).for_each(|to| *to = radius);
+        })
+    }
+
+    /// Young's modulus of a body over that of its Green's function.
+    fn set_stiffness_scale(&mut self, py: Python<'_>, body: usize, scale: f64) -> PyResult<()> {
+        self.change(py, |settings| {
+            settings.stiffness_scale.iter_mut().skip(body).take(1).for_each(|to| *to = scale);
+        })
+    }
+
+    /// Largest strain to which tools may take the bodies; zero for any.
+    fn set_strain_limit(&mut self, py: Python<'_>, limit: f64) -> PyResult<()> {
+        self.change(py, |settings| settings.strain_limit = limit)
+    }
+
+    /// Lets go of everything and clears faults.
+    fn reset(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.change(py, |settings| settings.resets = settings.resets.wrapping_add(1))
     }
 
     /// Seconds that a body in motion advances in a second.
-    fn set_time_scale(&mut self, time_scale: f64) {
-        self.settings.time_scale = time_scale;
-        self.tell();
+    fn set_time_scale(&mut self, py: Python<'_>, time_scale: f64) -> PyResult<()> {
+        self.change(py, |settings| settings.time_scale = time_scale)
     }
 
-    /// Gives the surface point closest to `point` (m) an impulse, N s, within a duration, s.
-    fn strike(&mut self, point: [f64; 3], impulse: [f64; 3], duration: f64) {
-        self.settings.strike = Strike { point: point.into(), impulse: impulse.into(), duration };
-        self.settings.strikes = self.settings.strikes.wrapping_add(1);
-        self.tell();
+    /// Gives the surface point of a body closest to `point` (m) an impulse, N s, within a duration, s, on a patch of a
+    /// radius, m.
+    fn strike(
+        &mut self,
+        py: Python<'_>,
+        body: usize,
+        point: [f64; 3],
+        impulse: [f64; 3],
+        duration: f64,
+        radius: f64,
+    ) -> PyResult<()> {
+        self.change(py, |settings| {
+            settings.strike = Strike { body, point: point.into(), impulse: impulse.into(), radius, duration };
+            settings.strikes = settings.strikes.wrapping_add(1);
+        })
     }
 
-    /// Surface node (rank) whose displacement is logged.
-    fn watch(&mut self, rank: u32) {
-        self.settings.watch = rank;
-        self.tell();
+    /// A body and its surface node (rank) whose displacement is logged.
+    fn watch(&mut self, py: Python<'_>, body: usize, node: u32) -> PyResult<()> {
+        self.change(py, |settings| settings.watch = Some((body, node)))
     }
 
-    /// Whether contacts of this radius (m) can be weighed everywhere on the surface.
+    /// Whether contacts of this radius (m) can be weighed everywhere on the surfaces.
     fn accepts_contact_radius(&self, py: Python<'_>, radius: f64) -> bool {
         py.detach(|| self.model.check_contact_radius(radius).is_ok())
     }
 
     /// The latest tick as a dictionary; None if the loop does not run.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let tools = self.targets.len();
-        let model = self.model.clone();
-        let Some(servo) = self.servo() else { return Ok(None) };
-        let Published { status: tick, state } = servo.latest();
+        let (model, tools) = (self.model.clone(), self.targets.len());
+        let Some(servo) = &mut self.servo else { return Ok(None) };
+        let Published { status, state } = servo.latest().clone();
+        let surfaces = py.detach(|| {
+            let intact = model.bodies.iter().try_for_each(|body| body.green().require_intact());
+            intact.map(|()| (0..model.bodies.len()).map(|body| state.displacements(&model, body)).collect::<Vec<_>>())
+        });
+        let surfaces = surfaces.map_err(|e| to_python(py, e))?;
         let frame = PyDict::new(py);
-        let displacements = state.displacements(&model);
-        frame.set_item("time", tick.time)?;
-        frame.set_item("forces", tick.forces[..tools].iter().map(|f| f.to_array()).collect::<Vec<_>>())?;
-        frame.set_item("positions", tick.devices[..tools].iter().map(|d| d.position.to_array()).collect::<Vec<_>>())?;
-        frame.set_item("displacements", displacements.into_pyarray(py))?;
-        frame.set_item("contacts", contact_records(state))?;
-        frame.set_item("refused", state.tools[..tools].iter().map(|c| c.refused).collect::<Vec<_>>())?;
+        let bodies = PyList::empty(py);
+        for (body, displacements) in surfaces.into_iter().enumerate() {
+            bodies.append((displacements.into_pyarray(py), state.energy(body).as_ref().map(energy_array)))?;
+        }
+        frame.set_item("bodies", bodies)?;
+        frame.set_item("time", status.time)?;
+        frame.set_item("forces", status.wrenches[..tools].iter().map(|w| w.force.to_array()).collect::<Vec<_>>())?;
+        frame.set_item("torques", status.wrenches[..tools].iter().map(|w| w.torque.to_array()).collect::<Vec<_>>())?;
+        let poses = || status.readings[..tools].iter().map(|reading| reading.pose);
+        frame.set_item("positions", poses().map(|pose| pose.position.to_array()).collect::<Vec<_>>())?;
+        frame.set_item("orientations", poses().map(|pose| wxyz(pose.orientation)).collect::<Vec<_>>())?;
+        frame.set_item("limited", status.limited[..tools].to_vec())?;
+        frame.set_item("contacts", contact_records(&model, &state))?;
+        frame.set_item("refused", refusals(&state, tools))?;
         let summary = |s: palpate_servo::Summary| [s.p50, s.p99, s.p999, s.max];
-        frame.set_item("compute_us", summary(tick.compute))?;
-        frame.set_item("wakeup_us", summary(tick.wakeup))?;
-        frame.set_item("ticks", tick.ticks)?;
-        frame.set_item("missed_deadlines", tick.missed_deadlines)?;
-        frame.set_item("dropped_rows", tick.dropped_rows)?;
-        let crashed = tick.crashed.then_some("the force loop stopped unexpectedly; forces are off");
-        frame.set_item("fault", tick.fault.map(|f| f.message()).or(crashed))?;
-        let energy = state.energy.as_ref().map(energy_array);
-        frame.set_item("energy", energy)?;
-        frame.set_item("realtime", (tick.realtime.priority, tick.realtime.locked_memory))?;
+        frame.set_item("compute_us", summary(status.compute))?;
+        frame.set_item("wakeup_us", summary(status.wakeup))?;
+        frame.set_item("ticks", status.ticks)?;
+        frame.set_item("missed_deadlines", status.missed_deadlines())?;
+        frame.set_item("missed_computing", status.missed_computing)?;
+        frame.set_item("dropped_rows", status.dropped_rows)?;
+        frame.set_item("fault", status.fault.map(|fault| fault.to_string()))?;
+        frame.set_item("realtime", (status.realtime.priority, status.realtime.locked_memory))?;
         Ok(Some(frame))
     }
 
     /// Contacts of the latest tick, as in `frame` but without the rest of it; None if the loop does not run.
     fn contacts(&mut self) -> Option<Vec<ContactRecord>> {
-        self.servo().as_mut().map(|servo| contact_records(&servo.latest().state))
+        let model = self.model.clone();
+        self.servo.as_mut().map(|servo| contact_records(&model, &servo.latest().state))
     }
 
-    /// The contact of a tool at the latest tick, and displacements (3s) per unit way of the tool from its anchor along x,
-    /// y and z, m/m; None for a tool that does not touch.
+    /// The contact of a tool with a body at the latest tick, and the body's displacements (3s) per unit displacement of
+    /// the tool from its anchor along x, y and z of the body's frame, m/m; None for a tool that does not touch it.
     #[allow(clippy::type_complexity)] // a record and three arrays; naming them would need a class nobody else uses
     fn contact_response<'py>(
         &mut self,
         py: Python<'py>,
         tool: usize,
+        body: usize,
     ) -> Option<(ContactRecord, Vec<Bound<'py, PyArray1<f64>>>)> {
         let model = self.model.clone();
-        let state = self.servo().as_mut()?.latest().state.clone();
-        let fields = py.detach(|| state.response(&model, tool))?;
-        let record = contact_records(&state).into_iter().find(|record| record.0 == tool)?;
+        let state = self.servo.as_mut()?.latest().state.clone();
+        let fields = py.detach(|| state.response(&model, tool, body))?;
+        let record = contact_records(&model, &state).into_iter().find(|record| (record.0, record.1) == (tool, body))?;
         Some((record, fields.map(|field| field.into_pyarray(py)).into()))
     }
 
-    /// Rows (18 a tick) of the log since the last call: time, position, force, computing time, wake-up delay, displacement
-    /// of the watched node, body time, energies.
+    /// Rows (18 a tick) of the log since the last call: time, position and force of the first tool, computing time, wake-up
+    /// delay, displacement of the watched node, and time and energies of the watched body.
     fn drain_log<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
-        if let Some(servo) = self.servo() {
+        let body = self.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
+        if let Some(servo) = &mut self.servo {
             servo.drain_log(|row| {
                 rows.push(row.time);
                 rows.extend(row.position.to_array());
                 rows.extend(row.force.to_array());
                 rows.extend([row.compute_us, row.wakeup_us]);
-                rows.extend(row.watched.to_array());
-                rows.push(row.body_time);
-                rows.extend(energy_array(&row.energy));
+                rows.extend(row.watched.unwrap_or_default().to_array());
+                rows.push(row.body_time[body]);
+                rows.extend(energy_array(&row.energy[body]));
             });
         }
         rows.into_pyarray(py)
     }
 
-    /// Moves the first tool through (t, 3) positions offline, NaN where it is out of the scene, with blows `(tick, point,
-    /// impulse, duration)` in order of time: forces on the device (3t), energies (5t; empty for a body that does not move),
-    /// displacements of the watched surface ranks (3 a node and tick), and the fault, if one latched.
-    #[allow(clippy::type_complexity)] // four arrays read once
+    /// Moves the tools through positions (ticks, tools, 3), NaN where one is out of the scene, orientations (ticks, tools,
+    /// 4) and grabs (ticks, tools) offline, with strikes in order of time and watched nodes as pairs of body and rank.
     fn run<'py>(
         &self,
         py: Python<'py>,
-        positions: PyReadonlyArray2<'py, f64>,
-        strikes: Vec<(usize, [f64; 3], [f64; 3], f64)>,
-        watch: Vec<u32>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Option<&'static str>)>
-    {
-        let positions = vectors(&positions).map_err(|e| to_python(py, e))?;
+        positions: PyReadonlyArray3<'py, f64>,
+        orientations: PyReadonlyArray3<'py, f64>,
+        grabs: PyReadonlyArray2<'py, bool>,
+        strikes: Vec<StrikeArguments>,
+        watch: Vec<(usize, u32)>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let poses = poses(positions.as_slice()?, orientations.as_slice()?);
+        let grabs = grabs.as_slice()?.to_vec();
+        let ticks = positions.shape()[0];
         let strikes: Vec<_> = strikes
             .into_iter()
-            .map(|(tick, point, impulse, duration)| {
-                (tick, Strike { point: point.into(), impulse: impulse.into(), duration })
+            .map(|(tick, body, point, impulse, duration, radius)| {
+                (tick, Strike { body, point: point.into(), impulse: impulse.into(), radius, duration })
             })
             .collect();
-        let input = Input {
-            contact_radius: self.settings.contact_radius,
-            stiffness_scale: self.settings.stiffness_scale,
-            ..Input::default()
-        };
-        let (model, limits) = (self.model.clone(), self.limits);
-        let script = Script { positions: &positions, strikes: &strikes, watch: &watch };
-        let recording = py.detach(|| palpate_servo::run(model, limits, &input, &script));
+        let script = Script { period: 1.0 / self.rate, poses: &poses, grabs: &grabs, strikes: &strikes, watch: &watch };
+        let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
+        let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
+        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, strain, &script));
+        let recording = recording.map_err(|e| to_python(py, e))?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
-        let energies: Vec<f64> = recording.energies.iter().flat_map(energy_array).collect();
-        let fault = recording.fault.map(|f| f.message());
-        Ok((flat(recording.forces), energies.into_pyarray(py), flat(recording.displacements), fault))
+        let mut energies: Vec<Vec<f64>> = vec![Vec::new(); self.model.bodies.len()];
+        for (body, of_body) in recording.energies {
+            energies[body] = of_body.iter().flat_map(energy_array).collect();
+        }
+        let answer = PyDict::new(py);
+        answer.set_item("forces", flat(recording.forces))?;
+        answer.set_item("torques", flat(recording.torques))?;
+        answer.set_item("watched", flat(recording.displacements))?;
+        answer.set_item("limited", recording.limited.into_pyarray(py))?;
+        answer.set_item("energies", energies.into_iter().map(|e| e.into_pyarray(py)).collect::<Vec<_>>())?;
+        answer.set_item("compute_ns", recording.compute_ns.into_pyarray(py))?;
+        answer.set_item("fault", recording.fault.map(|fault| fault.to_string()))?;
+        debug_assert_eq!(poses.len(), ticks * self.model.tools.len());
+        Ok(answer)
     }
-}
-
-/// Kinetic, strain, coupling, dissipated, work; J.
-fn energy_array(e: &Energy) -> [f64; 5] {
-    [e.kinetic, e.strain, e.coupling, e.dissipated, e.work]
-}
-
-/// Tool, mode, (point, normal, force, anchor), nodes and weights of a contact.
-type ContactRecord = (usize, &'static str, [[f64; 3]; 4], Vec<usize>, Vec<f64>);
-
-fn contact_records(state: &Snapshot) -> Vec<ContactRecord> {
-    let touching = state.tools.iter().enumerate().filter(|(_, contact)| contact.mode != Mode::Free);
-    touching
-        .map(|(tool, contact)| {
-            let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
-            let (nodes, weights) = contact.patch.iter().unzip();
-            let vectors = [contact.point, contact.normal, contact.force, contact.anchor].map(|v| v.to_array());
-            (tool, mode, vectors, nodes, weights)
-        })
-        .collect()
 }
 
 impl SimulationCore {
-    /// Hands the settings to the loop, if it runs.
-    fn tell(&mut self) {
-        let settings = self.settings;
-        if let Some(servo) = self.servo() {
-            servo.set(settings);
+    /// Changes the settings, and hands them to the loop if it runs; a value that is refused changes nothing.
+    fn change(&mut self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> PyResult<()> {
+        let mut settings = self.settings;
+        change(&mut settings);
+        settings.check(&self.model).map_err(|e| to_python(py, e))?;
+        self.settings = settings;
+        match &mut self.servo {
+            Some(servo) => servo.set(settings).map_err(|e| to_python(py, e)),
+            None => Ok(()),
         }
     }
+}
 
-    fn servo(&mut self) -> &mut Option<Servo> {
-        self.servo.get_mut().unwrap_or_else(PoisonError::into_inner)
-    }
+/// For each tool why no contact began, or None.
+fn refusals(state: &Snapshot, tools: usize) -> Vec<Option<&'static str>> {
+    let of_tool =
+        |tool: &palpate_core::simulation::ToolState| tool.refused.iter().flatten().next().map(|r| r.message());
+    state.tools[..tools].iter().map(of_tool).collect()
 }

@@ -314,8 +314,8 @@ class Simulation:
         """Contact of a tool, and the surface's displacements (3, s, 3) per unit displacement of the tool along an axis.
 
         The tool's displacement counts from the anchor, along the axes of the body's own frame; the surface is at
-        `u_free` plus these fields times its components, with the stiffness of contacts limited as in the force loop; None
-        for a tool that does not touch the body.
+        `u_free` plus these fields times its components, with the stiffness of contacts limited as in the force loop;
+        None for a tool that does not touch the body.
         """
         answer = self._core.contact_response(self._tool(tool), self._body(body))
         if answer is None:

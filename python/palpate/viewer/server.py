@@ -18,9 +18,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from palpate import __version__
-from palpate.errors import Error, ViewerError
+from palpate.errors import Error, SimulationError, ViewerError
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
+from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.pages import headers, host_is_ours, load_pages
 from palpate.viewer.session import Session, Wants, choices
 
@@ -89,11 +90,12 @@ class ViewerServer:
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
         self._session = Session(built)
+        self._session.start()
+        self._worker = Worker()
         self._models, self._scene_of = list(models), scene_of
         self._clients: list[Client] = []
         self._controller: Client | None = None
-        self._building = False
-        self._cancelled = False
+        self._building: LongWork | None = None
         self._server: Server | None = None
 
     @property
@@ -126,7 +128,7 @@ class ViewerServer:
                 server_header=None,
             )
         except OSError as error:
-            self._session.close()
+            self._close_session()
             if error.errno == errno.EADDRINUSE:
                 raise ViewerError(
                     f"port {self.port} on {self.host} is in use: choose another with --port, or --port 0 for a free one"
@@ -141,6 +143,12 @@ class ViewerServer:
             self._watch.cancel()
             self._server.close()
             await self._server.wait_closed()
+        if self._building is not None:
+            self._building.cancel()
+        self._close_session()
+
+    def _close_session(self) -> None:
+        self._worker.close()
         self._session.close()
 
     def _request(self, connection: ServerConnection, request: Request) -> Response | None:
@@ -218,11 +226,14 @@ class ViewerServer:
             elif client is not self._controller:
                 raise ViewerError("another viewer has control; this one watches")
             elif message["type"] == "cancel":
-                self._cancelled = True
+                if self._building is not None:
+                    self._building.cancel()
             elif message["type"] == "model":
                 await self._choose(message.get("name"))
-            elif self._session.handle(message):
-                await self._tell_all(self._session.settings())
+            else:
+                session = self._session
+                if await self._worker.call(session.handle, message):
+                    await self._tell_all(await self._worker.call(session.settings))
         except Error as error:
             await client.send({"type": "error", "text": str(error)})
 
@@ -235,11 +246,20 @@ class ViewerServer:
                 session = self._session
                 if client.shown is not session:
                     client.shown, client.log_seen = session, (0, 0)
-                    await client.connection.send(session.scene_message())
+                    await client.connection.send(await self._worker.call(session.scene_message))
                     client.may_send.set()
                     continue
                 client.sent += 1
-                message, client.log_seen = session.frame_message(client.sent, client.log_seen, client.wants)
+                try:
+                    message, client.log_seen = await self._worker.call(
+                        session.frame_message, client.sent, client.log_seen, client.wants
+                    )
+                except SimulationError:
+                    # Another model has taken the place of this one meanwhile.
+                    if session is self._session:
+                        raise
+                    client.may_send.set()
+                    continue
                 await client.connection.send(message)
                 await asyncio.sleep(1.0 / FRAME_RATE)
 
@@ -247,8 +267,8 @@ class ViewerServer:
         """Let go of the body; who has watched longest takes over."""
         if client is not self._controller:
             return
-        self._session.release()
         self._controller = self._clients[0] if self._clients else None
+        await self._worker.call(self._session.release)
         if self._controller is not None:
             await self._controller.send({"type": "role", "role": "control"})
 
@@ -257,7 +277,7 @@ class ViewerServer:
             await asyncio.sleep(0.25)
             controller = self._controller
             if controller is None or time.monotonic() - controller.heard > LOST_AFTER:
-                self._session.release()
+                await self._worker.call(self._session.release)
 
     async def _tell_all(self, message: dict[str, Any]) -> None:
         for client in list(self._clients):
@@ -267,33 +287,32 @@ class ViewerServer:
         """Switch to another model; the one shown goes on until the new one is ready."""
         if self._scene_of is None or name not in self._models:
             raise ViewerError(f"there is no model '{str(name)[:40]}'")
-        if self._building:
+        if self._building is not None:
             raise ViewerError("another model is being prepared")
-        self._building, self._cancelled = True, False
-        self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name)))
+        self._building = LongWork()
+        self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name), self._building))
 
-    async def _switch(self, name: str, scene: Scene) -> None:
-        solving, modes = self._reporter(f"Solving the {name}"), self._reporter(f"Computing the modes of the {name}")
-
+    async def _switch(self, name: str, scene: Scene, building: LongWork) -> None:
+        solving = self._reporter(f"Solving the {name}", building)
+        modes = self._reporter(f"Computing the modes of the {name}", building)
         try:
             await self._tell_all({"type": "status", "text": f"Loading the {name}", "progress": None, "left_s": None})
-            self._session.release()
-            built = await asyncio.to_thread(scene.build, solving, modes)
-            self._refuse_cancelled()
-            session = await asyncio.to_thread(Session, built)
-            old, self._session = self._session, session
-            old.close()
+            await self._worker.call(self._session.release)
+            session = await building.run(lambda: Session(scene.build(solving, modes)), Session.close)
+            # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
+            await self._worker.call(self._exchange, session)
         except Error as error:
             await self._tell_all({"type": "error", "text": str(error)})
         finally:
-            self._building = False
+            self._building = None
             await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
 
-    def _refuse_cancelled(self) -> None:
-        if self._cancelled:
-            raise ViewerError("cancelled: the body shown before stays")
+    def _exchange(self, session: Session) -> None:
+        self._session.close()
+        session.start()
+        self._session = session
 
-    def _reporter(self, text: str) -> Callable[[int, int], None]:
+    def _reporter(self, text: str, work: LongWork) -> Callable[[int, int], None]:
         """Tell all pages how far a long work is, from any thread; it begins with the first call.
 
         The work stops where a page has cancelled it.
@@ -302,7 +321,7 @@ class ViewerServer:
 
         def report(done: int, total: int) -> None:
             nonlocal started
-            self._refuse_cancelled()
+            work.require_wanted()
             started = started or time.monotonic()
             part = done / max(total, 1)
             left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None

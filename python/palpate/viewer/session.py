@@ -63,7 +63,6 @@ class Session:
         self._body_time = 0.0
         self._frame: Frame | None = None
         self._frame_time = 0.0
-        self.simulation.start()
 
     def _extent(self, body: int) -> float:
         """Longest side of a body, m."""
@@ -74,6 +73,10 @@ class Session:
         material = scene.bodies[body].material or scene.material
         ratio = None if built.body is None else material.poissons_ratio
         return ShownBody(built, Fields(self.simulation, self._extent(body), body), ratio)
+
+    def start(self) -> None:
+        """Start the loop."""
+        self.simulation.start()
 
     def close(self) -> None:
         """Stop the loop."""

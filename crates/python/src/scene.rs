@@ -1,0 +1,119 @@
+//! Arguments of a simulation, as Python gives them, and what it reads back.
+
+use glam::{DMat3, DQuat, DVec3};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use palpate_core::dynamics::{Energy, ModalModel, exact_step};
+use palpate_core::simulation::{
+    BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel,
+};
+use palpate_core::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::dynamics::{SchemeArguments, scheme};
+use crate::green::GreenCore;
+
+/// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
+/// and the spring between tools and patches, N/m.
+pub type DynamicsArguments<'py> =
+    (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
+/// Green's function, position (m), orientation (unit quaternion w x y z), and what moves the body.
+pub type BodyArguments<'py> = (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>);
+/// Radius (m), contact radius (m), contact law, largest stiffness (N/m).
+pub type ToolArguments = (f64, f64, String, f64);
+
+/// Tool, body, mode, (point, normal, force, torque, anchor, displacement) in the world, whether it is limited, nodes and
+/// weights of a contact.
+pub type ContactRecord = (usize, usize, &'static str, [[f64; 3]; 6], bool, Vec<u32>, Vec<f64>);
+
+/// A body with everything that Python gave of it, free of the interpreter.
+pub struct BodyParts {
+    green: std::sync::Arc<palpate_core::green::GreensFunction>,
+    placement: Placement,
+    modes: Option<(Vec<f64>, Vec<f64>, SchemeArguments, bool, f64)>,
+}
+
+/// Takes arguments out of the interpreter's hands.
+pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
+    let (green, position, orientation, dynamics) = arguments;
+    let modes = dynamics
+        .as_ref()
+        .map(|(eigenvalues, shapes, scheme, exact, coupling)| -> PyResult<_> {
+            Ok((eigenvalues.as_slice()?.to_vec(), shapes.as_slice()?.to_vec(), *scheme, *exact, *coupling))
+        })
+        .transpose()?;
+    let placement =
+        Placement { position: DVec3::from(*position), rotation: DMat3::from_quat(quaternion(*orientation)) };
+    Ok(BodyParts { green: green.green.clone(), placement, modes })
+}
+
+impl BodyParts {
+    /// The body as a tick sees it.
+    pub fn build(self) -> Result<BodyModel> {
+        let body = BodyModel::new(self.green, self.placement)?;
+        let Some((eigenvalues, shapes, arguments, exact, coupling)) = self.modes else { return Ok(body) };
+        let ((newmark, rayleigh), dt) = (scheme(arguments)?, arguments.0);
+        let step = |k, c| if exact { exact_step(k, c, dt) } else { newmark.mode_step(k, c) };
+        let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, dt, step)?;
+        body.with_dynamics(BodyDynamics::new(modes, coupling)?)
+    }
+}
+
+/// A tool, and the contact radius it starts with, m.
+pub fn tool(arguments: ToolArguments) -> Result<(ToolModel, f64)> {
+    let (radius, contact_radius, law, max_stiffness) = arguments;
+    let law = LawKind::parse(&law).ok_or_else(|| Error::Invalid(format!("there is no contact law '{law}'")))?;
+    Ok((ToolModel { radius, law, max_stiffness }, contact_radius))
+}
+
+/// From w x y z, made of length one to the last bit.
+pub fn quaternion([w, x, y, z]: [f64; 4]) -> DQuat {
+    DQuat::from_xyzw(x, y, z, w).normalize()
+}
+
+/// As w x y z.
+pub fn wxyz(q: DQuat) -> [f64; 4] {
+    [q.w, q.x, q.y, q.z]
+}
+
+/// Poses of (ticks, tools, 3) positions and (ticks, tools, 4) orientations. A tool that is out of the scene keeps its
+/// position that is not finite.
+pub fn poses(positions: &[f64], orientations: &[f64]) -> Vec<Pose> {
+    let (positions, orientations) = (positions.as_chunks::<3>().0, orientations.as_chunks::<4>().0);
+    positions
+        .iter()
+        .zip(orientations)
+        .map(|(&position, &orientation)| Pose {
+            position: position.into(),
+            orientation: match position.iter().all(|x| x.is_finite()) {
+                true => quaternion(orientation),
+                false => DQuat::IDENTITY,
+            },
+        })
+        .collect()
+}
+
+/// Kinetic, strain, coupling, dissipated, work; J.
+pub fn energy_array(e: &Energy) -> [f64; 5] {
+    [e.kinetic, e.strain, e.coupling, e.dissipated, e.work]
+}
+
+/// The contacts of a tick.
+pub fn contact_records(model: &Model, state: &Snapshot) -> Vec<ContactRecord> {
+    let record = |contact: &Contact, nodes: &[u32], weights: &[f64]| {
+        let placement = &model.bodies[contact.body].placement;
+        let vectors = [
+            placement.point_to_world(contact.point),
+            placement.vector_to_world(contact.normal),
+            placement.vector_to_world(contact.force),
+            DVec3::ZERO,
+            placement.point_to_world(contact.anchor),
+            placement.vector_to_world(contact.displacement),
+        ];
+        let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
+        let limited = contact.share < 1.0;
+        let vectors = vectors.map(|v| v.to_array());
+        (contact.tool, contact.body, mode, vectors, limited, nodes.to_vec(), weights.to_vec())
+    };
+    let contacts = state.contacts.iter();
+    contacts.map(|(contact, patch)| record(contact, patch.patch().nodes(), patch.patch().weights())).collect()
+}

@@ -1,0 +1,97 @@
+"""Work beside the event loop: what takes longer than a moment must not keep it from its sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+from palpate.errors import ViewerError
+
+Result = TypeVar("Result")
+
+
+class Worker:
+    """One thread that does everything a session is asked for, one thing after the other.
+
+    Frames, settings and commands touch the same running simulation; a single thread keeps them in order without locks,
+    and the event loop only waits for answers.
+    """
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="palpate-session")
+
+    async def call(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """Do ``work(*arguments)`` there, and return its result or raise its error."""
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work, *arguments)
+
+    def close(self) -> None:
+        """Do what was asked for, and end the thread."""
+        self._thread.shutdown()
+
+
+class LongWork:
+    """A computation that a person may cancel.
+
+    It runs on a thread that nobody waits for at the end of the program. Cancelled, it stops at its next report of
+    progress; a library that gives none goes on to its end, unheard.
+    """
+
+    def __init__(self) -> None:
+        self._cancelled = threading.Event()
+        self._stopped = asyncio.Event()
+
+    def cancel(self) -> None:
+        """Stop, as soon as the computation next reports."""
+        self._cancelled.set()
+        self._stopped.set()
+
+    def require_wanted(self) -> None:
+        """Refuse to go on once it is cancelled.
+
+        Raises
+        ------
+        ViewerError
+            It is.
+
+        """
+        if self._cancelled.is_set():
+            raise ViewerError("cancelled: the body shown before stays")
+
+    async def run(self, work: Callable[[], Result], discard: Callable[[Result], None]) -> Result:
+        """Do ``work()`` and return its result; one that comes after cancelling is handed to ``discard``.
+
+        Raises
+        ------
+        ViewerError
+            It was cancelled.
+
+        """
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[Result] = loop.create_future()
+
+        def finish(result: Result | None, error: BaseException | None) -> None:
+            if self._cancelled.is_set():
+                if error is None:
+                    discard(result)  # type: ignore[arg-type]
+            elif error is not None:
+                done.set_exception(error)
+            else:
+                done.set_result(result)  # type: ignore[arg-type]
+
+        def compute() -> None:
+            result, error = None, None
+            try:
+                result = work()
+            except BaseException as raised:
+                error = raised
+            loop.call_soon_threadsafe(finish, result, error)
+
+        threading.Thread(target=compute, name="palpate-long-work", daemon=True).start()
+        stopped = asyncio.ensure_future(self._stopped.wait())
+        await asyncio.wait({done, stopped}, return_when=asyncio.FIRST_COMPLETED)
+        stopped.cancel()
+        self.require_wanted()
+        return done.result()
