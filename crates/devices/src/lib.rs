@@ -1,26 +1,8 @@
-//! Haptic devices behind one trait. A driver knows positions and forces in world coordinates, nothing of bodies.
+//! Haptic devices behind one trait. A driver knows poses and wrenches in world coordinates, nothing of bodies.
 
+mod device;
 pub mod simulated;
 
-use glam::DVec3;
-
-/// What a device says at a tick.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct DeviceState {
-    /// Tip position, m.
-    pub position: DVec3,
-    /// Tip velocity, m/s.
-    pub velocity: DVec3,
-    /// Whether the tip is in the scene.
-    pub active: bool,
-    /// Whether the grab button is held.
-    pub grab: bool,
-}
-
-/// One haptic device. Both calls belong to the tick: they never allocate, lock or block.
-pub trait Device: Send {
-    /// The device's state now; `period` is the time since the last call, s.
-    fn read(&mut self, period: f64) -> DeviceState;
-    /// Puts out a force on the hand, N.
-    fn write(&mut self, force: DVec3);
-}
+pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
+// All that a driver knows of the core; `scripts/check_architecture.py` checks it.
+pub use palpate_core::simulation::{Pose, Twist, Wrench};

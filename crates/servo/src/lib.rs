@@ -1,19 +1,27 @@
-//! The 1 kHz force loop: absolute deadlines, a wait-free hand-off, a safety stage that is always on, statistics.
+//! The force loop: devices, wait-free hand-offs, a safety stage that is always on, statistics.
 //!
-//! The loop and an offline run call the same [`Ticker::tick`], so a recorded path gives the same bits in both.
+//! [`ForceLoop::tick`] is the whole of a tick. The servo's own thread calls it at a fixed rate ([`Servo`]), a driver's
+//! callback may call it instead, and an offline run calls it without a clock ([`run`]): the same input gives the same bits
+//! in all of them.
 
 mod clock;
+mod force_loop;
+mod handoff;
+mod log;
 mod offline;
 mod safety;
 mod servo;
+mod settings;
 mod statistics;
-mod ticker;
+mod subnormals;
+mod timing;
 
-pub use offline::{Recording, Script, run};
-pub use safety::{Fault, Safety, SafetyLimits};
-pub use servo::{LogRow, Published, RealtimeStatus, Servo, Settings, Status};
+pub use clock::now_ns;
+pub use force_loop::ForceLoop;
+pub use handoff::{LoopHandle, Published};
+pub use log::{LogRow, RealtimeStatus, Status};
+pub use offline::{RecordedContact, Recording, Script, run};
+pub use safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
+pub use servo::Servo;
+pub use settings::Settings;
 pub use statistics::{Histogram, Summary};
-pub use ticker::{TickOutput, Ticker};
-
-/// Ticks a second.
-pub const RATE: f64 = 1000.0;

@@ -3,62 +3,180 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use palpate_core::simulation::{Energy, Input, MAX_TOOLS, Model, Snapshot, Strike};
-use palpate_devices::DeviceState;
+use palpate_core::Result;
+use palpate_core::dynamics::Energy;
+use palpate_core::simulation::{Mode, Model, Pose, Snapshot, Strike};
+use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
 
-use crate::RATE;
+use crate::force_loop::ForceLoop;
 use crate::safety::{Fault, SafetyLimits};
-use crate::ticker::Ticker;
+use crate::settings::{Settings, check_node, refuse_unless};
 
 /// What happens, tick by tick.
 pub struct Script<'a> {
-    /// Where the first tool is, m; not finite while it is out of the scene.
-    pub positions: &'a [DVec3],
-    /// Blows and their ticks, in order.
+    /// Time between two ticks, s.
+    pub period: f64,
+    /// Where the tools are, (ticks x tools): all tools of a tick, then those of the next. A position that is not finite
+    /// takes the tool out of the scene.
+    pub poses: &'a [Pose],
+    /// Which tools hold on to what they touch, (ticks x tools); empty if none ever does.
+    pub grabs: &'a [bool],
+    /// Strikes and their ticks, in order and at most one a tick.
     pub strikes: &'a [(usize, Strike)],
-    /// Surface nodes (ranks) whose displacements are recorded.
-    pub watch: &'a [u32],
+    /// A body and the ranks of its surface nodes whose displacements are recorded.
+    pub watch: Option<(usize, &'a [u32])>,
 }
 
-/// What came of it.
-#[derive(Default)]
+/// A contact at one tick; vectors are in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedContact {
+    /// The tick.
+    pub tick: usize,
+    /// Index of the tool.
+    pub tool: usize,
+    /// Index of the body.
+    pub body: usize,
+    /// Whether it presses or holds on.
+    pub mode: Mode,
+    /// Contact point on the untouched surface, m.
+    pub point: DVec3,
+    /// Force on the body as computed, N: on the device it comes made safe.
+    pub force: DVec3,
+}
+
+/// What a script did.
+#[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// Force on the first device at each tick, N.
+    /// Force on each device at each tick (ticks x tools), N.
     pub forces: Vec<DVec3>,
-    /// Energy at each tick; empty for a body that does not move.
-    pub energies: Vec<Energy>,
-    /// Displacements of the watched nodes at each tick, m.
+    /// Torque about each tip at each tick (ticks x tools), N m.
+    pub torques: Vec<DVec3>,
+    /// For each body that moves its index, and its energies at each tick.
+    pub energies: Vec<(usize, Vec<Energy>)>,
+    /// All contacts, in the order of ticks.
+    pub contacts: Vec<RecordedContact>,
+    /// Displacements of the watched nodes at each tick (ticks x nodes), m, in their body's frame.
     pub displacements: Vec<DVec3>,
-    /// The fault, if one latched.
+    /// The first fault that latched.
     pub fault: Option<Fault>,
 }
 
-/// Ticks through a script.
-pub fn run(model: Arc<Model>, limits: SafetyLimits, settings: &Input, script: &Script<'_>) -> Recording {
-    let mut ticker = Ticker::new(model.clone(), limits);
-    let mut snapshot = Snapshot::new(&model);
-    let mut devices = [DeviceState::default(); MAX_TOOLS];
-    let mut previous = None;
+/// Ticks through a script, settings unchanged but for its strikes.
+///
+/// # Errors
+/// See [`ForceLoop::new`]; a script of the wrong shape, or with a body or node that the model does not have.
+pub fn run(model: &Arc<Model>, limits: SafetyLimits, settings: Settings, script: &Script<'_>) -> Result<Recording> {
+    check(model, script)?;
+    let tools = model.tools.len();
+    let devices = (0..tools).map(|tool| Box::new(Scripted::new(script, tool, tools)) as Box<dyn Device>).collect();
+    let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
+    let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
-    let mut recording = Recording::default();
-    for (tick, &position) in script.positions.iter().enumerate() {
-        let active = position.is_finite();
-        let velocity = previous.filter(|_| active).map_or(DVec3::ZERO, |before| (position - before) * RATE);
-        previous = active.then_some(position);
-        devices[0] = if active {
-            DeviceState { position, velocity, active, grab: false }
-        } else {
-            DeviceState { active, ..devices[0] }
-        };
-        let strike = strikes.next_if(|(when, _)| *when == tick).map(|&(_, strike)| strike);
-        let output = ticker.tick(&devices, &Input { strike, ..*settings }, 1.0 / RATE);
-        recording.fault = recording.fault.or(output.fault);
-        recording.forces.push(output.forces[0]);
-        recording.energies.extend(ticker.energy());
-        if !script.watch.is_empty() {
-            ticker.snapshot_into(&mut snapshot);
-            recording.displacements.extend(snapshot.displacements_of(&model, script.watch));
+    let moving = (0..model.bodies.len()).filter(|&body| model.bodies[body].moves());
+    let mut recording = Recording { energies: moving.map(|body| (body, Vec::new())).collect(), ..Recording::default() };
+    for tick in 0..script.poses.len() / tools {
+        if let Some(&(_, strike)) = strikes.next_if(|(when, _)| *when == tick) {
+            settings.strike = strike;
+            settings.strikes = settings.strikes.wrapping_add(1);
+            handle.set(settings)?;
+        }
+        force_loop.tick((1e9 * script.period * tick as f64).round() as u64, script.period);
+        let published = handle.latest();
+        let (status, state) = (&published.status, &published.state);
+        recording.fault = recording.fault.or(status.fault);
+        recording.forces.extend(status.wrenches[..tools].iter().map(|wrench| wrench.force));
+        recording.torques.extend(status.wrenches[..tools].iter().map(|wrench| wrench.torque));
+        for (body, energies) in &mut recording.energies {
+            energies.extend(state.energy(*body));
+        }
+        recording.contacts.extend(contacts(model, state, tick));
+        if let Some((body, nodes)) = script.watch {
+            recording.displacements.extend(state.displacements_of(model, body, nodes));
         }
     }
-    recording
+    Ok(recording)
+}
+
+fn check(model: &Model, script: &Script<'_>) -> Result<()> {
+    let (tools, poses, grabs) = (model.tools.len(), script.poses.len(), script.grabs.len());
+    refuse_unless(script.period > 0.0 && script.period.is_finite(), || {
+        format!("the time between two ticks must be positive, got {} s", script.period)
+    })?;
+    refuse_unless(poses % tools == 0, || format!("{poses} poses are not a whole number of ticks of {tools} tools"))?;
+    refuse_unless(grabs == 0 || grabs == poses, || format!("there are {poses} poses, but {grabs} grabs"))?;
+    let ticks = script.strikes.iter().map(|(tick, _)| *tick);
+    refuse_unless(ticks.clone().zip(ticks.clone().skip(1)).all(|(a, b)| a < b), || {
+        "strikes must be in order of time, one a tick".into()
+    })?;
+    refuse_unless(ticks.clone().all(|tick| tick < poses / tools), || {
+        format!("a strike comes after the last of {} ticks", poses / tools)
+    })?;
+    if let Some((body, nodes)) = script.watch {
+        nodes.iter().try_for_each(|&node| check_node(model, body, node))?;
+    }
+    Ok(())
+}
+
+fn contacts<'a>(model: &'a Model, state: &'a Snapshot, tick: usize) -> impl Iterator<Item = RecordedContact> + 'a {
+    state.contacts.iter().map(move |(contact, _)| {
+        let placement = &model.bodies[contact.body].placement;
+        RecordedContact {
+            tick,
+            tool: contact.tool,
+            body: contact.body,
+            mode: contact.mode,
+            point: placement.point_to_world(contact.point),
+            force: placement.vector_to_world(contact.force),
+        }
+    })
+}
+
+/// The device of one tool of a script. Its pose is commanded: it may jump.
+struct Scripted {
+    poses: std::vec::IntoIter<Pose>,
+    grabs: std::vec::IntoIter<bool>,
+    latest: Reading,
+}
+
+impl Scripted {
+    fn new(script: &Script<'_>, tool: usize, tools: usize) -> Self {
+        fn of_tool<T: Copy>(all: &[T], tool: usize, tools: usize) -> std::vec::IntoIter<T> {
+            all.iter().copied().skip(tool).step_by(tools).collect::<Vec<_>>().into_iter()
+        }
+        Self {
+            poses: of_tool(script.poses, tool, tools),
+            grabs: of_tool(script.grabs, tool, tools),
+            latest: Reading::default(),
+        }
+    }
+}
+
+impl Device for Scripted {
+    fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
+        let before = self.latest;
+        let pose = self.poses.next().ok_or(DeviceFault::Disconnected)?;
+        self.latest.active = pose.position.is_finite();
+        self.latest.timestamp_ns = now_ns;
+        self.latest.buttons = if self.grabs.next().unwrap_or(false) { Buttons::GRAB } else { Buttons::default() };
+        if self.latest.active {
+            self.latest.pose = pose;
+            self.latest.twist = if before.active { twist(&before.pose, &pose, period) } else { Twist::default() };
+        }
+        Ok(self.latest)
+    }
+
+    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceFault> {
+        Ok(())
+    }
+
+    fn limits(&self) -> DeviceLimits {
+        DeviceLimits::UNLIMITED
+    }
+}
+
+/// Mean velocity from one pose to the next.
+fn twist(before: &Pose, now: &Pose, period: f64) -> Twist {
+    let turn = now.orientation * before.orientation.conjugate();
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    Twist { linear: (now.position - before.position) / period, angular: turn.to_scaled_axis() / period }
 }

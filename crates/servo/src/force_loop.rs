@@ -1,0 +1,252 @@
+//! One tick, the same for the servo's thread, a driver's callback and an offline run.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use palpate_core::Result;
+use palpate_core::simulation::{Input, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
+use palpate_devices::{Device, Wrench};
+
+use crate::clock;
+use crate::handoff::{LoopEnds, LoopHandle, handoffs};
+use crate::log::{LogRow, RealtimeStatus, Status};
+use crate::safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
+use crate::settings::{Settings, refuse_unless};
+use crate::subnormals::FlushSubnormals;
+use crate::timing::{Clock, Timing};
+
+/// A simulation with its devices, safety stages and hand-offs, ready to tick.
+///
+/// Whoever owns it ticks it: one thread at a time, and any thread. It may move from one to another between ticks.
+pub struct ForceLoop {
+    model: Arc<Model>,
+    state: State,
+    scratch: Scratch,
+    devices: Vec<Box<dyn Device>>,
+    limits: SafetyLimits,
+    stages: Vec<SafetyStage>,
+    /// A fault of the whole loop.
+    fault: Option<FaultReason>,
+    ends: LoopEnds,
+    settings: Settings,
+    timing: Timing,
+    status: Status,
+    /// Time of the first tick, ns.
+    start_ns: Option<u64>,
+    /// Row of the last tick: how long it took is known when it is over.
+    row: Option<LogRow>,
+}
+
+impl ForceLoop {
+    /// At rest, at the start of the safety ramp, with one device a tool of the model and in their order.
+    ///
+    /// # Errors
+    /// More or fewer devices than tools, limits or settings that are out of range, a tool stiffer than its device holds.
+    pub fn new(
+        model: Arc<Model>,
+        devices: Vec<Box<dyn Device>>,
+        limits: SafetyLimits,
+        settings: Settings,
+    ) -> Result<(Self, LoopHandle)> {
+        Self::with_clock(model, devices, limits, settings, clock::now_ns)
+    }
+
+    /// With a clock to measure ticks by.
+    pub(crate) fn with_clock(
+        model: Arc<Model>,
+        devices: Vec<Box<dyn Device>>,
+        limits: SafetyLimits,
+        settings: Settings,
+        clock: Clock,
+    ) -> Result<(Self, LoopHandle)> {
+        let (tools, given) = (model.tools.len(), devices.len());
+        refuse_unless(tools == given, || format!("a scene of {tools} tools takes as many devices, got {given}"))?;
+        limits.check()?;
+        settings.check(&model)?;
+        let stage = |(tool, device): (usize, &Box<dyn Device>)| {
+            Ok(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?))
+        };
+        let stages = devices.iter().enumerate().map(stage).collect::<Result<Vec<_>>>()?;
+        let (ends, handle) = handoffs(&model, &settings);
+        let (state, scratch) = (model.state(), model.scratch());
+        let force_loop = Self {
+            model,
+            state,
+            scratch,
+            devices,
+            limits,
+            stages,
+            fault: None,
+            ends,
+            settings,
+            timing: Timing::new(clock),
+            status: Status::default(),
+            start_ns: None,
+            row: None,
+        };
+        Ok((force_loop, handle))
+    }
+
+    /// Reads the devices, steps, makes safe and writes the devices; then accounts and publishes.
+    ///
+    /// `now_ns` is the time for which the tick is due by the monotonic clock ([`crate::now_ns`]), ns: its deadline, or in a
+    /// driver's callback the time of the call. `period` is the time between two ticks, s. Subnormal numbers are flushed
+    /// inside and the thread's mode restored. Never allocates, locks or blocks, and never panics: a panic within becomes a
+    /// latched fault.
+    pub fn tick(&mut self, now_ns: u64, period: f64) {
+        let _flush = FlushSubnormals::begin();
+        if self.fault == Some(FaultReason::Panic) {
+            return self.release();
+        }
+        if catch_unwind(AssertUnwindSafe(|| self.guarded_tick(now_ns, period))).is_err() {
+            self.latch(FaultReason::Panic);
+            self.release();
+        }
+    }
+
+    /// Latches a fault of the whole loop: no wrench on any device until a reset. The first one stays, unless the new one
+    /// outlasts resets.
+    pub fn latch(&mut self, reason: FaultReason) {
+        if self.fault.is_none() || reason.outlasts_reset() {
+            self.fault = Some(reason);
+        }
+    }
+
+    /// Time between two ticks that the devices ask for at least, s.
+    pub(crate) fn shortest_period(&self) -> f64 {
+        let rates = self.devices.iter().filter_map(|device| device.limits().rate);
+        rates.fold(0.0, |period, rate| period.max(1.0 / rate))
+    }
+
+    pub(crate) fn set_realtime(&mut self, realtime: RealtimeStatus) {
+        self.status.realtime = realtime;
+    }
+
+    /// Apart from `tick`, so that no arithmetic moves out of where subnormal numbers are flushed.
+    #[inline(never)]
+    fn guarded_tick(&mut self, now_ns: u64, period: f64) {
+        self.timing.begin(now_ns);
+        let mut input = self.receive(period);
+        self.read_devices(&mut input, now_ns, period);
+        let output = step(&self.model, &mut self.state, &mut self.scratch, &input);
+        self.write_devices(&output, period);
+        self.account(now_ns, &output);
+        self.publish();
+        let (took_ns, overrun) = self.timing.end(period, &self.limits, &mut self.status);
+        if let Some(row) = &mut self.row {
+            row.compute_us = 1e-3 * took_ns as f64;
+        }
+        overrun.into_iter().for_each(|reason| self.latch(reason));
+    }
+
+    /// What has come in through the hand-offs since the last tick.
+    fn receive(&mut self, period: f64) -> Input {
+        let settings = *self.ends.settings.read();
+        let controls = settings.controls(&self.settings, period);
+        self.settings = settings;
+        if controls.reset {
+            self.fault = self.fault.filter(|fault| fault.outlasts_reset());
+            self.timing.reset();
+            self.stages.iter_mut().for_each(SafetyStage::reset);
+        }
+        Input { controls, ..Input::default() }
+    }
+
+    /// What the devices say. A tool with a fault is out of the scene: what it would touch has no hand behind it.
+    fn read_devices(&mut self, input: &mut Input, now_ns: u64, period: f64) {
+        for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
+            let admitted = stage.admit(device.read(now_ns, period), now_ns, period);
+            let reading = &mut self.status.readings[tool];
+            match admitted {
+                Some(said) => *reading = said,
+                None => reading.active = false,
+            }
+            let faultless = self.fault.is_none() && stage.fault().is_none();
+            input.tools[tool] = ToolInput {
+                pose: reading.pose,
+                twist: reading.twist,
+                active: reading.active && faultless,
+                grab: reading.buttons.grab(),
+            };
+        }
+    }
+
+    /// Wrenches of the devices, made safe.
+    fn write_devices(&mut self, output: &Output, period: f64) {
+        let common = self.fault;
+        for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
+            common.into_iter().for_each(|reason| stage.latch(reason));
+            let wrench = stage.apply(output.wrench_on_device[tool], period);
+            self.status.wrenches[tool] = wrench;
+            if let Err(fault) = device.write(wrench) {
+                stage.latch(FaultReason::Device(fault));
+            }
+        }
+    }
+
+    /// Numbers of this tick; the row of the last one goes out.
+    fn account(&mut self, now_ns: u64, output: &Output) {
+        self.timing.account(&mut self.status);
+        self.push_row();
+        let start_ns = *self.start_ns.get_or_insert(now_ns);
+        let status = &mut self.status;
+        status.time = 1e-9 * now_ns.saturating_sub(start_ns) as f64;
+        status.limited = output.limited;
+        status.fault = fault(self.fault, &self.stages);
+        let mut row = LogRow {
+            time: status.time,
+            position: status.readings[0].pose.position,
+            force: status.wrenches[0].force,
+            forces: status.wrenches.map(|wrench| wrench.force),
+            wakeup_us: 1e-3 * self.timing.delay_ns() as f64,
+            watched: self
+                .settings
+                .watch
+                .map(|(body, node)| self.state.displacement_of(&self.model, body, node as usize)),
+            ..LogRow::default()
+        };
+        for (body, state) in self.state.bodies.iter().enumerate() {
+            if let Some(motion) = &state.motion {
+                (row.body_time[body], row.energy[body]) = (motion.time, motion.energy());
+            }
+        }
+        self.row = Some(row);
+    }
+
+    fn publish(&mut self) {
+        let published = self.ends.published.input_buffer_mut();
+        self.state.snapshot_into(&mut published.state);
+        published.status = self.status;
+        self.ends.published.publish();
+    }
+
+    fn push_row(&mut self) {
+        if let Some(row) = self.row.take() {
+            self.status.dropped_rows += u64::from(self.ends.rows.push(row).is_err());
+        }
+    }
+
+    /// No wrench on any device; the last row and the status go out. A device that panics again is left alone.
+    fn release(&mut self) {
+        for device in &mut self.devices {
+            let _ = catch_unwind(AssertUnwindSafe(|| device.write(Wrench::default())));
+        }
+        self.push_row();
+        self.status.wrenches = [Wrench::default(); MAX_TOOLS];
+        self.status.fault = fault(self.fault, &self.stages);
+        self.publish();
+    }
+}
+
+/// The devices are left without a wrench.
+impl Drop for ForceLoop {
+    fn drop(&mut self) {
+        self.release();
+    }
+}
+
+/// The fault of the whole loop, or of the first tool that has one.
+fn fault(common: Option<FaultReason>, stages: &[SafetyStage]) -> Option<Fault> {
+    let of_tool = |(tool, stage): (usize, &SafetyStage)| Some(Fault { tool: Some(tool), reason: stage.fault()? });
+    common.map(|reason| Fault { tool: None, reason }).or_else(|| stages.iter().enumerate().find_map(of_tool))
+}

@@ -1,0 +1,77 @@
+//! Both ends of the wait-free hand-offs between a force loop and everybody else.
+//!
+//! The latest state goes out and the latest settings come in through triple buffers; every tick goes into a bounded ring,
+//! and is dropped and counted where nobody drains it. Nothing that another thread does can make the loop wait. What else
+//! comes in, prepared off the tick, gets a hand-off of its own here and is taken up in `ForceLoop::receive`.
+
+use std::sync::Arc;
+
+use palpate_core::Result;
+use palpate_core::simulation::{Model, Snapshot};
+use rtrb::{Consumer, Producer, RingBuffer};
+use triple_buffer::{Input, Output, triple_buffer};
+
+use crate::log::{LogRow, Status};
+use crate::settings::Settings;
+
+/// Rows of the log kept for a reader: 20 seconds at 1 kHz.
+const LOG_ROWS: usize = 20_000;
+
+/// The latest tick, for drawing.
+#[derive(Clone)]
+pub struct Published {
+    /// What happened.
+    pub status: Status,
+    /// What is drawn.
+    pub state: Snapshot,
+}
+
+/// The loop's ends.
+pub(crate) struct LoopEnds {
+    pub settings: Output<Settings>,
+    pub published: Input<Published>,
+    pub rows: Producer<LogRow>,
+}
+
+/// Everybody else's ends.
+pub struct LoopHandle {
+    model: Arc<Model>,
+    settings: Input<Settings>,
+    published: Output<Published>,
+    rows: Consumer<LogRow>,
+}
+
+/// Both ends, with settings that have been checked.
+pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings) -> (LoopEnds, LoopHandle) {
+    let (settings_in, settings_out) = triple_buffer(settings);
+    let first = Published { status: Status::default(), state: Snapshot::new(model) };
+    let (published_in, published_out) = triple_buffer(&first);
+    let (producer, consumer) = RingBuffer::new(LOG_ROWS);
+    let ends = LoopEnds { settings: settings_out, published: published_in, rows: producer };
+    let handle = LoopHandle { model: model.clone(), settings: settings_in, published: published_out, rows: consumer };
+    (ends, handle)
+}
+
+impl LoopHandle {
+    /// Changes the settings; wait-free.
+    ///
+    /// # Errors
+    /// See [`Settings::check`]; the loop then keeps those it has.
+    pub fn set(&mut self, settings: Settings) -> Result<()> {
+        settings.check(&self.model)?;
+        self.settings.write(settings);
+        Ok(())
+    }
+
+    /// The latest tick; wait-free.
+    pub fn latest(&mut self) -> &Published {
+        self.published.read()
+    }
+
+    /// Hands out the rows of the log since the last call. The latest tick's row comes with the next tick.
+    pub fn drain_log(&mut self, mut each: impl FnMut(LogRow)) {
+        while let Ok(row) = self.rows.pop() {
+            each(row);
+        }
+    }
+}
