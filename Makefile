@@ -45,6 +45,7 @@ test: $(VENV)/.installed $(PAGE) lint
 lint: $(VENV)/.installed viewer/node_modules/.package-lock.json
 	cargo fmt --all --check
 	cargo clippy --release --quiet --workspace --all-targets -- -D warnings
+	cargo clippy --release --quiet -p palpate-core -p palpate-servo --no-default-features -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	cd viewer && npm run --silent check

@@ -9,7 +9,7 @@ use palpate_core::dynamics::{
     State, basis_key as core_basis_key, exact_step, partition,
 };
 use palpate_core::fem::SymmetricCsc;
-use palpate_core::green::Factor;
+use palpate_core::solver::Factor;
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 

@@ -10,6 +10,7 @@
 //! recurrence of two numbers a mode: the same answer with all modes, and the cost of the modes kept with fewer.
 
 mod ahead;
+#[cfg(feature = "offline")]
 mod direct;
 mod energy;
 mod exponential;
@@ -21,6 +22,7 @@ mod scheme;
 mod store;
 
 pub use ahead::{Ahead, Held, StepEnergy};
+#[cfg(feature = "offline")]
 pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
 pub use energy::{Account, Energies};
 pub use exponential::exact_step;
