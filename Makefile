@@ -51,6 +51,7 @@ test: $(VENV)/.installed $(PAGE) lint
 lint: $(VENV)/.installed viewer/node_modules/.checks
 	cargo fmt --all --check
 	cargo clippy --release --quiet --workspace --all-targets -- -D warnings
+	cargo clippy --release --quiet -p palpate-core -p palpate-servo --no-default-features -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	cd viewer && npm run --silent check

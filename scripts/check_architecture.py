@@ -15,6 +15,12 @@ ROOT = Path(__file__).resolve().parent.parent
 MAX_FILE_LINES = 500
 MAX_PAGE_LINES = 100
 
+# The chapters of core; each may import earlier ones.
+CHAPTERS = ("element", "mesh", "fem", "solver", "green", "capacitance", "contact", "strain", "dynamics", "simulation")
+
+# What the online part of core builds without.
+OFFLINE_ONLY = {"faer", "metis-sys", "rayon", "memmap2"}
+
 # What each crate must not depend on, and why.
 FORBIDDEN = {
     "core": (
@@ -44,9 +50,11 @@ def main() -> int:
     problems = [
         *page_problems(),
         *dependency_problems(),
-        *python_import_problems(),
-        *dead_name_problems(),
         *length_problems(),
+        *python_import_problems(),
+        *rust_import_problems(),
+        *small_build_problems(),
+        *dead_name_problems(),
     ]
     for problem in problems:
         print(f"check_architecture: {problem}", file=sys.stderr)
@@ -217,6 +225,136 @@ def length_problems() -> list[str]:
         for p in sources
         if len(p.read_text().splitlines()) > MAX_FILE_LINES
     ]
+
+
+def rust_import_problems() -> list[str]:
+    """Circles among the files of a crate, and chapters of core that import later ones.
+
+    A file imports another one whose items it names by a path from `crate`, `super` or `self`, in `use` or in the code.
+    A name that a `mod.rs` hands on (`pub use`) counts as the file behind it; what a `mod.rs` or `lib.rs` says of the
+    files below itself does not count, nor do tests.
+    """
+    problems = []
+    for root in sorted(ROOT.glob("crates/*/src")):
+        graph = rust_imports(root)
+        for circle in circles(graph):
+            problems.append(f"{root.relative_to(ROOT)} has a circle of imports: {' -> '.join(circle)}")
+        if root.parent.name != "core":
+            continue
+        for file, used in graph.items():
+            chapter, others = file.split("/")[0], {name.split("/")[0] for name in used}
+            later = [name for name in others if name in CHAPTERS and chapter in CHAPTERS]
+            problems += [
+                f"core's {file} imports {name}, a later chapter"
+                for name in sorted(later)
+                if CHAPTERS.index(name) > CHAPTERS.index(chapter)
+            ]
+    return problems
+
+
+def rust_imports(root: Path) -> dict[str, set[str]]:
+    """For each file of a crate, relative to its `src`, the files whose items it names."""
+    modules = {}
+    for path in sorted(root.rglob("*.rs")):
+        parts = path.relative_to(root).with_suffix("").parts
+        modules[parts[:-1] if parts[-1] in ("mod", "lib") else parts] = path
+    handed_on = {module: {} for module in modules}
+    paths = {module: rust_paths(path.read_text(), module) for module, path in modules.items()}
+    for module, path in modules.items():
+        if path.stem in ("mod", "lib"):
+            # `pub use child::{A, B}`, relative to the module itself.
+            for statement in re.findall(r"pub(?:\([^)]*\))? use ([^;]+);", path.read_text()):
+                for names in use_paths(statement):
+                    handed_on[module][names[-1]] = (*module, *names)
+
+    def file_of(names: tuple[str, ...]) -> tuple[str, ...]:
+        for _ in range(9):  # a name may be handed on several times
+            module = next(names[:k] for k in range(len(names), -1, -1) if names[:k] in modules)
+            target = handed_on[module].get(names[len(module)]) if len(names) > len(module) else None
+            if target is None:
+                return module
+            names = target
+        return module
+
+    graph = {}
+    for module, named in paths.items():
+        own = str(modules[module].relative_to(root))
+        below = modules[module].stem in ("mod", "lib")
+        used = {file_of(names) for names in named}
+        graph[own] = {
+            str(modules[other].relative_to(root))
+            for other in used
+            if other != module and not (below and other[: len(module)] == module)
+        }
+    return graph
+
+
+def rust_paths(text: str, module: tuple[str, ...]) -> set[tuple[str, ...]]:
+    """Absolute paths that a file names, the crate's own, tests and comments left out."""
+    text = re.split(r"#\[cfg\((?:all\()?test", text)[0]
+    text = re.sub(r"//[^\n]*", "", text)
+    found = set()
+    statements = re.findall(r"\buse ([^;]+);", text)
+    rest = re.sub(r"\buse [^;]+;", "", text)
+    for names in [
+        *(names for statement in statements for names in use_paths(statement)),
+        *(tuple(path.split("::")) for path in re.findall(r"\b(?:crate|super|self)(?:::\w+)+", rest)),
+    ]:
+        if names[0] not in ("crate", "super", "self"):
+            continue
+        base, k = module, 0
+        while k < len(names) and names[k] in ("crate", "super", "self"):
+            base = {"crate": (), "super": base[:-1], "self": base}[names[k]]
+            k += 1
+        found.add((*base, *names[k:]))
+    return found
+
+
+def use_paths(statement: str) -> list[tuple[str, ...]]:
+    """All paths of a `use` statement with braces."""
+    statement = re.sub(r"\s+as\s+\w+", "", re.sub(r"\s+", " ", statement)).strip()
+    opening = statement.find("{")
+    if opening < 0:
+        return [tuple(name.strip() for name in statement.split("::"))]
+    head = tuple(name for name in statement[:opening].replace(" ", "").split("::") if name)
+    parts, depth, start = [], 0, opening + 1
+    for at in range(opening, len(statement)):
+        depth += {"{": 1, "}": -1}.get(statement[at], 0)
+        if (statement[at] == "," and depth == 1) or depth == 0:
+            parts.append(statement[start:at])
+            start = at + 1
+        if depth == 0:
+            break
+    return [(*head, *path) for part in parts if part.strip() for path in use_paths(part.strip())]
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """One circle through each file that is on one, each circle once."""
+    found = {}
+    for start in sorted(graph):
+        behind, waiting = {start: None}, [start]
+        while waiting:
+            file = waiting.pop(0)
+            if start in graph[file]:
+                circle = [file]
+                while behind[circle[-1]] is not None:
+                    circle.append(behind[circle[-1]])
+                found.setdefault(frozenset(circle), [*circle[::-1], start])
+                break
+            for other in sorted(graph[file] - behind.keys()):
+                behind[other] = file
+                waiting.append(other)
+    return list(found.values())
+
+
+def small_build_problems() -> list[str]:
+    """Dependencies that only the offline part of core may bring."""
+    command = ["cargo", "tree", "-p", "palpate-core", "--no-default-features", "-e", "normal", "--prefix", "none"]
+    listed = subprocess.run([*command, "--offline"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode:
+        return [f"cargo tree fails: {listed.stderr.strip().splitlines()[-1]}"]
+    names = {line.split(" ")[0] for line in listed.stdout.splitlines() if line}
+    return [f"palpate-core without its feature 'offline' depends on {name}" for name in sorted(names & OFFLINE_ONLY)]
 
 
 if __name__ == "__main__":

@@ -1,20 +1,28 @@
 //! Finite elements, Green's functions, capacitance and contact: the numerics and physics of Palpate.
 //!
-//! The folders are the chapters of the theory, in order: [`element`], [`mesh`], [`fem`], [`green`], [`capacitance`],
-//! [`contact`], [`strain`], [`dynamics`], [`simulation`]. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
+//! The folders are the chapters of the theory, in order: `element`, `mesh`, `fem`, `solver`, `green`, `capacitance`,
+//! `contact`, `strain`, `dynamics`, `simulation`. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
+//!
+//! The feature `offline` brings what is computed before anyone touches: assembly, factorisation, precomputation, changes of
+//! boundary conditions. Without it the crate reads stores and answers a tick, and depends on neither faer, METIS nor
+//! rayon.
 //!
 //! Nothing here reads a clock, starts threads of its own (rayon in the offline part apart) or touches a file other than
 //! the stores of Green's functions and modes.
 
+#[cfg(feature = "offline")]
 pub mod capacitance;
 pub mod contact;
 pub mod dynamics;
 pub mod element;
 mod error;
+#[cfg(feature = "offline")]
 pub mod fem;
 pub mod green;
 pub mod mesh;
 pub mod simulation;
+#[cfg(feature = "offline")]
+pub mod solver;
 pub mod strain;
 
 pub use error::{Error, Result};

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use faer::{MatMut, Par};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{
-    Account, Basis, Direct, DirectScratch, DirectState, Energies, Lanes, Model, Newmark, Rayleigh, Scratch, Solver,
-    State, basis_key as core_basis_key, exact_step, partition,
+    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Lanes, ModalModel, ModalScratch, ModalState, Newmark,
+    Rayleigh, Solver, basis_key as core_basis_key, exact_step, partition,
 };
 use palpate_core::fem::SymmetricCsc;
-use palpate_core::green::Factor;
+use palpate_core::solver::Factor;
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -43,7 +43,7 @@ pub fn scheme(arguments: SchemeArguments) -> Result<(Newmark, Rayleigh)> {
     Ok((Newmark::new(dt, alpha, delta)?, Rayleigh { mass, stiffness }))
 }
 
-fn tuple(energies: Energies) -> EnergyTuple {
+fn tuple(energies: Energy) -> EnergyTuple {
     (energies.kinetic, energies.strain, energies.dissipated, energies.work)
 }
 
@@ -138,10 +138,10 @@ impl SparseFactor {
 /// Motion by modes.
 #[pyclass(module = "palpate._native")]
 pub struct ModalMotion {
-    model: Model,
-    state: State,
-    scratch: Scratch,
-    account: Account,
+    model: ModalModel,
+    state: ModalState,
+    scratch: ModalScratch,
+    account: EnergyAccount,
 }
 
 #[pymethods]
@@ -162,9 +162,9 @@ impl ModalMotion {
         let build = || -> Result<Self> {
             let (newmark, rayleigh) = scheme(arguments)?;
             let step = |k, c| if exact { exact_step(k, c, newmark.dt) } else { newmark.mode_step(k, c) };
-            let model = Model::new(k, shapes, &rayleigh, newmark.dt, step)?;
+            let model = ModalModel::new(k, shapes, &rayleigh, newmark.dt, step)?;
             let state = model.state_from(q, v)?;
-            let (scratch, account) = (model.scratch(), Account::new(&state));
+            let (scratch, account) = (model.scratch(), EnergyAccount::new(&state));
             Ok(Self { model, state, scratch, account })
         };
         py.detach(build).map_err(|e| to_python(py, e))

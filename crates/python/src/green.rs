@@ -17,7 +17,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::body::{self, indices, materials, vectors};
 use crate::errors::to_python;
 
-/// A Green's function in memory or in a mapped store.
+/// A Green's function in memory, or in memory and its store.
 #[pyclass(frozen, module = "palpate._native")]
 pub struct GreenCore {
     pub(crate) green: Arc<GreensFunction>,
@@ -54,6 +54,11 @@ fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
     build().map_err(|e| to_python(arguments.py(), e))
 }
 
+fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
+    let stiffness = palpate_core::fem::stiffness(&problem.mesh, &problem.materials);
+    palpate_core::green::Interior::new(&stiffness, &problem.supports, &problem.surface_nodes, &problem.loads)
+}
+
 fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
     Precision::parse(name)
         .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f16', 'f32' or 'f64'"))))
@@ -71,7 +76,7 @@ impl Interior {
     #[new]
     fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
         let problem = problem(arguments)?;
-        let interior = py.detach(|| palpate_core::green::Interior::new(&problem)).map_err(|e| to_python(py, e))?;
+        let interior = py.detach(|| interior(&problem)).map_err(|e| to_python(py, e))?;
         Ok(Self { interior: Arc::new(interior) })
     }
 
@@ -155,7 +160,7 @@ impl GreenCore {
         py.detach(|| self.green.save(&path)).map_err(|e| to_python(py, e))
     }
 
-    /// Maps and verifies a store.
+    /// Reads and verifies a store.
     #[staticmethod]
     #[pyo3(signature = (path, expected_key=None))]
     fn load(py: Python<'_>, path: PathBuf, expected_key: Option<String>) -> PyResult<Self> {

@@ -5,6 +5,7 @@ mod body;
 mod dynamics;
 mod errors;
 mod green;
+mod scene;
 mod simulation;
 mod strain;
 

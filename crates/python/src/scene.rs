@@ -14,8 +14,7 @@ use crate::green::GreenCore;
 
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
 /// and the spring between tools and patches, N/m.
-pub type DynamicsArguments<'py> =
-    (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
+pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
 /// Green's function, position (m), orientation (unit quaternion w x y z), and what moves the body.
 pub type BodyArguments<'py> = (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>);
 /// Radius (m), contact radius (m), contact law, largest stiffness (N/m).

@@ -1,9 +1,9 @@
 //! A simulation: the loop with simulated devices, and the same ticks offline.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use palpate_core::simulation::{MAX_BODIES, Model, Pose, Snapshot, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{Handle, Target, simulated};
@@ -31,7 +31,8 @@ pub struct SimulationCore {
     strain: StrainPreparer,
     handles: Vec<Handle>,
     targets: Vec<Target>,
-    servo: Option<Servo>,
+    /// Locked by callers from Python among themselves; the loop knows nothing of it.
+    servo: Mutex<Option<Servo>>,
 }
 
 #[pymethods]
@@ -64,7 +65,7 @@ impl SimulationCore {
             strain: StrainPreparer::new(&model),
             handles: Vec::new(),
             targets: vec![Target::default(); model.tools.len()],
-            servo: None,
+            servo: Mutex::new(None),
             model,
         })
     }
@@ -88,13 +89,13 @@ impl SimulationCore {
         let (model, limits, settings, rate, strain) =
             (self.model.clone(), self.limits, self.settings, self.rate, self.strain.clone());
         let started = py.detach(|| Servo::start(model, devices, limits, settings, rate, strain));
-        self.servo = Some(started.map_err(|e| to_python(py, e))?);
+        *self.servo() = Some(started.map_err(|e| to_python(py, e))?);
         Ok(())
     }
 
     /// Stops the loop.
     fn stop(&mut self, py: Python<'_>) {
-        if let Some(mut servo) = self.servo.take() {
+        if let Some(mut servo) = self.servo().take() {
             py.detach(|| servo.stop());
         }
     }
@@ -179,7 +180,7 @@ impl SimulationCore {
     /// The latest tick as a dictionary; None if the loop does not run.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let (model, tools) = (self.model.clone(), self.targets.len());
-        let Some(servo) = &mut self.servo else { return Ok(None) };
+        let Some(servo) = self.servo() else { return Ok(None) };
         let Published { status, state } = servo.latest().clone();
         let surfaces = py.detach(|| {
             let intact = model.bodies.iter().try_for_each(|body| body.green().require_intact());
@@ -216,7 +217,7 @@ impl SimulationCore {
     /// Contacts of the latest tick, as in `frame` but without the rest of it; None if the loop does not run.
     fn contacts(&mut self) -> Option<Vec<ContactRecord>> {
         let model = self.model.clone();
-        self.servo.as_mut().map(|servo| contact_records(&model, &servo.latest().state))
+        self.servo().as_mut().map(|servo| contact_records(&model, &servo.latest().state))
     }
 
     /// The contact of a tool with a body at the latest tick, and the body's displacements (3s) per unit displacement of
@@ -229,7 +230,7 @@ impl SimulationCore {
         body: usize,
     ) -> Option<(ContactRecord, Vec<Bound<'py, PyArray1<f64>>>)> {
         let model = self.model.clone();
-        let state = self.servo.as_mut()?.latest().state.clone();
+        let state = self.servo().as_mut()?.latest().state.clone();
         let fields = py.detach(|| state.response(&model, tool, body))?;
         let record = contact_records(&model, &state).into_iter().find(|record| (record.0, record.1) == (tool, body))?;
         Some((record, fields.map(|field| field.into_pyarray(py)).into()))
@@ -240,7 +241,7 @@ impl SimulationCore {
     fn drain_log<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
         let body = self.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
-        if let Some(servo) = &mut self.servo {
+        if let Some(servo) = self.servo() {
             servo.drain_log(|row| {
                 rows.push(row.time);
                 rows.extend(row.position.to_array());
@@ -277,7 +278,7 @@ impl SimulationCore {
         let script = Script { period: 1.0 / self.rate, poses: &poses, grabs: &grabs, strikes: &strikes, watch: &watch };
         let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
         let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
-        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, strain, &script));
+        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script));
         let recording = recording.map_err(|e| to_python(py, e))?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
         let mut energies: Vec<Vec<f64>> = vec![Vec::new(); self.model.bodies.len()];
@@ -298,13 +299,17 @@ impl SimulationCore {
 }
 
 impl SimulationCore {
+    fn servo(&mut self) -> &mut Option<Servo> {
+        self.servo.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Changes the settings, and hands them to the loop if it runs; a value that is refused changes nothing.
     fn change(&mut self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> PyResult<()> {
         let mut settings = self.settings;
         change(&mut settings);
         settings.check(&self.model).map_err(|e| to_python(py, e))?;
         self.settings = settings;
-        match &mut self.servo {
+        match self.servo() {
             Some(servo) => servo.set(settings).map_err(|e| to_python(py, e)),
             None => Ok(()),
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_core::Error;
-use palpate_core::contact::{Patch, PatchScratch, SurfaceQuery, patch_weights};
+use palpate_core::contact::{Patch, PatchGeometry, PatchScratch, SurfaceQuery, patch_weights};
 use palpate_core::strain::{self, MAX_CONTACTS_WATCHED, StrainOperator};
 use pyo3::prelude::*;
 
@@ -130,8 +130,9 @@ pub fn contact_patch<'py>(
     let mut patch = Patch::default();
     let query = SurfaceQuery::new(surface).map_err(|e| to_python(py, e))?;
     if let Some(centre) = query.closest(surface, point.into()) {
-        patch_weights(surface, &centre, radius, &mut PatchScratch::new(surface), &mut patch);
+        let (geometry, mut scratch) = (PatchGeometry::new(surface), PatchScratch::new(surface));
+        patch_weights(surface, &geometry, &centre, radius, &mut scratch, &mut patch)
+            .map_err(|refusal| to_python(py, Error::Invalid(refusal.message().into())))?;
     }
-    let count = patch.count;
-    Ok((patch.nodes[..count].to_vec().into_pyarray(py), patch.weights[..count].to_vec().into_pyarray(py)))
+    Ok((patch.nodes().to_vec().into_pyarray(py), patch.weights().to_vec().into_pyarray(py)))
 }

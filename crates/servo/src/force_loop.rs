@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use palpate_core::Result;
-use palpate_core::simulation::{Input, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
+use palpate_core::simulation::{Input, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
 use palpate_devices::{Device, Wrench};
 
 use crate::clock;
@@ -31,6 +31,8 @@ pub struct ForceLoop {
     settings: Settings,
     timing: Timing,
     status: Status,
+    /// Of which bodies the strain can be limited.
+    limited: [bool; MAX_BODIES],
     /// Time of the first tick, ns.
     start_ns: Option<u64>,
     /// Row of the last tick: how long it took is known when it is over.
@@ -81,6 +83,7 @@ impl ForceLoop {
             settings,
             timing: Timing::new(clock),
             status: Status::default(),
+            limited: [false; MAX_BODIES],
             start_ns: None,
             row: None,
         };
@@ -112,6 +115,12 @@ impl ForceLoop {
         }
     }
 
+    /// Limits the strain of bodies from now on: for these, responses are prepared.
+    #[cfg(feature = "offline")]
+    pub(crate) fn limit_strain(&mut self, bodies: [bool; MAX_BODIES]) {
+        self.limited = bodies;
+    }
+
     /// Time between two ticks that the devices ask for at least, s.
     pub(crate) fn shortest_period(&self) -> f64 {
         let rates = self.devices.iter().filter_map(|device| device.limits().rate);
@@ -130,6 +139,7 @@ impl ForceLoop {
         self.read_devices(&mut input, now_ns, period);
         let output = step(&self.model, &mut self.state, &mut self.scratch, &input);
         self.write_devices(&output, period);
+        self.ends.strain.ask(&self.state, &input.controls.strain_limit);
         self.account(now_ns, &output);
         self.publish();
         let (took_ns, overrun) = self.timing.end(period, &self.limits, &mut self.status);
@@ -142,7 +152,8 @@ impl ForceLoop {
     /// What has come in through the hand-offs since the last tick.
     fn receive(&mut self, period: f64) -> Input {
         let settings = *self.ends.settings.read();
-        let controls = settings.controls(&self.settings, period);
+        let controls = settings.controls(&self.settings, period, &self.limited);
+        self.ends.strain.receive(&mut self.state);
         self.settings = settings;
         if controls.reset {
             self.fault = self.fault.filter(|fault| fault.outlasts_reset());

@@ -13,6 +13,7 @@ use triple_buffer::{Input, Output, triple_buffer};
 
 use crate::log::{LogRow, Status};
 use crate::settings::Settings;
+use crate::strain::{PreparerEnd, StrainEnd, strain_ends};
 
 /// Rows of the log kept for a reader: 20 seconds at 1 kHz.
 const LOG_ROWS: usize = 20_000;
@@ -31,6 +32,7 @@ pub(crate) struct LoopEnds {
     pub settings: Output<Settings>,
     pub published: Input<Published>,
     pub rows: Producer<LogRow>,
+    pub strain: StrainEnd,
 }
 
 /// Everybody else's ends.
@@ -39,6 +41,8 @@ pub struct LoopHandle {
     settings: Input<Settings>,
     published: Output<Published>,
     rows: Consumer<LogRow>,
+    /// For whoever prepares strain responses.
+    pub(crate) strain: Option<PreparerEnd>,
 }
 
 /// Both ends, with settings that have been checked.
@@ -47,8 +51,15 @@ pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings) -> (LoopEnds, Lo
     let first = Published { status: Status::default(), state: Snapshot::new(model) };
     let (published_in, published_out) = triple_buffer(&first);
     let (producer, consumer) = RingBuffer::new(LOG_ROWS);
-    let ends = LoopEnds { settings: settings_out, published: published_in, rows: producer };
-    let handle = LoopHandle { model: model.clone(), settings: settings_in, published: published_out, rows: consumer };
+    let (strain, preparer) = strain_ends();
+    let ends = LoopEnds { strain, settings: settings_out, published: published_in, rows: producer };
+    let handle = LoopHandle {
+        model: model.clone(),
+        settings: settings_in,
+        published: published_out,
+        rows: consumer,
+        strain: Some(preparer),
+    };
     (ends, handle)
 }
 

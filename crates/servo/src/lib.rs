@@ -9,10 +9,13 @@ mod force_loop;
 mod handoff;
 mod log;
 mod offline;
+#[cfg(feature = "offline")]
+mod preparer;
 mod safety;
 mod servo;
 mod settings;
 mod statistics;
+mod strain;
 mod subnormals;
 mod timing;
 
@@ -21,6 +24,8 @@ pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
 pub use offline::{RecordedContact, Recording, Script, run};
+#[cfg(feature = "offline")]
+pub use preparer::StrainPreparer;
 pub use safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
 pub use servo::Servo;
 pub use settings::Settings;

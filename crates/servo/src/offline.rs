@@ -1,16 +1,23 @@
 //! The same ticks without a clock.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_core::Result;
 use palpate_core::dynamics::Energy;
-use palpate_core::simulation::{Mode, Model, Pose, Snapshot, Strike};
+use palpate_core::simulation::{Mode, Model, Pose, Snapshot, StrainWatch, Strike};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
 
+use crate::clock::now_ns;
 use crate::force_loop::ForceLoop;
+use crate::preparer::StrainPreparer;
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::{Settings, check_node, refuse_unless};
+use crate::strain::PreparerEnd;
+
+/// Ticks after which a strain response comes: about as many as the thread beside a running loop takes.
+const PREPARATION_TICKS: usize = 16;
 
 /// What happens, tick by tick.
 pub struct Script<'a> {
@@ -23,8 +30,8 @@ pub struct Script<'a> {
     pub grabs: &'a [bool],
     /// Strikes and their ticks, in order and at most one a tick.
     pub strikes: &'a [(usize, Strike)],
-    /// A body and the ranks of its surface nodes whose displacements are recorded.
-    pub watch: Option<(usize, &'a [u32])>,
+    /// Bodies and the ranks of their surface nodes whose displacements are recorded.
+    pub watch: &'a [(usize, u32)],
 }
 
 /// A contact at one tick; vectors are in the world.
@@ -57,6 +64,10 @@ pub struct Recording {
     pub contacts: Vec<RecordedContact>,
     /// Displacements of the watched nodes at each tick (ticks x nodes), m, in their body's frame.
     pub displacements: Vec<DVec3>,
+    /// Whether the limit of strain kept each tool from following its device (ticks x tools).
+    pub limited: Vec<bool>,
+    /// What each tick took, ns: the only part that differs from run to run.
+    pub compute_ns: Vec<u64>,
     /// The first fault that latched.
     pub fault: Option<Fault>,
 }
@@ -65,11 +76,19 @@ pub struct Recording {
 ///
 /// # Errors
 /// See [`ForceLoop::new`]; a script of the wrong shape, or with a body or node that the model does not have.
-pub fn run(model: &Arc<Model>, limits: SafetyLimits, settings: Settings, script: &Script<'_>) -> Result<Recording> {
+pub fn run(
+    model: &Arc<Model>,
+    limits: SafetyLimits,
+    settings: Settings,
+    strain: &StrainPreparer,
+    script: &Script<'_>,
+) -> Result<Recording> {
     check(model, script)?;
     let tools = model.tools.len();
     let devices = (0..tools).map(|tool| Box::new(Scripted::new(script, tool, tools)) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
+    force_loop.limit_strain(strain.known());
+    let mut preparation = Preparation { end: handle.strain.take(), strain, due: VecDeque::new() };
     let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
     let moving = (0..model.bodies.len()).filter(|&body| model.bodies[body].moves());
@@ -80,21 +99,49 @@ pub fn run(model: &Arc<Model>, limits: SafetyLimits, settings: Settings, script:
             settings.strikes = settings.strikes.wrapping_add(1);
             handle.set(settings)?;
         }
+        preparation.hand_over(tick);
+        let begun = now_ns();
         force_loop.tick((1e9 * script.period * tick as f64).round() as u64, script.period);
+        recording.compute_ns.push(now_ns() - begun);
+        preparation.prepare(tick);
         let published = handle.latest();
         let (status, state) = (&published.status, &published.state);
         recording.fault = recording.fault.or(status.fault);
         recording.forces.extend(status.wrenches[..tools].iter().map(|wrench| wrench.force));
+        recording.limited.extend(&status.limited[..tools]);
         recording.torques.extend(status.wrenches[..tools].iter().map(|wrench| wrench.torque));
         for (body, energies) in &mut recording.energies {
             energies.extend(state.energy(*body));
         }
         recording.contacts.extend(contacts(model, state, tick));
-        if let Some((body, nodes)) = script.watch {
-            recording.displacements.extend(state.displacements_of(model, body, nodes));
+        for &(body, node) in script.watch {
+            recording.displacements.extend(state.displacements_of(model, body, &[node]));
         }
     }
     Ok(recording)
+}
+
+/// Strain responses between the ticks, handed over after a fixed number of them.
+struct Preparation<'a> {
+    end: Option<PreparerEnd>,
+    strain: &'a StrainPreparer,
+    due: VecDeque<(usize, (usize, Box<StrainWatch>))>,
+}
+
+impl Preparation<'_> {
+    fn hand_over(&mut self, tick: usize) {
+        let Some(end) = &mut self.end else { return };
+        while self.due.front().is_some_and(|(when, _)| *when <= tick) {
+            self.due.pop_front().into_iter().for_each(|(_, response)| end.hand_over(response));
+        }
+    }
+
+    fn prepare(&mut self, tick: usize) {
+        let Some(end) = &mut self.end else { return };
+        while let Some(prepared) = end.prepare_one(self.strain) {
+            self.due.extend(prepared.map(|response| (tick + PREPARATION_TICKS, response)));
+        }
+    }
 }
 
 fn check(model: &Model, script: &Script<'_>) -> Result<()> {
@@ -111,10 +158,7 @@ fn check(model: &Model, script: &Script<'_>) -> Result<()> {
     refuse_unless(ticks.clone().all(|tick| tick < poses / tools), || {
         format!("a strike comes after the last of {} ticks", poses / tools)
     })?;
-    if let Some((body, nodes)) = script.watch {
-        nodes.iter().try_for_each(|&node| check_node(model, body, node))?;
-    }
-    Ok(())
+    script.watch.iter().try_for_each(|&(body, node)| check_node(model, body, node))
 }
 
 fn contacts<'a>(model: &'a Model, state: &'a Snapshot, tick: usize) -> impl Iterator<Item = RecordedContact> + 'a {

@@ -12,6 +12,7 @@ use crate::clock::{lock_memory, next_deadline, now_ns, request_realtime_priority
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::{LogRow, RealtimeStatus};
+use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::safety::SafetyLimits;
 use crate::settings::{Settings, refuse_unless};
 
@@ -23,13 +24,16 @@ pub struct Servo {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     handle: LoopHandle,
+    /// Prepares strain responses while the loop runs.
+    _worker: Option<StrainWorker>,
 }
 
 impl Servo {
     /// Ticks a second where nothing else is asked for, Hz.
     pub const DEFAULT_RATE: f64 = 1000.0;
 
-    /// Starts the loop with one device a tool, `rate` ticks a second (100 to 10000 Hz).
+    /// Starts the loop with one device a tool, `rate` ticks a second (100 to 10000 Hz), and beside it a thread that prepares
+    /// the strain of contacts.
     ///
     /// # Errors
     /// See [`ForceLoop::new`]; a rate out of range or beyond what a device takes; no thread from the operating system.
@@ -39,11 +43,14 @@ impl Servo {
         limits: SafetyLimits,
         settings: Settings,
         rate: f64,
+        strain: StrainPreparer,
     ) -> Result<Self> {
         refuse_unless(RATES.contains(&rate), || {
             format!("the loop ticks at {} to {} Hz, got {rate}", RATES.start(), RATES.end())
         })?;
-        let (mut force_loop, handle) = ForceLoop::new(model, devices, limits, settings)?;
+        let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings)?;
+        force_loop.limit_strain(strain.known());
+        let worker = handle.strain.take().map(|end| StrainWorker::start(end, strain)).transpose()?;
         let (period, shortest) = (1.0 / rate, force_loop.shortest_period());
         refuse_unless(period >= shortest, || {
             format!("a device takes at most {} wrenches a second, the loop has {rate}", 1.0 / shortest)
@@ -62,7 +69,7 @@ impl Servo {
         let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(ticks);
         let thread = thread.map_err(|source| Error::Io { path: "palpate-servo".into(), source })?;
         let _ = ready_out.recv();
-        Ok(Self { stop, thread: Some(thread), handle })
+        Ok(Self { stop, thread: Some(thread), handle, _worker: worker })
     }
 
     /// Changes the settings; wait-free.

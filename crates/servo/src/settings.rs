@@ -64,12 +64,12 @@ impl Settings {
         self.watch.map_or(Ok(()), |(body, node)| check_node(model, body, node))
     }
 
-    /// What a tick makes of them, given those of the tick before.
-    pub(crate) fn controls(&self, before: &Settings, period: f64) -> Controls {
+    /// What a tick makes of them, given those of the tick before; the strain of some bodies cannot be limited.
+    pub(crate) fn controls(&self, before: &Settings, period: f64, limited: &[bool; MAX_BODIES]) -> Controls {
         Controls {
             contact_radius: self.contact_radius,
             stiffness_scale: self.stiffness_scale,
-            strain_limit: self.strain_limit,
+            strain_limit: limited.map(|limited| if limited { self.strain_limit } else { 0.0 }),
             reset: self.resets != before.resets,
             advance: self.time_scale * period,
             strike: (self.strikes != before.strikes).then_some(self.strike),

@@ -194,7 +194,7 @@ def _print_precompute(results: list[Result]) -> None:
                 r.method, f"{r.seconds:.4g}", shares[0], f"{r.cpu_seconds:.4g}", shares[1], columns, str(r.repeats)
             )
         Console().print(table)
-        print(f"Palpate's file, written, verified and mapped: {ours.writing_seconds:.3g} s more")
+        print(f"Palpate's file, written, verified and read: {ours.writing_seconds:.3g} s more")
     print("share: Palpate's time over that of the row")
 
 

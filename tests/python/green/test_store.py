@@ -53,6 +53,18 @@ def test_truncated_store_is_refused(store, length):
         palpate.GreensFunction.load(store)
 
 
+def test_store_cut_short_in_use_harms_nobody(block, block_green, tmp_path):
+    """A mapped file would kill the process by SIGBUS."""
+    block_green.save(tmp_path / "copy.palpate")
+    copy = palpate.GreensFunction.load(tmp_path / "copy.palpate", body=block)
+    os.truncate(tmp_path / "copy.palpate", 100)
+    node = int(np.setdiff1d(block.mesh.surface_nodes, block.fixed_nodes)[3])
+    a, b = (g.solve(displacements={node: (0, 0, 1e-3)}) for g in (block_green, copy))
+    assert np.array_equal(a.forces, b.forces)
+    with pytest.raises(palpate.StoreError, match="cut short"):
+        palpate.GreensFunction.load(tmp_path / "copy.palpate")
+
+
 def test_missing_file(tmp_path):
     with pytest.raises(palpate.StoreError, match="no such file"):
         palpate.GreensFunction.load(tmp_path / "none.palpate")

@@ -15,7 +15,7 @@ use faer::{MatMut, Par};
 
 use super::{Energy, Newmark, Rayleigh};
 use crate::fem::{Supports, SymmetricCsc};
-use crate::green::Factor;
+use crate::solver::Factor;
 use crate::{Error, Result};
 
 /// Columns of the dense inverse solved at once.

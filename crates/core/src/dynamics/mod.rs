@@ -9,6 +9,7 @@
 //! `direct` solves this on all dofs. `K`, `M` and `B` share eigenvectors, so `modal` carries the same motion by one
 //! recurrence of two numbers a mode: the same answer with all modes, and the cost of the modes kept with fewer.
 
+#[cfg(feature = "offline")]
 mod direct;
 mod energy;
 mod exponential;
@@ -16,6 +17,7 @@ mod modal;
 mod scheme;
 mod store;
 
+#[cfg(feature = "offline")]
 pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
 pub use energy::Energy;
 pub use exponential::exact_step;

@@ -8,9 +8,8 @@ use faer::Par;
 use faer::dyn_stack::MemBuffer;
 use faer::mat::MatMut;
 
-use super::columns::Problem;
-use super::factor::Factor;
-use crate::fem::{Supports, stiffness};
+use crate::fem::{Supports, SymmetricCsc};
+use crate::solver::Factor;
 use crate::{Error, Result};
 
 /// Extension of surface displacements to all nodes.
@@ -28,19 +27,19 @@ pub struct Interior {
 }
 
 impl Interior {
-    /// Factorises the inner part of the stiffness.
+    /// Factorises the inner part of the stiffness (all dofs) of a body with these supports, surface nodes (mesh indices,
+    /// ascending) and reference loads on all dofs, N (empty for none).
     ///
     /// # Errors
     /// An inner block that is not positive definite: degenerate elements.
-    pub fn new(problem: &Problem) -> Result<Self> {
-        let stiffness = stiffness(&problem.mesh, &problem.materials);
+    pub fn new(stiffness: &SymmetricCsc, supports: &Supports, surface_nodes: &[u32], loads: &[f64]) -> Result<Self> {
         let dof_count = stiffness.dimension;
-        let mut held: Vec<u32> = problem.surface_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-        held.extend(problem.supports.fixed.iter().copied());
+        let mut held: Vec<u32> = surface_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+        held.extend(supports.fixed.iter().copied());
         held.sort_unstable();
         held.dedup();
         let mut interior = Self {
-            surface_nodes: problem.surface_nodes.clone(),
+            surface_nodes: surface_nodes.to_vec(),
             coupling_start: vec![0],
             coupling: Vec::new(),
             inner: Vec::new(),
@@ -52,16 +51,16 @@ impl Interior {
             return Ok(interior);
         }
         let supports = Supports::new(dof_count, held)?;
-        interior.factor = Some(Factor::new(&stiffness, &supports, Par::rayon(0))?);
-        let is_surface = |dof: u32| problem.surface_nodes.binary_search(&(dof / 3)).is_ok();
+        interior.factor = Some(Factor::new(stiffness, &supports, Par::rayon(0))?);
+        let is_surface = |dof: u32| surface_nodes.binary_search(&(dof / 3)).is_ok();
         for &dof in &supports.free {
             // The matrix is symmetric: the row is the column.
             interior.coupling.extend(stiffness.column(dof as usize).filter(|&(row, _)| is_surface(row)));
             interior.coupling_start.push(interior.coupling.len());
         }
-        interior.loads = match problem.loads.is_empty() {
+        interior.loads = match loads.is_empty() {
             true => vec![0.0; supports.free.len()],
-            false => supports.free.iter().map(|&dof| problem.loads[dof as usize]).collect(),
+            false => supports.free.iter().map(|&dof| loads[dof as usize]).collect(),
         };
         interior.inner = supports.free;
         Ok(interior)

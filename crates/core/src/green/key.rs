@@ -1,31 +1,32 @@
 //! The content key: a hash of everything that determines a Green's function.
 
-use super::columns::Problem;
+#[cfg(feature = "offline")]
 use super::precision::Precision;
 
 /// Version of the store's layout; part of the key, so that an old file is recomputed, never misread.
 pub const FORMAT_VERSION: u32 = 3;
 
-/// Hex BLAKE3 hash of mesh, materials, supports, loads, touch region, element, precision and format version.
-pub fn content_key(problem: &Problem, precision: Precision) -> String {
-    let element = problem.mesh.tets.element_name();
-    let mut hash = blake3::Hasher::new();
-    hash.update(format!("palpate green {FORMAT_VERSION} {element} {}", precision.name()).as_bytes());
-    let mut section = |bytes: &[u8]| {
-        hash.update(&(bytes.len() as u64).to_le_bytes());
-        hash.update(bytes);
-    };
-    section(bytemuck::cast_slice(&problem.mesh.nodes));
-    section(bytemuck::cast_slice(problem.mesh.tets.as_flattened()));
-    for material in &problem.materials {
-        // Density does not enter the static answer.
-        section(bytemuck::cast_slice(&[material.youngs_modulus, material.poissons_ratio]));
+/// Hex BLAKE3 hash of element, precision, format version and sections of bytes, each with its length.
+#[cfg(feature = "offline")]
+pub struct ContentKey(blake3::Hasher);
+
+#[cfg(feature = "offline")]
+impl ContentKey {
+    /// No section yet.
+    pub fn new(element: &str, precision: Precision) -> Self {
+        let mut hash = blake3::Hasher::new();
+        hash.update(format!("palpate green {FORMAT_VERSION} {element} {}", precision.name()).as_bytes());
+        Self(hash)
     }
-    section(bytemuck::cast_slice(&problem.supports.fixed));
-    section(bytemuck::cast_slice(&problem.surface_nodes));
-    section(bytemuck::cast_slice(&problem.touch));
-    if !problem.loads.is_empty() {
-        section(bytemuck::cast_slice(&problem.loads));
+
+    /// Adds a section.
+    pub fn section(&mut self, bytes: &[u8]) {
+        self.0.update(&(bytes.len() as u64).to_le_bytes());
+        self.0.update(bytes);
     }
-    hash.finalize().to_hex().to_string()
+
+    /// The key.
+    pub fn finish(self) -> String {
+        self.0.finalize().to_hex().to_string()
+    }
 }

@@ -13,38 +13,25 @@
 
 mod blocks;
 mod checksums;
-mod columns;
 mod columns_file;
 mod entries;
-mod factor;
-mod free_response;
 mod function;
+#[cfg(feature = "offline")]
 mod interior;
 mod key;
-mod mirror;
-mod number;
 mod numbers;
-mod operators;
-mod ordering;
-mod panels;
-mod partial;
 mod places;
-mod plan;
 mod precision;
+#[cfg(feature = "offline")]
 mod precompute;
-mod scaled;
 mod store;
 mod store_writer;
-mod sweep;
-mod system;
-mod tree;
 
-pub use columns::Problem;
-pub use factor::{Factor, Symbolic};
 pub use function::GreensFunction;
+#[cfg(feature = "offline")]
 pub use interior::Interior;
 pub use key::FORMAT_VERSION;
 pub use places::TouchNode;
-pub use plan::Plan;
 pub use precision::Precision;
-pub use precompute::{Found, Progress, Target, plan, precompute, precompute_to};
+#[cfg(feature = "offline")]
+pub use precompute::{Found, Plan, Problem, Progress, Target, plan, precompute, precompute_to};

@@ -6,7 +6,7 @@
 use bytemuck::Pod;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::Precision;
+use super::precision::Precision;
 
 /// A number as it is stored.
 pub trait Stored: Pod {

@@ -244,3 +244,133 @@ impl<'a> Reader<'a> {
 fn store_error(path: &Path, reason: impl Into<String>) -> Error {
     Error::Store { path: path.to_owned(), reason: reason.into() }
 }
+
+#[cfg(all(test, feature = "offline"))]
+mod tests {
+    use std::fs::{OpenOptions, remove_file};
+    use std::path::PathBuf;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::fem::{Isotropic, Supports};
+    use crate::green::{Problem, TouchNode, precompute};
+    use crate::mesh::TetMesh;
+
+    /// Three tetrahedra in a row on a clamped face, not all of it touchable, in a file of its own.
+    fn stored(name: &str, precision: Precision) -> (GreensFunction, PathBuf) {
+        let nodes =
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.1, 1.0], [1.0, 0.9, 1.1], [0.2, 1.0, 2.0]];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 4], [1, 4, 3], [2, 5, 4], [2, 3, 5], [3, 4, 5]];
+        let tets = vec![[0, 1, 2, 3], [1, 2, 3, 4], [2, 3, 4, 5]];
+        let mesh = TetMesh::new(nodes.map(DVec3::from).to_vec(), tets.into()).expect("a valid mesh");
+        let problem = Problem {
+            materials: vec![Isotropic::new(10e3, 0.4, 1000.0).expect("a valid material"); 3],
+            supports: Supports::new(18, (0..9).collect()).expect("valid supports"),
+            surface_nodes: (0..6).collect(),
+            surface_faces: faces.to_vec().into(),
+            touch: vec![2, 3, 5],
+            loads: Vec::new(),
+            mesh,
+        };
+        let green = precompute(&problem, precision, &|_, _| true).expect("a supported body");
+        let path = std::env::temp_dir().join(format!("palpate-{}-{name}-{}", std::process::id(), precision.name()));
+        green.save(&path).expect("a writable folder");
+        (green, path)
+    }
+
+    fn cut(path: &Path) {
+        let file = OpenOptions::new().write(true).open(path).expect("the store");
+        file.set_len(100).expect("a file that can be cut");
+    }
+
+    fn patch(green: &GreensFunction) -> Vec<TouchNode> {
+        [3, 5].map(|node| green.touchable(node).expect("a touchable node")).to_vec()
+    }
+
+    fn moved(green: &GreensFunction) -> Vec<f64> {
+        let mut moved = vec![0.0; 18];
+        green.add_forces(
+            &patch(green).into_iter().map(|c| (c, DVec3::new(1.0, -2.0, 0.5))).collect::<Vec<_>>(),
+            &mut moved,
+        );
+        moved
+    }
+
+    #[test]
+    fn columns_in_the_file_answer_as_those_in_memory() {
+        for precision in [Precision::F16, Precision::F32, Precision::F64] {
+            let (green, path) = stored("columns", precision);
+            for bound in [usize::MAX, 0] {
+                let loaded = load_within(&path, Some(&green.key), bound).expect("a good store");
+                assert_eq!((loaded.is_resident(0), loaded.is_resident(3)), (bound > 0, true));
+                for (row, column) in (0..18).flat_map(|row| (0..9).map(move |column| (row, column))) {
+                    assert_eq!(loaded.entry(row, column), green.entry(row, column), "row {row}, column {column}");
+                }
+                assert_eq!(moved(&loaded), moved(&green));
+                let (mut a, mut b) = (vec![1.0; 18], vec![1.0; 18]);
+                loaded.add_column(7, 3.0, &mut a);
+                green.add_column(7, 3.0, &mut b);
+                assert_eq!(a, b);
+                let (mut a, mut b) = (vec![0.0; 6 * 18], vec![0.0; 6 * 18]);
+                loaded.block(&[0, 1, 2, 3, 4, 5], &patch(&loaded), &mut a);
+                green.block(&[0, 1, 2, 3, 4, 5], &patch(&green), &mut b);
+                assert_eq!(a, b);
+                let mean =
+                    |green: &GreensFunction| green.weighted_block(&[4, 3], &[0.7, 0.3], &patch(green), &[0.4, 0.6]);
+                let largest = mean(&green).to_cols_array().into_iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                let difference = (mean(&loaded) - mean(&green)).to_cols_array();
+                assert!(difference.into_iter().all(|x| x.abs() <= 1e-15 * largest));
+                let copy = path.with_extension("copy");
+                loaded.save(&copy).expect("a writable folder");
+                assert!(std::fs::read(&copy).expect("the copy") == std::fs::read(&path).expect("the store"));
+                remove_file(copy).expect("the copy");
+            }
+            remove_file(path).expect("the store");
+        }
+    }
+
+    #[test]
+    fn a_file_cut_short_in_use_is_refused_and_contacts_go_on() {
+        for precision in [Precision::F16, Precision::F32, Precision::F64] {
+            let (green, path) = stored("cut", precision);
+            let loaded = load_within(&path, None, 0).expect("a good store");
+            assert!(loaded.is_intact() && loaded.require_intact().is_ok());
+            cut(&path);
+            assert!(!loaded.is_intact());
+            let refusal = loaded.require_intact().expect_err("a file cut short").to_string();
+            assert!(refusal.contains("cut short while in use"), "{refusal}");
+            assert!(loaded.save(&path.with_extension("copy")).is_err() && !path.with_extension("copy").exists());
+            // What contacts ask for is in memory; what is not is no number.
+            let compliance = |green: &GreensFunction| green.symmetric_block(&[3, 5], &patch(green), &[0.5, 0.5]);
+            assert_eq!(compliance(&loaded), compliance(&green));
+            assert!(moved(&loaded).iter().any(|u| u.is_nan()));
+            assert!(loaded.entry(12, 3).is_nan() && !loaded.entry(15, 3).is_nan());
+            remove_file(path).expect("the store");
+        }
+    }
+
+    #[test]
+    fn a_store_in_memory_does_not_need_its_file() {
+        let (green, path) = stored("memory", Precision::F32);
+        let loaded = load_within(&path, None, usize::MAX).expect("a good store");
+        cut(&path);
+        assert!(loaded.is_intact());
+        assert_eq!(moved(&loaded), moved(&green));
+        remove_file(path).expect("the store");
+    }
+
+    #[test]
+    fn a_damaged_block_is_refused_however_it_is_held() {
+        let (_, path) = stored("damaged", Precision::F64);
+        let reader = Reader::open(&path).expect("a good header");
+        let at = reader.start + reader.tensor("psi").expect("the operator").data_offsets.0 as u64 + 300;
+        let file = OpenOptions::new().write(true).open(&path).expect("the store");
+        file.write_all_at(&[0xff], at).expect("a file that can be written");
+        for bound in [usize::MAX, 0] {
+            let refusal = load_within(&path, None, bound).err().expect("a damaged store").to_string();
+            assert!(refusal.contains("checksum of block 0 differs"), "{refusal}");
+        }
+        remove_file(path).expect("the store");
+    }
+}

@@ -1,7 +1,9 @@
 //! Chapter 2: the discretised body: tetrahedra, and the surface that can be touched.
 
 mod surface;
+#[cfg(feature = "offline")]
 mod tetrahedra;
 
 pub use surface::{Faces, Surface};
+#[cfg(feature = "offline")]
 pub use tetrahedra::{TetMesh, Tets, node_elements, positions};

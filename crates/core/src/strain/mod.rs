@@ -14,15 +14,21 @@
 //! The tick's side ([`StrainResponse`], [`StrainKind`], [`provisional_displacement`]) needs nothing but vectors; the rest
 //! needs the interior solution and rayon.
 
+#[cfg(feature = "offline")]
 mod gradient;
+#[cfg(feature = "offline")]
 mod loading;
+#[cfg(feature = "offline")]
 mod measure;
+#[cfg(feature = "offline")]
 mod places;
 mod provisional;
 mod response;
 mod tensor;
 
+#[cfg(feature = "offline")]
 pub use gradient::GradientOperator;
+#[cfg(feature = "offline")]
 pub use measure::{StrainMeasure, StrainOperator};
 pub use provisional::provisional_displacement;
 pub use response::{MAX_CONTACTS_WATCHED, MAX_STRAIN_PLACES, StrainResponse};

@@ -2,17 +2,23 @@
 
 mod hand;
 
+use glam::DVec3;
 use triple_buffer::{Input, Output, triple_buffer};
 
 use self::hand::Hand;
 pub use self::hand::TIME_CONSTANT;
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Wrench};
 
+/// Longest time for which a target goes on at its velocity, s: a pointer that says nothing more has stopped.
+const EXTRAPOLATION: f64 = 0.1;
+
 /// What the other side asks of the simulated device.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Target {
     /// Where the tool should go.
     pub pose: Pose,
+    /// Velocity at which the target goes on from there, m/s, for [`EXTRAPOLATION`] at most.
+    pub velocity: DVec3,
     /// Whether the tool is in the scene.
     pub active: bool,
     /// Whether the grab button is held.
@@ -36,17 +42,21 @@ pub struct SimulatedDevice {
     targets: Output<Target>,
     hand: Hand,
     active: bool,
+    /// Time since the latest target was set, s.
+    age: f64,
 }
 
 /// A simulated device and the handle that moves it.
 pub fn simulated() -> (Handle, SimulatedDevice) {
     let (input, output) = triple_buffer(&Target::default());
-    (Handle { targets: input }, SimulatedDevice { targets: output, hand: Hand::default(), active: false })
+    (Handle { targets: input }, SimulatedDevice { targets: output, hand: Hand::default(), active: false, age: 0.0 })
 }
 
 impl Device for SimulatedDevice {
     fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
-        let target = *self.targets.read();
+        self.age = if self.targets.update() { 0.0 } else { self.age + period };
+        let mut target = *self.targets.output_buffer_mut();
+        target.pose.position += target.velocity * self.age.min(EXTRAPOLATION);
         let appears = target.active && !self.active;
         self.active = target.active;
         if appears || !self.hand.is_finite() {
@@ -75,7 +85,7 @@ impl Device for SimulatedDevice {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DQuat, DVec3};
+    use glam::DQuat;
 
     use super::*;
 
@@ -96,7 +106,7 @@ mod tests {
             handle.set(Target { active: true, ..Target::default() });
             read(&mut device, period);
             let pose = Pose { position: DVec3::X, orientation: DQuat::from_rotation_z(2.0) };
-            handle.set(Target { pose, active: true, grab: false });
+            handle.set(Target { pose, active: true, ..Target::default() });
             let ticks = (0.02 / period).round() as usize;
             let mut tip = Reading::default();
             for _ in 0..ticks {
@@ -117,7 +127,7 @@ mod tests {
         // The same rotation by a quaternion of either sign; 3.5 rad one way is 2.78 rad the other.
         for orientation in [DQuat::from_rotation_x(3.5), -DQuat::from_rotation_x(3.5)] {
             let pose = Pose { position: DVec3::ZERO, orientation };
-            handle.set(Target { pose, active: true, grab: false });
+            handle.set(Target { pose, active: true, ..Target::default() });
             let first = read(&mut device, 1e-3);
             assert!(first.twist.angular.x <= 0.0);
             let last = (0..300).map(|_| read(&mut device, 1e-3)).last().expect("a reading");
@@ -126,11 +136,23 @@ mod tests {
         }
     }
 
+    /// In the long run a critically damped hand trails a steady target by twice its time constant.
+    #[test]
+    fn a_target_with_a_velocity_goes_on_for_a_tenth_of_a_second() {
+        let (mut handle, mut device) = simulated();
+        handle.set(Target { active: true, ..Target::default() });
+        read(&mut device, 1e-3);
+        handle.set(Target { active: true, velocity: DVec3::X, ..Target::default() });
+        let path: Vec<f64> = (0..1000).map(|_| read(&mut device, 1e-3).pose.position.x).collect();
+        assert!((path[90] - (0.09 - 2.0 * TIME_CONSTANT)).abs() < 1e-3, "{}", path[90]);
+        assert!((path[999] - EXTRAPOLATION).abs() < 1e-9);
+    }
+
     #[test]
     fn appears_at_its_target_without_a_sweep() {
         let (mut handle, mut device) = simulated();
         let pose = Pose { position: DVec3::Y, orientation: DQuat::from_rotation_y(1.0) };
-        handle.set(Target { pose, active: true, grab: true });
+        handle.set(Target { pose, active: true, grab: true, ..Target::default() });
         let tip = read(&mut device, 1e-3);
         assert_eq!(tip.pose, pose);
         assert_eq!(tip.twist.linear, DVec3::ZERO);

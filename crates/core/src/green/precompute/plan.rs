@@ -2,15 +2,16 @@
 
 use rayon::current_num_threads;
 
-use super::columns::{Layout, Problem};
-use super::factor::Symbolic;
+use super::block::Block;
+use super::layout::Layout;
 use super::mirror;
-use super::panels::Block;
-use super::precision::Precision;
+use super::problem::Problem;
 use super::sweep::{loaded, scratch_numbers};
 use super::system::System;
 use super::tree::Tree;
 use crate::fem::SymmetricCsc;
+use crate::green::precision::Precision;
+use crate::solver::Symbolic;
 use crate::{Error, Result};
 
 /// Columns of a block, best first: enough for the matrix products, few enough for the cache and to share among tasks.

@@ -11,8 +11,8 @@
 
 use faer::mat::MatMut;
 
-use super::factor::Factor;
 use crate::fem::{Supports, SymmetricCsc};
+use crate::solver::Factor;
 use crate::{Error, Result};
 
 /// `v` on the rows `row_dofs` for the loads (N, all dofs); empty if there are none.

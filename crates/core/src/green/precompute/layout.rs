@@ -1,65 +1,15 @@
-//! The reference problem, and the rows and columns of its `Psi`: which there are, and in which order they are solved.
+//! The rows and columns of `Psi`: which there are, in which order they are solved, and where they are stored.
 
-use super::factor::Symbolic;
+use crate::solver::Symbolic;
 use glam::DVec3;
 
-use super::key::content_key;
-use super::panels::Block;
-use super::places::Places;
-use super::precision::Precision;
+use super::block::Block;
+use super::problem::Problem;
+use super::spatial_order::spatial_order;
 use super::sweep::Source;
 use super::tree::{NONE, Tree, Wanted};
-use crate::Result;
-use crate::fem::{Isotropic, Supports, SymmetricCsc};
-use crate::mesh::{Faces, Surface, TetMesh};
-
-/// The reference problem (paper 3.1): a supported body, with its own loads if it has any.
-pub struct Problem {
-    /// The body.
-    pub mesh: TetMesh,
-    /// One material an element.
-    pub materials: Vec<Isotropic>,
-    /// Its supports.
-    pub supports: Supports,
-    /// Mesh indices of the surface nodes, ascending.
-    pub surface_nodes: Vec<u32>,
-    /// Outward faces of the surface, mesh indices.
-    pub surface_faces: Faces,
-    /// Touchable surface nodes as ascending ranks in `surface_nodes`.
-    pub touch: Vec<u32>,
-    /// Reference loads on all dofs, N; empty for none.
-    pub loads: Vec<f64>,
-}
-
-impl Problem {
-    /// Content key of the Green's function with this precision.
-    pub fn key(&self, precision: Precision) -> String {
-        content_key(self, precision)
-    }
-
-    pub(super) fn surface(&self) -> Result<Surface> {
-        let local = |n: u32| self.surface_nodes.binary_search(&n).ok().map(|i| i as u32);
-        let positions = self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect();
-        Surface::new(positions, self.surface_faces.renumbered(local)?)
-    }
-
-    /// Dof of every row: the surface's, then the supported ones inside.
-    pub(super) fn row_dofs(&self) -> Vec<u32> {
-        let mut dofs: Vec<u32> = self.surface_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-        let inside = |d: &u32| self.surface_nodes.binary_search(&(d / 3)).is_err();
-        dofs.extend(self.supports.fixed.iter().copied().filter(inside));
-        dofs
-    }
-
-    /// The modulus of the whole body if it only scales forces: not under loads, for they do not scale with it.
-    pub(super) fn common_youngs_modulus(&self) -> Option<f64> {
-        if !self.loads.is_empty() {
-            return None;
-        }
-        let first = self.materials.first()?.youngs_modulus;
-        self.materials.iter().all(|m| m.youngs_modulus == first).then_some(first)
-    }
-}
+use crate::fem::{Supports, SymmetricCsc};
+use crate::green::places::Places;
 
 /// The rows and columns of the operator, and the order in which they are solved.
 pub struct Layout {
@@ -108,7 +58,7 @@ impl Layout {
         let supported = order[..columns].partition_point(|&row| at(row_dofs[row as usize]).is_none());
         let positions_of_surface: Vec<DVec3> =
             problem.surface_nodes.iter().map(|&n| problem.mesh.nodes[n as usize]).collect();
-        let places = Places::new(&positions_of_surface, &problem.touch);
+        let places = Places::new(spatial_order(&positions_of_surface, &problem.touch), problem.touch.len());
         let mut place_of_stored = vec![NONE; row_dofs.len()];
         let mut place_of_dof = vec![NONE; stiffness.dimension];
         for (place, &row) in order.iter().enumerate() {

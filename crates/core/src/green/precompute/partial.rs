@@ -10,7 +10,7 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::panels::Block;
+use super::block::Block;
 use crate::{Error, Result};
 
 /// Bytes of the description, padding included.

@@ -10,7 +10,7 @@
 //! with are the entries near their bound, and those have 15 bits here and 11 there (nodal forces under 20 neighbouring
 //! nodes: 1e-2 of the largest with halves).
 
-use super::columns::Layout;
+use super::layout::Layout;
 use super::mirror::Mirror;
 use super::number::Number;
 use crate::Result;

@@ -1,8 +1,8 @@
 //! A block of columns from its loads to its panel.
 
-use super::columns::Layout;
+use super::block::Block;
+use super::layout::Layout;
 use super::number::Number;
-use super::panels::Block;
 use super::sweep::{Scratch, Sweep, loaded, readers};
 use super::tree::{NONE, Tree};
 use crate::fem::{Supports, SymmetricCsc};

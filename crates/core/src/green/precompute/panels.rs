@@ -10,24 +10,6 @@ use super::number::Number;
 use super::partial::Partial;
 use crate::{Error, Result};
 
-/// Which columns a block has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// First column, in the order of elimination.
-    pub first: usize,
-    /// Number of columns.
-    pub width: usize,
-    /// Rows of its panel.
-    pub rows: usize,
-}
-
-impl Block {
-    /// Numbers in its panel.
-    pub fn len(&self) -> usize {
-        self.rows * self.width
-    }
-}
-
 /// Where the panels are kept.
 pub enum Panels<T> {
     /// In memory.

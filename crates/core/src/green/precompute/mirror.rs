@@ -3,10 +3,12 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::columns::Layout;
+use super::block::Block;
+use super::layout::Layout;
 use super::number::Number;
-use super::panels::{Block, Panels};
-use crate::{Error, Result};
+use super::panels::Panels;
+use super::tasks::in_tasks;
+use crate::Result;
 
 /// The panels with what is known of their places.
 pub struct Mirror<'a, T> {
@@ -31,7 +33,7 @@ impl<T: Number> Mirror<'_, T> {
     /// That of reading a panel, or of `take`.
     pub fn columns(&self, tasks: usize, take: &(dyn Fn(usize, &[T]) -> Result<()> + Sync)) -> Result<()> {
         let next = AtomicUsize::new(0);
-        super::precompute::in_tasks(tasks, &|| {
+        in_tasks(tasks, &|| {
             let (mut lines, mut panel, mut column) = (Vec::new(), Vec::new(), vec![T::default(); self.layout.rows()]);
             loop {
                 let block = next.fetch_add(1, Ordering::Relaxed);
@@ -122,9 +124,4 @@ fn transpose_into<T: Number>(panel: &[T], width: usize, lines: &mut [T], length:
             }
         }
     }
-}
-
-/// A poisoned or missing result of a task.
-pub fn task_failed() -> Error {
-    Error::Invalid("a task of the precomputation failed unexpectedly".into())
 }

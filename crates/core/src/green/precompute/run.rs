@@ -7,24 +7,27 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use faer::Par;
 
-use super::columns::{Layout, Problem};
-use super::entries::Entries;
+use super::block::Block;
 use super::free_response::free_response;
-use super::function::GreensFunction;
-use super::key::FORMAT_VERSION;
-use super::mirror::{Mirror, task_failed};
+use super::layout::Layout;
+use super::mirror::Mirror;
 use super::number::Number;
-use super::numbers::Numbers;
 use super::operators::operators;
-use super::panels::{Block, Panels};
+use super::panels::Panels;
 use super::partial::Partial;
 use super::plan::{Plan, Prepared};
-use super::precision::Precision;
-use super::scaled::{quantise, scales};
-use super::store_writer::StoreWriter;
+use super::problem::Problem;
+use super::scales::{quantise, scales};
 use super::sweep::{Scratch, Sweep};
 use super::system::System;
+use super::tasks::{in_tasks, task_failed};
 use crate::fem::SymmetricCsc;
+use crate::green::entries::Entries;
+use crate::green::function::GreensFunction;
+use crate::green::key::FORMAT_VERSION;
+use crate::green::numbers::Numbers;
+use crate::green::precision::Precision;
+use crate::green::store_writer::StoreWriter;
 use crate::{Error, Result};
 
 /// Told `(columns done, columns in all)` from any thread; `false` stops the computation.
@@ -277,23 +280,6 @@ fn geometry(problem: &Problem, layout: &Layout, precision: Precision) -> Result<
 /// Places, format and scales of entries that are still to be computed.
 fn without_numbers(layout: &Layout, row_is_fixed: &[bool], scale: Vec<f64>, precision: Precision) -> Entries {
     Entries::new(layout.places.clone(), row_is_fixed, scale, Numbers::zeros(precision, 0), None)
-}
-
-/// Runs `work` in some tasks at once, to the first error.
-pub fn in_tasks(tasks: usize, work: &(dyn Fn() -> Result<()> + Sync)) -> Result<()> {
-    let outcome = Mutex::new(Ok(()));
-    rayon::scope(|scope| {
-        for _ in 0..tasks {
-            scope.spawn(|_| {
-                if let (Err(error), Ok(mut first)) = (work(), outcome.lock())
-                    && first.is_ok()
-                {
-                    *first = Err(error);
-                }
-            });
-        }
-    });
-    outcome.into_inner().map_err(|_| task_failed())?
 }
 
 /// Where unfinished work on a store is kept.

@@ -1,4 +1,5 @@
 //! Fill-reducing order by nested dissection (METIS), on the node graph so that a node's dofs stay together.
+//! Through `metis-sys`: the safe `metis` crate does not offer nested dissection.
 #![allow(unsafe_code)] // METIS is a C library.
 
 use metis_sys::{METIS_NodeND, idx_t, rstatus_et_METIS_OK};

@@ -1,0 +1,72 @@
+//! The reference problem: a supported body, and the key of its Green's function.
+
+use crate::Result;
+use crate::fem::{Isotropic, Supports};
+use crate::green::key::ContentKey;
+use crate::green::precision::Precision;
+use crate::mesh::{Faces, Surface, TetMesh};
+
+/// The reference problem (paper 3.1): a supported body, with its own loads if it has any.
+pub struct Problem {
+    /// The body.
+    pub mesh: TetMesh,
+    /// One material an element.
+    pub materials: Vec<Isotropic>,
+    /// Its supports.
+    pub supports: Supports,
+    /// Mesh indices of the surface nodes, ascending.
+    pub surface_nodes: Vec<u32>,
+    /// Outward faces of the surface, mesh indices.
+    pub surface_faces: Faces,
+    /// Touchable surface nodes as ascending ranks in `surface_nodes`.
+    pub touch: Vec<u32>,
+    /// Reference loads on all dofs, N; empty for none.
+    pub loads: Vec<f64>,
+}
+
+impl Problem {
+    /// Content key of the Green's function with this precision: mesh, materials, supports, loads, touch region.
+    pub fn key(&self, precision: Precision) -> String {
+        let mut key = ContentKey::new(self.mesh.tets.element_name(), precision);
+        key.section(bytemuck::cast_slice(&self.mesh.nodes));
+        key.section(bytemuck::cast_slice(self.mesh.tets.as_flattened()));
+        for material in &self.materials {
+            // Density does not enter the static answer.
+            key.section(bytemuck::cast_slice(&[material.youngs_modulus, material.poissons_ratio]));
+        }
+        key.section(bytemuck::cast_slice(&self.supports.fixed));
+        key.section(bytemuck::cast_slice(&self.surface_nodes));
+        key.section(bytemuck::cast_slice(&self.touch));
+        if !self.loads.is_empty() {
+            key.section(bytemuck::cast_slice(&self.loads));
+        }
+        key.finish()
+    }
+
+    /// The surface in its own numbering.
+    ///
+    /// # Errors
+    /// Faces of nodes that are not on the surface.
+    pub fn surface(&self) -> Result<Surface> {
+        let local = |n: u32| self.surface_nodes.binary_search(&n).ok().map(|i| i as u32);
+        let positions = self.surface_nodes.iter().map(|&n| self.mesh.nodes[n as usize]).collect();
+        Surface::new(positions, self.surface_faces.renumbered(local)?)
+    }
+
+    /// Dof of every row: the surface's, then the supported ones inside.
+    pub fn row_dofs(&self) -> Vec<u32> {
+        let mut dofs: Vec<u32> = self.surface_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+        let inside = |d: &u32| self.surface_nodes.binary_search(&(d / 3)).is_err();
+        dofs.extend(self.supports.fixed.iter().copied().filter(inside));
+        dofs
+    }
+
+    /// The modulus of the whole body if it only scales forces: not under loads, for they do not scale with it.
+    pub fn common_youngs_modulus(&self) -> Option<f64> {
+        if !self.loads.is_empty() {
+            return None;
+        }
+        let first = self.materials.first()?.youngs_modulus;
+        self.materials.iter().all(|m| m.youngs_modulus == first).then_some(first)
+    }
+}

@@ -1,0 +1,99 @@
+//! Who prepares strain responses: a thread beside the loop, or an offline run between its ticks.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use palpate_core::simulation::{MAX_BODIES, Model, StrainWatch};
+use palpate_core::strain::StrainMeasure;
+use palpate_core::{Error, Result};
+
+use crate::strain::{PreparerEnd, StrainRequest};
+
+/// What measures the strain of the bodies of a model, as far as it is known.
+#[derive(Clone)]
+pub struct StrainPreparer {
+    model: Arc<Model>,
+    measures: [Option<Arc<StrainMeasure>>; MAX_BODIES],
+}
+
+impl StrainPreparer {
+    /// Knows none yet: the strain of no body is limited.
+    pub fn new(model: &Arc<Model>) -> Self {
+        Self { model: model.clone(), measures: Default::default() }
+    }
+
+    /// Takes the measure of a body; of one that does not exist it is left out.
+    pub fn set_measure(&mut self, body: usize, measure: Arc<StrainMeasure>) {
+        if let Some(place) = self.measures.get_mut(body) {
+            *place = Some(measure);
+        }
+    }
+
+    /// Whether the strain of each body can be limited.
+    pub(crate) fn known(&self) -> [bool; MAX_BODIES] {
+        self.measures.each_ref().map(Option::is_some)
+    }
+
+    /// `None` for a body without a measure, or contacts whose strain cannot be prepared: the bound of the tick then stays.
+    fn prepare(&self, request: &StrainRequest) -> Option<(usize, Box<StrainWatch>)> {
+        let (measure, body) = (self.measures[request.body].as_ref()?, self.model.bodies.get(request.body)?);
+        let patches: Vec<_> = request.patches[..request.count].iter().map(|p| (p.nodes(), p.weights())).collect();
+        let response = measure.prepare(body.green(), &patches, request.limit).ok()?;
+        Some((request.body, Box::new(StrainWatch { response, serials: request.serials })))
+    }
+}
+
+impl PreparerEnd {
+    /// Answers one request, if there is one; `later` takes the response in place of the ring.
+    pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<(usize, Box<StrainWatch>)>> {
+        while self.replaced.pop().is_ok() {}
+        let request = self.requests.pop().ok()?;
+        Some(preparer.prepare(&request))
+    }
+
+    /// Hands a response to the loop. One that finds no room is lost; the tick keeps its own bound then.
+    pub fn hand_over(&mut self, response: (usize, Box<StrainWatch>)) {
+        let _ = self.responses.push(response);
+    }
+}
+
+/// A thread that prepares, woken by the loop.
+pub(crate) struct StrainWorker {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl StrainWorker {
+    /// Starts it.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn start(mut end: PreparerEnd, preparer: StrainPreparer) -> Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (stopped, worker) = (stop.clone(), end.worker.clone());
+        let work = move || {
+            while !stopped.load(Ordering::Acquire) {
+                match end.prepare_one(&preparer) {
+                    Some(Some(response)) => end.hand_over(response),
+                    Some(None) => {}
+                    None => std::thread::park(),
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("palpate-strain".into()).spawn(work);
+        let thread = thread.map_err(|source| Error::Io { path: "palpate-strain".into(), source })?;
+        let _ = worker.set(thread.thread().clone());
+        Ok(Self { stop, thread: Some(thread) })
+    }
+}
+
+impl Drop for StrainWorker {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            thread.thread().unpark();
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Strain responses prepared beside the loop: what the limit of strain in the tick needs of every set of contacts.
+//!
+//! The tick notices that the contacts of a body have changed and puts a request into a ring; somebody who is not in a hurry
+//! prepares a response, in milliseconds, and puts it into another; the one it replaces goes back through a third, for
+//! memory must not be freed in a tick. Until a response has come, the tick bounds what has just begun by itself.
+
+use std::sync::{Arc, OnceLock};
+use std::thread::Thread;
+
+use palpate_core::contact::Patch;
+use palpate_core::simulation::{MAX_BODIES, State, StrainWatch};
+use palpate_core::strain::MAX_CONTACTS_WATCHED;
+use rtrb::{Consumer, Producer, RingBuffer};
+
+/// Requests and responses that may be under way.
+const IN_FLIGHT: usize = 16;
+
+/// The contacts of one body, for which strain is to be prepared.
+#[derive(Clone)]
+pub(crate) struct StrainRequest {
+    pub body: usize,
+    pub limit: f64,
+    pub serials: [u64; MAX_CONTACTS_WATCHED],
+    pub patches: [Patch; MAX_CONTACTS_WATCHED],
+    pub count: usize,
+}
+
+/// The loop's end.
+pub(crate) struct StrainEnd {
+    requests: Producer<StrainRequest>,
+    responses: Consumer<(usize, Box<StrainWatch>)>,
+    replaced: Producer<Box<StrainWatch>>,
+    /// What was asked for last: contacts and limit of each body.
+    asked: [([u64; MAX_CONTACTS_WATCHED], f64); MAX_BODIES],
+    worker: Arc<OnceLock<Thread>>,
+}
+
+/// The end of whoever prepares.
+pub(crate) struct PreparerEnd {
+    pub requests: Consumer<StrainRequest>,
+    pub responses: Producer<(usize, Box<StrainWatch>)>,
+    pub replaced: Consumer<Box<StrainWatch>>,
+    pub worker: Arc<OnceLock<Thread>>,
+}
+
+/// Both ends.
+pub(crate) fn strain_ends() -> (StrainEnd, PreparerEnd) {
+    let (requests_in, requests_out) = RingBuffer::new(IN_FLIGHT);
+    let (responses_in, responses_out) = RingBuffer::new(IN_FLIGHT);
+    let (replaced_in, replaced_out) = RingBuffer::new(IN_FLIGHT);
+    let worker = Arc::new(OnceLock::new());
+    let asked = [([0; MAX_CONTACTS_WATCHED], 0.0); MAX_BODIES];
+    let end = StrainEnd {
+        requests: requests_in,
+        responses: responses_out,
+        replaced: replaced_in,
+        asked,
+        worker: worker.clone(),
+    };
+    (end, PreparerEnd { requests: requests_out, responses: responses_in, replaced: replaced_out, worker })
+}
+
+impl StrainEnd {
+    /// Takes up what has come; never allocates or frees.
+    pub fn receive(&mut self, state: &mut State) {
+        while self.replaced.slots() > 0 {
+            let Ok((body, watch)) = self.responses.pop() else { return };
+            if let Some(replaced) = state.watch_strain(body, watch) {
+                // There is a slot, and nobody else fills it.
+                let _ = self.replaced.push(replaced);
+            }
+        }
+    }
+
+    /// Asks for responses where contacts or the limit have changed; never allocates or blocks.
+    pub fn ask(&mut self, state: &State, limits: &[f64; MAX_BODIES]) {
+        for (body, (asked, &limit)) in self.asked.iter_mut().zip(limits).enumerate() {
+            let mut now = ([0; MAX_CONTACTS_WATCHED], limit);
+            for (serial, (contact, _)) in now.0.iter_mut().zip(state.contacts.iter().filter(|(c, _)| c.body == body)) {
+                *serial = contact.serial;
+            }
+            if now == *asked || limit <= 0.0 || now.0[0] == 0 {
+                continue;
+            }
+            if self.requests.is_full() {
+                continue;
+            }
+            let mut request = StrainRequest {
+                body,
+                limit,
+                serials: now.0,
+                patches: std::array::from_fn(|_| Patch::default()),
+                count: 0,
+            };
+            for (_, patch) in state.contacts.iter().filter(|(c, _)| c.body == body).take(MAX_CONTACTS_WATCHED) {
+                request.patches[request.count].copy_from(patch.patch());
+                request.count += 1;
+            }
+            let _ = self.requests.push(request);
+            *asked = now;
+            if let Some(worker) = self.worker.get() {
+                worker.unpark();
+            }
+        }
+    }
+}
