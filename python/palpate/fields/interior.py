@@ -24,11 +24,11 @@ class Interior:
 
     def __init__(self, body: Body):
         self._surface = len(body.mesh.surface_nodes)
-        self._core = _native.Interior(problem_arrays(body, None))
+        self.core = _native.Interior(problem_arrays(body, None))
 
     def extend(self, displacements: np.ndarray) -> np.ndarray:
         """Displacements of all nodes, (n, 3) m, from (s, 3) m at the surface nodes."""
         given = np.ascontiguousarray(displacements, dtype=np.float64)
         if given.shape != (self._surface, 3) or not np.isfinite(given).all():
             raise BodyError(f"displacements must be finite and of shape ({self._surface}, 3), got {given.shape}")
-        return self._core.extend(given.ravel()).reshape(-1, 3)
+        return self.core.extend(given.ravel()).reshape(-1, 3)

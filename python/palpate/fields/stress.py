@@ -115,6 +115,11 @@ class StressRecovery:
         weights = scipy.sparse.kron(patches[:, used], np.ones((1, len(points))), format="csr")
         self._fit = _linear_fit(weights, positions, mesh.nodes[nodes])
 
+    @property
+    def strain_operator(self) -> scipy.sparse.csr_array:
+        """Strain at the nodes from the displacements of all nodes, (6 s, 3 n): xx, yy, zz, xy, yz, zx of each node, 1/m."""
+        return (scipy.sparse.kron(self._fit, scipy.sparse.eye_array(6)).tocsr() @ self._strain).tocsr()
+
     def recover(self, displacements: np.ndarray) -> SurfaceStress:
         """Stress and strain for displacements of the surface nodes, (s, 3) m.
 

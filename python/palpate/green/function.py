@@ -104,6 +104,16 @@ class GreensFunction:
             return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
         return ElementStrain(StressRecovery(self.body))
 
+    @cached_property
+    def native_strain_measure(self) -> _native.StrainMeasure:
+        """The same measure for the force loop, which limits strain."""
+        measure = self.strain_measure
+        if not isinstance(measure, ElementStrain):
+            return _native.StrainMeasure.of_surface(self._core)
+        operator = measure.recovery.strain_operator
+        rows = operator.indptr.astype(np.int64), operator.indices.astype(np.uint32), operator.data
+        return _native.StrainMeasure.of_elements(*rows, measure.recovery.interior.core)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
         self._core.save(Path(path))

@@ -234,7 +234,7 @@ class Simulation:
         """Give the loop what measures strain, once it is asked to limit it: it takes a factor of every body."""
         if self._strain_limit > 0 and not self._armed:
             for rank, body in enumerate(self.bodies):
-                self._core.set_strain_measure(rank, body.green.strain_measure.native)
+                self._core.set_strain_measure(rank, body.green.native_strain_measure)
             self._armed = True
 
     def strike(
