@@ -13,6 +13,7 @@
 
 use glam::{DQuat, DVec3};
 
+use crate::rotation::rotation_vector;
 use crate::{Pose, Twist};
 
 /// Time constant with which the tip follows its target, s: a step is followed to 98 % in about six of them.
@@ -51,13 +52,4 @@ fn decay(offset: DVec3, rate: DVec3, period: f64) -> (DVec3, DVec3) {
     let (decay, omega) = ((-period / TIME_CONSTANT).exp(), 1.0 / TIME_CONSTANT);
     let slope = rate + omega * offset;
     ((offset + slope * period) * decay, (rate - omega * slope * period) * decay)
-}
-
-/// Shortest rotation in the world that takes one orientation to another, rad along its axis. By the arctangent: the
-/// arccosine of `w` would lose half of the digits of a small angle.
-fn rotation_vector(from: DQuat, to: DQuat) -> DVec3 {
-    let turn = to * from.conjugate();
-    let turn = if turn.w < 0.0 { -turn } else { turn };
-    let sine = turn.xyz().length();
-    if sine == 0.0 { DVec3::ZERO } else { turn.xyz() * (2.0 * sine.atan2(turn.w) / sine) }
 }

@@ -46,15 +46,15 @@ impl ReadingCheck {
             self.latest = Some(fresh);
             return Ok(());
         };
-        let distance = fresh.position.distance(before.position);
-        if reading.timestamp_ns > before.timestamp_ns {
-            self.latest = Some(fresh);
-            // Measurements that a bus delivers in bursts lie closer than they were made: a tick apart at least.
-            let elapsed = (1e-9 * (fresh.timestamp_ns - before.timestamp_ns) as f64).max(period);
-            return if distance <= limits.max_speed * elapsed { Ok(()) } else { Err(FaultReason::JumpingInput) };
-        }
-        if distance > limits.max_speed * period {
+        // Measurements that a bus delivers in bursts lie closer than they were made: a tick apart at least.
+        let between_ns = fresh.timestamp_ns.saturating_sub(before.timestamp_ns);
+        let elapsed = (1e-9 * between_ns as f64).max(period);
+        if fresh.position.distance(before.position) > limits.max_speed * elapsed {
             return Err(FaultReason::JumpingInput);
+        }
+        if between_ns > 0 {
+            self.latest = Some(fresh);
+            return Ok(());
         }
         let age = 1e-9 * now_ns.saturating_sub(before.seen_ns) as f64;
         if age <= limits.max_reading_age { Ok(()) } else { Err(FaultReason::StaleInput) }
