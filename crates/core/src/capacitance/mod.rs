@@ -86,7 +86,7 @@ fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response
     }
     let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
     let n = rows.len();
-    let capacitance = Mat::from_fn(n, n, |i, j| green.entry(rows[i], switched[j].0));
+    let capacitance = switched_square(green, &rows);
     // A released support answers to its share of the reference loads besides the force given.
     let wanted = |i: usize| switched[i].1 + if green.row_is_fixed[rows[i]] { green.load_on_row(rows[i]) } else { 0.0 };
     let residual = Mat::from_fn(n, 1, |i, _| wanted(i) - response[rows[i]]);
@@ -101,6 +101,31 @@ fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response
     };
     let unknown: Vec<f64> = (0..n).map(|i| unknown[(i, 0)]).collect();
     if unknown.iter().all(|q| q.is_finite()) { Ok(unknown) } else { Err(floating()) }
+}
+
+/// `Psi_SS`, cut out of the blocks between the nodes of the rows `S`.
+fn switched_square(green: &GreensFunction, rows: &[usize]) -> Mat<f64> {
+    let mut nodes: Vec<u32> = rows.iter().map(|row| (row / 3) as u32).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let at = |row: usize| 3 * nodes.partition_point(|&node| (node as usize) < row / 3) + row % 3;
+    let places: Vec<usize> = rows.iter().map(|&row| at(row)).collect();
+    let mut square = Mat::zeros(rows.len(), rows.len());
+    let (mut block, mut in_block) = (vec![0.0; 9 * nodes.len()], None);
+    for (j, &row) in rows.iter().enumerate() {
+        // The dofs of a node mostly follow each other.
+        if in_block != Some(row / 3)
+            && let Some(column) = green.touchable(row / 3)
+        {
+            green.block(&nodes, &[column], &mut block);
+            in_block = Some(row / 3);
+        }
+        let column = &block[row % 3 * 3 * nodes.len()..];
+        for (i, &place) in places.iter().enumerate() {
+            square[(i, j)] = column[place];
+        }
+    }
+    square
 }
 
 /// Solves with released supports, refusing a body that is left free to move.

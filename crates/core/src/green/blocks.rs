@@ -50,7 +50,7 @@ impl Entries {
             for (column, &other) in columns.iter().zip(column_weights) {
                 let factors = self.free[column.place()];
                 for axis in 0..3 {
-                    let numbers = DVec3::from(self.from_file::<3>(3 * place, 3 * column.place() + axis));
+                    let numbers = DVec3::from(self.read_from_file::<3>(3 * place, 3 * column.place() + axis));
                     *sum.col_mut(axis) += factors[axis] * weight * other * (DVec3::new(x, y, z) * numbers);
                 }
             }
@@ -72,7 +72,7 @@ impl Entries {
         for (out, &column) in out.chunks_exact_mut(3 * places.len()).zip(&columns) {
             for (out, &row) in out.chunks_exact_mut(3).zip(&places) {
                 if row >= self.resident {
-                    out.copy_from_slice(&self.from_file::<3>(row, column));
+                    out.copy_from_slice(&self.read_from_file::<3>(row, column));
                 }
                 for (k, value) in out.iter_mut().enumerate() {
                     *value *= self.scale_of(row + k) * self.scale_of(column);

@@ -109,7 +109,7 @@ impl Entries {
         let value = if row < self.resident {
             self.numbers.run(self.arch, One(column * self.resident + row))
         } else {
-            self.from_file::<1>(row, column)[0]
+            self.read_from_file::<1>(row, column)[0]
         };
         // The product of the scales first: it is the same for the mirrored entry.
         self.scale_of(row) * self.scale_of(column) * value
@@ -173,7 +173,7 @@ impl Entries {
     }
 
     /// Stored numbers, unscaled, of a column from row `row` on, out of the file; NaN where it fails.
-    pub(super) fn from_file<const N: usize>(&self, row: usize, column: usize) -> [f64; N] {
+    pub(super) fn read_from_file<const N: usize>(&self, row: usize, column: usize) -> [f64; N] {
         let mut numbers = Numbers::zeros(self.precision(), N);
         let from = row * self.precision().bytes();
         let read = self.file.as_ref().is_some_and(|file| file.read(column, from, numbers.bytes_mut()).is_ok());

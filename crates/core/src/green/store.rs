@@ -263,7 +263,7 @@ mod tests {
             [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.1, 1.0], [1.0, 0.9, 1.1], [0.2, 1.0, 2.0]];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 4], [1, 4, 3], [2, 5, 4], [2, 3, 5], [3, 4, 5]];
         let tets = vec![[0, 1, 2, 3], [1, 2, 3, 4], [2, 3, 4, 5]];
-        let mesh = TetMesh::new(nodes.map(DVec3::from).to_vec(), tets.into()).expect("a valid mesh");
+        let mesh = TetMesh::new(nodes.map(DVec3::from).to_vec(), tets).expect("a valid mesh");
         let problem = Problem {
             materials: vec![Isotropic::new(10e3, 0.4, 1000.0).expect("a valid material"); 3],
             supports: Supports::new(18, (0..9).collect()).expect("valid supports"),
