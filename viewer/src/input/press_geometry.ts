@@ -73,7 +73,7 @@ export class PressGesture implements Gesture {
   }
 }
 
-/** The held point follows the pointer in the plane through it that faces the camera. */
+/** The grabbed point follows the pointer in the plane through it that faces the camera. */
 export class GrabGesture implements Gesture {
   readonly grab = true;
   private readonly pull = new THREE.Vector3();
