@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use faer::{MatMut, Par};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{
-    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Lanes, ModalModel, ModalScratch, ModalState, Newmark,
-    Rayleigh, Solver, basis_key as core_basis_key, exact_step, partition,
+    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Lanes, ModalModel, ModalScratch, ModalState,
+    Newmark, Rayleigh, Solver, basis_key as core_basis_key, exact_step, partition,
 };
 use palpate_core::fem::SymmetricCsc;
 use palpate_core::solver::Factor;

@@ -2,6 +2,7 @@
 
 mod closest;
 mod compliance;
+mod curved;
 mod patch;
 mod quadrature;
 mod touchable;

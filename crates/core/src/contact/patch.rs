@@ -228,7 +228,7 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
             let face = &self.geometry.faces[t as usize / F::PARTS.len()];
             let corners = corners_of::<F, N>(t).map(|l| [l.y, l.z]);
             let ends = self.surface.corners(t);
-            let moments = face.integrate(corners, ends, self.centre, self.radius);
+            let moments = face.integrate(&self.geometry.rules, corners, ends, self.centre, self.radius);
             if moments.covered {
                 for (node, sum) in self.faces[t as usize / F::PARTS.len()].into_iter().zip(moments.of_shapes::<N>()) {
                     if scratch.touched_by[node as usize] != scratch.visit {

@@ -6,16 +6,17 @@
 //!
 //! On a flat face with straight edges all cells are alike, so their mid-edges form a lattice, and along a row of it `r^2`
 //! is a quadratic in the running index: the rows and the part of each that the ball of radius `a` covers are known
-//! beforehand. A curved face is split cell by cell, and its polynomial is prepared.
+//! beforehand. Curved faces are in `curved`.
 
 use glam::DVec3;
 
+use super::curved::{Cell, CellRules};
 use crate::mesh::{Faces, Surface};
 
 /// Quadrature cells are split until their edges are below this part of the contact radius.
-const CELL_SIZE: f64 = 0.2;
+pub(super) const CELL_SIZE: f64 = 0.2;
 /// Depth at which splitting stops: cells of 2^-24 of a triangle's edge are below any physical radius.
-const MAX_DEPTH: u32 = 24;
+pub(super) const MAX_DEPTH: u32 = 24;
 /// A face whose polynomial bends it by less than this part of its edges is flat to round-off.
 const FLAT: f64 = 1e-13;
 
@@ -33,6 +34,8 @@ pub struct FaceGeometry {
 /// The faces of a surface at rest.
 pub struct PatchGeometry {
     pub(super) faces: Vec<FaceGeometry>,
+    /// How curved cells are summed.
+    pub(super) rules: CellRules,
     /// Largest contact radius known to be within the limit everywhere, m, as bits.
     pub(super) verified_radius: std::sync::atomic::AtomicU64,
 }
@@ -45,7 +48,7 @@ impl PatchGeometry {
             Faces::Linear(faces) => faces.iter().map(|f| FaceGeometry::linear(f.map(at))).collect(),
             Faces::Quadratic(faces) => faces.iter().map(|f| FaceGeometry::quadratic(f.map(at))).collect(),
         };
-        Self { faces, verified_radius: 0.into() }
+        Self { faces, rules: CellRules::new(), verified_radius: 0.into() }
     }
 }
 
@@ -76,11 +79,29 @@ impl Moments {
         std::array::from_fn(|k| if N == 3 { linear[k] } else { quadratic[k] })
     }
 
-    fn add(&mut self, [s, t]: Coordinates, weight: f64) {
-        self.covered = true;
-        for (sum, power) in self.sums.iter_mut().zip([1.0, s, t, s * s, s * t, t * t]) {
-            *sum += weight * power;
+    /// Adds moments over a cell, in the cell's own coordinates `(x, y)`, of a face whose point `(s, t)` they are at the
+    /// cell's corners.
+    pub(super) fn add_cell(&mut self, [a, b, c]: [Coordinates; 3], own: [f64; 6]) {
+        if own[0] <= 0.0 {
+            return;
         }
+        self.covered = true;
+        let [one, x, y, xx, xy, yy] = own;
+        let ([s, t], [sx, tx], [sy, ty]) = (a, [b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+        let parts = [
+            one,
+            s * one + sx * x + sy * y,
+            t * one + tx * x + ty * y,
+            s * s * one + 2.0 * s * (sx * x + sy * y) + sx * sx * xx + 2.0 * sx * sy * xy + sy * sy * yy,
+            s * t * one
+                + (s * tx + t * sx) * x
+                + (s * ty + t * sy) * y
+                + sx * tx * xx
+                + (sx * ty + sy * tx) * xy
+                + sy * ty * yy,
+            t * t * one + 2.0 * t * (tx * x + ty * y) + tx * tx * xx + 2.0 * tx * ty * xy + ty * ty * yy,
+        ];
+        self.sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
     }
 }
 
@@ -108,22 +129,20 @@ impl FaceGeometry {
         if self.flat { flat } else { flat + (c[3] * s + c[4] * t) * s + c[5] * (t * t) }
     }
 
-    /// Area in space over area in coordinates.
-    fn stretch_at(&self, [s, t]: Coordinates) -> f64 {
-        let c = &self.coefficients;
-        let along_s = c[1] + c[3] * (2.0 * s) + c[4] * t;
-        let along_t = c[2] + c[4] * s + c[5] * (2.0 * t);
-        along_s.cross(along_t).length()
-    }
-
     /// Moments over the triangle with the given corners, positions `ends`, under the mask around `centre`.
-    pub fn integrate(&self, corners: [Coordinates; 3], ends: [DVec3; 3], centre: DVec3, radius: f64) -> Moments {
+    pub fn integrate(
+        &self,
+        rules: &CellRules,
+        corners: [Coordinates; 3],
+        ends: [DVec3; 3],
+        centre: DVec3,
+        radius: f64,
+    ) -> Moments {
         let mut moments = Moments::default();
         if self.flat {
             Lattice::new(corners, ends, centre, radius, self.stretch).integrate(&mut moments);
         } else {
-            let mask = Mask { face: self, centre, squared_radius: radius * radius, radius };
-            mask.integrate(corners, ends, 0, &mut moments);
+            Cell { corners, ends }.integrate(self, rules, centre, radius, 0, &mut moments);
         }
         moments
     }
@@ -258,47 +277,4 @@ fn below_one([c0, c1, c2]: [f64; 3], least: i64, most: i64) -> Option<(i64, i64)
     let (middle, half) = (-c1 / (2.0 * c2), discriminant.sqrt() / (2.0 * c2));
     let (low, high) = ((middle - half).floor().max(least as f64), (middle + half).ceil().min(most as f64));
     (low <= high).then_some((low as i64, high as i64))
-}
-
-/// The mask over a curved face.
-struct Mask<'a> {
-    face: &'a FaceGeometry,
-    centre: DVec3,
-    radius: f64,
-    squared_radius: f64,
-}
-
-impl Mask<'_> {
-    /// Splits the cell (`corners` in the face's coordinates, `ends` in space) until it is small against the radius, then
-    /// applies the mid-edge rule.
-    fn integrate(&self, corners: [Coordinates; 3], ends: [DVec3; 3], depth: u32, moments: &mut Moments) {
-        let ([a, b, c], [la, lb, lc]) = (ends, corners);
-        let squared_edges = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
-        let longest = squared_edges[0].max(squared_edges[1]).max(squared_edges[2]);
-        let middles = [halfway(la, lb), halfway(lb, lc), halfway(lc, la)];
-        let at = middles.map(|l| self.face.at(l));
-        let chords = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
-        // A face is at most quadratic: it leaves the plane of the cell's corners by `4 sum l_i l_j d_ij`, with the
-        // deviations `d` at the middles of the edges; the sum of the products is at most a third.
-        let squared_deviation = (0..3).map(|k| (at[k] - chords[k]).length_squared()).fold(0.0, f64::max);
-        // No point of the flat cell is farther from its centroid than two thirds of its longest edge.
-        let reach = self.radius + 2.0 / 3.0 * longest.sqrt() + 4.0 / 3.0 * squared_deviation.sqrt();
-        if ((a + b + c) / 3.0 - self.centre).length_squared() > reach * reach {
-            return;
-        }
-        if longest > CELL_SIZE * CELL_SIZE * self.squared_radius && depth < MAX_DEPTH {
-            self.integrate([la, middles[0], middles[2]], [a, at[0], at[2]], depth + 1, moments);
-            self.integrate([middles[0], lb, middles[1]], [at[0], b, at[1]], depth + 1, moments);
-            self.integrate([middles[2], middles[1], lc], [at[2], at[1], c], depth + 1, moments);
-            self.integrate(middles, at, depth + 1, moments);
-            return;
-        }
-        let part = 0.5 * doubled_area(corners);
-        for (middle, point) in middles.into_iter().zip(at) {
-            let inside = 1.0 - (point - self.centre).length_squared() / self.squared_radius;
-            if inside > 0.0 {
-                moments.add(middle, part / 3.0 * self.face.stretch_at(middle) * inside * inside);
-            }
-        }
-    }
 }
