@@ -23,9 +23,6 @@ FORBIDDEN = {
     "servo": ({"pyo3", "numpy"}, "the loop runs without Python"),
 }
 
-# All that a driver may know of the core.
-DEVICE_TYPES = {"Pose", "Twist", "Wrench"}
-
 
 def main() -> int:
     """Print every broken rule; the exit status is 1 if there is one."""
@@ -66,19 +63,8 @@ def tracked_files() -> list[str]:
     return listed.stdout.splitlines()
 
 
-def dependency_problems() -> list[str]:
-    """Dependencies that a crate's place forbids."""
-    problems = []
-    for crate, (forbidden, reason) in FORBIDDEN.items():
-        manifest = ROOT / "crates" / crate / "Cargo.toml"
-        if manifest.exists():
-            used = set(tomllib.loads(manifest.read_text()).get("dependencies", {}))
-            problems += [f"crates/{crate} must not depend on {name}: {reason}" for name in sorted(used & forbidden)]
-    core = "\n".join(p.read_text() for p in (ROOT / "crates/core/src").rglob("*.rs"))
-    problems += [
-        f"crates/core uses {name}: it reads no clock" for name in ("Instant::now", "SystemTime") if name in core
-    ]
-    return problems + device_problems()
+# All that a driver may know of the core.
+DEVICE_TYPES = {"Pose", "Twist", "Wrench"}
 
 
 def device_problems() -> list[str]:
@@ -97,6 +83,21 @@ def allowed_types(use: re.Match[str]) -> str:
     """Leave nothing of a use of the core that names types of the trait only."""
     names = set(re.findall(r"\w+", use[1]))
     return "" if names <= DEVICE_TYPES else use[0]
+
+
+def dependency_problems() -> list[str]:
+    """Dependencies that a crate's place forbids."""
+    problems = device_problems()
+    for crate, (forbidden, reason) in FORBIDDEN.items():
+        manifest = ROOT / "crates" / crate / "Cargo.toml"
+        if manifest.exists():
+            used = set(tomllib.loads(manifest.read_text()).get("dependencies", {}))
+            problems += [f"crates/{crate} must not depend on {name}: {reason}" for name in sorted(used & forbidden)]
+    core = "\n".join(p.read_text() for p in (ROOT / "crates/core/src").rglob("*.rs"))
+    problems += [
+        f"crates/core uses {name}: it reads no clock" for name in ("Instant::now", "SystemTime") if name in core
+    ]
+    return problems
 
 
 def length_problems() -> list[str]:
