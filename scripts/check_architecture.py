@@ -27,7 +27,7 @@ FORBIDDEN = {
         {"pyo3", "numpy", "triple_buffer", "rtrb", "libc"},
         "core knows no Python, no clock and no hand-off",
     ),
-    "devices": ({"pyo3", "numpy", "palpate-core"}, "a driver knows positions and forces only"),
+    "devices": ({"pyo3", "numpy", "palpate-servo"}, "a driver knows poses and wrenches only"),
     "servo": ({"pyo3", "numpy"}, "the loop runs without Python"),
 }
 
@@ -92,9 +92,31 @@ def tracked_files() -> list[str]:
     return listed.stdout.splitlines()
 
 
+# All that a driver may know of the core.
+DEVICE_TYPES = {"Pose", "Twist", "Wrench"}
+
+
+def device_problems() -> list[str]:
+    """Find uses of the core by drivers that go beyond the types of the trait."""
+    problems = []
+    for path in sorted((ROOT / "crates/devices").rglob("*.rs")):
+        uses = re.sub(r"//.*", "", path.read_text())
+        allowed = re.sub(r"\bpalpate_core::simulation::(\w+|\{[\w\s,]*\})", allowed_types, uses)
+        if "palpate_core" in allowed:
+            names = ", ".join(sorted(DEVICE_TYPES))
+            problems.append(f"{path.relative_to(ROOT)} uses more of the core than {names}: a driver knows no bodies")
+    return problems
+
+
+def allowed_types(use: re.Match[str]) -> str:
+    """Leave nothing of a use of the core that names types of the trait only."""
+    names = set(re.findall(r"\w+", use[1]))
+    return "" if names <= DEVICE_TYPES else use[0]
+
+
 def dependency_problems() -> list[str]:
     """Dependencies that a crate's place forbids."""
-    problems = []
+    problems = device_problems()
     for crate, (forbidden, reason) in FORBIDDEN.items():
         manifest = ROOT / "crates" / crate / "Cargo.toml"
         if manifest.exists():

@@ -1,36 +1,14 @@
 //! A modal step never allocates, repeats its bits, and its parts fit together.
 #![allow(unsafe_code)] // a counting allocator
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "common/counting_allocator.rs"]
+mod counting_allocator;
 
+use counting_allocator::allocations;
 use glam::{DMat3, DVec3};
 use palpate_core::dynamics::{
     EnergyAccount, Lanes, LoadedPatch, ModalModel, Newmark, Projection, Rayleigh, exact_step,
 };
-
-thread_local! {
-    static COUNT: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every call is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|c| c.set(c.get() + 1));
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        COUNT.with(|c| c.set(c.get() + 1));
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 const MODES: usize = 37;
 const ROWS: usize = 30;
@@ -59,7 +37,7 @@ fn steps_never_allocate_and_repeat_their_bits() {
         let (mut account, mut pressed) = (EnergyAccount::new(&state), Projection::new(&model));
         let mut predicted = model.predicted_state();
         let mut seen = [0.0; 2];
-        let before = COUNT.with(Cell::get);
+        let before = allocations();
         for tick in 0..500 {
             let t = f64::from(tick) * 1e-3;
             // A row that does not exist is left out, never a panic.
@@ -69,7 +47,7 @@ fn steps_never_allocate_and_repeat_their_bits() {
             model.advance(&mut predicted, &mut [LoadedPatch::new(&pressed, DVec3::new(0.0, 1e-3, -t * 1e-2))]);
             model.read(&state.q, [0, 5].into_iter(), &mut seen);
         }
-        assert_eq!(COUNT.with(Cell::get), before, "a step allocated");
+        assert_eq!(allocations(), before, "a step allocated");
         assert!(seen.iter().all(|x| x.is_finite() && *x != 0.0));
         *end = [bits(&state.q), bits(&predicted.free_q)].concat();
     }

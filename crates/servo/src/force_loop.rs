@@ -65,10 +65,10 @@ impl ForceLoop {
         refuse_unless(tools == given, || format!("a scene of {tools} tools takes as many devices, got {given}"))?;
         limits.check()?;
         settings.check(&model)?;
-        let stage = |(tool, device): (usize, &Box<dyn Device>)| {
-            Ok(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?))
-        };
-        let stages = devices.iter().enumerate().map(stage).collect::<Result<Vec<_>>>()?;
+        let mut stages = Vec::new();
+        for (tool, device) in devices.iter().enumerate() {
+            stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?));
+        }
         let (ends, handle) = handoffs(&model, &settings);
         let (state, scratch) = (model.state(), model.scratch());
         let force_loop = Self {

@@ -2,7 +2,8 @@
 //!
 //! A decaying motion ends in subnormal numbers, with which each operation takes a hundred times as long on many
 //! processors. Whether they are flushed is a mode of the thread, and a driver's thread may have either: the tick sets the
-//! mode and gives it back, so that its time is bounded and its bits are the same on every thread.
+//! mode and gives it back, so that its time is bounded and its bits are the same on every thread. The compiler knows nothing
+//! of it and computes constants without; that is the same in every run of the same program.
 #![allow(unsafe_code)] // the register has no safe interface
 
 /// Flushes subnormal inputs and results to zero until dropped.

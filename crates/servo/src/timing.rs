@@ -68,3 +68,62 @@ impl Timing {
         self.overruns = 0;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    const PERIOD: f64 = 1e-3;
+
+    thread_local! {
+        static NOW: Cell<u64> = const { Cell::new(0) };
+    }
+
+    fn now() -> u64 {
+        NOW.with(Cell::get)
+    }
+
+    fn timing() -> (Timing, Status) {
+        NOW.with(|now| now.set(0));
+        (Timing::new(now), Status::default())
+    }
+
+    /// A tick that is due now, begins `late_us` later and takes `took_us`.
+    fn tick(timing: &mut Timing, status: &mut Status, late_us: u64, took_us: u64) -> Option<FaultReason> {
+        let due_ns = now();
+        NOW.with(|now| now.set(due_ns + 1000 * late_us));
+        timing.begin(due_ns);
+        NOW.with(|now| now.set(now.get() + 1000 * took_us));
+        timing.account(status);
+        let (took_ns, overrun) = timing.end(PERIOD, &SafetyLimits::default(), status);
+        assert_eq!(took_ns, 1000 * took_us);
+        overrun
+    }
+
+    #[test]
+    fn deadlines_are_missed_by_computing_or_by_waking() {
+        for (late, took, by_computing, by_waking) in
+            [(0, 999, 0, 0), (0, 1000, 1, 0), (0, 2500, 2, 0), (2500, 300, 0, 2), (1500, 1600, 1, 2), (600, 600, 0, 1)]
+        {
+            let (mut timing, mut status) = timing();
+            tick(&mut timing, &mut status, late, took);
+            assert_eq!((status.missed_computing, status.missed_waking), (by_computing, by_waking), "{late} {took}");
+        }
+    }
+
+    #[test]
+    fn one_long_tick_or_many_late_ones_are_an_overrun() {
+        let (mut timing, mut status) = timing();
+        assert_eq!(tick(&mut timing, &mut status, 500_000, 100_000), None, "waking up late is none");
+        assert_eq!(tick(&mut timing, &mut status, 0, 100_001), Some(FaultReason::Overrun));
+        timing.reset();
+        for _ in 0..3 {
+            (0..19).for_each(|_| assert_eq!(tick(&mut timing, &mut status, 0, 1100), None));
+            assert_eq!(tick(&mut timing, &mut status, 0, 900), None, "one in time forgives");
+        }
+        (0..19).for_each(|_| assert_eq!(tick(&mut timing, &mut status, 0, 1100), None));
+        assert_eq!(tick(&mut timing, &mut status, 0, 1100), Some(FaultReason::Overrun));
+    }
+}

@@ -74,3 +74,131 @@ impl SafetyStage {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use palpate_devices::{Pose, Twist};
+
+    use super::*;
+
+    const PERIOD: f64 = 1e-3;
+    const PERIOD_NS: u64 = 1_000_000;
+
+    fn force(force: DVec3) -> Wrench {
+        Wrench { force, ..Wrench::default() }
+    }
+
+    fn torque(torque: DVec3) -> Wrench {
+        Wrench { torque, ..Wrench::default() }
+    }
+
+    fn settled(limits: SafetyLimits) -> SafetyStage {
+        let mut stage = SafetyStage::new(limits);
+        (0..1000).for_each(|_| _ = stage.apply(Wrench::default(), PERIOD));
+        stage
+    }
+
+    /// A reading of a tip moving along x, measured by a clock that is 7 s ahead.
+    fn reading(x: f64, measured_ns: u64) -> Reading {
+        let pose = Pose::at(DVec3::new(x, 0.0, 0.0));
+        Reading { pose, active: true, timestamp_ns: measured_ns + 7_000_000_000, ..Reading::default() }
+    }
+
+    #[test]
+    fn ramps_in_at_the_start_and_after_a_reset() {
+        let limits = SafetyLimits { max_slew: 1e9, ..SafetyLimits::default() };
+        let mut stage = SafetyStage::new(limits);
+        for _ in 0..2 {
+            let out: Vec<f64> = (0..300).map(|_| stage.apply(force(DVec3::X), PERIOD).force.x).collect();
+            assert!((out[124] - 0.5).abs() < 1e-9);
+            assert_eq!(out[299], 1.0);
+            stage.reset();
+        }
+    }
+
+    #[test]
+    fn forces_and_torques_are_limited_each_by_its_own() {
+        let limits = SafetyLimits { max_torque: 0.2, max_torque_slew: 10.0, ..SafetyLimits::default() };
+        let mut stage = settled(limits);
+        let computed = Wrench { force: 20.0 * DVec3::X, torque: -DVec3::Y };
+        for tick in 1..40 {
+            let (out, t) = (stage.apply(computed, PERIOD), f64::from(tick) * PERIOD);
+            assert!((out.force - DVec3::X * (500.0 * t).min(8.0)).length() < 1e-12);
+            assert!((out.torque + DVec3::Y * (10.0 * t).min(0.2)).length() < 1e-12);
+        }
+        assert_eq!(stage.apply(Wrench::default(), PERIOD), Wrench::default(), "letting go is never slowed down");
+    }
+
+    #[test]
+    fn a_wrench_that_is_not_finite_latches_until_reset() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e200] {
+            for wrench in [force(DVec3::new(0.0, bad, 0.0)), torque(DVec3::new(0.0, 0.0, bad))] {
+                let mut stage = settled(SafetyLimits::default());
+                assert_eq!(stage.apply(wrench, PERIOD), Wrench::default());
+                assert_eq!(stage.apply(force(DVec3::X), PERIOD), Wrench::default());
+                assert_eq!(stage.fault(), Some(FaultReason::WrenchNotFinite));
+                stage.reset();
+                assert!(stage.apply(force(DVec3::X), PERIOD).force.x > 0.0);
+            }
+        }
+    }
+
+    /// Ticks through what a device says, by its tick; the fault and the tick at which it latched.
+    fn admitted(said: impl Fn(u64) -> Result<Reading, DeviceFault>, ticks: u64) -> Option<(u64, FaultReason)> {
+        let mut stage = settled(SafetyLimits::default());
+        (0..ticks).find_map(|tick| {
+            stage.admit(said(tick), tick * PERIOD_NS, PERIOD);
+            stage.fault().map(|fault| (tick, fault))
+        })
+    }
+
+    #[test]
+    fn input_that_stops_is_stale_after_its_time() {
+        // The last measurement is seen at 100 ms; 50 ms later it is still good, 51 ms later not.
+        let stops = |tick: u64| Ok(reading(0.0, tick.min(100) * PERIOD_NS));
+        assert_eq!(admitted(stops, 300), Some((151, FaultReason::StaleInput)));
+        // A device slower than the loop is not stale, and one out of the scene has nothing to say.
+        assert_eq!(admitted(|tick| Ok(reading(0.0, tick / 10 * 10 * PERIOD_NS)), 300), None);
+        assert_eq!(admitted(|tick| Ok(Reading { active: tick < 100, ..reading(0.0, 0) }), 40), None);
+        assert_eq!(admitted(|tick| Ok(Reading { active: tick > 200, ..reading(0.0, 0) }), 250), None);
+    }
+
+    #[test]
+    fn input_that_jumps_latches() {
+        let path = |speed: f64| move |tick: u64| Ok(reading(speed * PERIOD * tick as f64, tick * PERIOD_NS));
+        assert_eq!(admitted(path(9.9), 100), None);
+        assert_eq!(admitted(path(10.1), 100), Some((1, FaultReason::JumpingInput)));
+        // Every fifth tick a measurement: 40 mm in 5 ms are 8 m/s.
+        let slow = |tick: u64| Ok(reading(0.04 * (tick / 5) as f64, tick / 5 * 5 * PERIOD_NS));
+        assert_eq!(admitted(slow, 100), None);
+        // A tool that comes into the scene may come in anywhere.
+        let comes = |tick: u64| Ok(Reading { active: tick != 50, ..reading((tick / 50) as f64, tick * PERIOD_NS) });
+        assert_eq!(admitted(comes, 99), None);
+        assert_eq!(admitted(comes, 200), Some((100, FaultReason::JumpingInput)));
+    }
+
+    #[test]
+    fn bad_numbers_and_faults_of_the_device_latch() {
+        let good = reading(0.0, 0);
+        let (mut position, mut orientation) = (good.pose, good.pose);
+        (position.position.y, orientation.orientation.w) = (f64::NAN, f64::INFINITY);
+        let twist = Twist { angular: DVec3::NAN, ..Twist::default() };
+        for bad in
+            [Reading { pose: position, ..good }, Reading { pose: orientation, ..good }, Reading { twist, ..good }]
+        {
+            assert_eq!(admitted(|_| Ok(bad), 10), Some((0, FaultReason::ReadingNotFinite)));
+            assert_eq!(admitted(|_| Ok(Reading { active: false, ..bad }), 10), None);
+        }
+        let fault = DeviceFault::Driver(-7);
+        assert_eq!(admitted(|_| Err(fault), 10), Some((0, FaultReason::Device(fault))));
+    }
+
+    #[test]
+    fn the_first_fault_stays() {
+        let mut stage = settled(SafetyLimits::default());
+        stage.latch(FaultReason::StaleInput);
+        stage.apply(force(DVec3::NAN), PERIOD);
+        assert_eq!(stage.fault(), Some(FaultReason::StaleInput));
+    }
+}

@@ -1,0 +1,134 @@
+//! A tick never allocates: counted for every kind of tick.
+#![allow(unsafe_code)] // a counting allocator
+
+mod common;
+#[path = "../../core/tests/common/counting_allocator.rs"]
+mod counting_allocator;
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use palpate_core::simulation::{Mode, Pose, Snapshot, Strike};
+use palpate_devices::{Buttons, Reading};
+use palpate_servo::{ForceLoop, LoopHandle, Published, SafetyLimits, Settings};
+
+use common::{PERIOD, PERIOD_NS, device, scene, settings};
+use counting_allocator::allocations;
+
+const TICKS: u64 = 2600;
+const BAD_NUMBER: u64 = 2200;
+const RESET: u64 = 2300;
+
+/// The first tool presses the first body again and again, holds on to it, goes to the second body, and from there to where
+/// it may not touch.
+fn first_tool(tick: u64) -> Reading {
+    let depth = 0.012 * (6e-3 * tick as f64).sin();
+    let (x, y, above) = match tick {
+        BAD_NUMBER => (f64::NAN, 0.05, 0.0),
+        0..1200 => (0.03 + 2e-5 * tick as f64, 0.05, 0.005 - depth),
+        1200..1500 => (0.05, 0.05, 0.01),
+        1500..1900 | RESET.. => (0.22, 0.05, 0.003),
+        1900..2000 => (0.16, 0.05, 0.02),
+        _ => (0.16, 0.05, 0.003),
+    };
+    let buttons = if (1200..1500).contains(&tick) { Buttons::GRAB } else { Buttons::default() };
+    Reading { pose: Pose::at(DVec3::new(x, y, 0.1 + above)), buttons, active: true, ..Reading::default() }
+}
+
+/// The second tool is on the first body for a while.
+fn second_tool(tick: u64) -> Reading {
+    let pose = Pose::at(DVec3::new(0.07, 0.05, 0.101));
+    Reading { pose, active: (300..2000).contains(&tick) && !(900..1000).contains(&tick), ..Reading::default() }
+}
+
+fn settings_at(tick: u64) -> Settings {
+    let strike = Strike {
+        body: 0,
+        point: DVec3::new(0.02, 0.02, 0.1),
+        impulse: DVec3::new(0.0, 0.0, -1e-4),
+        radius: 0.02,
+        duration: 3e-3,
+    };
+    let resets = u32::from(tick >= RESET);
+    let strikes = u32::from(tick >= 100) + u32::from(tick >= 1600);
+    let watch = (tick / 200 % 2 == 1).then_some((0, 7));
+    Settings { resets, strike, strikes, watch, ..settings() }
+}
+
+/// What kinds of tick that was, given the contacts before it.
+fn kinds(tick: u64, before: &[(u64, usize)], published: &Published) -> Vec<&'static str> {
+    let Published { status, state } = published;
+    let now = contacts(state);
+    let both = |holds: bool, name: &'static str| holds.then_some(name);
+    let (set, last) = (settings_at(tick), settings_at(tick.saturating_sub(1)));
+    [
+        both(now.is_empty(), "free"),
+        both(now.iter().any(|contact| !before.contains(contact)), "begin"),
+        both(!now.is_empty() && now == before, "hold"),
+        both(before.iter().any(|contact| !now.contains(contact)), "end"),
+        both(state.contacts.iter().any(|(contact, _)| contact.mode == Mode::Grab), "grab"),
+        both(now.iter().filter(|contact| contact.1 == 0).count() == 2, "two tools"),
+        both([0, 1].iter().all(|body| now.iter().any(|contact| contact.1 == *body)), "two bodies"),
+        both(state.energy(0).is_some_and(|energy| energy.kinetic > 0.0), "motion"),
+        both(set.strikes != last.strikes, "strike"),
+        both(set.resets != last.resets, "reset"),
+        both(status.fault.is_some(), "fault"),
+        both(state.tools[0].refused[1].is_some(), "refused"),
+        both(set.watch.is_some(), "watch"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// Serial and body of the contacts.
+fn contacts(state: &Snapshot) -> Vec<(u64, usize)> {
+    state.contacts.iter().map(|(contact, _)| (contact.serial, contact.body)).collect()
+}
+
+/// Ticks and allocations by kind of tick.
+fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static str, (u64, u64)> {
+    let mut counts = BTreeMap::new();
+    let mut before = Vec::new();
+    for tick in 0..TICKS {
+        handle.set(settings_at(tick)).expect("valid settings");
+        let start = allocations();
+        force_loop.tick(tick * PERIOD_NS, PERIOD);
+        let made = allocations() - start;
+        let published = handle.latest();
+        for kind in kinds(tick, &before, published) {
+            let (ticks, sum) = counts.entry(kind).or_insert((0, 0));
+            (*ticks, *sum) = (*ticks + 1, *sum + made);
+        }
+        before = contacts(&published.state);
+    }
+    counts
+}
+
+#[test]
+fn allocations_are_counted() {
+    let start = allocations();
+    drop(std::hint::black_box(vec![0_u8]));
+    assert_eq!(allocations() - start, 2);
+}
+
+#[test]
+fn no_kind_of_tick_allocates() {
+    for (moving, quadratic) in [(false, false), (true, false), (false, true)] {
+        let devices = vec![
+            device(|now_ns| Ok(Reading { timestamp_ns: now_ns, ..first_tool(now_ns / PERIOD_NS) })),
+            device(|now_ns| Ok(Reading { timestamp_ns: now_ns, ..second_tool(now_ns / PERIOD_NS) })),
+        ];
+        // Other programs on the machine must not decide which ticks have a fault.
+        let limits = SafetyLimits { max_compute: f64::INFINITY, max_overruns: u32::MAX, ..SafetyLimits::default() };
+        let (force_loop, handle) =
+            ForceLoop::new(scene(moving, quadratic), devices, limits, settings()).expect("a valid loop");
+        let counts = count(force_loop, handle);
+        let allocating: Vec<_> = counts.iter().filter(|(_, (_, sum))| *sum > 0).collect();
+        assert!(allocating.is_empty(), "kinds of tick that allocate, with ticks and allocations: {allocating:?}");
+        let all = ["free", "begin", "hold", "end", "grab", "two tools", "two bodies", "strike", "reset", "fault"];
+        for kind in all.into_iter().chain(["refused", "watch"]).chain(moving.then_some("motion")) {
+            assert!(counts.contains_key(kind), "no tick was of the kind '{kind}': {counts:?}");
+        }
+    }
+}
