@@ -8,9 +8,11 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use palpate_core::simulation::{Input, Model, Pose, Snapshot, Strike, step};
-use palpate_devices::simulated::simulated;
+use palpate_devices::simulated::{Target, simulated};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench};
-use palpate_servo::{Fault, FaultReason, ForceLoop, LoopHandle, SafetyLimits, Script, Servo, Settings, now_ns, run};
+use palpate_servo::{
+    Fault, FaultReason, ForceLoop, LoopHandle, SafetyLimits, Script, Servo, Settings, StrainPreparer, now_ns, run,
+};
 
 use common::{PERIOD, PERIOD_NS, Scripted, device, scene, settings, single};
 
@@ -57,8 +59,8 @@ fn a_drivers_callback_gives_the_bits_of_an_offline_run() {
     let blow = DVec3::new(0.0, 0.0, -1e-3);
     let point = DVec3::new(0.02, 0.02, 0.1);
     let strike = Strike { body: 0, point, impulse: blow, radius: 0.02, duration: 3e-3 };
-    let script = Script { period: PERIOD, poses: &poses, grabs: &grabs, strikes: &[(700, strike)], watch: None };
-    let recording = run(&model, patient(), settings(), &script).expect("a valid script");
+    let script = Script { period: PERIOD, poses: &poses, grabs: &grabs, strikes: &[(700, strike)], watch: &[] };
+    let recording = run(&model, patient(), settings(), &StrainPreparer::new(&model), &script).expect("a valid script");
     assert_eq!(recording.fault, None);
     assert_eq!(recording.energies[0].1.len(), TICKS);
 
@@ -109,9 +111,9 @@ fn subnormal_numbers_are_flushed_live_and_offline() {
     let bits = |moved: Vec<DVec3>| moved.iter().flat_map(|u| u.to_array()).map(f64::to_bits).collect::<Vec<_>>();
 
     let poses = vec![Pose::at(DVec3::NAN); 100];
-    let watch = Some((0, nodes.as_slice()));
-    let script = Script { period: PERIOD, poses: &poses, grabs: &[], strikes: &[(0, strike)], watch };
-    let recording = run(&model, patient(), settings(), &script).expect("a valid script");
+    let watch: Vec<_> = nodes.iter().map(|&node| (0, node)).collect();
+    let script = Script { period: PERIOD, poses: &poses, grabs: &[], strikes: &[(0, strike)], watch: &watch };
+    let recording = run(&model, patient(), settings(), &StrainPreparer::new(&model), &script).expect("a valid script");
     let offline = bits(recording.displacements[99 * nodes.len()..].to_vec());
 
     let idle = device(|now_ns| Ok(Reading { timestamp_ns: now_ns, ..Reading::default() }));
@@ -158,7 +160,9 @@ fn what_does_not_fit_the_scene_is_an_error() {
         Box::new(Scripted { read: |now_ns| Ok(pressing(now_ns)), write: |_| Ok(()), limits })
     };
     let start = |limits, rate| {
-        let servo = Servo::start(single(false), vec![with_limits(limits)], patient(), settings(), rate);
+        let scene = single(false);
+        let strain = StrainPreparer::new(&scene);
+        let servo = Servo::start(scene, vec![with_limits(limits)], patient(), settings(), rate, strain);
         servo.err().map(|error| error.to_string())
     };
     refused(start(weak, 500.0), "holds 2000 N/m");
@@ -326,7 +330,7 @@ fn a_row_has_its_own_ticks_time_and_watch() {
 #[test]
 fn a_servo_keeps_its_rate_and_leaves_its_devices_without_a_wrench() {
     let (mut target, first) = simulated();
-    target.set(palpate_devices::simulated::Target { pose: pressing(0).pose, active: true, grab: false });
+    target.set(Target { pose: pressing(0).pose, active: true, ..Target::default() });
     let written = Arc::new(Mutex::new(Vec::new()));
     let all = written.clone();
     let mut first = first;
@@ -338,8 +342,10 @@ fn a_servo_keeps_its_rate_and_leaves_its_devices_without_a_wrench() {
         },
         limits: DeviceLimits::UNLIMITED,
     };
-    let mut servo =
-        Servo::start(single(false), vec![Box::new(device)], patient(), settings(), 500.0).expect("a running loop");
+    let scene = single(false);
+    let strain = StrainPreparer::new(&scene);
+    let servo = Servo::start(scene, vec![Box::new(device)], patient(), settings(), 500.0, strain);
+    let mut servo = servo.expect("a running loop");
     let (start, mut status) = (Instant::now(), servo.latest().status);
     while status.ticks < 250 && start.elapsed() < Duration::from_secs(20) {
         std::thread::sleep(Duration::from_millis(10));

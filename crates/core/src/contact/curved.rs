@@ -1,20 +1,18 @@
-//! Quadrature on a curved face, cell by cell.
+//! Quadrature on a face, cell by cell.
 //!
-//! A cell is the image of a triangle under a polynomial `x(p)` of degree two, for which a chord is exactly
-//! `x(q) - x(p) = J((p + q) / 2) (q - p)`: the edges of its cells at depth `m` are `J e / 2^m` with `J` linear in the place.
-//! Where the bounds of `|J e|` over the cell show that all its parts are split to the same depth, and no further, their
-//! mid-edges form a lattice that is known beforehand, and all of them are summed at once. Elsewhere the cell is split, and the
-//! bounds of its parts are closer.
+//! Where all parts of a triangle are split to the same depth, and no further, their mid-edges form a lattice that is known
+//! beforehand, and all of them are summed at once. Elsewhere, and where the triangle is much larger than the contact, it is
+//! split cell by cell.
 
 use glam::DVec3;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::quadrature::{CELL_SIZE, Coordinates, FaceGeometry, MAX_DEPTH, Moments, halfway};
+use super::quadrature::{CELL_SIZE, Coordinates, FaceGeometry, MAX_DEPTH, Moments, cell_reach, halfway};
 
 /// Points taken at once: sums run in so many parts in a fixed order, whatever the processor's vectors.
 const LANES: usize = 8;
 /// Depth of the finest lattice.
-const DEEPEST: usize = 3;
+pub const DEEPEST: usize = 3;
 
 type Lane = [f64; LANES];
 
@@ -36,6 +34,25 @@ impl CellRules {
     /// Of all depths.
     pub fn new() -> Self {
         Self { arch: Arch::new(), lattices: std::array::from_fn(lattice) }
+    }
+
+    /// Points of the lattice of a depth on a cell.
+    pub fn place(&self, depth: usize, polynomial: &Polynomial) -> Vec<PlacedPoints> {
+        let of_chunk = |points| PlacedPoints {
+            at: places(&polynomial.coefficients, points),
+            area: areas(&polynomial.coefficients, points),
+        };
+        self.lattices[depth].iter().map(of_chunk).collect()
+    }
+
+    /// Moments over a cell, in its own coordinates, from its points at a depth.
+    pub fn sum_placed(&self, depth: usize, placed: &[PlacedPoints], centre: DVec3, radius: f64) -> [f64; 6] {
+        self.arch.dispatch(PlacedSum { points: &self.lattices[depth], placed, centre, radius })
+    }
+
+    /// Moments over a cell whose parts are all split to a depth, in its own coordinates.
+    pub fn sum(&self, depth: usize, polynomial: &Polynomial, centre: DVec3, radius: f64) -> [f64; 6] {
+        self.arch.dispatch(Sum { points: &self.lattices[depth], polynomial, centre, radius })
     }
 }
 
@@ -80,21 +97,19 @@ impl Cell {
         let middles = [halfway(la, lb), halfway(lb, lc), halfway(lc, la)];
         let at = middles.map(|l| face.at(l));
         let chords = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
-        // The cell leaves the plane of its corners by `4 sum l_i l_j d_ij`, with the deviations `d` at the middles of the
-        // edges; the sum of the products is at most a third.
-        let squared_deviation = (0..3).map(|k| (at[k] - chords[k]).length_squared()).fold(0.0, f64::max);
-        // No point of the flat cell is farther from its centroid than two thirds of its longest edge.
-        let reach = radius + 2.0 / 3.0 * longest.sqrt() + 4.0 / 3.0 * squared_deviation.sqrt();
+        let deviation = (0..3).map(|k| at[k].distance(chords[k])).fold(0.0, f64::max);
+        let reach = radius + cell_reach(longest, deviation);
         if ((a + b + c) / 3.0 - centre).length_squared() > reach * reach {
             return;
         }
         let polynomial = Polynomial::through(self.ends, at);
-        let is_small = longest <= CELL_SIZE * CELL_SIZE * radius * radius || depth == MAX_DEPTH;
-        let lattice = if is_small { Some(0) } else { polynomial.common_depth(CELL_SIZE * radius, MAX_DEPTH - depth) };
-        if let Some(deeper) = lattice {
-            let points = &rules.lattices[deeper];
-            moments
-                .add_cell(self.corners, rules.arch.dispatch(Sum { points, polynomial: &polynomial, centre, radius }));
+        let finest = CELL_SIZE * radius;
+        let common = match longest <= finest * finest || depth == MAX_DEPTH {
+            true => Some(0),
+            false => polynomial.surely_common_depth(finest, MAX_DEPTH - depth),
+        };
+        if let Some(deeper) = common {
+            moments.add_cell(self.corners, rules.sum(deeper, &polynomial, centre, radius));
             return;
         }
         let parts = [
@@ -110,26 +125,31 @@ impl Cell {
 }
 
 /// A cell as a polynomial of its own coordinates, `x = c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2`.
-struct Polynomial([DVec3; 6]);
+pub struct Polynomial {
+    coefficients: [[f64; 3]; 6],
+}
 
 impl Polynomial {
     /// From corners and the middles of the edges 01, 12, 20.
-    fn through([x0, x1, x2]: [DVec3; 3], [x01, x12, x20]: [DVec3; 3]) -> Self {
-        Self([
+    pub fn through([x0, x1, x2]: [DVec3; 3], [x01, x12, x20]: [DVec3; 3]) -> Self {
+        let coefficients = [
             x0,
             4.0 * x01 - 3.0 * x0 - x1,
             4.0 * x20 - 3.0 * x0 - x2,
             2.0 * (x0 + x1 - 2.0 * x01),
             4.0 * (x0 - x01 - x20 + x12),
             2.0 * (x0 + x2 - 2.0 * x20),
-        ])
+        ];
+        Self { coefficients: coefficients.map(|c| c.to_array()) }
     }
 
-    /// Depth, at most that of the finest lattice, to which all parts of the cell are split until their edges are within
-    /// `finest`; `None` where they differ, may differ, or go deeper.
-    fn common_depth(&self, finest: f64, allowed: u32) -> Option<usize> {
-        let [_, c1, c2, c3, c4, c5] = self.0;
-        // J e for the edges e = (1, 0), (0, 1), (-1, 1) is `k0 + kx x + ky y`.
+    /// Depth of a lattice to which all parts are surely split until their edges are within `finest`, by bounds that cost
+    /// little.
+    ///
+    /// A chord of a polynomial of degree two is `x(q) - x(p) = J((p + q) / 2) (q - p)`: edges at depth `m` are `J e / 2^m`, and
+    /// `J e` is linear in the place.
+    fn surely_common_depth(&self, finest: f64, allowed: u32) -> Option<usize> {
+        let [_, c1, c2, c3, c4, c5] = self.coefficients.map(DVec3::from);
         let edges = [(c1, 2.0 * c3, c4), (c2, c4, 2.0 * c5), (c2 - c1, c4 - 2.0 * c3, 2.0 * c5 - c4)];
         let (mut most, mut least) = (0.0f64, 0.0f64);
         for (k0, kx, ky) in edges {
@@ -141,11 +161,57 @@ impl Polynomial {
             least = least.max(middle.length() - change);
         }
         // Round-off of the bounds must not decide.
-        let (most, least) = (most * (1.0 + 1e-9), least * (1.0 - 1e-9));
-        let fits =
-            |&depth: &usize| most <= finest * (1u32 << depth) as f64 && least > finest * (1u32 << depth) as f64 / 2.0;
-        (1..=DEEPEST.min(allowed as usize)).find(fits)
+        let fits = |edge: f64| most * (1.0 + 1e-9) <= edge && least * (1.0 - 1e-9) > 0.5 * edge;
+        (1..=DEEPEST.min(allowed as usize)).find(|&depth| fits(finest * (1u32 << depth) as f64))
     }
+
+    /// Position of a point, in the cell's coordinates.
+    fn at(&self, x: f64, y: f64) -> DVec3 {
+        let [c0, c1, c2, c3, c4, c5] = self.coefficients.map(DVec3::from);
+        c0 + (c1 + c3 * x + c4 * y) * x + (c2 + c5 * y) * y
+    }
+
+    /// For each depth up to that of the finest lattice the shortest and the longest of the parts' longest edges, squared.
+    pub fn squared_edges(&self) -> [[f64; 2]; DEEPEST + 1] {
+        const SIZE: usize = 1 << DEEPEST;
+        let mut grid = [[DVec3::ZERO; SIZE + 1]; SIZE + 1];
+        for (j, row) in grid.iter_mut().enumerate() {
+            for (i, point) in row.iter_mut().enumerate() {
+                *point = self.at(i as f64 / SIZE as f64, j as f64 / SIZE as f64);
+            }
+        }
+        std::array::from_fn(|depth| {
+            let step = SIZE >> depth;
+            let longest =
+                |[a, b, c]: [DVec3; 3]| a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+            let mut bounds = [f64::INFINITY, 0.0f64];
+            for (i, j) in (0..SIZE * SIZE).map(|k| (k / SIZE, k % SIZE)).filter(|(i, j)| i % step + j % step == 0) {
+                let corners = [grid[j][i], grid[j][i + step], grid[j + step][i]];
+                // Upright cells, and those between them.
+                let upright = (i + j < SIZE).then(|| longest(corners));
+                let between =
+                    (i + j + step < SIZE).then(|| longest([corners[1], corners[2], grid[j + step][i + step]]));
+                for edge in upright.into_iter().chain(between) {
+                    bounds = [bounds[0].min(edge), bounds[1].max(edge)];
+                }
+            }
+            bounds
+        })
+    }
+}
+
+/// Depth, at most that of the finest lattice, to which all parts of a cell are split until their edges are within a length;
+/// `None` where they differ or go deeper.
+pub fn common_depth(squared_edges: &[[f64; 2]; DEEPEST + 1], squared_finest: f64) -> Option<usize> {
+    let split = squared_edges.iter().take_while(|[shortest, _]| *shortest > squared_finest).count();
+    squared_edges.get(split).filter(|[_, longest]| *longest <= squared_finest).map(|_| split)
+}
+
+/// Points of a lattice on a cell in space: where they are, and the area that each stands for.
+#[derive(Clone, Copy)]
+pub struct PlacedPoints {
+    at: [Lane; 3],
+    area: Lane,
 }
 
 /// Moments over a cell, in its own coordinates, of the mask times the area in space.
@@ -160,46 +226,127 @@ impl NullaryFnOnce for Sum<'_> {
     type Output = [f64; 6];
     #[inline(always)]
     fn call(self) -> [f64; 6] {
-        let [c0, c1, c2, c3, c4, c5] = self.polynomial.0.map(|c| c.to_array());
-        let centre = self.centre.to_array();
-        let squared_radius = self.radius * self.radius;
+        let (mask, coefficients) = (Mask::new(self.centre, self.radius), &self.polynomial.coefficients);
         let mut sums = [[0.0; LANES]; 6];
         for points in self.points {
-            let (x, y) = (&points.x, &points.y);
-            let mut squared_distance = [0.0; LANES];
-            let mut along_x = [[0.0; LANES]; 3];
-            let mut along_y = [[0.0; LANES]; 3];
-            for k in 0..3 {
-                for l in 0..LANES {
-                    let offset = c0[k] - centre[k]
-                        + (c1[k] + c3[k] * x[l] + c4[k] * y[l]) * x[l]
-                        + (c2[k] + c5[k] * y[l]) * y[l];
-                    squared_distance[l] += offset * offset;
-                    along_x[k][l] = c1[k] + 2.0 * c3[k] * x[l] + c4[k] * y[l];
-                    along_y[k][l] = c2[k] + c4[k] * x[l] + 2.0 * c5[k] * y[l];
-                }
-            }
-            let mut weight = [0.0; LANES];
-            for l in 0..LANES {
-                let inside = (1.0 - squared_distance[l] / squared_radius).max(0.0);
-                let cross = [
-                    along_x[1][l] * along_y[2][l] - along_x[2][l] * along_y[1][l],
-                    along_x[2][l] * along_y[0][l] - along_x[0][l] * along_y[2][l],
-                    along_x[0][l] * along_y[1][l] - along_x[1][l] * along_y[0][l],
-                ];
-                let stretch = (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]).sqrt();
-                weight[l] = points.share[l] * stretch * inside * inside;
-            }
-            for l in 0..LANES {
-                let (wx, wy) = (weight[l] * x[l], weight[l] * y[l]);
-                sums[0][l] += weight[l];
-                sums[1][l] += wx;
-                sums[2][l] += wy;
-                sums[3][l] += wx * x[l];
-                sums[4][l] += wx * y[l];
-                sums[5][l] += wy * y[l];
+            let inside = mask.at(&places(coefficients, points));
+            if total(inside) > 0.0 {
+                add(&mut sums, points, &inside, &areas(coefficients, points));
             }
         }
-        sums.map(|[a, b, c, d, e, f, g, h]| ((a + e) + (c + g)) + ((b + f) + (d + h)))
+        totals(&sums)
     }
+}
+
+/// The same over points that are placed already.
+struct PlacedSum<'a> {
+    points: &'a [Points],
+    placed: &'a [PlacedPoints],
+    centre: DVec3,
+    radius: f64,
+}
+
+impl NullaryFnOnce for PlacedSum<'_> {
+    type Output = [f64; 6];
+    #[inline(always)]
+    fn call(self) -> [f64; 6] {
+        let mask = Mask::new(self.centre, self.radius);
+        let mut sums = [[0.0; LANES]; 6];
+        for (points, placed) in self.points.iter().zip(self.placed) {
+            add(&mut sums, points, &mask.at(&placed.at), &placed.area);
+        }
+        totals(&sums)
+    }
+}
+
+/// `1 - r^2 / a^2`, zero beyond the radius.
+struct Mask {
+    centre: [f64; 3],
+    inverse: f64,
+}
+
+impl Mask {
+    #[inline(always)]
+    fn new(centre: DVec3, radius: f64) -> Self {
+        Self { centre: centre.to_array(), inverse: 1.0 / (radius * radius) }
+    }
+
+    #[inline(always)]
+    fn at(&self, places: &[Lane; 3]) -> Lane {
+        let mut squared_distance = [0.0; LANES];
+        for k in 0..3 {
+            for l in 0..LANES {
+                let offset = places[k][l] - self.centre[k];
+                squared_distance[l] += offset * offset;
+            }
+        }
+        let mut inside = [0.0; LANES];
+        for l in 0..LANES {
+            inside[l] = (1.0 - squared_distance[l] * self.inverse).max(0.0);
+        }
+        inside
+    }
+}
+
+// Loops, not closures: a closure may be compiled for the narrowest vectors.
+#[inline(always)]
+fn places(c: &[[f64; 3]; 6], points: &Points) -> [Lane; 3] {
+    let (x, y) = (&points.x, &points.y);
+    let mut places = [[0.0; LANES]; 3];
+    for k in 0..3 {
+        for l in 0..LANES {
+            let along = (c[1][k] + c[3][k] * x[l] + c[4][k] * y[l]) * x[l];
+            places[k][l] = c[0][k] + along + (c[2][k] + c[5][k] * y[l]) * y[l];
+        }
+    }
+    places
+}
+
+/// Area in space of what the points stand for.
+#[inline(always)]
+fn areas(c: &[[f64; 3]; 6], points: &Points) -> Lane {
+    let (x, y) = (&points.x, &points.y);
+    let (mut along_x, mut along_y) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+    for k in 0..3 {
+        for l in 0..LANES {
+            along_x[k][l] = c[1][k] + 2.0 * c[3][k] * x[l] + c[4][k] * y[l];
+            along_y[k][l] = c[2][k] + c[4][k] * x[l] + 2.0 * c[5][k] * y[l];
+        }
+    }
+    let mut area = [0.0; LANES];
+    for l in 0..LANES {
+        let nx = along_x[1][l] * along_y[2][l] - along_x[2][l] * along_y[1][l];
+        let ny = along_x[2][l] * along_y[0][l] - along_x[0][l] * along_y[2][l];
+        let nz = along_x[0][l] * along_y[1][l] - along_x[1][l] * along_y[0][l];
+        area[l] = points.share[l] * (nx * nx + ny * ny + nz * nz).sqrt();
+    }
+    area
+}
+
+#[inline(always)]
+fn add(sums: &mut [Lane; 6], points: &Points, inside: &Lane, area: &Lane) {
+    for l in 0..LANES {
+        let (x, y, weight) = (points.x[l], points.y[l], area[l] * inside[l] * inside[l]);
+        let (wx, wy) = (weight * x, weight * y);
+        sums[0][l] += weight;
+        sums[1][l] += wx;
+        sums[2][l] += wy;
+        sums[3][l] += wx * x;
+        sums[4][l] += wx * y;
+        sums[5][l] += wy * y;
+    }
+}
+
+#[inline(always)]
+fn totals(sums: &[Lane; 6]) -> [f64; 6] {
+    let mut totals = [0.0; 6];
+    for k in 0..6 {
+        totals[k] = total(sums[k]);
+    }
+    totals
+}
+
+#[inline(always)]
+fn total([a, b, c, d, e, f, g, h]: Lane) -> f64 {
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }

@@ -11,7 +11,7 @@ use std::sync::atomic::Ordering;
 
 use glam::DVec3;
 
-use super::quadrature::{PatchGeometry, halfway};
+use super::quadrature::PatchGeometry;
 use super::{Refusal, SurfacePoint};
 use crate::element::{Face, Tri3, Tri6};
 use crate::mesh::{Faces, Surface};
@@ -226,9 +226,8 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
             let t = scratch.queue[next];
             next += 1;
             let face = &self.geometry.faces[t as usize / F::PARTS.len()];
-            let corners = corners_of::<F, N>(t).map(|l| [l.y, l.z]);
-            let ends = self.surface.corners(t);
-            let moments = face.integrate(&self.geometry.rules, corners, ends, self.centre, self.radius);
+            let (bulges, ends) = (&self.geometry.triangles[t as usize].bulges, self.surface.corners(t));
+            let moments = self.geometry.integrate(t as usize, face, self.centre, self.radius);
             if moments.covered {
                 for (node, sum) in self.faces[t as usize / F::PARTS.len()].into_iter().zip(moments.of_shapes::<N>()) {
                     if scratch.touched_by[node as usize] != scratch.visit {
@@ -242,11 +241,10 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
                 }
             }
             for (k, &other) in self.surface.neighbours[t as usize].iter().enumerate() {
-                let (i, j) = (k, (k + 1) % 3);
                 if other != u32::MAX
                     && scratch.visited[other as usize] != scratch.visit
                     && self.surface.normals[other as usize].dot(self.facing) > 0.0
-                    && self.reaches(face.at(halfway(corners[i], corners[j])), [ends[i], ends[j]])
+                    && self.reaches([ends[k], ends[(k + 1) % 3]], bulges[k])
                 {
                     scratch.visited[other as usize] = scratch.visit;
                     scratch.queue.push(other);
@@ -257,8 +255,7 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
     }
 
     /// Whether an edge comes into the ball. A curved edge bulges from its chord by no more than its middle does.
-    fn reaches(&self, middle: DVec3, ends: [DVec3; 2]) -> bool {
-        let bulge = (middle - (ends[0] + ends[1]) / 2.0).length();
+    fn reaches(&self, ends: [DVec3; 2], bulge: f64) -> bool {
         let reach = self.radius + bulge;
         squared_distance_to_segment(self.centre, ends[0], ends[1]) < reach * reach
     }

@@ -10,13 +10,17 @@
 
 use glam::DVec3;
 
-use super::curved::{Cell, CellRules};
+use super::curved::{Cell, CellRules, DEEPEST, PlacedPoints, Polynomial, common_depth};
+use crate::element::{Face, Tri3, Tri6};
 use crate::mesh::{Faces, Surface};
 
 /// Quadrature cells are split until their edges are below this part of the contact radius.
 pub(super) const CELL_SIZE: f64 = 0.2;
 /// Depth at which splitting stops: cells of 2^-24 of a triangle's edge are below any physical radius.
 pub(super) const MAX_DEPTH: u32 = 24;
+/// Depths whose points are placed beforehand: those of triangles that are not much larger than a fifth of the radius, of which
+/// a contact covers many.
+const PLACED_DEPTHS: usize = 2;
 /// A face whose polynomial bends it by less than this part of its edges is flat to round-off.
 const FLAT: f64 = 1e-13;
 
@@ -31,25 +35,114 @@ pub struct FaceGeometry {
     stretch: f64,
 }
 
-/// The faces of a surface at rest.
+/// What depends on a drawn triangle alone.
+pub struct TriangleGeometry {
+    /// In the coordinates of its face.
+    pub(super) corners: [Coordinates; 3],
+    ends: [DVec3; 3],
+    polynomial: Polynomial,
+    /// Shortest and longest of the cells' longest edges by depth, squared, m^2.
+    squared_edges: [[f64; 2]; DEEPEST + 1],
+    /// Points of the lattices of the first depths.
+    placed: [Vec<PlacedPoints>; PLACED_DEPTHS],
+    centroid: DVec3,
+    /// No point of it is farther from the centroid, m.
+    reach: f64,
+    /// How far the middle of each edge lies off its chord, m.
+    pub(super) bulges: [f64; 3],
+}
+
+/// The faces of a surface at rest, prepared.
 pub struct PatchGeometry {
     pub(super) faces: Vec<FaceGeometry>,
-    /// How curved cells are summed.
-    pub(super) rules: CellRules,
+    pub(super) triangles: Vec<TriangleGeometry>,
+    rules: CellRules,
     /// Largest contact radius known to be within the limit everywhere, m, as bits.
     pub(super) verified_radius: std::sync::atomic::AtomicU64,
 }
 
 impl PatchGeometry {
-    /// Prepares the faces.
+    /// Prepares faces and triangles.
     pub fn new(surface: &Surface) -> Self {
         let at = |n: u32| surface.positions[n as usize];
-        let faces = match &surface.faces {
-            Faces::Linear(faces) => faces.iter().map(|f| FaceGeometry::linear(f.map(at))).collect(),
-            Faces::Quadratic(faces) => faces.iter().map(|f| FaceGeometry::quadratic(f.map(at))).collect(),
+        let (faces, parts): (Vec<_>, Vec<_>) = match &surface.faces {
+            Faces::Linear(faces) => {
+                (faces.iter().map(|f| FaceGeometry::linear(f.map(at))).collect(), corners_of::<Tri3, 3>())
+            }
+            Faces::Quadratic(faces) => {
+                (faces.iter().map(|f| FaceGeometry::quadratic(f.map(at))).collect(), corners_of::<Tri6, 6>())
+            }
         };
-        Self { faces, rules: CellRules::new(), verified_radius: 0.into() }
+        let rules = CellRules::new();
+        let of_triangle = |t: usize| {
+            TriangleGeometry::new(&rules, &faces[t / parts.len()], parts[t % parts.len()], surface.corners(t as u32))
+        };
+        let triangles = (0..surface.triangles.len()).map(of_triangle).collect();
+        Self { faces, triangles, rules, verified_radius: 0.into() }
     }
+
+    /// Moments of the mask around `centre` over triangle `t` of a face.
+    pub fn integrate(&self, t: usize, face: &FaceGeometry, centre: DVec3, radius: f64) -> Moments {
+        let (triangle, mut moments) = (&self.triangles[t], Moments::default());
+        let reach = radius + triangle.reach;
+        if (triangle.centroid - centre).length_squared() > reach * reach {
+            return moments;
+        }
+        match common_depth(&triangle.squared_edges, CELL_SIZE * CELL_SIZE * radius * radius) {
+            Some(depth) => {
+                let own = match triangle.placed.get(depth) {
+                    Some(placed) => self.rules.sum_placed(depth, placed, centre, radius),
+                    None => self.rules.sum(depth, &triangle.polynomial, centre, radius),
+                };
+                moments.add_cell(triangle.corners, own);
+            }
+            None if face.flat => {
+                Lattice::new(triangle.corners, triangle.ends, centre, radius, face.stretch).integrate(&mut moments);
+            }
+            None => Cell { corners: triangle.corners, ends: triangle.ends }.integrate(
+                face,
+                &self.rules,
+                centre,
+                radius,
+                0,
+                &mut moments,
+            ),
+        }
+        moments
+    }
+}
+
+impl TriangleGeometry {
+    fn new(rules: &CellRules, face: &FaceGeometry, corners: [Coordinates; 3], ends: [DVec3; 3]) -> Self {
+        let ([la, lb, lc], [a, b, c]) = (corners, ends);
+        let at = [halfway(la, lb), halfway(lb, lc), halfway(lc, la)].map(|l| face.at(l));
+        let chords = [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
+        let bulges = [0, 1, 2].map(|k| if face.flat { 0.0 } else { at[k].distance(chords[k]) });
+        let squared_longest = [b - a, c - b, a - c].map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
+        let polynomial = Polynomial::through(ends, at);
+        Self {
+            corners,
+            ends,
+            squared_edges: polynomial.squared_edges(),
+            placed: std::array::from_fn(|depth| rules.place(depth, &polynomial)),
+            polynomial,
+            centroid: (a + b + c) / 3.0,
+            reach: cell_reach(squared_longest, bulges.into_iter().fold(0.0, f64::max)),
+            bulges,
+        }
+    }
+}
+
+/// Distance from the centroid of a cell that none of its points exceeds. No point of the flat cell is farther than two thirds
+/// of its longest edge; the cell leaves the plane of its corners by `4 sum l_i l_j d_ij`, with the deviations `d` at the
+/// middles of the edges, and the sum of the products is at most a third.
+pub(super) fn cell_reach(squared_longest: f64, deviation: f64) -> f64 {
+    2.0 / 3.0 * squared_longest.sqrt() + 4.0 / 3.0 * deviation
+}
+
+/// Corners of the drawn triangles of a face in its coordinates.
+fn corners_of<F: Face<N>, const N: usize>() -> Vec<[Coordinates; 3]> {
+    F::PARTS.iter().map(|part| part.map(|k| [F::NODES[k].y, F::NODES[k].z])).collect()
 }
 
 /// A point of a face: its coordinates `s`, `t`.
@@ -127,24 +220,6 @@ impl FaceGeometry {
         let c = &self.coefficients;
         let flat = c[0] + c[1] * s + c[2] * t;
         if self.flat { flat } else { flat + (c[3] * s + c[4] * t) * s + c[5] * (t * t) }
-    }
-
-    /// Moments over the triangle with the given corners, positions `ends`, under the mask around `centre`.
-    pub fn integrate(
-        &self,
-        rules: &CellRules,
-        corners: [Coordinates; 3],
-        ends: [DVec3; 3],
-        centre: DVec3,
-        radius: f64,
-    ) -> Moments {
-        let mut moments = Moments::default();
-        if self.flat {
-            Lattice::new(corners, ends, centre, radius, self.stretch).integrate(&mut moments);
-        } else {
-            Cell { corners, ends }.integrate(self, rules, centre, radius, 0, &mut moments);
-        }
-        moments
     }
 }
 
