@@ -28,8 +28,11 @@ pub type ContactRecord = (usize, usize, &'static str, [[f64; 3]; 6], bool, Vec<u
 pub struct BodyParts {
     green: std::sync::Arc<palpate_core::green::GreensFunction>,
     placement: Placement,
-    modes: Option<(Vec<f64>, Vec<f64>, SchemeArguments, bool, f64)>,
+    modes: Option<ModesParts>,
 }
+
+/// [`DynamicsArguments`] free of the interpreter.
+type ModesParts = (Vec<f64>, Vec<f64>, SchemeArguments, bool, f64);
 
 /// Takes arguments out of the interpreter's hands.
 pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {

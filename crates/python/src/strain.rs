@@ -120,6 +120,7 @@ pub fn provisional_displacement(
 
 /// Nodes (ranks, k) and weights (k) of a patch of radius `radius` (m) around the surface point closest to `point` (m).
 #[pyfunction]
+#[allow(clippy::type_complexity)] // two arrays; naming them would need a class nobody else uses
 pub fn contact_patch<'py>(
     py: Python<'py>,
     green: &GreenCore,

@@ -70,7 +70,7 @@ impl ForceLoop {
             stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?));
         }
         let (ends, handle) = handoffs(&model, &settings);
-        let (state, scratch) = (model.state(), model.scratch());
+        let (state, scratch) = (State::new(&model), Scratch::new(&model));
         let force_loop = Self {
             model,
             state,

@@ -123,7 +123,7 @@ fn subnormal_numbers_are_flushed_live_and_offline() {
     assert_eq!(bits(handle.latest().state.displacements_of(&model, 0, &nodes)), offline);
 
     // The same steps with subnormal numbers kept end elsewhere, so that there was something to flush.
-    let (mut state, mut scratch, mut snapshot) = (model.state(), model.scratch(), Snapshot::new(&model));
+    let (mut state, mut scratch, mut snapshot) = (State::new(&model), Scratch::new(&model), Snapshot::new(&model));
     for tick in 0..100 {
         let mut input = Input::default();
         input.controls.strike = (tick == 0).then_some(strike);

@@ -7,7 +7,8 @@
 use glam::DVec3;
 use pulp::{Arch, NullaryFnOnce};
 
-use super::quadrature::{CELL_SIZE, Coordinates, FaceGeometry, MAX_DEPTH, Moments, cell_reach, halfway};
+use super::face::FaceGeometry;
+use super::moments::{CELL_SIZE, Coordinates, MAX_DEPTH, Moments, cell_reach, halfway};
 
 /// Points taken at once: sums run in so many parts in a fixed order, whatever the processor's vectors.
 const LANES: usize = 8;

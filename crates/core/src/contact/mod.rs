@@ -3,12 +3,17 @@
 mod closest;
 mod compliance;
 mod curved;
+mod face;
+mod lattice;
+mod moments;
 mod patch;
 mod quadrature;
+mod refusal;
 mod touchable;
 
 pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{smallest_eigenvalue, touch};
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
-pub use touchable::{Refusal, TouchPatch};
+pub use refusal::Refusal;
+pub use touchable::TouchPatch;

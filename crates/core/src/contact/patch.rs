@@ -11,8 +11,9 @@ use std::sync::atomic::Ordering;
 
 use glam::DVec3;
 
+use super::closest::SurfacePoint;
 use super::quadrature::PatchGeometry;
-use super::{Refusal, SurfacePoint};
+use super::refusal::Refusal;
 use crate::element::{Face, Tri3, Tri6};
 use crate::mesh::{Faces, Surface};
 use crate::{Error, Result};

@@ -3,26 +3,8 @@
 use glam::{DMat3, DVec3};
 
 use super::patch::{MAX_PATCH_NODES, Patch};
+use super::refusal::Refusal;
 use crate::green::{GreensFunction, TouchNode};
-
-/// Why no contact begins at a place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// A node under the contact lies outside the touch region; its rank among the surface nodes.
-    NotTouchable(u32),
-    /// The contact covers more than [`MAX_PATCH_NODES`] nodes.
-    TooManyNodes,
-}
-
-impl Refusal {
-    /// One line for people.
-    pub fn message(self) -> &'static str {
-        match self {
-            Refusal::NotTouchable(_) => "the contact reaches outside the touch region",
-            Refusal::TooManyNodes => "the contact covers too many nodes: choose a smaller contact radius",
-        }
-    }
-}
 
 /// A patch with the columns of its nodes.
 #[derive(Clone, Debug)]

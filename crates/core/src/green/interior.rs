@@ -88,7 +88,7 @@ impl Interior {
     /// A length that is not a multiple of three a surface node.
     pub fn extend_responses(&self, fields: &[f64]) -> Result<Vec<f64>> {
         let rows = 3 * self.surface_nodes.len();
-        if fields.is_empty() || fields.len() % rows != 0 {
+        if fields.is_empty() || !fields.len().is_multiple_of(rows) {
             let given = fields.len();
             return Err(Error::Invalid(format!("fields of {rows} surface dofs are needed, got {given} numbers")));
         }

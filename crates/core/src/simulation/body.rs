@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Placement;
+use super::input::Placement;
 use crate::contact::{PatchGeometry, SurfacePoint, SurfaceQuery};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;

@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Contacts, MAX_CONTACTS};
+use super::MAX_CONTACTS;
+use super::contacts::Contacts;
 use crate::dynamics::{Energy, StepEnergy};
 
 /// Energies so far, and what the next booking starts from.

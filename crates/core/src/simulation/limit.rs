@@ -2,7 +2,7 @@
 //!
 //! Beyond about 10 % strain a linear solution balloons. While contacts stick, strain follows from their forces, and forces
 //! at rest are linear in the displacements `d` of the tools from their anchors: the largest common share `s <= 1` of all
-//! `d` of a body at which no place passes the limit is found from a few places ([`StrainResponse`]), prepared once a set of
+//! `d` of a body at which no place passes the limit is found from a few places ([`crate::strain::StrainResponse`]), prepared once a set of
 //! contacts off the tick. The force then stays that of `s d` however far a hand goes on.
 //!
 //! A contact that has just begun is not prepared for yet. Until it is, its displacement is held below
@@ -10,56 +10,24 @@
 
 use glam::DVec3;
 
+use super::MAX_CONTACTS;
+use super::contacts::Contact;
+use super::model::Model;
+use super::scratch::Scratch;
 use super::solve::{gather, solve_with};
-use super::{Contact, MAX_CONTACTS, Model, Scratch, State};
+use super::state::State;
+use super::strain_watch::StrainWatch;
 use crate::contact::MAX_PATCH_NODES;
-use crate::strain::{MAX_CONTACTS_WATCHED, StrainResponse, provisional_displacement};
+use crate::strain::{MAX_CONTACTS_WATCHED, provisional_displacement};
 
 /// Growth a tick of the bound of a contact that has been prepared for.
 const OPENING: f64 = 1.1;
 
-/// Strain per newton on some contacts of a body.
-#[derive(Clone, Debug)]
-pub struct StrainWatch {
-    /// The places that matter.
-    pub response: StrainResponse,
-    /// Serials of the contacts, in the order of the response; zero for none.
-    pub serials: [u64; MAX_CONTACTS_WATCHED],
-}
-
-/// Where a limited tool was when a body in motion left it: until the body is back, or the tool out, it counts as being no
-/// farther, or it would be hit all the harder.
-#[derive(Clone, Copy, Debug)]
-pub struct Rebound {
-    anchor: DVec3,
-    normal: DVec3,
-    share: f64,
-}
-
-impl Rebound {
-    /// Of a contact that ends; `None` if it was not limited.
-    pub(super) fn of(contact: &Contact) -> Option<Self> {
-        let Contact { anchor, normal, share, .. } = *contact;
-        (share < 1.0).then_some(Self { anchor, normal, share })
-    }
-
-    /// Where a tool counts as being; `None` once it has come out.
-    pub(super) fn position(&self, position: DVec3) -> Option<DVec3> {
-        let displacement = position - self.anchor;
-        (displacement.dot(self.normal) < 0.0).then(|| self.anchor + self.share * displacement)
-    }
-}
-
-impl StrainWatch {
-    fn covers(watch: Option<&Self>, contact: &Contact) -> bool {
-        watch.is_some_and(|watch| watch.serials.contains(&contact.serial))
-    }
-}
-
-/// Bound on the displacement of a contact that begins in `slot`, m.
-pub(super) fn first_bound(model: &Model, state: &State, slot: usize, limit: f64) -> f64 {
+/// Bounds the displacement of the contact that has just begun in `slot`.
+pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
     if limit <= 0.0 {
-        return f64::INFINITY;
+        state.contacts.slots[slot].bound = f64::INFINITY;
+        return;
     }
     let body = &model.bodies[state.contacts.slots[slot].body];
     let patch = state.contacts.patches[slot].patch();
@@ -68,7 +36,8 @@ pub(super) fn first_bound(model: &Model, state: &State, slot: usize, limit: f64)
         let supported = body.green.row_is_fixed[3 * node..3 * node + 3].iter().all(|&fixed| fixed);
         (weights[i], positions[i]) = (if supported { 0.0 } else { weight }, body.green.surface.positions[node]);
     }
-    provisional_displacement(&weights[..patch.count], &positions[..patch.count], body.mean_edge, limit)
+    let (weights, positions) = (&weights[..patch.count], &positions[..patch.count]);
+    state.contacts.slots[slot].bound = provisional_displacement(weights, positions, body.mean_edge, limit);
 }
 
 /// Shortens the displacements of the contacts of a body to what the limit of strain lets pass; zero is no limit.

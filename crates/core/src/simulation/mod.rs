@@ -7,26 +7,34 @@
 //! `motion`, which a `strike` may set going, and an `energy` that is accounted for. `snapshot` is what is drawn.
 
 mod body;
+mod contacts;
 mod energy;
 mod input;
 mod law;
 mod limit;
 mod model;
 mod motion;
+mod scratch;
 mod snapshot;
 mod solve;
 mod state;
 mod step;
+mod strain_watch;
 mod strike;
+mod system;
+mod time;
+mod tool;
 
 pub use body::{BodyDynamics, BodyModel};
+pub use contacts::{Contact, Contacts, Mode};
 pub use input::{Controls, Input, Output, Placement, Pose, Strike, ToolInput, Twist, Wrench};
-pub use law::LawKind;
-pub use limit::{Rebound, StrainWatch};
-pub use model::{Model, Scratch, ToolModel};
+pub use model::Model;
+pub use scratch::Scratch;
 pub use snapshot::Snapshot;
-pub use state::{BodyState, Contact, Contacts, Mode, State, ToolState};
+pub use state::{BodyState, State, ToolState};
 pub use step::step;
+pub use strain_watch::{Rebound, StrainWatch};
+pub use tool::{LawKind, ToolModel};
 
 /// Most tools a simulation may have.
 pub const MAX_TOOLS: usize = 4;

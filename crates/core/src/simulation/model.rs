@@ -1,22 +1,9 @@
-//! What is fixed while a simulation runs, and its reusable memory.
+//! What is fixed while a simulation runs.
 
-use super::law::LawKind;
-use super::solve::System;
-use super::state::{Contacts, State};
-use super::{BodyModel, MAX_BODIES, MAX_TOOLS};
-use crate::contact::{Patch, PatchScratch};
+use super::body::BodyModel;
+use super::tool::ToolModel;
+use super::{MAX_BODIES, MAX_TOOLS};
 use crate::{Error, Result};
-
-/// The tip of one device.
-#[derive(Clone, Copy, Debug)]
-pub struct ToolModel {
-    /// Radius of the sphere, m.
-    pub radius: f64,
-    /// How it touches.
-    pub law: LawKind,
-    /// Stiffest contact rendered, N/m: near a support the body alone would be rigid, which no device can render.
-    pub max_stiffness: f64,
-}
 
 /// Bodies and tools.
 pub struct Model {
@@ -24,14 +11,6 @@ pub struct Model {
     pub bodies: Vec<BodyModel>,
     /// The tools; one a device.
     pub tools: Vec<ToolModel>,
-}
-
-/// Memory a tick needs, sized once.
-pub struct Scratch {
-    /// One a body.
-    pub(super) patches: Vec<PatchScratch>,
-    pub(super) candidate: Patch,
-    pub(super) system: Box<System>,
 }
 
 impl Model {
@@ -55,27 +34,11 @@ impl Model {
         Ok(Self { bodies, tools })
     }
 
-    /// A state at rest, nothing touched.
-    pub fn state(&self) -> State {
-        State::at_rest(self)
-    }
-
-    /// Memory for [`super::step`].
-    pub fn scratch(&self) -> Scratch {
-        let patches = self.bodies.iter().map(|body| PatchScratch::new(&body.green.surface)).collect();
-        Scratch { patches, candidate: Patch::default(), system: Box::default() }
-    }
-
     /// Refuses a contact radius that some body cannot take.
     ///
     /// # Errors
     /// See [`BodyModel::check_contact_radius`].
     pub fn check_contact_radius(&self, radius: f64) -> Result<()> {
         self.bodies.iter().try_for_each(|body| body.check_contact_radius(radius))
-    }
-
-    /// Empty slots.
-    pub(super) fn contacts(&self) -> Contacts {
-        Contacts::default()
     }
 }

@@ -12,10 +12,11 @@
 
 use glam::{DMat3, DVec3};
 
-use super::body::{BodyModel, TIME_STEPS};
+use super::MAX_CONTACTS;
+use super::body::BodyModel;
+use super::contacts::Contacts;
 use super::energy::Account;
-use super::strike::StrikeInProgress;
-use super::{Contacts, Controls, MAX_CONTACTS, Model, State};
+use super::strike::{StrikeInProgress, gather};
 use crate::contact::{Patch, SurfacePoint};
 use crate::dynamics::{Energy, Lanes, LoadedPatch, ModalModel, PredictedState, Projection};
 
@@ -35,7 +36,7 @@ pub struct Motion {
     pub(super) strike: StrikeInProgress,
     account: Account,
     /// Body time not yet stepped through, s.
-    due: f64,
+    pub(super) due: f64,
     /// Body time since the start, s.
     pub time: f64,
 }
@@ -59,7 +60,7 @@ impl Motion {
     }
 
     /// Brings the body to rest. A step is made due, for contacts begin and end only within steps.
-    fn rest(&mut self, modes: &ModalModel) {
+    pub(super) fn rest(&mut self, modes: &ModalModel) {
         let PredictedState { q, v, free_q, free_v } = &mut self.predicted;
         for x in [q, v, free_q, free_v] {
             x.fill(Lanes::default());
@@ -148,7 +149,7 @@ impl Motion {
     }
 
     /// Ends the step by the forces of contacts and strike, predicts the next, and keeps account of the energy.
-    fn advance(&mut self, modes: &ModalModel, coupling: f64, contacts: &Contacts, body: usize) {
+    pub(super) fn advance(&mut self, modes: &ModalModel, coupling: f64, contacts: &Contacts, body: usize) {
         self.strike.advance();
         // The strike comes behind the contacts: the array is filled with it.
         let mut loaded = [self.strike.loaded(); MAX_CONTACTS + 1];
@@ -169,40 +170,4 @@ impl Motion {
         self.account.book_work(contacts, body);
         self.account.energy.work += self.strike.work(modes, &self.predicted.q);
     }
-}
-
-pub(super) fn gather(projection: &mut Projection, modes: &ModalModel, patch: &Patch) {
-    projection.gather(modes, patch.iter().map(|(node, weight)| (3 * node, weight)));
-}
-
-/// Lets body time pass; a reset brings the body to rest.
-pub(super) fn pass_time(model: &Model, state: &mut State, body: usize, controls: &Controls) {
-    if let (Some(dynamics), Some(motion)) = (&model.bodies[body].dynamics, &mut state.bodies[body].motion) {
-        motion.due += if controls.advance > 0.0 { controls.advance.min(*TIME_STEPS.end()) } else { 0.0 };
-        if controls.reset {
-            motion.rest(&dynamics.modes);
-        }
-    }
-}
-
-/// Whether a step of a body in motion has come due, and begins; true for one that does not move.
-pub(super) fn begin_step(model: &Model, state: &mut State, body: usize) -> bool {
-    let (Some(dynamics), Some(motion)) = (&model.bodies[body].dynamics, &mut state.bodies[body].motion) else {
-        return true;
-    };
-    // A thousandth of a step forgives the rounding of many small advances.
-    let due = motion.due > 0.999 * dynamics.modes.dt;
-    if due {
-        motion.due -= dynamics.modes.dt;
-        motion.time += dynamics.modes.dt;
-    }
-    due
-}
-
-/// Ends a step of a body in motion. False for one that does not move: a single answer is all there is.
-pub(super) fn end_step(model: &Model, state: &mut State, body: usize) -> bool {
-    let State { bodies, contacts, .. } = state;
-    let (Some(dynamics), Some(motion)) = (&model.bodies[body].dynamics, &mut bodies[body].motion) else { return false };
-    motion.advance(&dynamics.modes, dynamics.coupling, contacts, body);
-    true
 }

@@ -2,8 +2,14 @@
 
 use glam::{DMat3, DVec3};
 
-use super::solve::{System, solve_with};
-use super::{Contacts, MAX_CONTACTS, MAX_TOOLS, Model, State, ToolState};
+use super::body::BodyModel;
+use super::contacts::Contacts;
+use super::model::Model;
+use super::solve::solve_with;
+use super::state::{State, ToolState};
+use super::strike::gather;
+use super::system::System;
+use super::{MAX_CONTACTS, MAX_TOOLS};
 use crate::dynamics::{Energy, Lanes, Projection};
 
 /// What a tick left of one body.
@@ -44,13 +50,17 @@ impl State {
 impl Snapshot {
     /// Of bodies at rest.
     pub fn new(model: &Model) -> Self {
-        let body = |body: &super::BodyModel| BodySnapshot {
+        let body = |body: &BodyModel| BodySnapshot {
             energy: body.dynamics.as_ref().map(|_| Energy::default()),
             time: 0.0,
             stiffness_scale: 1.0,
             modal: body.dynamics.as_ref().map_or_else(Vec::new, |dynamics| dynamics.modes.state().q),
         };
-        Self { contacts: model.contacts(), tools: Default::default(), bodies: model.bodies.iter().map(body).collect() }
+        Self {
+            contacts: Contacts::default(),
+            tools: Default::default(),
+            bodies: model.bodies.iter().map(body).collect(),
+        }
     }
 
     /// Where the energy of a body in motion is.
@@ -108,7 +118,7 @@ impl Snapshot {
         let modes = &dynamics.modes;
         let (mut projection, mut moving) = (Projection::new(modes), self.bodies[body].modal.clone());
         for slot in self.contacts.on(body) {
-            super::motion::gather(&mut projection, modes, self.contacts.patches[slot].patch());
+            gather(&mut projection, modes, self.contacts.patches[slot].patch());
             projection.take_static(modes, self.contacts.slots[slot].force, &mut moving);
         }
         moving
@@ -121,7 +131,7 @@ impl Snapshot {
         let slot = self.contacts.of(tool, body)?;
         let (green, scale) = (&model.bodies[body].green, self.bodies[body].stiffness_scale);
         let slots: Vec<usize> = self.contacts.on(body).collect();
-        let mut state = model.state();
+        let mut state = State::new(model);
         state.contacts = self.contacts.clone();
         let block = |a: usize, b: usize| -> DMat3 {
             let (a, b) = (&self.contacts.patches[a], &self.contacts.patches[b]);

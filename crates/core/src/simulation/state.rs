@@ -1,105 +1,14 @@
-//! What evolves: contacts in slots, what tools remember, bodies.
+//! What evolves: contacts, what tools remember, bodies.
 
 use glam::{DMat3, DVec3};
 
-use super::limit::{Rebound, StrainWatch};
+use super::body::BodyModel;
+use super::contacts::Contacts;
+use super::model::Model;
 use super::motion::Motion;
-use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Model};
-use crate::contact::{Refusal, TouchPatch};
-
-/// What a contact does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mode {
-    /// The slot is empty.
-    #[default]
-    Free,
-    /// Touching, unilateral: never pulls.
-    Press,
-    /// Holding on, bilateral.
-    Grab,
-}
-
-/// A contact of one tool with one body; vectors are in the body's frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Contact {
-    // Written when it begins.
-    /// What it does; [`Mode::Free`] is an empty slot.
-    pub mode: Mode,
-    /// Index of the tool.
-    pub tool: usize,
-    /// Index of the body.
-    pub body: usize,
-    /// Counts the contacts since the start: tells one from another in the same slot.
-    pub serial: u64,
-    /// Contact point on the untouched surface, m.
-    pub point: DVec3,
-    /// Unit outward normal there.
-    pub normal: DVec3,
-    /// Tool position at which the contact carries no force, m.
-    pub anchor: DVec3,
-
-    // Written every tick.
-    /// Displacement of the tool from the anchor, as far as the limit of strain lets it, m.
-    pub displacement: DVec3,
-    /// Which part that is of the whole displacement.
-    pub share: f64,
-    /// Bound on its length while the limit is not known yet, m.
-    pub(super) bound: f64,
-    /// Force on the body, N.
-    pub force: DVec3,
-}
-
-/// Slots for contacts. The patches stand apart, so that looking through the slots touches little memory.
-#[derive(Clone, Debug)]
-pub struct Contacts {
-    pub(super) slots: [Contact; MAX_CONTACTS],
-    pub(super) patches: Vec<TouchPatch>,
-    pub(super) begun: u64,
-}
-
-impl Default for Contacts {
-    fn default() -> Self {
-        Self { slots: Default::default(), patches: vec![TouchPatch::default(); MAX_CONTACTS], begun: 0 }
-    }
-}
-
-impl Contacts {
-    /// The contacts and their patches.
-    pub fn iter(&self) -> impl Iterator<Item = (&Contact, &TouchPatch)> {
-        self.slots.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free)
-    }
-
-    /// Slots of the contacts of a body.
-    pub(super) fn on(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
-        (0..MAX_CONTACTS).filter(move |&slot| self.slots[slot].mode != Mode::Free && self.slots[slot].body == body)
-    }
-
-    /// Slot of the contact of a tool with a body.
-    pub(super) fn of(&self, tool: usize, body: usize) -> Option<usize> {
-        self.on(body).find(|&slot| self.slots[slot].tool == tool)
-    }
-
-    /// An empty slot.
-    pub(super) fn empty(&self) -> Option<usize> {
-        (0..MAX_CONTACTS).find(|&slot| self.slots[slot].mode == Mode::Free)
-    }
-
-    /// Empties a slot.
-    pub(super) fn clear(&mut self, slot: usize) {
-        self.slots[slot] = Contact::default();
-    }
-
-    /// Copies the contacts that there are; nothing is allocated.
-    pub(super) fn copy_from(&mut self, other: &Contacts) {
-        self.begun = other.begun;
-        for slot in 0..MAX_CONTACTS {
-            self.slots[slot] = other.slots[slot];
-            if other.slots[slot].mode != Mode::Free {
-                self.patches[slot].copy_from(&other.patches[slot]);
-            }
-        }
-    }
-}
+use super::strain_watch::{Rebound, StrainWatch};
+use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
+use crate::contact::Refusal;
 
 /// What a tool remembers of each body it does not touch.
 #[derive(Clone, Copy, Debug, Default)]
@@ -138,8 +47,9 @@ pub struct State {
 }
 
 impl State {
-    pub(super) fn at_rest(model: &Model) -> Self {
-        let body = |body: &super::BodyModel| BodyState {
+    /// At rest, nothing touched.
+    pub fn new(model: &Model) -> Self {
+        let body = |body: &BodyModel| BodyState {
             stiffness_scale: 1.0,
             motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
             strain: None,
@@ -147,7 +57,7 @@ impl State {
         Self {
             bodies: model.bodies.iter().map(body).collect(),
             tools: Default::default(),
-            contacts: model.contacts(),
+            contacts: Contacts::default(),
             compliance: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
         }
     }

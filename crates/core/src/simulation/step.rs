@@ -1,8 +1,13 @@
 //! The tick, in stages.
 
-use super::law::Approach;
-use super::limit::Rebound;
-use super::{Input, Mode, Model, Output, Scratch, State, limit, motion, solve, strike};
+use super::contacts::Mode;
+use super::input::{Input, Output};
+use super::law::{Approach, law_of};
+use super::model::Model;
+use super::scratch::Scratch;
+use super::state::State;
+use super::strain_watch::Rebound;
+use super::{limit, solve, time};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) -> Output {
@@ -10,16 +15,16 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
         state.bodies[body].stiffness_scale = stiffness_scale(model, body, input);
 
         // 1. A body that moves makes as many time steps as have come due; one that does not answers at once.
-        strike::begin(model, state, scratch, body, input);
-        motion::pass_time(model, state, body, &input.controls);
-        while motion::begin_step(model, state, body) {
+        time::begin_strike(model, state, scratch, body, input);
+        time::pass_time(model, state, body, &input.controls);
+        while time::begin_step(model, state, body) {
             // 2. Contacts begin, follow their tools, and push.
             follow_tools(model, state, scratch, body, input);
             limit::apply(model, state, scratch, body, input.controls.strain_limit[body]);
             push(model, state, scratch, body);
 
             // 3. Their forces go into the motion.
-            if !motion::end_step(model, state, body) {
+            if !time::end_step(model, state, body) {
                 break;
             }
         }
@@ -32,7 +37,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
 /// Contacts of a body begin, follow their tools, or end, by geometry and buttons.
 fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
     for (tool, tool_model) in model.tools.iter().enumerate() {
-        let law = tool_model.law.law();
+        let law = law_of(tool_model.law);
         let said = &input.tools[tool];
         let place = state.contacts.of(tool, body);
         state.tools[tool].refused[body] = None;
@@ -56,7 +61,11 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                 }
             }
             None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], scratch) {
-                Ok(Some(begun)) => solve::add_contact(model, state, begun, scratch, input.controls.strain_limit[body]),
+                Ok(Some(begun)) => {
+                    if let Some(slot) = solve::add_contact(model, state, begun, scratch) {
+                        limit::begin(model, state, slot, input.controls.strain_limit[body]);
+                    }
+                }
                 Ok(None) => {}
                 Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
             },
@@ -76,7 +85,7 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
                 continue;
             }
             let tool = contact.tool;
-            if model.tools[tool].law.law().end(contact) {
+            if law_of(model.tools[tool].law).end(contact) {
                 let position = contact.anchor + contact.displacement / contact.share;
                 if model.bodies[body].moves() && state.tools[tool].rebound[body].is_none() {
                     state.tools[tool].rebound[body] = Rebound::of(contact);

@@ -2,9 +2,7 @@
 
 use glam::DVec3;
 
-use super::motion::gather;
-use super::{Input, Model, Scratch, State};
-use crate::contact::{Patch, patch_weights};
+use crate::contact::Patch;
 use crate::dynamics::{Lanes, LoadedPatch, ModalModel, Projection};
 
 /// A strike takes no more steps than this: a second at the usual time step.
@@ -38,7 +36,8 @@ impl StrikeInProgress {
         (self.next, self.force) = (0, Default::default());
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether another one may begin.
+    pub fn is_over(&self) -> bool {
         self.next == 0 && self.force == [DVec3::ZERO; 2]
     }
 
@@ -87,20 +86,7 @@ impl StrikeInProgress {
     }
 }
 
-/// Begins a strike where the input asks for one. A second one before the first is over is left out.
-pub(super) fn begin(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
-    let (Some(strike), fixed) = (&input.controls.strike, &model.bodies[body]) else { return };
-    let (Some(dynamics), Some(motion)) = (&fixed.dynamics, &mut state.bodies[body].motion) else { return };
-    if strike.body != body || !(strike.point.is_finite() && strike.impulse.is_finite()) || !motion.strike.is_over() {
-        return;
-    }
-    let Some(closest) = fixed.closest(fixed.placement.point_to_body(strike.point)) else { return };
-    let centre = fixed.material_point(&closest);
-    let Scratch { patches, candidate, .. } = scratch;
-    let surface = &fixed.green.surface;
-    let weighed = patch_weights(surface, &fixed.geometry, &centre, strike.radius, &mut patches[body], candidate);
-    if weighed.is_ok() {
-        let impulse = fixed.placement.vector_to_body(strike.impulse);
-        motion.begin_strike(&dynamics.modes, candidate, impulse, strike.duration);
-    }
+/// Gathers the rows of the modes at a patch.
+pub(super) fn gather(projection: &mut Projection, modes: &ModalModel, patch: &Patch) {
+    projection.gather(modes, patch.iter().map(|(node, weight)| (3 * node, weight)));
 }

@@ -10,42 +10,22 @@ mod stick;
 use glam::{DMat3, DVec3};
 
 use super::body::{BodyDynamics, BodyModel};
+use super::contacts::Contact;
+use super::input::Input;
+use super::model::Model;
 use super::motion::Motion;
-use super::{Contact, Input, Model, Scratch, ToolModel};
+use super::scratch::Scratch;
+use super::tool::{LawKind, ToolModel};
 use crate::contact::{Refusal, SurfacePoint};
 
 /// A tool farther than this many radii from the surface at rest meets it there: displacements are smaller than that.
 const MOVING_REACH: f64 = 4.0;
 
-/// The laws there are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LawKind {
-    /// A smooth patch of a physical radius that sticks to the material it first touched.
-    #[default]
-    Patch,
-    /// The contact of Jun, Choi and Cho: the node closest to where the tool first touched.
-    Node,
-}
-
-impl LawKind {
-    /// `"patch"` or `"node"`.
-    pub fn name(self) -> &'static str {
-        match self {
-            LawKind::Patch => "patch",
-            LawKind::Node => "node",
-        }
-    }
-
-    /// The law called `name`.
-    pub fn parse(name: &str) -> Option<Self> {
-        [LawKind::Patch, LawKind::Node].into_iter().find(|kind| kind.name() == name)
-    }
-
-    pub(super) fn law(self) -> &'static dyn Law {
-        match self {
-            LawKind::Patch => &stick::Sticking(patch::Patch),
-            LawKind::Node => &stick::Sticking(node::Node),
-        }
+/// What a kind of law says.
+pub fn law_of(kind: LawKind) -> &'static dyn Law {
+    match kind {
+        LawKind::Patch => &stick::Sticking(patch::Patch),
+        LawKind::Node => &stick::Sticking(node::Node),
     }
 }
 

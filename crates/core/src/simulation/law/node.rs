@@ -4,7 +4,7 @@
 use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint};
-use crate::simulation::Scratch;
+use crate::simulation::scratch::Scratch;
 
 /// The node of the touched triangle that is closest.
 pub struct Node;

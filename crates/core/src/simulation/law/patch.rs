@@ -3,7 +3,7 @@
 use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint, patch_weights};
-use crate::simulation::Scratch;
+use crate::simulation::scratch::Scratch;
 
 /// Consistent weights over a disc of the contact radius.
 pub struct Patch;

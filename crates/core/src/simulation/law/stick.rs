@@ -9,7 +9,9 @@ use glam::DMat3;
 use super::{Approach, Law};
 use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
 use crate::simulation::body::BodyDynamics;
-use crate::simulation::{Contact, Mode, Scratch, ToolModel};
+use crate::simulation::contacts::{Contact, Mode};
+use crate::simulation::scratch::Scratch;
+use crate::simulation::tool::ToolModel;
 
 /// A grab reaches this many tool radii from the surface.
 const GRAB_REACH: f64 = 2.0;

@@ -1,19 +1,22 @@
 //! Rows and columns of the compliance between contacts: worked out once, when a contact begins.
 
-use crate::simulation::limit::first_bound;
-use crate::simulation::{Contact, Model, Scratch, State};
+use crate::simulation::contacts::Contact;
+use crate::simulation::model::Model;
+use crate::simulation::scratch::Scratch;
+use crate::simulation::state::State;
 
 /// Takes up a contact that begins, whose patch is `scratch.candidate`: a slot, its compliance with every other contact of
-/// the body, and of a body in motion where the moving patch is met. Refused where a node may not be touched.
-pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &Scratch, strain_limit: f64) {
+/// the body, and of a body in motion where the moving patch is met. Returns the slot; `None`, with the reason left with the
+/// tool, where a node may not be touched.
+pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &Scratch) -> Option<usize> {
     let (tool, body) = (begun.tool, begun.body);
     let green = &model.bodies[body].green;
     let State { bodies, contacts, compliance, tools } = &mut *state;
     // There are as many slots as pairs of a tool and a body.
-    let Some(slot) = contacts.empty() else { return };
+    let slot = contacts.empty()?;
     if let Err(refusal) = contacts.patches[slot].admit(green, &scratch.candidate) {
         tools[tool].refused[body] = Some(refusal);
-        return;
+        return None;
     }
     contacts.begun += 1;
     contacts.slots[slot] = Contact { serial: contacts.begun, ..begun };
@@ -30,6 +33,5 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
         contacts.slots[slot].anchor -= met;
         contacts.slots[slot].displacement += met;
     }
-    let bound = first_bound(model, state, slot, strain_limit);
-    state.contacts.slots[slot].bound = bound;
+    Some(slot)
 }

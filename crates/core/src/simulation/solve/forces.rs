@@ -2,8 +2,11 @@
 
 use glam::{DMat3, DVec3};
 
-use super::System;
-use crate::simulation::{MAX_CONTACTS, Model, State};
+use crate::simulation::MAX_CONTACTS;
+use crate::simulation::law::law_of;
+use crate::simulation::model::Model;
+use crate::simulation::state::State;
+use crate::simulation::system::System;
 
 /// Forces of the contacts of a body, `d` being the displacement of each tool from its anchor, `d_free` its patch's free
 /// motion, `C` the static compliance or that of one step, and `s` what each contact law adds.
@@ -55,7 +58,7 @@ pub fn solve_with(
             let mut block = compliance(a, b);
             if a == b {
                 let tool = &model.tools[contact.tool];
-                let added = tool.law.law().respond(tool, model.bodies[contact.body].dynamics.as_ref(), &block);
+                let added = law_of(tool.law).respond(tool, model.bodies[contact.body].dynamics.as_ref(), &block);
                 block += DMat3::from_diagonal(DVec3::splat(added));
             }
             for row in 0..3 {

@@ -1,6 +1,6 @@
 //! A dense symmetric system of a few contacts.
 
-use crate::simulation::MAX_CONTACTS;
+use super::MAX_CONTACTS;
 
 /// Most unknowns.
 pub const MAX_DOFS: usize = 3 * MAX_CONTACTS;
