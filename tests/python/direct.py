@@ -1,4 +1,4 @@
-"""Direct finite element answers to contacts: SciPy on the body's stiffness, the patches' displacements as constraints."""
+"""Direct finite element answers to contacts: SciPy on the stiffness, patches as constraints."""
 
 from __future__ import annotations
 
