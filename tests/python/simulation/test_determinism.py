@@ -61,7 +61,8 @@ def test_the_same_bits_from_a_store_of_any_number_of_threads(block, tmp_path):
         "import sys, hashlib, palpate; body = palpate.Body(palpate.TetMesh.read('block.vtu'), "
         "material=palpate.Material(10e3, 0.4, 1000.0), fixed=lambda p: p[:, 0] < 1e-9); "
         "green = palpate.precompute(body, precision='f64', path=sys.argv[1], progress=False); "
-        "print(hashlib.sha256(green.touch((0.04, 0.026, 0.05), (0, 0, -1e-3), 0.01).displacements.tobytes()).hexdigest())"
+        "touch = green.touch((0.04, 0.026, 0.05), (0, 0, -1e-3), 0.01); "
+        "print(hashlib.sha256(touch.displacements.tobytes()).hexdigest())"
     )
     for threads in ("1", "2"):
         command = [sys.executable, "-c", code, f"{threads}.palpate"]
