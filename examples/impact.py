@@ -30,20 +30,21 @@ built = scene.build()
 
 def with_modes(count):
     """Return the simulation with the lowest of its modes."""
-    motion = replace(built.motion, basis=built.motion.basis.first(count))
-    return palpate.Simulation(replace(built, motion=motion))
+    (body,) = built.bodies
+    motion = replace(body.motion, basis=body.motion.basis.first(count))
+    return palpate.Simulation(replace(built, bodies=(replace(body, motion=motion),)))
 
 
 def fall(ticks):
     """Positions of the tool: down at a constant speed, then at rest."""
     depth = np.minimum(SPEED * DT * np.arange(ticks) - 1e-3, DEPTH)
-    return TOP + np.outer(scene.tool.radius - depth, [0, 0, 1])
+    return TOP + np.outer(scene.tools[0].radius - depth, [0, 0, 1])
 
 
 # Tool and patch are kept DEPTH apart by the coupling and the body in series: f = (C + I/k_c)^-1 d.
 reference = palpate.Simulation(built)
 basis, coupling = reference.motion.basis, reference.motion.coupling
-unit_presses = [reference.green.touch(TOP, axis, scene.tool.contact_radius).force for axis in np.eye(3)]
+unit_presses = [reference.green.touch(TOP, axis, scene.tools[0].contact_radius).force for axis in np.eye(3)]
 compliance = np.linalg.inv(np.column_stack(unit_presses))
 
 

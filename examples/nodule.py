@@ -17,20 +17,21 @@ JUST_NOTICEABLE = 0.1
 
 scene = palpate.Scene.read(Path(__file__).with_name("nodule.toml"))
 built = scene.build()
+body = built.bodies[0].body
 tissue = built.scene.material.material()
-without = palpate.Body(built.body.mesh, material=tissue, fixed=built.body.fixed_nodes)
-fields = {"with the nodule": built.green, "without": palpate.precompute(without)}
+without = palpate.Body(body.mesh, material=tissue, fixed=body.fixed_nodes)
+fields = {"with the nodule": built.bodies[0].green, "without": palpate.precompute(without)}
 
 # Press by a millimetre with a fingertip, sideways free, along a line over the middle.
 line = np.linspace(0.012, 0.068, 57)
 stiffness = {}
 for name, green in fields.items():
-    presses = [green.touch((x, 0.04, 0.04), (None, None, -1e-3), scene.tool.contact_radius) for x in line]
+    presses = [green.touch((x, 0.04, 0.04), (None, None, -1e-3), scene.tools[0].contact_radius) for x in line]
     stiffness[name] = np.array([-press.force[2] / 1e-3 for press in presses])
 
 gain = stiffness["with the nodule"] / stiffness["without"] - 1
 felt = line[gain > JUST_NOTICEABLE]
-print(f"{built.body.mesh}")
+print(f"{body.mesh}")
 print(f"over the nodule {100 * gain.max():.0f} % stiffer, at x = {1e3 * line[gain.argmax()]:.0f} mm")
 print(f"more than {100 * JUST_NOTICEABLE:.0f} % from x = {1e3 * felt.min():.0f} to {1e3 * felt.max():.0f} mm")
 

@@ -66,7 +66,7 @@ def test_every_module_of_the_package_tells_what_it_is():
 def test_attributes_of_objects_are_named_in_the_docstrings_of_their_classes(block, block_green):
     scene = palpate.Scene(body={"store": "block.palpate"})
     basis = palpate.modes(block, 3)
-    objects = [block, block_green, block.mesh, basis, palpate.Simulation(BuiltScene(scene, block, block_green))]
+    objects = [block, block_green, block.mesh, basis, palpate.Simulation(BuiltScene.of(scene, block, block_green))]
     objects += [
         palpate.Newmark(block, modes=basis),
         palpate.StressRecovery(block),

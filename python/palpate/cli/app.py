@@ -6,7 +6,7 @@ import sys
 import warnings
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -170,11 +170,8 @@ def info(
     if file.suffix == ".toml":
         scene = palpate.Scene.read(file)
         print(f"{file}: scene of {scene.name}")
-        for table, entries in scene.model_dump(exclude_none=True).items():
-            for entry in entries if isinstance(entries, list) else [entries]:
-                for name, value in entry.items():
-                    if value != []:
-                        print(f"  {table}.{name} = {value}")
+        for name, value in scene.model_dump(by_alias=True, exclude_none=True).items():
+            _print_entry(name, value)
         print("  lengths in m, pressures in Pa, forces in N, times in s")
         return
     made = palpate.TetMesh.read(file, unit)
@@ -184,6 +181,18 @@ def info(
     print(
         f"  regions: {sorted(set(made.regions.tolist()))}, dihedral angle >= {made.dihedral_angles().min():.1f} degrees"
     )
+
+
+def _print_entry(name: str, value: Any) -> None:
+    """Print the keys under a name of a scene, those of several tables with their number."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _print_entry(f"{name}.{key}", inner)
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for rank, entry in enumerate(value):
+            _print_entry(name if len(value) == 1 else f"{name}[{rank}]", entry)
+    elif value != []:
+        print(f"  {name} = {value}")
 
 
 @app.command("models")

@@ -117,7 +117,7 @@ class StressRecovery:
 
     @property
     def strain_operator(self) -> scipy.sparse.csr_array:
-        """Strain at the nodes from the displacements of all nodes, (6 s, 3 n): xx, yy, zz, xy, yz, zx of each node, 1/m."""
+        """Strain at the nodes from the displacements of all, (6 s, 3 n): xx, yy, zz, xy, yz, zx of each node, 1/m."""
         return (scipy.sparse.kron(self._fit, scipy.sparse.eye_array(6)).tocsr() @ self._strain).tocsr()
 
     def recover(self, displacements: np.ndarray) -> SurfaceStress:

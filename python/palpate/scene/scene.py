@@ -57,8 +57,10 @@ class Scene(SceneTables):
         body, (path, text) = self.bodies[rank], self.source
         supports = body.supports or self.supports
         if body.mesh is not None and supports.fixed is None:
-            place = ["body", rank, "supports"] if body.supports is not None else ["supports"]
-            raise SceneError(f"{located(path, text, place)}: the key 'supports.fixed' is missing")
+            shared = ["supports"] if "supports" in self.model_fields_set else ["body", rank]
+            place = ["body", rank, "supports"] if body.supports is not None else shared
+            of_which = f" for body '{body.title}'" if len(self.bodies) > 1 else ""
+            raise SceneError(f"{located(path, text, place)}: the key 'supports.fixed' is missing{of_which}")
         own = {"material", "region", "loads", "dynamics", "supports"}
         given = body.model_fields_set & own
         if len(self.bodies) == 1:

@@ -76,6 +76,19 @@ def grabs_of(grabs: Any, positions: np.ndarray) -> np.ndarray:
     return held
 
 
+def for_all_tools(
+    positions: np.ndarray, orientations: np.ndarray, grabs: np.ndarray, tools: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Add the tools that a script does not speak of, out of the scene: (t, tools, 3), (t, tools, 4), (t, tools)."""
+    ticks, given = positions.shape[:2]
+    out = np.full((ticks, tools - given, 3), np.nan)
+    upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (ticks, tools - given, 4))
+    free = np.zeros((ticks, tools - given), dtype=bool)
+    added = ((positions, out), (orientations, upright), (grabs, free))
+    path, turned, held = (np.concatenate(pair, axis=1) for pair in added)
+    return path, turned, held
+
+
 def strike_of(
     point: Sequence[float], impulse: Sequence[float], duration: float = 0.0
 ) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:

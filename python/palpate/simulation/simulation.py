@@ -17,7 +17,7 @@ from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.frame import BodyFrame, Contact, Frame
 from palpate.simulation.recording import LOG_DTYPE, Recording
-from palpate.simulation.script import grabs_of, orientations_of, positions_of, strike_of
+from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
 PERCENTILES = ("p50", "p99", "p999", "max")
@@ -395,7 +395,8 @@ class Simulation:
         Parameters
         ----------
         positions
-            (t, 3) m of the first tool, or (t, tools, 3); a row of NaN takes a tool out of the scene.
+            (t, 3) m of the first tool, or (t, tools, 3) of the first ones; a row of NaN takes a tool out of the scene,
+            where those that are left out always are.
         orientations
             Unit quaternions w x y z (t, 4) or (t, tools, 4); left out, tools do not turn.
         strikes
@@ -420,15 +421,18 @@ class Simulation:
         nodes = [(0, node) if np.ndim(node) == 0 else tuple(node) for node in watch]
         ranks = [(self._body(body), self._rank_of(node, body)) for body, node in nodes]
         self._arm_strain_limit()
-        raw = self._core.run(path, turned, held, sorted(struck, key=lambda strike: strike[0]), ranks)
+        ticks, given, tools = *path.shape[:2], len(self._radii)
+        everything = for_all_tools(path, turned, held, tools)
+        raw = self._core.run(*everything, sorted(struck, key=lambda strike: strike[0]), ranks)
         if raw["fault"] is not None:
             raise SimulationError(raw["fault"])
-        ticks, tools = path.shape[:2]
-        shape = (ticks, 3) if np.ndim(positions) == 2 else (ticks, tools, 3)
-        forces, torques = (raw[name].reshape(shape) for name in ("forces", "torques"))
+        shape = (ticks, 3) if np.ndim(positions) == 2 else (ticks, given, 3)
+        forces, torques = (
+            raw[name].reshape(ticks, tools, 3)[:, :given].reshape(shape) for name in ("forces", "torques")
+        )
+        limited = raw["limited"].astype(bool).reshape(ticks, tools)[:, :given].reshape(shape[:-1])
         energies = tuple(Energy(*rows.reshape(-1, 5).T) if len(rows) else None for rows in raw["energies"])
         time = np.arange(1, ticks + 1) / self.scene.device.rate
-        limited = raw["limited"].astype(bool).reshape(shape[:-1])
         return Recording(time, forces, torques, raw["watched"].reshape(ticks, len(ranks), 3), limited, energies)
 
     def _rank_of(self, node: int, body: int) -> int:

@@ -125,7 +125,8 @@ def test_simulation_presses_the_sagged_body(loaded, loaded_green):
     limits = {"max_force": 100.0, "max_slew": 1e9, "ramp": 0.0}
     tool = {"radius": 0.006, "contact_radius": 0.012}
     scene = scene.model_copy(update={"device": scene.device.model_copy(update=limits)})
-    scene = scene.model_copy(update={"tool": scene.tool.model_copy(update=tool)})
+    view = scene.view.model_copy(update={"strain_limit": 0.0})
+    scene = scene.model_copy(update={"tools": [scene.tools[0].model_copy(update=tool)], "view": view})
     simulation = palpate.Simulation(scene)
     rows = np.searchsorted(loaded.mesh.surface_nodes, loaded.mesh.surface_triangles)
     rest = loaded_green.surface_positions[rows]

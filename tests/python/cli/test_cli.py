@@ -173,7 +173,11 @@ def test_models_beside_the_counts_of_the_paper(tmp_path):
 def test_info_on_a_scene(tmp_path):
     (tmp_path / "a.toml").write_text('[body]\nmodel = "liver"\n[material]\nyoungs_modulus = "5kPa"\n')
     shown = run("info", "a.toml", cwd=tmp_path).stdout
-    assert "material.youngs_modulus = 5000.0" in shown
+    assert "  material.youngs_modulus = 5000.0\n" in shown and "  body.model = liver\n" in shown
+    several = '[[body]]\nmodel = "liver"\n[[body]]\nmodel = "kidney"\n[body.material]\nyoungs_modulus = "5kPa"\n'
+    (tmp_path / "b.toml").write_text(several)
+    shown = run("info", "b.toml", cwd=tmp_path).stdout
+    assert "  body[0].model = liver\n" in shown and "  body[1].material.youngs_modulus = 5000.0\n" in shown
 
 
 def test_wrong_words_are_explained(tmp_path):

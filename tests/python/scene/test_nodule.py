@@ -42,7 +42,7 @@ def patch_weights(mesh, point, radius, split=24):
 
 
 def test_stiffness_over_the_nodule_equals_a_direct_solve(nodule):
-    body = nodule.body
+    body = nodule.bodies[0].body
     assert len(np.unique(body.mesh.regions)) == 2
     K = skfem_stiffness(body)
     free = np.setdiff1d(np.arange(K.shape[0]), body.fixed_dofs)
@@ -55,12 +55,12 @@ def test_stiffness_over_the_nodule_equals_a_direct_solve(nodule):
         u = np.zeros(K.shape[0])
         u[free] = solve(load[free])
         direct = 1 / (load @ u)
-        felt = -nodule.green.touch(point, (None, None, -PRESS), RADIUS).force[2] / PRESS
+        felt = -nodule.bodies[0].green.touch(point, (None, None, -PRESS), RADIUS).force[2] / PRESS
         assert felt == pytest.approx(direct, rel=0.01)
 
 
 def test_the_nodule_is_as_large_as_asked(nodule):
     """Elements follow the sphere by their centroids; their volume is that of the sphere to a few per cent."""
-    mesh = nodule.body.mesh
+    mesh = nodule.bodies[0].body.mesh
     volume = mesh.volumes[mesh.regions == 1].sum()
     assert volume == pytest.approx(4 / 3 * np.pi * 0.005**3, rel=0.03)

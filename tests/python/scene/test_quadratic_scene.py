@@ -32,6 +32,8 @@ contact_radius = {PATCH}
 max_force = 100
 max_slew = 1e9
 ramp = 0
+[view]
+strain_limit = 0
 """
 
 
@@ -49,12 +51,12 @@ def built(tmp_path_factory):
 
 
 def test_force_on_the_device_is_the_touch(built):
-    mesh = built.body.mesh
+    mesh = built.bodies[0].body.mesh
     assert mesh.is_quadratic
-    assert np.isin(mesh.surface_nodes[mesh.nodes[mesh.surface_nodes, 2] < 1e-6], built.body.fixed_nodes).all()
+    assert np.isin(mesh.surface_nodes[mesh.nodes[mesh.surface_nodes, 2] < 1e-6], built.bodies[0].body.fixed_nodes).all()
     depth = np.linspace(1e-3, -2e-3, 50)[:, None]
     forces = palpate.Simulation(built).run(TOP + (RADIUS + depth) * [0, 0, 1])
-    expected = built.green.touch(TOP, (0, 0, -2e-3), PATCH).force
+    expected = built.bodies[0].green.touch(TOP, (0, 0, -2e-3), PATCH).force
     assert forces[-1] == pytest.approx(-expected, rel=1e-2, abs=1e-3)
     assert forces[-1, 2] > 0.05
 
@@ -62,15 +64,15 @@ def test_force_on_the_device_is_the_touch(built):
 def test_quadratic_elements_are_softer_at_the_same_contact(built, tmp_path):
     """Both are upper bounds of the stiffness; the one with more freedom is nearer."""
     linear = scene(tmp_path, box_mesh(cells=(5, 4, 4), jitter=0.1), element="").build()
-    assert not linear.body.mesh.is_quadratic
-    force = [b.green.touch(TOP, (0, 0, -2e-3), PATCH).force[2] for b in (built, linear)]
+    assert not linear.bodies[0].body.mesh.is_quadratic
+    force = [b.bodies[0].green.touch(TOP, (0, 0, -2e-3), PATCH).force[2] for b in (built, linear)]
     assert -force[1] > -1.1 * force[0] > 0
 
 
 def test_listed_supports_hold_the_nodes_between_them(tmp_path):
     mesh = box_mesh(cells=(3, 2, 2))
     listed = np.flatnonzero(mesh.nodes[:, 2] < 1e-9).tolist()
-    body = scene(tmp_path, mesh, fixed=str(listed)).build().body
+    body = scene(tmp_path, mesh, fixed=str(listed)).build().bodies[0].body
     assert np.array_equal(body.fixed_nodes, np.flatnonzero(body.mesh.nodes[:, 2] < 1e-9))
     with pytest.raises(palpate.BodyError, match="fixed node 100000 does not exist"):
         scene(tmp_path, mesh, fixed="[0, 100000]").build()
@@ -79,7 +81,9 @@ def test_listed_supports_hold_the_nodes_between_them(tmp_path):
 def test_second_order_files_are_taken_as_they_are(tmp_path):
     curved = bent(box_mesh(cells=(3, 2, 2)).to_quadratic())
     for element in ("", 'element = "quadratic"'):
-        assert np.array_equal(scene(tmp_path, curved, element, '"x < 1e-2"').build().body.mesh.tets, curved.tets)
+        assert np.array_equal(
+            scene(tmp_path, curved, element, '"x < 1e-2"').build().bodies[0].body.mesh.tets, curved.tets
+        )
     with pytest.raises(palpate.SceneError, match=r"block\.vtu holds 10-node tetrahedra: leave out body.element"):
         scene(tmp_path, curved, 'element = "linear"').build()
     with pytest.raises(palpate.SceneError, match=r"block\.toml:5: body.element"):
@@ -112,16 +116,17 @@ def test_strain_on_curved_faces():
 
 def test_viewer_is_sent_flat_triangles_and_tets(built):
     session = Session(built)
+    session.start()
     try:
         header, arrays = decode(session.scene_message())
-        mesh = built.body.mesh
-        assert header["tets"] == len(mesh.tets)
-        assert arrays["tets"].shape == (8 * len(mesh.tets), 4)
-        assert np.array_equal(np.unique(arrays["tets"]), np.arange(len(mesh.nodes)))
-        assert np.array_equal(arrays["surface_triangles"], mesh.surface_triangles)
+        mesh = built.bodies[0].body.mesh
+        assert [body["tets"] for body in header["bodies"]] == [len(mesh.tets)]
+        assert arrays["0/tets"].shape == (8 * len(mesh.tets), 4)
+        assert np.array_equal(np.unique(arrays["0/tets"]), np.arange(len(mesh.nodes)))
+        assert np.array_equal(arrays["0/surface_triangles"], mesh.surface_triangles)
         message, _ = session.frame_message(1, (0, 0), Wants(cutaway=True))
         header, arrays = decode(message)
-        assert arrays["displacements"].shape == (len(mesh.nodes), 3)
+        assert arrays["0/displacements"].shape == (len(mesh.nodes), 3)
         assert header["strain"] <= 1e-12
     finally:
         session.close()
@@ -157,7 +162,7 @@ def test_a_surface_becomes_ten_node_tetrahedra_unless_told_otherwise(tmp_path):
     for element in ("", 'element = "linear"', 'element = "quadratic"'):
         text = f'[body]\nmesh = "ball.stl"\n{element}\n[supports]\nfixed = "z < -0.02"\n'
         (tmp_path / "ball.toml").write_text(text)
-        mesh = palpate.Scene.read(tmp_path / "ball.toml").build().body.mesh
+        mesh = palpate.Scene.read(tmp_path / "ball.toml").build().bodies[0].body.mesh
         counts[element] = (mesh.tets.shape[1], len(mesh.nodes))
     assert [nodes for nodes, _ in counts.values()] == [10, 4, 10]
     assert counts[""] == counts['element = "quadratic"']

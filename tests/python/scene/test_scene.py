@@ -29,7 +29,7 @@ def test_quantities_are_si(tmp_path):
     (tmp_path / "a.toml").write_text(GOOD)
     scene = palpate.Scene.read(tmp_path / "a.toml")
     assert scene.material.youngs_modulus == 10e3
-    assert scene.tool.radius == pytest.approx(5e-3)
+    assert scene.tools[0].radius == pytest.approx(5e-3)
     assert scene.device.max_force > 0
 
 
@@ -65,12 +65,12 @@ def test_models_stores_and_views(tmp_path):
     scene = palpate.Scene.read(tmp_path / "a.toml")
     assert scene.name == "kidney"
     assert scene.view.position == (0, -0.3, 0.1)
-    green = scene.build(progress=False).green
+    green = scene.build(progress=False).bodies[0].green
     green.save(tmp_path / "k.palpate")
     (tmp_path / "b.toml").write_text('[body]\nstore = "k.palpate"\n[tool]\nradius = "3mm"\n')
     built = palpate.Scene.read(tmp_path / "b.toml").build()
-    assert built.body is None
-    assert built.green.key == green.key
+    assert built.bodies[0].body is None
+    assert built.bodies[0].green.key == green.key
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def regions_scene(tmp_path):
 
 
 def test_regions_and_loads_of_a_scene(regions_scene):
-    body = palpate.Scene.read(regions_scene).build().body
+    body = palpate.Scene.read(regions_scene).build().bodies[0].body
     mesh = body.mesh
     centroids = mesh.nodes[mesh.tets].mean(axis=1)
     core = (centroids[:, 0] > 0.02) & (centroids[:, 0] < 0.06)

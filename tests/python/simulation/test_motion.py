@@ -14,7 +14,7 @@ import palpate
 SIZE = (0.12, 0.03, 0.03)
 RADIUS, CONTACT_RADIUS, COUPLING = 0.006, 0.008, 500.0
 TOP = np.array([0.10, 0.015, 0.03])
-FREE_LIMITS = "[device]\nmax_force = '1kN'\nmax_slew = 1e9\nramp = 0\n"
+FREE_LIMITS = "[device]\nmax_force = '1kN'\nmax_slew = 1e9\nramp = 0\n[view]\nstrain_limit = 0\n"
 
 
 def scene(folder, dynamics: str, fixed: str = "x < 1e-6", more: str = "", cells=(10, 3, 3)) -> palpate.Scene:
@@ -58,7 +58,7 @@ def test_a_held_press_comes_to_the_static_answer(tmp_path, weights, modes):
 def test_a_held_press_is_the_body_with_the_spring_built_in(tmp_path):
     """Newmark in accelerations for `K + k_c W W^T` under `k_c W d`; the spring itself is not damped."""
     made = scene(tmp_path, "modes = 'all'\nrayleigh = [1.0, 2e-4]\n", fixed="z < 1e-6")
-    made = made.model_copy(update={"tool": made.tool.model_copy(update={"contact_radius": 0.0})})
+    made = made.model_copy(update={"tools": [made.tools[0].model_copy(update={"contact_radius": 0.0})]})
     simulation = palpate.Simulation(made)
     body = simulation.body
     # Without a radius a contact carries the shape functions at the point: here of two corners of a triangle.
@@ -139,13 +139,13 @@ def test_a_body_in_motion_sags_under_its_weight_and_moves_about_that(tmp_path):
 def test_a_strike_excites_each_mode_by_its_share(tmp_path):
     """After an impulse `J` on a patch `W` a mode swings as `Phi^T W J / omega sin(omega t)`, each on its own."""
     made = scene(tmp_path, "scheme = 'exact'\nmodes = 12\nrayleigh = [0, 0]\n")
-    made = made.model_copy(update={"tool": made.tool.model_copy(update={"contact_radius": 0.0})})
+    made = made.model_copy(update={"tools": [made.tools[0].model_copy(update={"contact_radius": 0.0})]})
     simulation = palpate.Simulation(made)
     basis, nodes = simulation.motion.basis, simulation.green.surface_nodes
     struck = int(np.argmin(np.linalg.norm(simulation.body.mesh.nodes - [0.108, 0.02, 0.03], axis=1)))
     impulse, dt, tick = np.array([4e-4, -3e-4, -1e-3]), 1e-3, 20
     played = simulation.play(
-        np.full((1500, 3), np.nan), [(tick, simulation.body.mesh.nodes[struck], impulse)], watch=nodes
+        np.full((1500, 3), np.nan), strikes=[(tick, simulation.body.mesh.nodes[struck], impulse)], watch=nodes
     )
     omega = 2 * np.pi * basis.frequencies
     # The force is a triangle of two steps around its tick's end: a mode hears it dulled by sinc^2(omega dt / 2).

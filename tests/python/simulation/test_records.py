@@ -18,12 +18,12 @@ RADIUS = 0.005
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
     scene = palpate.Scene(body={"store": "block.palpate"}, tool={"radius": RADIUS, "contact_radius": 0.012})
-    return BuiltScene(scene, block, block_green)
+    return BuiltScene.of(scene, block, block_green)
 
 
 def press(built: BuiltScene, depth: float) -> palpate.Recording:
     path = TOP + [0.0, 0.0, RADIUS] - np.outer(np.linspace(-1e-4, depth, 50), [0.0, 0.0, 1.0])
-    return palpate.Simulation(built).play(path, watch=[int(built.green.surface_nodes[5])])
+    return palpate.Simulation(built).play(path, watch=[int(built.bodies[0].green.surface_nodes[5])])
 
 
 def one_number_changed(record, name: str):
@@ -62,8 +62,11 @@ def test_frames_and_contacts_are_compared_by_value(built):
         time.sleep(0.1)
         frame = simulation.frame()
         assert len(frame.contacts) == 1
-        assert frame == dataclasses.replace(frame, displacements=frame.displacements.copy())
-        assert frame != one_number_changed(frame, "displacements")
+        (body,) = frame.bodies
+        copied = dataclasses.replace(body, displacements=body.displacements.copy())
+        assert frame == dataclasses.replace(frame, bodies=(copied,))
+        assert frame != dataclasses.replace(frame, bodies=(one_number_changed(body, "displacements"),))
+        assert frame != one_number_changed(frame, "forces")
         assert frame.contacts[0] != one_number_changed(frame.contacts[0], "weights")
         time.sleep(0.01)
         assert simulation.frame() != frame, "another tick has another time"

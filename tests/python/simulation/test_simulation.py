@@ -36,6 +36,8 @@ contact_radius = "{PATCH * 1e3}mm"
 max_force = 100
 max_slew = 1e9
 ramp = 0
+[view]
+strain_limit = 0
 """
     )
     return palpate.Scene.read(tmp_path / "block.toml")
@@ -136,7 +138,7 @@ def test_same_path_same_bits(scene):
 
 def test_device_limits_hold(tmp_path, scene):
     text = (tmp_path / "block.toml").read_text()
-    limits = "[device]\nmax_force = 0.3\nmax_slew = 5\nramp = 0.1\n"
+    limits = "[view]\nstrain_limit = 0\n[device]\nmax_force = 0.3\nmax_slew = 5\nramp = 0.1\n"
     (tmp_path / "tame.toml").write_text(text[: text.index("[device]")] + limits)
     path = along((0, 0, 0.001), (0, 0, -0.004), ticks=400)
     free = palpate.Simulation(scene).run(path)
@@ -160,6 +162,6 @@ def test_contact_radius_that_covers_too_much_is_refused(scene):
     green = palpate.precompute(body, touch=fine.surface_nodes[-50:])
     from palpate.scene import BuiltScene
 
-    simulation = palpate.Simulation(BuiltScene(scene, body, green))
+    simulation = palpate.Simulation(BuiltScene.of(scene, body, green))
     with pytest.raises(palpate.Error, match="limit is 256"):
         simulation.set_radius(0.05)
