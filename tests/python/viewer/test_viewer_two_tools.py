@@ -103,7 +103,8 @@ def test_two_tools_on_two_bodies(chromium, pair):
 def test_a_second_finger_feels_the_dent_of_the_first(chromium, liver):
     """By `f2 = delta / (c22 - c21 c12 / c11)`: the first finger holds the body against the second.
 
-    ``delta`` is how far the second finger goes below the dent that it meets; without the first one it is `f2 = delta / c22`.
+    ``delta`` is how far the second finger goes below the dent that it meets; without the first one it is
+    `f2 = delta / c22`.
     """
     with opened(chromium, liver) as page:
         x, y = page.evaluate("window.palpate.pickPoint()")
