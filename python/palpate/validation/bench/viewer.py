@@ -16,7 +16,6 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,9 @@ from palpate.viewer.server import ViewerServer
 # What a hand does at most: a slider reports 25 times a second, the pointer a hundred.
 SETTINGS_HZ, PRESSES_HZ = 25.0, 100.0
 # Between two beats of the event loop, and between two looks at the threads, s.
-BEAT, LOOK = 2e-3, 20e-3
+BEAT, LOOK = 2e-3, 50e-3
+# Threads of this process, where the system tells of them.
+TASKS = "/proc/self/task"
 # A model that is not there after this time is not awaited any longer, s.
 LONGEST_SWITCH = 600.0
 # Depth of the scripted press, over the size of the body, and presses a second.
@@ -206,13 +207,12 @@ def _watched_threads(loops: list[tuple[float, int]]) -> Iterator[None]:
 
 def servo_threads() -> int | None:
     """Threads of force loops in this process; None where the system does not tell (only Linux does)."""
-    tasks = Path("/proc/self/task")
-    if not tasks.is_dir():
+    if not os.path.isdir(TASKS):
         return None
     count = 0
-    for task in tasks.iterdir():
-        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
-            count += (task / "comm").read_text().strip() == "palpate-servo"
+    for task in os.listdir(TASKS):
+        with contextlib.suppress(OSError), open(f"{TASKS}/{task}/comm", "rb") as name:  # it may have ended meanwhile
+            count += name.read() == b"palpate-servo\n"
     return count
 
 
