@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from palpate.validation.bench.elements import Row as ElementRow
     from palpate.validation.bench.paper import Row
     from palpate.validation.bench.precompute import Result
+    from palpate.validation.bench.viewer import Row as ViewerRow
 
 bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
 app.add_typer(bench_app, name="bench")
@@ -233,3 +234,43 @@ def _print_table(rows: list[Row]) -> None:
     console = Console()
     console.print(table)
     console.print("force alone: patch contact with geometry and safety stage, as the 1 kHz loop runs it")
+
+
+@bench_app.command()
+def viewer(
+    paper: Annotated[bool, typer.Option("--paper", help="The meshes in the size of the paper; quicker.")] = False,
+    seconds: Annotated[float, typer.Option(min=0.1, help="How long each model is pressed.")] = 4.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """How long the viewer's server stalls while a page presses, moves sliders and changes the model.
+
+    100 presses and 25 settings a second; each model with an empty cache first, then from the cache.
+
+    Example: palpate bench viewer --seconds 2
+    """
+    from palpate.progress import narrated
+    from palpate.validation.bench import viewer as bench
+
+    with narrated("measuring; an empty cache takes a minute or two"):
+        rows = bench.run(paper=paper, seconds=seconds)
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+        return
+    _print_viewer(rows)
+
+
+def _print_viewer(rows: list[ViewerRow]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="The viewer's server under 100 presses and 25 settings a second", title_justify="left")
+    table.add_column("")
+    for title in ("s", "longest stall ms", "mean ms", "idle process ms", "frames/s", "ticks/s", "loops"):
+        table.add_column(title, justify="right")
+    for row in rows:
+        stalls = (f"{row.longest_stall_ms:.1f}", f"{row.mean_stall_ms:.2f}", f"{row.longest_idle_ms:.1f}")
+        rates = (f"{row.frames_per_second:.0f}", f"{row.ticks_per_second:.0f}")
+        loops = "-" if row.most_loops is None else str(row.most_loops)
+        table.add_row(row.phase, f"{row.seconds:.1f}", *stalls, *rates, loops)
+    Console().print(table)
+    print(f"longest stall of the event loop: {max(row.longest_stall_ms for row in rows):.1f} ms")

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import gc
 import json
 import secrets
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,6 +37,9 @@ HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
 BAD_TOKEN = 4401
+# So often threads pass on the interpreter's lock while the server runs, s; Python's own 5 ms add up to a visible halt
+# where the event loop takes the lock several times for one message.
+SWITCH_INTERVAL = 1e-3
 
 
 @dataclass(eq=False)
@@ -135,11 +140,18 @@ class ViewerServer:
                 ) from None
             raise ViewerError(f"cannot listen on {self.host}:{self.port}: {error.strerror or error}") from None
         self.port = self._server.sockets[0].getsockname()[1]
+        self._interval = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        # Modules are not garbage: a full collection that looks through them all halts everything for 30 ms.
+        gc.collect()
+        gc.freeze()
         self._watch = asyncio.create_task(self._watchdog())
 
     async def stop(self) -> None:
         """Close all connections and stop the loop."""
         if self._server is not None:
+            gc.unfreeze()
+            sys.setswitchinterval(self._interval)
             self._watch.cancel()
             self._server.close()
             await self._server.wait_closed()

@@ -239,7 +239,7 @@ class Session:
         return True
 
     def _set_youngs_modulus(self, youngs_modulus: float, message: Mapping[str, Any]) -> None:
-        body = index(message, "body", len(self._bodies)) if "body" in message else 0
+        body = index(message, "body", len(self._bodies))
         self.simulation.set_youngs_modulus(youngs_modulus, body)
 
     def _set_time_scale(self, time_scale: float, _message: Mapping[str, Any]) -> None:

@@ -19,7 +19,7 @@ TOP = [0.04, 0.025, 0.05]
 
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
-    return BuiltScene(palpate.Scene.of_store("block.palpate"), block, block_green)
+    return BuiltScene.of(palpate.Scene.of_store("block.palpate"), block, block_green)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def moving(block, block_green) -> BuiltScene:
     strike = {"point": TOP, "impulse": [0, 0, -1e-3]}
     scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": strike})
     motion = scene.dynamics.build(block, scene.device.max_stiffness, progress=False)
-    return BuiltScene(scene, block, block_green, motion)
+    return BuiltScene.of(scene, block, block_green, motion)
 
 
 def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
@@ -36,7 +36,7 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
         async with serving(moving) as server, page(server) as client, page(server) as watcher:
             scene, arrays = await client.receive("scene")
             told = scene["motion"]
-            assert told["frequencies"] == pytest.approx(moving.motion.basis.frequencies[:20].tolist())
+            assert told["frequencies"] == pytest.approx(moving.bodies[0].motion.basis.frequencies[:20].tolist())
             assert scene["bodies"][0]["youngs_modulus"] is None and told["youngs_modulus"] == pytest.approx(10e3)
             assert 0 < told["impulse"] < told["max_impulse"]
             assert not arrays["0/free"].any()
@@ -46,7 +46,7 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
             await client.say(type="strike", point=TOP, impulse=[0, 0, -told["impulse"]])
             _, arrays = await watcher.frame_where(lambda h: h["motion"]["struck_at"] is not None and h["strain"] > 1e-3)
             header, arrays = await client.frame_where(lambda h: h["motion"]["struck_at"] is not None)
-            top = np.argmin(np.linalg.norm(moving.green.surface_positions - TOP, axis=1))
+            top = np.argmin(np.linalg.norm(moving.bodies[0].green.surface_positions - TOP, axis=1))
             assert header["motion"]["watched"] == top
             while not len(arrays["history"]):
                 _, arrays = await client.receive("frame")
@@ -56,9 +56,9 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
             await client.say(type="mode", number=3)
             swung = lambda h: h["motion"]["mode"] and h["strain"] > 0.05  # noqa: E731
             header, arrays = await watcher.frame_where(swung)
-            assert header["motion"]["mode"]["frequency"] == pytest.approx(moving.motion.basis.frequencies[2])
+            assert header["motion"]["mode"]["frequency"] == pytest.approx(moving.bodies[0].motion.basis.frequencies[2])
             assert header["strain"] <= 0.1 + 1e-6
-            shape = moving.motion.basis.shapes[moving.green.surface_nodes, :, 2]
+            shape = moving.bodies[0].motion.basis.shapes[moving.bodies[0].green.surface_nodes, :, 2]
             alike = abs((shape * arrays["0/displacements"]).sum()) / np.linalg.norm(shape)
             assert alike == pytest.approx(np.linalg.norm(arrays["0/displacements"]), rel=1e-5)
             assert np.abs(server._session.simulation.frame().displacements).max() == 0
@@ -139,7 +139,7 @@ def test_the_impulse_in_the_viewer_is_that_of_the_offline_history(tmp_path):
     built = impulse_scene("beam", True).build(False)
     strike = built.scene.dynamics.strike
     simulation = palpate.Simulation(built)
-    node = int(np.argmin(np.linalg.norm(built.body.mesh.nodes - strike.point, axis=1)))
+    node = int(np.argmin(np.linalg.norm(built.bodies[0].body.mesh.nodes - strike.point, axis=1)))
     played = simulation.play(np.full((100, 3), np.nan), strikes=[(0, strike.point, strike.impulse)], watch=[node])
     there = np.column_stack([table[name] for name in ("ux_m", "uy_m", "uz_m")])[1:]
     assert played.displacements[:, 0] == pytest.approx(there, abs=1e-6 * np.abs(there).max())
@@ -149,14 +149,14 @@ def test_the_default_strike_swings_a_body_visibly_and_honestly(moving):
     """Struck along the inward normal at places all over: some swing visibly, and few strain it beyond 10 %."""
     session = Session(moving)
     session.close()
-    body, surface, mover = moving.body, moving.green.surface_nodes, session._moving
+    body, surface, mover = moving.bodies[0].body, moving.bodies[0].green.surface_nodes, session._moving
     outward = body.mesh.nodes - body.mesh.nodes.mean(axis=0)
     strains, swings = [], []
     for node in np.setdiff1d(surface, body.fixed_nodes)[::9]:
         impulse = -mover.impulse * outward[node] / np.linalg.norm(outward[node])
         strikes = [(0, body.mesh.nodes[node], impulse, mover._duration)]
         played = session.simulation.play(np.full((300, 3), np.nan), strikes=strikes, watch=surface)
-        strains.append(max(moving.green.strain_measure.largest(pose) for pose in played.displacements[::4]))
+        strains.append(max(moving.bodies[0].green.strain_measure.largest(pose) for pose in played.displacements[::4]))
         swings.append(np.linalg.norm(played.displacements, axis=2).max() / session.size)
     assert np.median(strains) < 0.1 and max(strains) < 0.25
     assert max(swings) > 0.03

@@ -245,15 +245,6 @@ def test_modes_swing_one_by_one(moving_page):
     assert not banner.is_visible()
 
 
-def test_no_second_tool_is_offered_where_there_is_one(page):
-    assert not page.locator("#fingers").is_visible() and not page.locator("#body-row").is_visible()
-    press(page, 10)
-    page.keyboard.press("n")
-    time.sleep(0.2)
-    assert state(page)["pinned"] == [] and state(page)["contacts"] == 1
-    page.mouse.up()
-
-
 def test_long_work_has_a_cancel_button(chromium, tmp_path):
     """With an empty cache the next body has to be solved first."""
     started = Program(tmp_path, "beam", "--paper")

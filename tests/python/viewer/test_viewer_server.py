@@ -11,7 +11,9 @@ from urllib.error import HTTPError
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 import websockets
+from conftest import skfem_stiffness
 from viewer_client import page, serving
 from websockets.asyncio.client import connect
 
@@ -26,7 +28,7 @@ TOP = [0.04, 0.025, 0.05]
 
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
-    return BuiltScene(palpate.Scene.of_store("block.palpate"), block, block_green)
+    return BuiltScene.of(palpate.Scene.of_store("block.palpate"), block, block_green)
 
 
 def get(server, path="/", host=None):
@@ -42,9 +44,9 @@ def test_a_press_is_felt_and_released(built):
             welcome, _ = await client.receive("welcome")
             assert welcome["role"] == "control"
             scene, arrays = await client.receive("scene")
-            assert np.allclose(arrays["0/nodes"], built.body.mesh.nodes, atol=1e-8)
-            assert np.array_equal(arrays["0/tets"], built.body.mesh.tets)
-            assert np.array_equal(arrays["0/fixed_nodes"], built.body.fixed_nodes)
+            assert np.allclose(arrays["0/nodes"], built.bodies[0].body.mesh.nodes, atol=1e-8)
+            assert np.array_equal(arrays["0/tets"], built.bodies[0].body.mesh.tets)
+            assert np.array_equal(arrays["0/fixed_nodes"], built.bodies[0].body.fixed_nodes)
             radius = scene["tools"][0]["radius"]
             deep = [TOP[0], TOP[1], TOP[2] + radius - 2e-3]
             await client.say(type="press", tool=0, position=[TOP[0], TOP[1], TOP[2] + radius + 1e-3], grab=False)
@@ -54,10 +56,10 @@ def test_a_press_is_felt_and_released(built):
             # The hand needs some tens of milliseconds to get there, the ramp a quarter of a second.
             settled = lambda h: h["time"] > 0.6 and h["tools"][0]["position"][2] < deep[2] + 1e-6 and h["interior"][0]  # noqa: E731
             header, arrays = await client.frame_where(settled)
-            expected = built.green.touch(TOP, (0, 0, -2e-3), scene["tools"][0]["contact_radius"])
+            expected = built.bodies[0].green.touch(TOP, (0, 0, -2e-3), scene["tools"][0]["contact_radius"])
             assert np.allclose(header["tools"][0]["force"], -expected.force, rtol=1e-3, atol=1e-4)
             assert header["tools"][0]["force"][2] > 0 > header["contacts"][0]["force"][2]
-            surface = arrays["0/displacements"][built.green.surface_nodes]
+            surface = arrays["0/displacements"][built.bodies[0].green.surface_nodes]
             assert np.allclose(surface, expected.displacements, atol=1e-6)
             assert len(arrays["0/displacements"]) == scene["bodies"][0]["nodes"]
             assert arrays["0/scalar"].max() == 255
@@ -146,7 +148,7 @@ def test_fields_are_those_of_the_recovery(built):
             await client.say(type="set", body=0, youngs_modulus=20e3)
             header, arrays = await settled(client, lambda h: h["time"] > 0.5)
             pose = arrays["0/displacements"].astype(float)
-            recovered = palpate.StressRecovery(built.body).recover(pose)
+            recovered = palpate.StressRecovery(built.bodies[0].body).recover(pose)
             strain = np.abs(recovered.principal_strains).max(axis=1)
             assert header["strain"] == pytest.approx(strain.max(), rel=1e-4)
             # Stress scales with the stiffness, which was doubled; strain does not.
@@ -166,7 +168,7 @@ def test_fields_are_those_of_the_recovery(built):
             await client.say(type="cutaway", on=True)
             header, arrays = await client.frame_where(lambda h: h["interior"][0])
             assert len(arrays["0/scalar"]) == scene["bodies"][0]["nodes"]
-            on_surface = arrays["0/scalar"][built.green.surface_nodes].astype(float)
+            on_surface = arrays["0/scalar"][built.bodies[0].green.surface_nodes].astype(float)
             assert np.abs(127.5 + 127.5 * values / header["fields"][0]["max"] - on_surface).max() < 0.7
             await client.say(type="field", name=5)
             assert "name" in (await client.receive("error"))[0]["text"]
@@ -175,7 +177,7 @@ def test_fields_are_those_of_the_recovery(built):
 
 
 def test_a_bare_store_offers_what_its_surface_knows(built, tmp_path):
-    built.green.save(tmp_path / "block.palpate")
+    built.bodies[0].green.save(tmp_path / "block.palpate")
     bare = palpate.Scene.of_store(tmp_path / "block.palpate").build()
 
     async def session():
@@ -219,6 +221,53 @@ def test_the_tool_is_limited(built):
             assert header["tools"][0]["wanted"] is None
 
     asyncio.run(session())
+
+
+def test_two_fingers_on_one_body_are_one_solve(block, block_green):
+    """Both presses feel each other: `K u = sum w_i f_i` with `w_i . u = d_i`, by scikit-fem's matrix and SciPy."""
+    finger = {"radius": 5e-3, "contact_radius": 12e-3}
+    built = BuiltScene.of(palpate.Scene(body={"store": "block.palpate"}, tool=[finger, finger]), block, block_green)
+    places = np.array([[0.03, 0.015, 0.05], [0.07, 0.035, 0.05]])
+    depths = np.array([[0, 0, -1e-3], [0, 0, -2e-3]])
+
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            await client.receive("scene")
+            alone = []
+            for tools in ([0], [1], [0, 1]):
+                for tool in tools:
+                    for depth in (-depths[tool], depths[tool]):
+                        target = places[tool] + [0, 0, 5e-3] + depth
+                        await client.say(type="press", tool=tool, position=target.tolist(), grab=False)
+                        await client.receive("frame")
+                count = len(tools)
+                header, _ = await settled(client, lambda h, n=count: h["time"] > 0.6 and len(h["contacts"]) == n)
+                forces = np.array([header["tools"][tool]["force"] for tool in tools])
+                alone.append(forces)
+                contacts = server._session.simulation.contacts()
+                if count == 1:
+                    await client.say(type="release", tool=tools[0])
+                    await client.frame_where(lambda h: h["contacts"] == [])
+            return alone, contacts
+
+    (first, second, both), contacts = asyncio.run(session())
+    contacts.sort(key=lambda contact: contact.tool)
+    assert np.abs(both[0] - first[0]).max() > 0.02 * np.linalg.norm(first)
+    assert np.abs(both[1] - second[0]).max() > 0.02 * np.linalg.norm(second)
+    assert -both == pytest.approx(forces_of(block, contacts), rel=1e-3, abs=1e-4)
+
+
+def forces_of(body, contacts) -> np.ndarray:
+    """Forces (c, 3) on a body that give its patches the displacements of their tools."""
+    dofs, axes = 3 * len(body.mesh.nodes), np.arange(3)
+    weights = np.zeros((dofs, 3 * len(contacts)))
+    for rank, contact in enumerate(contacts):
+        for axis in axes:
+            weights[3 * contact.nodes + axis, 3 * rank + axis] = contact.weights
+    free = np.setdiff1d(np.arange(dofs), (3 * body.fixed_nodes[:, None] + axes).ravel())
+    moved = scipy.sparse.linalg.spsolve(skfem_stiffness(body)[free][:, free].tocsc(), weights[free])
+    given = np.concatenate([contact.displacement for contact in contacts])
+    return np.linalg.solve(weights[free].T @ moved, given).reshape(-1, 3)
 
 
 @pytest.mark.parametrize("token", ["wrong", "", None, 5])
@@ -419,7 +468,7 @@ def test_long_work_is_cancelled(built, monkeypatch, tmp_path):
             while status["text"]:
                 status, _ = await client.receive("status")
             _, arrays = await client.receive("frame")
-            assert len(arrays["0/displacements"]) == len(built.green.surface_nodes)
+            assert len(arrays["0/displacements"]) == len(built.bodies[0].green.surface_nodes)
             # A cancel with nothing under way is not kept for the next one.
             await client.say(type="cancel")
             await client.say(type="model", name="beam")

@@ -13,7 +13,7 @@ const axes: CameraAxes = {
   up: new THREE.Vector3(0, 0, 1),
   forward: new THREE.Vector3(0, 1, 0),
 };
-const touched = { untouched: new THREE.Vector3(0.01, 0.02, 0.03), normal: new THREE.Vector3(0.6, 0, 0.8) };
+const touched = { untouched: new THREE.Vector3(0.01, 0.02, 0.03), normal: new THREE.Vector3(0.6, 0, 0.8), dent: 0 };
 
 function expectClose(a: THREE.Vector3, b: THREE.Vector3): void {
   expect(a.distanceTo(b)).toBeLessThan(1e-15);
@@ -26,6 +26,13 @@ describe("a press", () => {
     const centre = press().centre();
     expectClose(centre, touched.untouched.clone().addScaledVector(touched.normal, RADIUS - 0.01 * SIZE));
     expect(press().depthOf(centre)).toBeCloseTo(0.01 * SIZE, 15);
+  });
+
+  it("begins below what is seen where another tool has pressed the surface in", () => {
+    const second = new PressGesture({ ...touched, dent: 0.006 }, axes, SIZE, RADIUS);
+    const seen = touched.untouched.clone().addScaledVector(touched.normal, -0.006);
+    expectClose(second.centre(), seen.addScaledVector(touched.normal, RADIUS - 0.01 * SIZE));
+    expect(second.depthOf(second.centre())).toBeCloseTo(0.01 * SIZE + 0.006, 15);
   });
 
   it("goes as deep as the pointer goes down, and shears along the surface as it goes right", () => {

@@ -4,7 +4,7 @@ import * as THREE from "three";
 
 import type { Pick } from "../scene/body_view";
 
-/** Depth of a press at the moment it begins, over the size of the body: a click is felt at once. */
+/** Depth of a press below what is seen at the moment it begins, over the size of the body: a click is felt at once. */
 const DEPTH_AT_START = 0.01;
 const DEPTH_MAX = 0.25;
 /** A press may be lifted this far off the surface without letting go of the button. */
@@ -19,8 +19,8 @@ export interface CameraAxes {
   forward: THREE.Vector3;
 }
 
-/** Where a gesture begins: a point of the untouched surface and the outward normal there. */
-export type Touched = { [Key in "untouched" | "normal"]: Pick[Key] };
+/** Where a gesture begins: a point of the untouched surface, the outward normal and the dent there. */
+export type Touched = { [Key in "untouched" | "normal" | "dent"]: Pick[Key] };
 
 /** What the pointer does with the body until it is let go. Lengths in m. */
 export interface Gesture {
@@ -47,7 +47,7 @@ export class PressGesture implements Gesture {
     private readonly size: number,
     private readonly toolRadius: number,
   ) {
-    this.pushed = DEPTH_AT_START * size;
+    this.pushed = DEPTH_AT_START * size + pick.dent;
     this.tangent = axes.right.clone().projectOnPlane(pick.normal).normalize();
   }
 

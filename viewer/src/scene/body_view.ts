@@ -19,6 +19,8 @@ export interface Pick {
   shown: THREE.Vector3;
   untouched: THREE.Vector3;
   normal: THREE.Vector3;
+  /** How deep other tools have pressed the surface in there, along the normal, m. */
+  dent: number;
   /** In the body's frame: the same point at rest under the body's own loads, and that normal. */
   inBody: { settled: Vec3; normal: Vec3 };
 }
@@ -156,13 +158,16 @@ export class BodyView {
   private pickAt(shown: THREE.Vector3, triangle: number, weights: Vec3): Pick {
     const { surface, placed } = this;
     const place = { corners: surface.cornersOf(triangle), weights };
-    const normal = new THREE.Vector3(...surface.at(surface.untouchedNormals, place)).normalize();
+    const normalInBody = new THREE.Vector3(...surface.at(surface.untouchedNormals, place)).normalize();
+    const normal = normalInBody.clone().applyQuaternion(placed.quaternion);
+    const untouched = new THREE.Vector3(...surface.at(surface.untouched, place)).applyMatrix4(placed.matrix);
     return {
       body: this.index,
       shown: shown.clone(),
-      untouched: new THREE.Vector3(...surface.at(surface.untouched, place)).applyMatrix4(placed.matrix),
-      normal: normal.clone().applyQuaternion(placed.quaternion),
-      inBody: { settled: surface.at(surface.settled, place), normal: normal.toArray() },
+      untouched,
+      normal,
+      dent: this.drawn?.touched ? untouched.clone().sub(shown).dot(normal) : 0,
+      inBody: { settled: surface.at(surface.settled, place), normal: normalInBody.toArray() },
     };
   }
 }

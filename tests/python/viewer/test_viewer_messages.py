@@ -10,7 +10,6 @@ import palpate
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
 from palpate.viewer.session import Session, Wants
-from palpate.viewer.shown_body import placed
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -52,7 +51,8 @@ def test_a_session_sends_messages_of_that_shape(block, block_green, moving):
         strike = {"point": [0.04, 0.025, 0.05], "impulse": [0, 0, -1e-3]}
         scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": strike})
         motion = scene.dynamics.build(block, scene.device.max_stiffness, progress=False)
-    session = Session(BuiltScene(scene, block, block_green, motion))
+    session = Session(BuiltScene.of(scene, block, block_green, motion))
+    session.start()
     try:
         session.handle({"type": "press", "tool": 0, "position": [0.04, 0.025, 0.05], "grab": True})
         sent = {
@@ -69,18 +69,3 @@ def test_a_session_sends_messages_of_that_shape(block, block_green, moving):
         assert kinds == {name: dtype for name, (dtype, _) in expected.items() if not name.startswith("1/")}
         assert all(array.ndim == expected[name][1].ndim for name, array in arrays.items())
         assert (header["motion"] is not None) is moving
-
-
-def test_a_body_is_placed_by_a_rotation_and_a_shift():
-    """A third of a turn about (1, 1, 1) takes x to y, y to z and z to x; the shift comes after it."""
-    orientation = (0.5, 0.5, 0.5, 0.5)
-    moved = placed(np.eye(3), (10.0, 20.0, 30.0), orientation)
-    assert moved == pytest.approx(np.roll(np.eye(3), 1, axis=1) + [10.0, 20.0, 30.0])
-    generator = np.random.default_rng(2)
-    quaternion = generator.normal(size=4)
-    quaternion /= np.linalg.norm(quaternion)
-    points = generator.normal(size=(20, 3))
-    from scipy.spatial.transform import Rotation
-
-    expected = Rotation.from_quat(np.roll(quaternion, -1)).apply(points)
-    assert placed(points, (0, 0, 0), tuple(quaternion)) == pytest.approx(expected, abs=1e-12)

@@ -4,33 +4,39 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import MARKS, opened, press, settled_force, until
-from pair_session import PairSession
+from browser import MARKS, Program, opened, press, settled_force, state, until
 
 import palpate
 from palpate.viewer.server import ViewerServer
-from palpate.viewer.session import Session
 
 pytestmark = MARKS
 
+HALF = 0.5**0.5
+TWO_LIVERS = [
+    {"model": "liver", "paper": True},
+    {
+        "model": "liver",
+        "paper": True,
+        "name": "second liver",
+        "position": (0.2, 0.02, 0.01),
+        "orientation": (HALF, 0.0, 0.0, HALF),
+    },
+]
+
 
 class Pair:
-    """A server with two livers, the second one beside the first and turned, and a tool for each."""
+    """A server with two livers, the second one beside the first and turned, and two tools."""
 
     def __init__(self, cache: Path):
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("XDG_CACHE_HOME", str(cache))
-            built = palpate.Scene(body={"model": "liver", "paper": True}).build(False)
-            half = 0.5**0.5
-            patch.setattr(
-                "palpate.viewer.server.Session",
-                lambda built: PairSession(Session(built), Session(built), (0.2, 0.02, 0.01), (half, 0.0, 0.0, half)),
-            )
-            self.server = ViewerServer(built, port=0)
+            scene = palpate.Scene(body=TWO_LIVERS, tool=[{}, {}])
+            self.server = ViewerServer(scene.build(False), port=0)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -54,6 +60,21 @@ def pair(cache):
     started.stop()
 
 
+@pytest.fixture(scope="module")
+def liver(cache):
+    started = Program(cache, "liver", "--paper")
+    yield started
+    assert started.stop() == 0
+
+
+def drag(page, x: float, y: float, pixels: int) -> None:
+    """Press at a place of the picture and push deeper; the button stays down."""
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, pixels + 1):
+        page.mouse.move(x, y + step)
+
+
 def test_two_tools_on_two_bodies(chromium, pair):
     with opened(chromium, pair) as page:
         assert not page.get_by_test_id("pinned-line").is_visible()
@@ -63,14 +84,11 @@ def test_two_tools_on_two_bodies(chromium, pair):
         pinned = until(page, lambda s: s["pinned"] == [0])
         page.mouse.up()
         # The pointer drives the second tool now, on the body that it meets.
-        x, y = page.evaluate("window.palpate.pickPoint(1)")
-        page.mouse.move(x, y)
-        page.mouse.down()
-        for step in range(1, 16):
-            page.mouse.move(x, y + step)
+        drag(page, *page.evaluate("window.palpate.pickPoint(1)"), 15)
         second = until(page, lambda s: s["contacts"] == 2 and s["forceMagnitude"] > 0.05)
         assert second["pinned"] == [0]
         assert np.allclose(second["tools"][0]["position"], pinned["tools"][0]["position"], atol=1e-6)
+        # Bodies do not feel each other.
         assert np.allclose(second["tools"][0]["force"], alone, rtol=1e-3)
         assert second["force"] == second["tools"][1]["force"] and second["force"][2] > 0
         told = page.get_by_test_id("pinned-line").inner_text()
@@ -79,6 +97,38 @@ def test_two_tools_on_two_bodies(chromium, pair):
         page.mouse.up()
         until(page, lambda s: s["contacts"] == 1 and s["tools"][0]["active"] and not s["tools"][1]["active"])
         page.keyboard.press("Escape")
+        until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
+
+
+def test_a_second_finger_feels_the_dent_of_the_first(chromium, liver):
+    """By `f2 = delta / (c22 - c21 c12 / c11)`: the first finger holds the body against the second.
+
+    ``delta`` is how far the second finger goes below the dent that it meets; without the first one it is
+    `f2 = delta / c22`.
+    """
+    with opened(chromium, liver) as page:
+        x, y = page.evaluate("window.palpate.pickPoint()")
+        beside = x - 40, y + 40
+        drag(page, *beside, 12)
+        until(page, lambda s: s["forceMagnitude"] > 0.01)
+        alone = settled_force(page)
+        page.mouse.up()
+        until(page, lambda s: s["contacts"] == 0)
+        drag(page, x, y, 12)
+        until(page, lambda s: s["forceMagnitude"] > 0.01)
+        first = settled_force(page)
+        page.keyboard.press("n")
+        until(page, lambda s: s["pinned"] == [0])
+        page.mouse.up()
+        drag(page, *beside, 12)
+        until(page, lambda s: s["contacts"] == 2 and s["forceMagnitude"] > 0.01)
+        second = settled_force(page)
+        assert np.linalg.norm(second) > 1.02 * np.linalg.norm(alone)
+        # What the second finger presses away, the first one need not.
+        assert np.linalg.norm(state(page)["tools"][0]["force"]) < 0.98 * np.linalg.norm(first)
+        page.mouse.up()
+        until(page, lambda s: s["contacts"] == 1)
+        page.keyboard.press("n")
         until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
 
 
@@ -111,4 +161,17 @@ def test_stiffness_and_legend_are_those_of_the_chosen_body(chromium, pair):
         assert page.locator("#stiffness-value").inner_text() == "100 kPa"
         page.get_by_test_id("body-select").select_option(index=0)
         assert page.locator("#stiffness-value").inner_text() == "10.0 kPa"
-        until(page, lambda _: [s.simulation.youngs_modulus for s in pair.server._session.sessions] == [10e3, 100e3])
+        simulation = pair.server._session.simulation
+        until(page, lambda _: [simulation.youngs_modulus_of(body) for body in (0, 1)] == [10e3, 100e3])
+
+
+def test_no_second_tool_is_offered_where_there_is_one(chromium, cache):
+    started = Program(cache, "beam", "--paper", "--impulse")
+    with opened(chromium, started) as page:
+        assert not page.locator("#fingers").is_visible() and not page.locator("#body-row").is_visible()
+        press(page, 10)
+        page.keyboard.press("n")
+        time.sleep(0.2)
+        assert state(page)["pinned"] == [] and state(page)["contacts"] == 1
+        page.mouse.up()
+    assert started.stop() == 0
