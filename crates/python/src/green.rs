@@ -180,6 +180,21 @@ impl GreenCore {
         Ok((answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py), answer.reactions.into_pyarray(py)))
     }
 
+    /// Shortest of `repeats` times of a plain copy of the entries between touchable nodes (ranks), us: what benchmarks of the
+    /// force loop compare with.
+    fn gather_us(&self, py: Python<'_>, nodes: Vec<u32>, repeats: usize) -> PyResult<f64> {
+        let columns: Option<Vec<_>> = nodes.iter().map(|&node| self.green.touchable(node as usize)).collect();
+        let untouchable = || to_python(py, Error::Invalid("a node is not touchable".into()));
+        let columns = columns.ok_or_else(untouchable)?;
+        let mut entries = vec![0.0; 9 * nodes.len() * nodes.len()];
+        let mut time = || {
+            let begun = std::time::Instant::now();
+            self.green.block(&nodes, &columns, &mut entries);
+            begun.elapsed().as_secs_f64()
+        };
+        Ok(py.detach(|| 1e6 * (0..repeats).map(|_| time()).fold(f64::INFINITY, f64::min)))
+    }
+
     /// Presses a patch: force on the body (3) and displacements (3s).
     fn touch<'py>(
         &self,

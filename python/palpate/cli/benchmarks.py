@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from palpate.validation.bench.elements import Row as ElementRow
     from palpate.validation.bench.paper import Row
     from palpate.validation.bench.precompute import Result
+    from palpate.validation.bench.tick import Row as TickRow
     from palpate.validation.bench.viewer import Row as ViewerRow
 
 bench_app = typer.Typer(help="Measure, beside something else in the same run.", no_args_is_help=True)
@@ -234,6 +235,39 @@ def _print_table(rows: list[Row]) -> None:
     console = Console()
     console.print(table)
     console.print("force alone: patch contact with geometry and safety stage, as the 1 kHz loop runs it")
+
+
+@bench_app.command()
+def tick(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Cost of every kind of tick over the nodes under a contact, the costliest place beside the mean.
+
+    Example: palpate bench tick --json > tick.json
+    """
+    from palpate.progress import narrated
+    from palpate.validation.bench import tick as bench
+
+    with narrated("pressing on the liver at many places"):
+        rows = bench.run()
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+        return
+    _print_tick(rows)
+
+
+def _print_tick(rows: list[TickRow]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("nodes", "body", "tick", title="Microseconds a tick")
+    for column in ("mean", "costliest place", "plain gather"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        gather = "" if row.gather is None else f"{row.gather:.1f}"
+        body = "moves" if row.motion else "at rest"
+        table.add_row(str(row.nodes), body, row.kind, f"{row.mean:.1f}", f"{row.costliest:.1f}", gather)
+    Console().print(table)
 
 
 @bench_app.command()
