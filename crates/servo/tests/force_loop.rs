@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
-use palpate_core::simulation::{Input, Model, Pose, Snapshot, Strike, step};
+use palpate_core::simulation::{Input, Model, Pose, Scratch, Snapshot, State, Strike, step};
 use palpate_devices::simulated::{Target, simulated};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench};
 use palpate_servo::{
