@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -87,7 +88,9 @@ class LongWork:
                 result = work()
             except BaseException as raised:
                 error = raised
-            loop.call_soon_threadsafe(finish, result, error)
+            # Nobody waits any more where the server has ended meanwhile.
+            with contextlib.suppress(RuntimeError):
+                loop.call_soon_threadsafe(finish, result, error)
 
         threading.Thread(target=compute, name="palpate-long-work", daemon=True).start()
         stopped = asyncio.ensure_future(self._stopped.wait())
