@@ -10,6 +10,7 @@ use palpate_devices::{Device, Wrench};
 use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
+use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
 use crate::settings::{Settings, refuse_unless};
 use crate::subnormals::FlushSubnormals;
@@ -115,9 +116,18 @@ impl ForceLoop {
         }
     }
 
-    /// Limits the strain of bodies from now on: for these, responses are prepared.
-    #[cfg(feature = "offline")]
-    pub(crate) fn limit_strain(&mut self, bodies: [bool; MAX_BODIES]) {
+    /// Limits the strain of the bodies that `preparer` can measure, by a thread beside the loop that prepares what each
+    /// contact needs; to be kept as long as the loop ticks.
+    ///
+    /// # Errors
+    /// A loop whose strain is limited already; no thread from the operating system.
+    pub fn limit_strain(&mut self, handle: &mut LoopHandle, preparer: StrainPreparer) -> Result<StrainWorker> {
+        self.limited = preparer.known();
+        StrainWorker::start(handle.take_strain()?, preparer)
+    }
+
+    /// Limits the strain of bodies for which somebody else prepares responses.
+    pub(crate) fn limit_strain_of(&mut self, bodies: [bool; MAX_BODIES]) {
         self.limited = bodies;
     }
 

@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use palpate_core::Result;
 use palpate_core::simulation::{Model, Snapshot};
+use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
 
@@ -42,7 +42,7 @@ pub struct LoopHandle {
     published: Output<Published>,
     rows: Consumer<LogRow>,
     /// For whoever prepares strain responses.
-    pub(crate) strain: Option<PreparerEnd>,
+    strain: Option<PreparerEnd>,
 }
 
 /// Both ends, with settings that have been checked.
@@ -72,6 +72,12 @@ impl LoopHandle {
         settings.check(&self.model)?;
         self.settings.write(settings);
         Ok(())
+    }
+
+    /// The end of whoever prepares strain responses.
+    pub(crate) fn take_strain(&mut self) -> Result<PreparerEnd> {
+        let taken = || Error::Invalid("the strain of this loop is limited already".into());
+        self.strain.take().ok_or_else(taken)
     }
 
     /// The latest tick; wait-free.

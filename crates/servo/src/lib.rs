@@ -9,7 +9,6 @@ mod force_loop;
 mod handoff;
 mod log;
 mod offline;
-#[cfg(feature = "offline")]
 mod preparer;
 mod safety;
 mod servo;
@@ -24,8 +23,7 @@ pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
 pub use offline::{RecordedContact, Recording, Script, run};
-#[cfg(feature = "offline")]
-pub use preparer::StrainPreparer;
+pub use preparer::{StrainPreparer, StrainWorker};
 pub use safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
 pub use servo::Servo;
 pub use settings::Settings;

@@ -87,8 +87,8 @@ pub fn run(
     let tools = model.tools.len();
     let devices = (0..tools).map(|tool| Box::new(Scripted::new(script, tool, tools)) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
-    force_loop.limit_strain(strain.known());
-    let mut preparation = Preparation { end: handle.strain.take(), strain, due: VecDeque::new() };
+    force_loop.limit_strain_of(strain.known());
+    let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
     let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
     let moving = (0..model.bodies.len()).filter(|&body| model.bodies[body].moves());
@@ -123,22 +123,20 @@ pub fn run(
 
 /// Strain responses between the ticks, handed over after a fixed number of them.
 struct Preparation<'a> {
-    end: Option<PreparerEnd>,
+    end: PreparerEnd,
     strain: &'a StrainPreparer,
     due: VecDeque<(usize, (usize, Box<StrainWatch>))>,
 }
 
 impl Preparation<'_> {
     fn hand_over(&mut self, tick: usize) {
-        let Some(end) = &mut self.end else { return };
         while self.due.front().is_some_and(|(when, _)| *when <= tick) {
-            self.due.pop_front().into_iter().for_each(|(_, response)| end.hand_over(response));
+            self.due.pop_front().into_iter().for_each(|(_, response)| self.end.hand_over(response));
         }
     }
 
     fn prepare(&mut self, tick: usize) {
-        let Some(end) = &mut self.end else { return };
-        while let Some(prepared) = end.prepare_one(self.strain) {
+        while let Some(prepared) = self.end.prepare_one(self.strain) {
             self.due.extend(prepared.map(|response| (tick + PREPARATION_TICKS, response)));
         }
     }

@@ -5,18 +5,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use palpate_core::simulation::{MAX_BODIES, Model, StrainWatch};
+#[cfg(feature = "offline")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
 
 use crate::strain::{PreparerEnd, StrainRequest};
 
-/// What measures the strain of the bodies of a model, as far as it is known.
+/// What measures the strain of the bodies of a model, as far as it is known. Measuring belongs to the offline part of the
+/// core: built without it, the strain of no body is limited.
 #[derive(Clone)]
 pub struct StrainPreparer {
+    #[cfg(feature = "offline")]
     model: Arc<Model>,
+    #[cfg(feature = "offline")]
     measures: [Option<Arc<StrainMeasure>>; MAX_BODIES],
 }
 
+#[cfg(feature = "offline")]
 impl StrainPreparer {
     /// Knows none yet: the strain of no body is limited.
     pub fn new(model: &Arc<Model>) -> Self {
@@ -44,6 +49,22 @@ impl StrainPreparer {
     }
 }
 
+#[cfg(not(feature = "offline"))]
+impl StrainPreparer {
+    /// Knows none.
+    pub fn new(_model: &Arc<Model>) -> Self {
+        Self {}
+    }
+
+    pub(crate) fn known(&self) -> [bool; MAX_BODIES] {
+        [false; MAX_BODIES]
+    }
+
+    fn prepare(&self, _request: &StrainRequest) -> Option<(usize, Box<StrainWatch>)> {
+        None
+    }
+}
+
 impl PreparerEnd {
     /// Answers one request, if there is one; `later` takes the response in place of the ring.
     pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<(usize, Box<StrainWatch>)>> {
@@ -58,8 +79,8 @@ impl PreparerEnd {
     }
 }
 
-/// A thread that prepares, woken by the loop.
-pub(crate) struct StrainWorker {
+/// A thread that prepares strain responses, woken by the loop; it ends when this is dropped.
+pub struct StrainWorker {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -69,7 +90,7 @@ impl StrainWorker {
     ///
     /// # Errors
     /// The operating system's.
-    pub fn start(mut end: PreparerEnd, preparer: StrainPreparer) -> Result<Self> {
+    pub(crate) fn start(mut end: PreparerEnd, preparer: StrainPreparer) -> Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, worker) = (stop.clone(), end.worker.clone());
         let work = move || {

@@ -25,7 +25,7 @@ pub struct Servo {
     thread: Option<JoinHandle<()>>,
     handle: LoopHandle,
     /// Prepares strain responses while the loop runs.
-    _worker: Option<StrainWorker>,
+    _worker: StrainWorker,
 }
 
 impl Servo {
@@ -49,8 +49,7 @@ impl Servo {
             format!("the loop ticks at {} to {} Hz, got {rate}", RATES.start(), RATES.end())
         })?;
         let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings)?;
-        force_loop.limit_strain(strain.known());
-        let worker = handle.strain.take().map(|end| StrainWorker::start(end, strain)).transpose()?;
+        let worker = force_loop.limit_strain(&mut handle, strain)?;
         let (period, shortest) = (1.0 / rate, force_loop.shortest_period());
         refuse_unless(period >= shortest, || {
             format!("a device takes at most {} wrenches a second, the loop has {rate}", 1.0 / shortest)

@@ -6,11 +6,13 @@ mod common;
 mod counting_allocator;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_core::simulation::{Mode, Pose, Snapshot, Strike};
+use palpate_core::strain::StrainMeasure;
 use palpate_devices::{Buttons, Reading};
-use palpate_servo::{ForceLoop, LoopHandle, Published, SafetyLimits, Settings};
+use palpate_servo::{ForceLoop, LoopHandle, Published, SafetyLimits, Settings, StrainPreparer};
 
 use common::{PERIOD, PERIOD_NS, device, scene, settings};
 use counting_allocator::allocations;
@@ -18,6 +20,10 @@ use counting_allocator::allocations;
 const TICKS: u64 = 2600;
 const BAD_NUMBER: u64 = 2200;
 const RESET: u64 = 2300;
+/// Reached by the presses of the first tool.
+const STRAIN_LIMIT: f64 = 0.03;
+/// Ticks between two breaks in which the strain of contacts is prepared.
+const BREAK: u64 = 10;
 
 /// The first tool presses the first body again and again, holds on to it, goes to the second body, and from there to where
 /// it may not touch.
@@ -52,7 +58,7 @@ fn settings_at(tick: u64) -> Settings {
     let resets = u32::from(tick >= RESET);
     let strikes = u32::from(tick >= 100) + u32::from(tick >= 1600);
     let watch = (tick / 200 % 2 == 1).then_some((0, 7));
-    Settings { resets, strike, strikes, watch, ..settings() }
+    Settings { resets, strike, strikes, watch, strain_limit: STRAIN_LIMIT, ..settings() }
 }
 
 /// What kinds of tick that was, given the contacts before it.
@@ -75,6 +81,7 @@ fn kinds(tick: u64, before: &[(u64, usize)], published: &Published) -> Vec<&'sta
         both(status.fault.is_some(), "fault"),
         both(state.tools[0].refused[1].is_some(), "refused"),
         both(set.watch.is_some(), "watch"),
+        both(status.limited[0], "limited"),
     ]
     .into_iter()
     .flatten()
@@ -92,6 +99,9 @@ fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static
     let mut before = Vec::new();
     for tick in 0..TICKS {
         handle.set(settings_at(tick)).expect("valid settings");
+        if tick % BREAK == 0 {
+            std::thread::sleep(std::time::Duration::from_micros(200));
+        }
         let start = allocations();
         force_loop.tick(tick * PERIOD_NS, PERIOD);
         let made = allocations() - start;
@@ -121,13 +131,19 @@ fn no_kind_of_tick_allocates() {
         ];
         // Other programs on the machine must not decide which ticks have a fault.
         let limits = SafetyLimits { max_compute: f64::INFINITY, max_overruns: u32::MAX, ..SafetyLimits::default() };
-        let (force_loop, handle) =
-            ForceLoop::new(scene(moving, quadratic), devices, limits, settings()).expect("a valid loop");
+        let model = scene(moving, quadratic);
+        let mut strain = StrainPreparer::new(&model);
+        for (body, of_body) in model.bodies.iter().enumerate() {
+            strain.set_measure(body, Arc::new(StrainMeasure::of_surface(&of_body.green().surface)));
+        }
+        let settings = Settings { strain_limit: STRAIN_LIMIT, ..settings() };
+        let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings).expect("a valid loop");
+        let _worker = force_loop.limit_strain(&mut handle, strain).expect("a thread");
         let counts = count(force_loop, handle);
         let allocating: Vec<_> = counts.iter().filter(|(_, (_, sum))| *sum > 0).collect();
         assert!(allocating.is_empty(), "kinds of tick that allocate, with ticks and allocations: {allocating:?}");
         let all = ["free", "begin", "hold", "end", "grab", "two tools", "two bodies", "strike", "reset", "fault"];
-        for kind in all.into_iter().chain(["refused", "watch"]).chain(moving.then_some("motion")) {
+        for kind in all.into_iter().chain(["refused", "watch", "limited"]).chain(moving.then_some("motion")) {
             assert!(counts.contains_key(kind), "no tick was of the kind '{kind}': {counts:?}");
         }
     }

@@ -26,6 +26,7 @@ impl StrainKind {
     }
 
     /// Change of the strain (six components) with the sample, to first order about `base`: `sym(F^T X)`.
+    #[cfg(feature = "offline")]
     pub(super) fn linearised(self, base: &[f64; 6], change: &[f64; 6]) -> [f64; 6] {
         let dot = |a: &[f64], b: &[f64]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         match self {
@@ -38,6 +39,7 @@ impl StrainKind {
     }
 
     /// Squared norm of what the strain changes by beyond first order: `|X^T X| / 2` is not above half of it.
+    #[cfg(feature = "offline")]
     pub(super) fn squared_curvature(self, change: &[f64; 6]) -> f64 {
         match self {
             StrainKind::Infinitesimal => 0.0,
@@ -47,6 +49,7 @@ impl StrainKind {
 }
 
 /// Scalar product of two symmetric tensors; in its norm, that of Frobenius, none of the principal values is larger.
+#[cfg(feature = "offline")]
 pub(super) fn tensor_product(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + 2.0 * (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
 }
