@@ -17,6 +17,7 @@ const IN_FLIGHT: usize = 16;
 
 /// The contacts of one body, for which strain is to be prepared.
 #[derive(Clone)]
+#[cfg_attr(not(feature = "offline"), allow(dead_code))] // nobody answers it there
 pub(crate) struct StrainRequest {
     pub body: usize,
     pub limit: f64,
