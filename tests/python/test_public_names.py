@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import inspect
 import pkgutil
 import re
@@ -61,6 +62,12 @@ def test_every_module_of_the_package_tells_what_it_is():
         if module.name != "palpate._native":
             source = module.module_finder.find_spec(module.name).loader.get_source(module.name)
             assert source.lstrip().startswith('"""'), module.name
+
+
+def test_every_module_of_the_package_can_be_imported():
+    for module in pkgutil.walk_packages(palpate.__path__, "palpate."):
+        if not module.name.endswith(("__main__", "_child")):  # programs
+            importlib.import_module(module.name)
 
 
 def test_attributes_of_objects_are_named_in_the_docstrings_of_their_classes(block, block_green):
