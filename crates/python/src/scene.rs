@@ -112,7 +112,7 @@ pub fn contact_records(model: &Model, state: &Snapshot) -> Vec<ContactRecord> {
             placement.vector_to_world(contact.displacement),
         ];
         let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
-        let limited = contact.share < 1.0;
+        let limited = contact.limited;
         let vectors = vectors.map(|v| v.to_array());
         (contact.tool, contact.body, mode, vectors, limited, nodes.to_vec(), weights.to_vec())
     };

@@ -60,7 +60,9 @@ impl Servo {
         // start is seen by a running loop.
         let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
         let ticks = move || {
-            let (priority, locked_memory) = (request_realtime_priority(), lock_memory());
+            // Locked first: at real-time priority it would keep other programs from the processor for a tenth of a second.
+            let locked_memory = lock_memory();
+            let priority = request_realtime_priority();
             force_loop.set_realtime(RealtimeStatus { priority, locked_memory });
             let _ = ready_in.send(());
             run(&mut force_loop, period, &stopped);

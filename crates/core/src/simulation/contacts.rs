@@ -39,8 +39,12 @@ pub struct Contact {
     // Written every tick.
     /// Displacement of the tool from the anchor, as far as the limit of strain lets it, m.
     pub displacement: DVec3,
-    /// Which part that is of the whole displacement.
-    pub share: f64,
+    /// The whole displacement of the tool from the anchor, m.
+    pub wanted: DVec3,
+    /// Whether the limit of strain keeps the tool from it.
+    pub limited: bool,
+    /// Whether it has pressed since it began.
+    pub(super) pressed: bool,
     /// Bound on its length while the limit is not known yet, m.
     pub(super) bound: f64,
     /// Force on the body, N.

@@ -1,17 +1,19 @@
 //! The limit of strain: a tool's displacement counts only as far as the body stays within what linear elasticity can say.
 //!
 //! Beyond about 10 % strain a linear solution balloons. While contacts stick, strain follows from their forces, and forces
-//! at rest are linear in the displacements `d` of the tools from their anchors: the largest common share `s <= 1` of all
-//! `d` of a body at which no place passes the limit is found from a few places ([`crate::strain::StrainResponse`]), prepared once a set of
-//! contacts off the tick. The force then stays that of `s d` however far a hand goes on.
+//! at rest are linear in the displacements `d` of the tools from their anchors. The tools count as displaced by the closest
+//! displacements under which no place passes the limit (`admissible`), found from a few places
+//! ([`crate::strain::StrainResponse`]) that are prepared once a set of contacts off the tick. However far a hand goes on, the
+//! force stays that of these displacements.
 //!
-//! A contact that has just begun is not prepared for yet. Until it is, its displacement is held below
-//! [`provisional_displacement`], which surely keeps strain within the limit; from then on that bound opens by a tenth a tick.
+//! A contact that has just begun is not prepared for yet. Until it is, its displacement on a body at rest is held below
+//! [`provisional_displacement`], which surely keeps strain within the limit; from then on that bound opens tick by tick. On a
+//! body in motion, whose patch may be met far from where it rests, such a bound would do work.
 
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
-use super::contacts::Contact;
+use super::admissible::{Contacts, Vectors, closest};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::solve::{gather, solve_with};
@@ -21,15 +23,15 @@ use crate::contact::MAX_PATCH_NODES;
 use crate::strain::{MAX_CONTACTS_WATCHED, provisional_displacement};
 
 /// Growth a tick of the bound of a contact that has been prepared for.
-const OPENING: f64 = 1.1;
+const OPENING: f64 = 1.3;
 
 /// Bounds the displacement of the contact that has just begun in `slot`.
 pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
-    if limit <= 0.0 {
+    let body = &model.bodies[state.contacts.slots[slot].body];
+    if limit <= 0.0 || body.moves() {
         state.contacts.slots[slot].bound = f64::INFINITY;
         return;
     }
-    let body = &model.bodies[state.contacts.slots[slot].body];
     let patch = state.contacts.patches[slot].patch();
     let (mut weights, mut positions) = ([0.0; MAX_PATCH_NODES], [DVec3::ZERO; MAX_PATCH_NODES]);
     for (i, (node, weight)) in patch.iter().enumerate() {
@@ -40,50 +42,104 @@ pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
     state.contacts.slots[slot].bound = provisional_displacement(weights, positions, body.mean_edge, limit);
 }
 
-/// Shortens the displacements of the contacts of a body to what the limit of strain lets pass; zero is no limit.
+/// Brings the displacements of the contacts of a body to what the limit of strain lets pass; zero is no limit.
 pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, limit: f64) {
     let mut slots = [0; MAX_CONTACTS];
     let count = gather(state, body, &mut slots);
     let slots = &slots[..count];
-    let State { bodies, contacts, .. } = state;
-    let watch = bodies[body].strain.as_deref();
+    let State { bodies, contacts, compliance, .. } = state;
+    let (watch, scale) = (bodies[body].strain.as_deref(), bodies[body].stiffness_scale);
     for &slot in slots {
+        // What the others' forces of the tick before make of the patch is not this contact's own.
+        let others = slots.iter().filter(|&&other| other != slot);
+        let dent: DVec3 = others.map(|&other| compliance[slot][other] * contacts.slots[other].force / scale).sum();
         let contact = &mut contacts.slots[slot];
-        contact.share = 1.0;
+        contact.limited = false;
         if limit > 0.0 {
             if StrainWatch::covers(watch, contact) {
                 contact.bound *= OPENING;
             }
-            let length = contact.displacement.length();
-            shorten(contact, if length > contact.bound { contact.bound / length } else { 1.0 });
+            let own = contact.displacement - dent;
+            if own.length() > contact.bound {
+                contact.displacement = dent + own * (contact.bound / own.length());
+                contact.limited = true;
+            }
         }
     }
-    if limit > 0.0 && count > 0 && bodies[body].strain.is_some() {
-        let share = common_share(model, state, scratch, body, slots, limit);
-        slots.iter().for_each(|&slot| shorten(&mut state.contacts.slots[slot], share));
+    if limit <= 0.0 || count == 0 {
+        return;
+    }
+    let Some(watch) = state.bodies[body].strain.as_deref() else { return };
+    let mut displacements = [DVec3::ZERO; MAX_CONTACTS];
+    for (displacement, &slot) in displacements.iter_mut().zip(slots) {
+        *displacement = state.contacts.slots[slot].displacement;
+    }
+    let mut at_rest = AtRest { model, state, scratch, body, slots, watch, limit };
+    if let Some(admissible) = closest(&mut at_rest, &displacements) {
+        for (displacement, &slot) in admissible.iter().zip(slots) {
+            let contact = &mut state.contacts.slots[slot];
+            // Those of contacts that have no part in it come back to the last digit.
+            contact.limited |= displacement.distance(contact.displacement) > 1e-9 * contact.displacement.length();
+            contact.displacement = *displacement;
+        }
     }
 }
 
-fn shorten(contact: &mut Contact, share: f64) {
-    if share < 1.0 {
-        contact.displacement *= share;
-        contact.share *= share;
+/// The contacts of a body as if it came to rest under them.
+struct AtRest<'a> {
+    model: &'a Model,
+    state: &'a State,
+    scratch: &'a mut Scratch,
+    body: usize,
+    slots: &'a [usize],
+    watch: &'a StrainWatch,
+    limit: f64,
+}
+
+impl AtRest<'_> {
+    /// For each contact its place in the watch.
+    fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.slots.iter().enumerate().filter_map(|(i, &slot)| {
+            let serial = self.state.contacts.slots[slot].serial;
+            let place = self.watch.serials.iter().position(|&known| known == serial);
+            place.map(|place| (i, place))
+        })
+    }
+
+    /// Forces at the Green's function's own stiffness, in the order of the watch.
+    fn watched(&self, forces: &Vectors) -> [DVec3; MAX_CONTACTS_WATCHED] {
+        let mut watched = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
+        for (i, place) in self.places() {
+            watched[place] = forces[i] / self.state.bodies[self.body].stiffness_scale;
+        }
+        watched
     }
 }
 
-/// Share of the forces of a body at rest under the contacts' displacements that keeps it within the limit.
-fn common_share(model: &Model, state: &State, scratch: &mut Scratch, body: usize, slots: &[usize], limit: f64) -> f64 {
-    let scale = state.bodies[body].stiffness_scale;
-    let compliance = |a: usize, b: usize| state.compliance[a][b] * (1.0 / scale);
-    let displacement = |slot: usize| state.contacts.slots[slot].displacement;
-    solve_with(model, state, &mut scratch.system, slots, compliance, displacement);
-    let Some(watch) = &state.bodies[body].strain else { return 1.0 };
-    let mut forces = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
-    for (i, &slot) in slots.iter().enumerate() {
-        let serial = state.contacts.slots[slot].serial;
-        if let Some(place) = watch.serials.iter().position(|&known| known == serial) {
-            forces[place] = DVec3::from_slice(&scratch.system.right[3 * i..3 * i + 3]) / scale;
+impl Contacts for AtRest<'_> {
+    fn forces(&mut self, displacements: &Vectors) -> Vectors {
+        let (state, slots, scale) = (self.state, self.slots, self.state.bodies[self.body].stiffness_scale);
+        let compliance = |a: usize, b: usize| state.compliance[a][b] * (1.0 / scale);
+        let displacement =
+            |slot: usize| slots.iter().position(|&s| s == slot).map_or(DVec3::ZERO, |i| displacements[i]);
+        solve_with(self.model, state, &mut self.scratch.system, slots, compliance, displacement);
+        let mut forces = [DVec3::ZERO; MAX_CONTACTS];
+        for (force, right) in forces[..slots.len()].iter_mut().zip(self.scratch.system.right.chunks_exact(3)) {
+            *force = DVec3::from_slice(right);
         }
+        forces
     }
-    watch.response.share(&forces, limit)
+
+    fn share(&self, forces: &Vectors) -> f64 {
+        self.watch.response.share(&self.watched(forces), self.limit)
+    }
+
+    fn gradient(&self, forces: &Vectors) -> Vectors {
+        let watched = self.watch.response.gradient(&self.watched(forces));
+        let mut gradient = [DVec3::ZERO; MAX_CONTACTS];
+        for (i, place) in self.places() {
+            gradient[i] = watched[place];
+        }
+        gradient
+    }
 }

@@ -6,6 +6,7 @@
 //! all contacts of a body together. A body that moves has a
 //! `motion`, which a `strike` may set going, and an `energy` that is accounted for. `snapshot` is what is drawn.
 
+mod admissible;
 mod body;
 mod contacts;
 mod energy;
@@ -33,7 +34,7 @@ pub use scratch::Scratch;
 pub use snapshot::Snapshot;
 pub use state::{BodyState, State, ToolState};
 pub use step::step;
-pub use strain_watch::{Rebound, StrainWatch};
+pub use strain_watch::StrainWatch;
 pub use tool::{LawKind, ToolModel};
 
 /// Most tools a simulation may have.

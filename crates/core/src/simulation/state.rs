@@ -6,7 +6,7 @@ use super::body::BodyModel;
 use super::contacts::Contacts;
 use super::model::Model;
 use super::motion::Motion;
-use super::strain_watch::{Rebound, StrainWatch};
+use super::strain_watch::StrainWatch;
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 use crate::contact::Refusal;
 
@@ -16,8 +16,6 @@ pub struct ToolState {
     /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
     /// the least reached since for one that was released inside, so that a force always starts from zero.
     pub entry_depth: [f64; MAX_BODIES],
-    /// Where a limited tool was left by a body in motion.
-    pub rebound: [Option<Rebound>; MAX_BODIES],
     /// Why no contact began where the tool reaches the body.
     pub refused: [Option<Refusal>; MAX_BODIES],
 }

@@ -1,12 +1,11 @@
 //! The tick, in stages.
 
-use super::contacts::Mode;
+use super::contacts::{Contact, Mode};
 use super::input::{Input, Output};
 use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::state::State;
-use super::strain_watch::Rebound;
 use super::{limit, solve, time};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
@@ -43,16 +42,10 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         state.tools[tool].refused[body] = None;
         if !said.active || input.controls.reset || !said.pose.is_finite() {
             state.tools[tool].entry_depth[body] = 0.0;
-            state.tools[tool].rebound[body] = None;
             place.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
-        let mut approach = Approach::new(model, state.bodies[body].motion.as_ref(), tool, body, input);
-        let rebound = state.tools[tool].rebound[body].and_then(|rebound| rebound.position(approach.position));
-        match rebound {
-            Some(position) => approach.position = position,
-            None => state.tools[tool].rebound[body] = None,
-        }
+        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), tool, body, input);
         match place {
             Some(slot) => {
                 if !law.update(&approach, &mut state.contacts.slots[slot]) {
@@ -80,22 +73,17 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
         solve::contact_forces(model, state, &mut scratch.system, body);
         let mut ended = false;
         for slot in 0..state.contacts.slots.len() {
-            let contact = &state.contacts.slots[slot];
+            let contact = &mut state.contacts.slots[slot];
             if contact.mode == Mode::Free || contact.body != body {
                 continue;
             }
-            let tool = contact.tool;
-            if law_of(model.tools[tool].law).end(contact) {
-                let position = contact.anchor + contact.displacement / contact.share;
-                if model.bodies[body].moves() && state.tools[tool].rebound[body].is_none() {
-                    state.tools[tool].rebound[body] = Rebound::of(contact);
-                }
-                let position = state.tools[tool].rebound[body].and_then(|r| r.position(position)).unwrap_or(position);
-                let motion = state.bodies[body].motion.as_ref();
-                let approach = Approach::at(model, motion, tool, body, position);
-                state.tools[tool].entry_depth[body] = approach.depth();
+            if law_of(model.tools[contact.tool].law).end(contact) {
+                let contact = *contact;
                 state.contacts.clear(slot);
+                remember(model, state, &contact);
                 ended = true;
+            } else {
+                contact.pressed = true;
             }
         }
         if !ended {
@@ -104,13 +92,27 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
     }
 }
 
+/// What a tool remembers of a contact that its force has ended: how deep it is, so that the next one starts from zero. On a
+/// body at rest a contact that has never pressed is forgotten: the tool is in a dent that others have made, and begins anew
+/// until it has come through it.
+fn remember(model: &Model, state: &mut State, contact: &Contact) {
+    let (tool, body) = (contact.tool, contact.body);
+    let moves = model.bodies[body].moves();
+    if !moves && !contact.pressed {
+        return;
+    }
+    let position = contact.anchor + contact.wanted;
+    let motion = state.bodies[body].motion.as_ref();
+    state.tools[tool].entry_depth[body] = Approach::at(model, motion, tool, body, position).depth();
+}
+
 fn answer(model: &Model, state: &State) -> Output {
     let mut output = Output::default();
     for (contact, _) in state.contacts.iter() {
         let placement = &model.bodies[contact.body].placement;
         output.wrench_on_device[contact.tool].force -= placement.vector_to_world(contact.force);
         output.in_contact[contact.tool] = true;
-        output.limited[contact.tool] |= contact.share < 1.0;
+        output.limited[contact.tool] |= contact.limited;
     }
     output
 }

@@ -93,6 +93,27 @@ impl StrainResponse {
         largest_share(self.at_rest, limit, |share| self.largest_at(share, &steps))
     }
 
+    /// Gradient of the largest strain by the forces, 1/N, at the place that is strained most under them.
+    pub fn gradient(&self, forces: &[DVec3; MAX_CONTACTS_WATCHED]) -> [DVec3; MAX_CONTACTS_WATCHED] {
+        let steps = self.steps(forces);
+        let strain =
+            |place: &Place, step: &[f64; 6]| self.kind.magnitude(&std::array::from_fn(|k| place.base[k] + step[k]));
+        let strains = self.places[..self.count].iter().zip(&steps).map(|(place, step)| strain(place, step));
+        let most = strains.enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let mut gradient = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
+        let Some((most, _)) = most else { return gradient };
+        let (place, step) = (&self.places[most], &steps[most]);
+        // Central differences: a principal value is smooth but where two of them meet.
+        let size = 1e-5 * forces.iter().map(|force| force.length()).fold(0.0, f64::max);
+        for (slopes, gradient) in place.slope[..self.contacts].iter().zip(&mut gradient) {
+            for (axis, slope) in slopes.iter().enumerate() {
+                let at = |change: f64| strain(place, &std::array::from_fn(|k| step[k] + change * slope[k]));
+                gradient[axis] = (at(size) - at(-size)) / (2.0 * size);
+            }
+        }
+        gradient
+    }
+
     /// Change of every place under the whole forces. NaN where a force is not finite.
     fn steps(&self, forces: &[DVec3; MAX_CONTACTS_WATCHED]) -> [[f64; 6]; MAX_STRAIN_PLACES] {
         let mut steps = [[0.0; 6]; MAX_STRAIN_PLACES];

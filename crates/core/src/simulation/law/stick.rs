@@ -57,13 +57,14 @@ impl<F: Footprint> Law for Sticking<F> {
             normal: closest.normal,
             anchor,
             displacement: approach.position - anchor,
-            share: 1.0,
+            wanted: approach.position - anchor,
             ..Contact::default()
         }))
     }
 
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
-        contact.displacement = approach.position - contact.anchor;
+        contact.wanted = approach.position - contact.anchor;
+        contact.displacement = contact.wanted;
         match contact.mode {
             Mode::Grab if !approach.grab => return false,
             Mode::Press if approach.grab => contact.mode = Mode::Grab,

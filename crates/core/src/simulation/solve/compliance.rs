@@ -32,6 +32,7 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
         let met = motion.free_displacement(slot) + motion.residual_displacement(contacts, slot);
         contacts.slots[slot].anchor -= met;
         contacts.slots[slot].displacement += met;
+        contacts.slots[slot].wanted += met;
     }
     Some(slot)
 }

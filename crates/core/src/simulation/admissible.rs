@@ -1,0 +1,248 @@
+//! The admissible displacements closest to given ones: those under which strain is within its limit.
+//!
+//! With the compliance `C` of the contacts (what their laws add included) and `f = C^-1 d`, the largest strain is a convex
+//! function of the forces, so those within the limit `L` form a convex set. The tools count as displaced by
+//!
+//! ```text
+//! p = argmin (d - p)^T C^-1 (d - p) / 2    with    strain(C^-1 p) <= L
+//! ```
+//!
+//! The force `C^-1 p` is the gradient by `d` of `d^T C^-1 d / 2` less that minimum (Moreau): a closed path of the tools does no
+//! work, beyond the limit as well. Shortening `d` alone, which needs no iteration, hands out energy where a tool goes round
+//! a circle. The set is approached from outside by half-spaces `a . f <= a . b` that support it at `b`, the share of the
+//! latest forces that is within the limit; on `n` of them the minimum is `p = d - sum mu_i a_i`, `mu >= 0`, found by the active
+//! set of Lawson and Hanson (1974).
+
+use glam::DVec3;
+
+use super::MAX_CONTACTS;
+
+/// Most supporting half-spaces.
+const CUTS: usize = 16;
+/// Most changes of the active set.
+const CHANGES: usize = 4 * CUTS;
+/// A half-space is as good as another if it lies outside of it by less than this part of its distance.
+const PARALLEL: f64 = 1e-13;
+/// A share of the forces that is so close to all of them is all of them.
+const CLOSE: f64 = 1e-6;
+
+/// One vector a contact.
+pub type Vectors = [DVec3; MAX_CONTACTS];
+
+/// What is known of the contacts of a body.
+pub trait Contacts {
+    /// Forces for displacements, `C^-1 d`, N.
+    fn forces(&mut self, displacements: &Vectors) -> Vectors;
+    /// Largest share of forces that is within the limit.
+    fn share(&self, forces: &Vectors) -> f64;
+    /// Gradient of the largest strain by the forces, up to a positive factor.
+    fn gradient(&self, forces: &Vectors) -> Vectors;
+}
+
+/// Half-spaces that support the admissible forces.
+struct Cuts {
+    count: usize,
+    /// `a`, and `C^-1 a`.
+    normals: [Vectors; CUTS],
+    stiff: [Vectors; CUTS],
+    /// `a_i C^-1 a_j`, and by how much the forces of `d` lie outside.
+    matrix: [[f64; CUTS]; CUTS],
+    excess: [f64; CUTS],
+    multipliers: [f64; CUTS],
+}
+
+/// Admissible displacements closest to `displacements`; `None` if those are admissible.
+pub fn closest(contacts: &mut impl Contacts, displacements: &Vectors) -> Option<Vectors> {
+    let wanted = contacts.forces(displacements);
+    let radial = contacts.share(&wanted);
+    if radial >= 1.0 {
+        return None;
+    }
+    let zero = [DVec3::ZERO; MAX_CONTACTS];
+    let mut cuts = Cuts {
+        count: 0,
+        normals: [zero; CUTS],
+        stiff: [zero; CUTS],
+        matrix: [[0.0; CUTS]; CUTS],
+        excess: [0.0; CUTS],
+        multipliers: [0.0; CUTS],
+    };
+    let (mut forces, mut share) = (wanted, radial);
+    while share < 1.0 - CLOSE && cuts.count < CUTS {
+        let bound = forces.map(|force| share * force);
+        let normal = contacts.gradient(&bound);
+        let stiff = contacts.forces(&normal);
+        if !cuts.add(normal, stiff, &wanted, &bound) {
+            return Some(displacements.map(|d| radial * d));
+        }
+        forces = cuts.corrected(&wanted, &cuts.stiff);
+        share = contacts.share(&forces);
+    }
+    Some(cuts.corrected(displacements, &cuts.normals).map(|d| share * d))
+}
+
+impl Cuts {
+    /// Adds a half-space and finds the multipliers anew; false if it is none.
+    fn add(&mut self, normal: Vectors, stiff: Vectors, wanted: &Vectors, bound: &Vectors) -> bool {
+        let n = self.count;
+        (self.normals[n], self.stiff[n]) = (normal, stiff);
+        self.excess[n] = dot(&normal, wanted) - dot(&normal, bound);
+        for i in 0..=n {
+            let product = dot(&self.normals[i], &stiff);
+            (self.matrix[i][n], self.matrix[n][i]) = (product, product);
+        }
+        if !(self.matrix[n][n] > 0.0 && self.matrix[n][n].is_finite() && self.excess[n].is_finite()) {
+            return false;
+        }
+        self.count += 1;
+        self.find_multipliers();
+        true
+    }
+
+    /// Minimises `mu . Q mu / 2 - c . mu` over `mu >= 0`, from the multipliers as they are.
+    fn find_multipliers(&mut self) {
+        let n = self.count;
+        let mut active = [false; CUTS];
+        (0..n).for_each(|i| active[i] = self.multipliers[i] > 0.0);
+        for _ in 0..CHANGES {
+            let slope =
+                |i: usize| self.excess[i] - (0..n).map(|j| self.matrix[i][j] * self.multipliers[j]).sum::<f64>();
+            let scaled = |i: usize| slope(i) / self.matrix[i][i].sqrt();
+            let steepest = (0..n).filter(|&i| !active[i]).max_by(|&i, &j| scaled(i).total_cmp(&scaled(j)));
+            let Some(next) = steepest.filter(|&i| slope(i) > PARALLEL * self.excess[i].abs()) else { return };
+            active[next] = true;
+            // The unconstrained minimum on the active ones, or as far towards it as none turns negative.
+            for _ in 0..n {
+                let Some(target) = self.minimum_on(&mut active) else { break };
+                let ratio = |i: usize| match active[i] && target[i] <= 0.0 {
+                    true => self.multipliers[i] / (self.multipliers[i] - target[i]),
+                    false => 1.0,
+                };
+                let ratios: [f64; CUTS] = std::array::from_fn(|i| if i < n { ratio(i) } else { 1.0 });
+                let step = ratios.into_iter().fold(1.0, f64::min);
+                for i in (0..n).filter(|&i| active[i]) {
+                    self.multipliers[i] += step * (target[i] - self.multipliers[i]);
+                }
+                if step >= 1.0 {
+                    break;
+                }
+                for i in (0..n).filter(|&i| ratios[i] <= step) {
+                    (active[i], self.multipliers[i]) = (false, 0.0);
+                }
+            }
+        }
+    }
+
+    /// `Q mu = c` on the active half-spaces; one that repeats the others is made inactive. `None` if none is left.
+    fn minimum_on(&mut self, active: &mut [bool; CUTS]) -> Option<[f64; CUTS]> {
+        let (mut a, mut x) = (self.matrix, self.excess);
+        for k in 0..self.count {
+            if !active[k] {
+                continue;
+            }
+            if a[k][k] <= PARALLEL * self.matrix[k][k] {
+                (active[k], self.multipliers[k]) = (false, 0.0);
+                continue;
+            }
+            for i in k + 1..self.count {
+                let factor = a[i][k] / a[k][k];
+                for j in k + 1..self.count {
+                    a[i][j] -= factor * a[k][j];
+                }
+                x[i] -= factor * x[k];
+            }
+        }
+        for k in (0..self.count).rev() {
+            if active[k] {
+                let known: f64 = (k + 1..self.count).filter(|&j| active[j]).map(|j| a[k][j] * x[j]).sum();
+                x[k] = (x[k] - known) / a[k][k];
+            } else {
+                x[k] = 0.0;
+            }
+        }
+        active[..self.count].contains(&true).then_some(x)
+    }
+
+    /// `from - sum mu_i directions_i`.
+    fn corrected(&self, from: &Vectors, directions: &[Vectors; CUTS]) -> Vectors {
+        let mut corrected = *from;
+        for (direction, multiplier) in directions[..self.count].iter().zip(self.multipliers) {
+            for (value, &along) in corrected.iter_mut().zip(direction) {
+                *value -= multiplier * along;
+            }
+        }
+        corrected
+    }
+}
+
+fn dot(a: &Vectors, b: &Vectors) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One contact, anisotropic stiffness, admissible forces in an ellipsoid `f . q f <= 1`.
+    struct Ellipsoid {
+        stiffness: DVec3,
+        q: DVec3,
+    }
+
+    impl Contacts for Ellipsoid {
+        fn forces(&mut self, displacements: &Vectors) -> Vectors {
+            displacements.map(|d| self.stiffness * d)
+        }
+        fn share(&self, forces: &Vectors) -> f64 {
+            (1.0 / forces[0].dot(self.q * forces[0]).sqrt()).min(1.0)
+        }
+        fn gradient(&self, forces: &Vectors) -> Vectors {
+            let mut gradient = [DVec3::ZERO; MAX_CONTACTS];
+            gradient[0] = self.q * forces[0];
+            gradient
+        }
+    }
+
+    fn at(d: DVec3) -> Vectors {
+        let mut all = [DVec3::ZERO; MAX_CONTACTS];
+        all[0] = d;
+        all
+    }
+
+    /// At the minimum `d - p` is along the outer normal by the forces, `d - p = mu grad g`, and the limit is met.
+    #[test]
+    fn the_closest_point_meets_the_conditions_of_a_minimum() {
+        let mut body = Ellipsoid { stiffness: DVec3::new(1.0, 2.0, 0.7), q: DVec3::new(1.0, 0.3, 2.0) };
+        for d in [DVec3::new(3.0, 1.0, -2.0), DVec3::new(0.1, 5.0, 0.0), DVec3::new(-9.0, 9.0, 9.0)] {
+            let p = closest(&mut body, &at(d)).expect("beyond the limit")[0];
+            let force = body.stiffness * p;
+            assert!((force.dot(body.q * force) - 1.0).abs() < 1e-4);
+            let (normal, correction) = ((body.q * force).normalize(), (d - p).normalize());
+            assert!(normal.dot(correction) > 1.0 - 1e-3, "{normal} {correction}");
+        }
+        assert!(closest(&mut body, &at(DVec3::splat(0.1))).is_none());
+    }
+
+    /// The work of a hand on a circle beyond the limit; shortening the displacement alone gives out a good part of it.
+    #[test]
+    fn a_circle_does_no_work() {
+        let mut body = Ellipsoid { stiffness: DVec3::new(1.0, 2.0, 0.7), q: DVec3::new(1.0, 0.3, 2.0) };
+        let circle = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / 2000.0;
+            DVec3::new(2.0 + angle.cos(), 1.5 + angle.sin(), 1.0)
+        };
+        let mut work = [(0.0, 0.0); 2];
+        for k in 0..2000 {
+            let (d, step) = (circle(k), circle(k + 1) - circle(k));
+            let middle = d + step / 2.0;
+            let closest = closest(&mut body, &at(middle)).expect("beyond the limit")[0];
+            let radial = middle * body.share(&at(body.stiffness * middle));
+            for ((sum, size), p) in work.iter_mut().zip([closest, radial]) {
+                let part = (body.stiffness * p).dot(step);
+                (*sum, *size) = (*sum + part, *size + part.abs());
+            }
+        }
+        assert!(work[0].0.abs() < 2e-4 * work[0].1, "{work:?}");
+        assert!(work[1].0.abs() > 1e-2 * work[1].1, "{work:?}");
+    }
+}
