@@ -454,7 +454,10 @@ def test_another_model_is_shown_when_it_is_ready(built):
 BLOCK = Path(__file__).parents[3] / "examples" / "block.obj"
 LONG = {
     # A mesher reports no progress: it is left to itself.
-    "Loading": {"body": {"mesh": str(BLOCK), "unit": "mm", "max_element_size": "3mm"}, "supports": {"fixed": "z < 1mm"}},
+    "Loading": {
+        "body": {"mesh": str(BLOCK), "unit": "mm", "max_element_size": "3mm"},
+        "supports": {"fixed": "z < 1mm"},
+    },
     "Solving": {"body": {"model": "doll"}},
     "Computing": {"body": {"model": "beam", "paper": True}, "dynamics": {"modes": "all"}},
 }
