@@ -64,3 +64,14 @@ async def page(server, *, token=None, origin=None):
         client = Page(server, socket)
         await client.say(type="hello", token=token or server.token, version=messages.VERSION)
         yield client
+
+
+async def settled(client, condition=lambda header: True):
+    """Frame once the hand has arrived: the force stands still."""
+    force = None
+    for _ in range(200):
+        header, arrays = await client.receive("frame")
+        if header["contacts"] and header["tools"][0]["force"] == force and condition(header):
+            return header, arrays
+        force = header["tools"][0]["force"]
+    raise AssertionError(f"the force does not settle; the last frame was {header}")

@@ -298,8 +298,8 @@ def _print_viewer(rows: list[ViewerRow]) -> None:
     from rich.table import Table
 
     table = Table(title="The viewer's server under 100 presses and 25 settings a second", title_justify="left")
-    table.add_column("")
-    for title in ("s", "longest stall ms", "mean ms", "idle process ms", "frames/s", "ticks/s", "loops"):
+    table.add_column("", no_wrap=True)
+    for title in ("s", "stall ms", "mean", "idle", "frames/s", "ticks/s", "loops"):
         table.add_column(title, justify="right")
     for row in rows:
         stalls = (f"{row.longest_stall_ms:.1f}", f"{row.mean_stall_ms:.2f}", f"{row.longest_idle_ms:.1f}")
@@ -307,4 +307,5 @@ def _print_viewer(rows: list[ViewerRow]) -> None:
         loops = "-" if row.most_loops is None else str(row.most_loops)
         table.add_row(row.phase, f"{row.seconds:.1f}", *stalls, *rates, loops)
     Console().print(table)
+    print("stall: longest halt of the event loop, and the mean; idle: of a process beside it that does nothing")
     print(f"longest stall of the event loop: {max(row.longest_stall_ms for row in rows):.1f} ms")

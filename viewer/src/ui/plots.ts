@@ -14,6 +14,9 @@ const REDRAW_INTERVAL_MS = 80;
 const HEIGHT_PX = 112;
 /** Above these stands what their lines mean. */
 const MOTION_HEIGHT_PX = 102;
+/** In a window lower than this plots give way by so much, or the statistics below would be out of sight. */
+const LOW_WINDOW_PX = 780;
+const LOWER_PX = 22;
 // Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
 const FONT = "11px system-ui, sans-serif";
 const TEXT_COLOR = "#9aa5b4";
@@ -69,6 +72,8 @@ export class Plots {
       this.log.clear();
       this.history.clear();
       this.span = scene?.motion?.span ?? 1;
+      // The log of the loop is about the first tool.
+      this.plots.force.axes[1]!.label = (scene?.tools.length ?? 1) > 1 ? "finger 1 (N)" : "force (N)";
     });
     store.subscribe(["tab"], ({ tab }) => {
       if (tab === "modes") return;
@@ -109,7 +114,8 @@ export class Plots {
     const { force, compute, displacement, energy } = this.plots;
     for (const plot of [force, compute, displacement, energy]) {
       const width = plot.root.parentElement!.clientWidth;
-      const height = plot === force || plot === compute ? HEIGHT_PX : MOTION_HEIGHT_PX;
+      const tall = plot === force || plot === compute ? HEIGHT_PX : MOTION_HEIGHT_PX;
+      const height = window.innerHeight < LOW_WINDOW_PX ? tall - LOWER_PX : tall;
       if (width > 0 && width !== plot.width) plot.setSize({ width, height });
     }
   }
