@@ -33,8 +33,9 @@ def test_a_circle_of_the_tool_gives_out_no_energy(limit, sense, across):
     assert (np.linalg.norm(forces, axis=1) > 0).all()
     assert (played.limited[-len(circle) :] == (limit > 0)).all()
     work = -np.einsum("ij,ij->i", (forces[1:] + forces[:-1]) / 2, np.diff(circle, axis=0))
-    # The trapezoidal rule is exact to about the square of the step's angle.
-    assert work.sum() >= -1e-4 * np.abs(work).sum()
+    # The trapezoidal rule is exact to about the square of the step's angle. Beyond the limit the force is that of the
+    # closest admissible displacement, found to some thousandths; one that is only shortened gives out a sixth.
+    assert work.sum() >= -(1e-2 if limit else 1e-4) * np.abs(work).sum()
 
 
 @pytest.mark.parametrize("limit", [0.0, 0.1])

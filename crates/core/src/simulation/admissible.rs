@@ -21,8 +21,11 @@ use super::MAX_CONTACTS;
 const CUTS: usize = 16;
 /// Most changes of the active set.
 const CHANGES: usize = 4 * CUTS;
-/// A half-space is as good as another if it lies outside of it by less than this part of its distance.
-const PARALLEL: f64 = 1e-13;
+/// Part by which the diagonal of the half-spaces' matrix is raised: more of them than there are components of force are
+/// linearly dependent.
+const RIDGE: f64 = 1e-11;
+/// A half-space is met if what is missing is this part of its distance.
+const MET: f64 = 1e-12;
 /// A share of the forces that is so close to all of them is all of them.
 const CLOSE: f64 = 1e-6;
 
@@ -109,11 +112,11 @@ impl Cuts {
                 |i: usize| self.excess[i] - (0..n).map(|j| self.matrix[i][j] * self.multipliers[j]).sum::<f64>();
             let scaled = |i: usize| slope(i) / self.matrix[i][i].sqrt();
             let steepest = (0..n).filter(|&i| !active[i]).max_by(|&i, &j| scaled(i).total_cmp(&scaled(j)));
-            let Some(next) = steepest.filter(|&i| slope(i) > PARALLEL * self.excess[i].abs()) else { return };
+            let Some(next) = steepest.filter(|&i| slope(i) > MET * self.excess[i].abs()) else { return };
             active[next] = true;
             // The unconstrained minimum on the active ones, or as far towards it as none turns negative.
             for _ in 0..n {
-                let Some(target) = self.minimum_on(&mut active) else { break };
+                let target = self.minimum_on(&active);
                 let ratio = |i: usize| match active[i] && target[i] <= 0.0 {
                     true => self.multipliers[i] / (self.multipliers[i] - target[i]),
                     false => 1.0,
@@ -133,15 +136,12 @@ impl Cuts {
         }
     }
 
-    /// `Q mu = c` on the active half-spaces; one that repeats the others is made inactive. `None` if none is left.
-    fn minimum_on(&mut self, active: &mut [bool; CUTS]) -> Option<[f64; CUTS]> {
+    /// `Q mu = c` on the active half-spaces, zero on the others.
+    fn minimum_on(&self, active: &[bool; CUTS]) -> [f64; CUTS] {
         let (mut a, mut x) = (self.matrix, self.excess);
+        (0..self.count).for_each(|k| a[k][k] *= 1.0 + RIDGE);
         for k in 0..self.count {
             if !active[k] {
-                continue;
-            }
-            if a[k][k] <= PARALLEL * self.matrix[k][k] {
-                (active[k], self.multipliers[k]) = (false, 0.0);
                 continue;
             }
             for i in k + 1..self.count {
@@ -160,7 +160,7 @@ impl Cuts {
                 x[k] = 0.0;
             }
         }
-        active[..self.count].contains(&true).then_some(x)
+        x
     }
 
     /// `from - sum mu_i directions_i`.
