@@ -153,7 +153,7 @@ def test_other_settings_are_noticed(press):
         assert 0.995 * LIMIT <= stiff.largest_strain <= PLACES * LIMIT
     press.set_strain_limit(0.5 * LIMIT)
     halved = settle(press)
-    assert halved.limited[0] and halved.largest_strain == pytest.approx(0.5 * LIMIT, rel=0.005)
+    assert halved.limited[0] and 0.4975 * LIMIT <= halved.largest_strain <= 0.5 * PLACES * LIMIT
     press.set_strain_limit(LIMIT)
     press.remove()
     time.sleep(0.05)
