@@ -34,7 +34,7 @@ pub struct Status {
     pub wrenches: [Wrench; MAX_TOOLS],
     /// What the devices said.
     pub readings: [Reading; MAX_TOOLS],
-    /// Whether each tool is held back by the limit of strain.
+    /// Whether the limit of strain keeps each tool from following its device.
     pub limited: [bool; MAX_TOOLS],
     /// Time that ticks take as a whole, statistics and hand-off included, us.
     pub compute: Summary,

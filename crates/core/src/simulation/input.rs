@@ -56,7 +56,7 @@ pub struct ToolInput {
     pub grab: bool,
 }
 
-/// A blow for a body in motion.
+/// An impulse for a body in motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Strike {
     /// Which body.
@@ -117,7 +117,7 @@ pub struct Output {
     pub wrench_on_device: [Wrench; MAX_TOOLS],
     /// Whether each tool touches.
     pub in_contact: [bool; MAX_TOOLS],
-    /// Whether each tool is held back by the limit of strain.
+    /// Whether the limit of strain keeps each tool from following its device.
     pub limited: [bool; MAX_TOOLS],
 }
 
