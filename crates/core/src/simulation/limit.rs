@@ -6,9 +6,9 @@
 //! ([`crate::strain::StrainResponse`]) that are prepared once a set of contacts off the tick. However far a hand goes on, the
 //! force stays that of these displacements.
 //!
-//! A contact that has just begun is not prepared for yet. Until it is, its displacement on a body at rest is held below
-//! [`provisional_displacement`], which surely keeps strain within the limit; from then on that bound opens tick by tick. On a
-//! body in motion, whose patch may be met far from where it rests, such a bound would do work.
+//! A contact that has just begun is not prepared for yet. Until it is, its displacement from where it met the patch stays
+//! below [`provisional_displacement`], which surely keeps its own strain within the limit; from then on that bound opens tick by
+//! tick.
 
 use glam::DVec3;
 
@@ -28,7 +28,7 @@ const OPENING: f64 = 1.3;
 /// Bounds the displacement of the contact that has just begun in `slot`.
 pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
     let body = &model.bodies[state.contacts.slots[slot].body];
-    if limit <= 0.0 || body.moves() {
+    if limit <= 0.0 {
         state.contacts.slots[slot].bound = f64::INFINITY;
         return;
     }
@@ -50,18 +50,19 @@ pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, bod
     let State { bodies, contacts, compliance, .. } = state;
     let (watch, scale) = (bodies[body].strain.as_deref(), bodies[body].stiffness_scale);
     for &slot in slots {
-        // What the others' forces of the tick before make of the patch is not this contact's own.
-        let others = slots.iter().filter(|&&other| other != slot);
+        // Where the patch was met, and what the others' forces of the tick before make of it, is not this contact's own.
+        let others = slots.iter().filter(|&&other| other != slot && !model.bodies[body].moves());
         let dent: DVec3 = others.map(|&other| compliance[slot][other] * contacts.slots[other].force / scale).sum();
         let contact = &mut contacts.slots[slot];
+        let found = contact.met + dent;
         contact.limited = false;
         if limit > 0.0 {
             if StrainWatch::covers(watch, contact) {
                 contact.bound *= OPENING;
             }
-            let own = contact.displacement - dent;
+            let own = contact.displacement - found;
             if own.length() > contact.bound {
-                contact.displacement = dent + own * (contact.bound / own.length());
+                contact.displacement = found + own * (contact.bound / own.length());
                 contact.limited = true;
             }
         }

@@ -33,6 +33,7 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
         contacts.slots[slot].anchor -= met;
         contacts.slots[slot].displacement += met;
         contacts.slots[slot].wanted += met;
+        contacts.slots[slot].met = met;
     }
     Some(slot)
 }
