@@ -41,10 +41,11 @@ fn first_tool(tick: u64) -> Reading {
     Reading { pose: Pose::at(DVec3::new(x, y, 0.1 + above)), buttons, active: true, ..Reading::default() }
 }
 
-/// The second tool is on the first body for a while.
+/// The second tool is on the first body for a while, and comes to it anew when the first has left it.
 fn second_tool(tick: u64) -> Reading {
     let pose = Pose::at(DVec3::new(0.07, 0.05, 0.101));
-    Reading { pose, active: (300..2000).contains(&tick) && !(900..1000).contains(&tick), ..Reading::default() }
+    let active = matches!(tick, 300..900 | 1000..1450 | 1520..2000);
+    Reading { pose, active, ..Reading::default() }
 }
 
 fn settings_at(tick: u64) -> Settings {
@@ -124,7 +125,10 @@ fn allocations_are_counted() {
 
 #[test]
 fn no_kind_of_tick_allocates() {
-    for (moving, quadratic) in [(false, false), (true, false), (false, true)] {
+    // When strain responses come is not the same from run to run, and contacts last longer or shorter: with the limit, only
+    // that it acts is asked for.
+    let bodies = [(false, false), (true, false), (false, true)];
+    for ((moving, quadratic), limited) in bodies.into_iter().flat_map(|body| [(body, false), (body, true)]) {
         let devices = vec![
             device(|now_ns| Ok(Reading { timestamp_ns: now_ns, ..first_tool(now_ns / PERIOD_NS) })),
             device(|now_ns| Ok(Reading { timestamp_ns: now_ns, ..second_tool(now_ns / PERIOD_NS) })),
@@ -138,12 +142,16 @@ fn no_kind_of_tick_allocates() {
         }
         let settings = Settings { strain_limit: STRAIN_LIMIT, ..settings() };
         let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings).expect("a valid loop");
-        let _worker = force_loop.limit_strain(&mut handle, strain).expect("a thread");
+        let _worker = limited.then(|| force_loop.limit_strain(&mut handle, strain).expect("a thread"));
         let counts = count(force_loop, handle);
         let allocating: Vec<_> = counts.iter().filter(|(_, (_, sum))| *sum > 0).collect();
         assert!(allocating.is_empty(), "kinds of tick that allocate, with ticks and allocations: {allocating:?}");
         let all = ["free", "begin", "hold", "end", "grab", "two tools", "two bodies", "strike", "reset", "fault"];
-        for kind in all.into_iter().chain(["refused", "watch", "limited"]).chain(moving.then_some("motion")) {
+        let kinds: Vec<_> = match limited {
+            true => vec!["limited"],
+            false => all.into_iter().chain(["refused", "watch"]).chain(moving.then_some("motion")).collect(),
+        };
+        for kind in kinds {
             assert!(counts.contains_key(kind), "no tick was of the kind '{kind}': {counts:?}");
         }
     }
