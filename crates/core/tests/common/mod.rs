@@ -19,7 +19,7 @@ pub fn cube(n: u32) -> Problem {
     let mut tets = Vec::new();
     for (i, j, k) in (0..n * n * n).map(|c| (c / (n * n), c / n % n, c % n)) {
         let corner = |b: u32| at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
-        // The two ways of cutting a cube alternate, so that the diagonals of neighbours meet.
+        // The two cuts of a cube alternate, so that the diagonals of neighbours meet.
         let cuts: [[u32; 4]; 5] = if (i + j + k) % 2 == 0 {
             [[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]]
         } else {
