@@ -19,8 +19,9 @@ def test_the_server_answers_while_models_change_and_sliders_move():
     for row in rows:
         # A clock proves nothing on a machine that others use; a second is more than any of them takes.
         assert row.longest_stall_ms < 1000
-        assert row.most_loops in {None, 1}
+        assert row.most_loops in {None, 0, 1}  # 0: a short phase between two loops
     for row in presses:
+        assert row.most_loops in {None, 1}
         assert row.frames_per_second > 5
         assert 500 < row.ticks_per_second < 1500
         assert 8 <= row.settings <= 26 * row.seconds + 15

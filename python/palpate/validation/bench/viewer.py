@@ -33,6 +33,8 @@ BEAT, LOOK = 2e-3, 50e-3
 TASKS = "/proc/self/task"
 # A model that is not there after this time is not awaited any longer, s.
 LONGEST_SWITCH = 600.0
+# Beginnings of refusals of settings and presses that were meant for another model.
+LATE = ("the contact radius goes up to", "press: the position")
 # Depth of the scripted press, over the size of the body, and presses a second.
 DEPTH, PRESSING_HZ = 0.02, 1.0
 
@@ -254,19 +256,26 @@ class _Page:
         async with connect(f"ws://{address}/socket", **options) as socket:
             self._socket = socket
             await self._say(type="hello", token=token, version=messages.VERSION)
+            self._begin("pressed")
             listening = asyncio.create_task(self._listen())
             await self._arrival(0)
-            self._begin("pressed")
-            busy = [asyncio.create_task(work) for work in (self._press(), self._move_sliders())]
-            for round_name in ("empty cache", "from the cache"):
-                for name in self._names:
-                    await self._change(name, round_name)
-            for task in (*busy, listening):
-                if task.done():
-                    task.result()
+            work = (self._press(), self._move_sliders(), self._change_models())
+            tasks = [listening, *(asyncio.create_task(one) for one in work)]
+            # Only changing models ends by itself; what ends before it is an error, or a server that hung up.
+            ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in tasks:
                 task.cancel()
+            for task in ended:
+                task.result()
+            if tasks[-1] not in ended:
+                raise RuntimeError(f"the server closed the connection: {socket.close_code} {socket.close_reason}")
         self.phases[-1].end = time.monotonic()
         return self.phases[1:]
+
+    async def _change_models(self) -> None:
+        for round_name in ("empty cache", "from the cache"):
+            for name in self._names:
+                await self._change(name, round_name)
 
     async def _change(self, name: str, round_name: str) -> None:
         self._begin(f"to {name}, {round_name}")
@@ -296,9 +305,11 @@ class _Page:
     async def _listen(self) -> None:
         async for raw in self._socket:
             if isinstance(raw, str):
-                kind = json.loads(raw)["type"]
-                if self.phases:
-                    self.phases[-1].settings += kind == "settings"
+                message = json.loads(raw)
+                # What was meant for the model before may reach the one after, and be refused by it.
+                if message["type"] == "error" and not message["text"].startswith(LATE):
+                    raise RuntimeError(f"the server refused: {message['text']}")
+                self.phases[-1].settings += message["type"] == "settings"
                 continue
             header, arrays = messages.decode(raw)
             if header["type"] == "scene":
