@@ -145,7 +145,7 @@ impl ForceLoop {
             refuse_unless(period >= 1.0 / most, || {
                 format!("a device takes at most {most} wrenches a second, the loop has {rate}")
             })?;
-            check_stiffness(&self.model, tool, &limits, period)?;
+            check_stiffness(&self.model, tool, &limits, Some(period))?;
         }
         Ok(())
     }

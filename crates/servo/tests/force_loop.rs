@@ -149,6 +149,7 @@ fn what_does_not_fit_the_scene_is_an_error() {
     refused(make(3, patient(), settings()), "2 tools takes as many devices, got 3");
     refused(make(2, SafetyLimits { max_force: f64::NAN, ..patient() }, settings()), "largest force");
     refused(make(2, SafetyLimits { ramp: -1.0, ..patient() }, settings()), "ramp");
+    refused(make(2, SafetyLimits { max_damping: f64::NAN, ..patient() }, settings()), "strongest damping");
     refused(make(2, patient(), Settings { watch: Some((2, 0)), ..settings() }), "no body 2");
     refused(make(2, patient(), Settings { watch: Some((1, 100_000)), ..settings() }), "no surface node 100000");
     let strike = Strike { body: 7, ..Strike::default() };
@@ -165,10 +166,17 @@ fn what_does_not_fit_the_scene_is_an_error() {
         let servo = Servo::start(scene, vec![with_limits(limits)], patient(), settings(), rate, strain);
         servo.err().map(|error| error.to_string())
     };
-    refused(start(weak, 500.0), "holds 2000 N/m");
+    refused(start(weak, 500.0), "holds at most 2000 N/m: lower max_stiffness to 2000");
     let slow = DeviceLimits { max_stiffness: f64::INFINITY, ..weak };
     refused(start(slow, 1000.0), "at most 800");
     assert_eq!(start(slow, 800.0), None);
+    // 2 b / T is 3200 N/m for 2 N s/m at 800 Hz, and 6400 for twice that; a millisecond of delay leaves 2461 of those.
+    let damped = |own_damping, delay| DeviceLimits { own_damping: Some(own_damping), delay, ..slow };
+    refused(start(damped(2.0, 0.0), 800.0), "holds at most 3200 N/m at 800 Hz: lower max_stiffness to 3200");
+    assert_eq!(start(damped(4.0, 0.0), 800.0), None);
+    refused(start(damped(4.0, 1e-3), 800.0), "holds at most 2461 N/m at 800 Hz");
+    refused(start(DeviceLimits { max_damping: f64::NAN, ..slow }, 800.0), "strongest damping of NaN");
+    refused(start(DeviceLimits { delay: -1e-3, ..slow }, 800.0), "delay of -0.001");
     refused(start(DeviceLimits::UNLIMITED, 99.0), "100 to 10000 Hz");
 }
 

@@ -16,6 +16,7 @@ mod limit;
 mod model;
 mod motion;
 mod scratch;
+mod slip;
 mod snapshot;
 mod solve;
 mod state;

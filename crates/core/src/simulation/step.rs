@@ -5,6 +5,7 @@ use super::input::{Controls, Input, Output};
 use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
+use super::slip::slip;
 use super::state::State;
 use super::tool::LawKind;
 use super::{limit, solve, time};
@@ -82,6 +83,7 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, co
     solve::local_forces(model, state, scratch, body, controls);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);
+        slip(model, state, &mut scratch.system, body);
         let mut ended = false;
         for slot in 0..state.contacts.slots.len() {
             let contact = &mut state.contacts.slots[slot];

@@ -97,7 +97,7 @@ impl SafetyLimits {
         for (name, value) in stated {
             refuse_unless(value >= 0.0, || format!("the device of tool {tool} states a {name} of {value}"))?;
         }
-        check_stiffness(model, tool, device, 0.0)?;
+        check_stiffness(model, tool, device, None)?;
         Ok(Self {
             max_damping: self.max_damping.min(device.max_damping),
             max_angular_damping: self.max_angular_damping.min(device.max_angular_damping),
@@ -109,15 +109,20 @@ impl SafetyLimits {
     }
 }
 
-/// Refuses a tool that may ask for a stiffer contact than its device holds with a time `period` between two ticks, s; zero
-/// asks for that at any rate. The model would have to be another: a force that is capped is not that of the body.
+/// Refuses a tool that may ask for a stiffer contact than its device holds with a time `period` between two ticks, s; `None`
+/// where that is not known yet. The model would have to be another: a force that is capped is not that of the body.
 ///
 /// # Errors
 /// The tool, with the largest stiffness that may stand there.
-pub fn check_stiffness(model: &Model, tool: usize, device: &DeviceLimits, period: f64) -> Result<()> {
-    let (asked, held) = (model.tools[tool].max_stiffness, device.largest_stiffness(period));
+pub fn check_stiffness(model: &Model, tool: usize, device: &DeviceLimits, period: Option<f64>) -> Result<()> {
+    let asked = model.tools[tool].max_stiffness;
+    let (held, rate) = match period {
+        Some(period) => (device.largest_stiffness(period), format!(" at {:.0} Hz", 1.0 / period)),
+        None => (device.max_stiffness, String::new()),
+    };
     refuse_unless(asked <= held, || {
-        let rate = if period > 0.0 { format!(" at {:.0} Hz", 1.0 / period) } else { String::new() };
+        // Rounded down: what the message says is accepted.
+        let held = held.floor();
         format!(
             "tool {tool} may ask for {asked} N/m, its device holds at most {held} N/m{rate}: lower max_stiffness to {held}"
         )

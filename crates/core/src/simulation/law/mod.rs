@@ -55,6 +55,11 @@ pub trait Law: Sync {
 
     /// Whether the contact ends by the force that was found.
     fn end(&self, contact: &Contact) -> bool;
+
+    /// Most tangential force of a contact that sticks, over its pressing force: beyond it the anchor slips. `None` for any.
+    fn cone(&self, _contact: &Contact) -> Option<f64> {
+        None
+    }
 }
 
 /// A tool beside a body; vectors are in the body's frame.

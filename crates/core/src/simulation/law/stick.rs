@@ -2,7 +2,8 @@
 //!
 //! With a footprint that does not move, `f = C^-1 d` is the gradient of `d^T C^-1 d / 2`: a closed path of the tool does no
 //! net work. The anchor lies where the surface, sagged under the reference loads, was met: the tool's displacement from it
-//! is the whole `d - W^T u_free`. A press lets go where it would pull; its tangential energy is then lost, never gained.
+//! is the whole `d - W^T u_free`. A press lets go where it would pull. Before it does, its anchor slips (`slip`), so that its
+//! tangential force ends with the pressing one; the energy of that is lost, never gained.
 
 use glam::DMat3;
 
@@ -15,6 +16,12 @@ use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A grab reaches this many tool radii from the surface.
 const GRAB_REACH: f64 = 2.0;
+
+/// A press carries no more tangential force than this many times its pressing force. Steep enough that a tool sticks however
+/// it is used: a half-space is softer along its surface than into it, so that a drag must be more than five times as long as the
+/// press is deep; far above any dry friction. Low enough that what is left for the last tick of a lift, five times
+/// the pressing force that one tick takes away, is not felt.
+const STEEPEST_CONE: f64 = 5.0;
 
 /// Which nodes a contact takes, and with what weights.
 pub trait Footprint: Sync {
@@ -88,5 +95,10 @@ impl<F: Footprint> Law for Sticking<F> {
 
     fn end(&self, contact: &Contact) -> bool {
         contact.mode == Mode::Press && contact.force.dot(contact.normal) >= 0.0
+    }
+
+    /// A tool that holds on carries any force.
+    fn cone(&self, contact: &Contact) -> Option<f64> {
+        (contact.mode == Mode::Press).then_some(STEEPEST_CONE)
     }
 }
