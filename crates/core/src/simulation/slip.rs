@@ -131,4 +131,5 @@ fn shift(contact: &mut Contact, by: DVec3) {
     contact.anchor += by;
     contact.displacement -= by;
     contact.wanted -= by;
+    contact.slipped += by;
 }

@@ -5,7 +5,7 @@
 //! is the whole `d - W^T u_free`. A press lets go where it would pull. Before it does, its anchor slips (`slip`), so that its
 //! tangential force ends with the pressing one; the energy of that is lost, never gained.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use super::{Approach, Law};
 use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
@@ -76,6 +76,7 @@ impl<F: Footprint> Law for Sticking<F> {
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
         contact.wanted = approach.position - contact.anchor;
         contact.displacement = contact.wanted;
+        contact.slipped = DVec3::ZERO;
         match contact.mode {
             Mode::Grab if !approach.grab => return false,
             Mode::Press if approach.grab => contact.mode = Mode::Grab,
