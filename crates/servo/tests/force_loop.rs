@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use palpate_core::simulation::{Input, Model, Pose, Scratch, Snapshot, State, Strike, step};
 use palpate_devices::simulated::{Target, simulated};
-use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench};
+use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench, known};
 use palpate_servo::{
     Fault, FaultReason, ForceLoop, LoopHandle, SafetyLimits, Script, Servo, Settings, StrainPreparer, now_ns, run,
 };
@@ -178,6 +178,20 @@ fn what_does_not_fit_the_scene_is_an_error() {
     refused(start(DeviceLimits { max_damping: f64::NAN, ..slow }, 800.0), "strongest damping of NaN");
     refused(start(DeviceLimits { delay: -1e-3, ..slow }, 800.0), "delay of -0.001");
     refused(start(DeviceLimits::UNLIMITED, 99.0), "100 to 10000 Hz");
+}
+
+/// A tool that may ask for 5000 N/m is refused by every device that holds less, with what it holds.
+#[test]
+fn known_devices_refuse_what_they_do_not_hold() {
+    for (name, limits) in known::ALL {
+        let device = Box::new(Scripted { read: |now_ns| Ok(pressing(now_ns)), write: |_| Ok(()), limits });
+        let refused = ForceLoop::new(single(false), vec![device], patient(), settings()).err();
+        let expected = (limits.max_stiffness < 5000.0).then(|| {
+            let held = limits.max_stiffness;
+            format!("tool 0 may ask for 5000 N/m, its device holds at most {held} N/m: lower max_stiffness to {held}")
+        });
+        assert_eq!(refused.map(|error| error.to_string()), expected, "{name}");
+    }
 }
 
 #[test]

@@ -51,6 +51,8 @@ pub struct Contact {
     pub limited: bool,
     /// How far its anchor has slipped since it was followed last, m.
     pub(super) slipped: DVec3,
+    /// Whether its force has been within its cone since it began.
+    pub(super) settled: bool,
     /// Whether it has pressed since it began.
     pub(super) pressed: bool,
     /// Bound on its length while the limit is not known yet, m.

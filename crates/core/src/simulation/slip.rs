@@ -19,6 +19,9 @@
 //! [`SHALLOWEST`], so that a contact loaded evenly sticks everywhere. The ratio is the contact's own, the forces of others
 //! held: it does not change when one of them ends.
 //!
+//! A contact that lands in the dent of another tool finds material that is displaced along the surface, and force along it before
+//! there is any into it. That is what sticking there means; it slips only after its force has once been within the cone.
+//!
 //! A slip only takes energy out. With the tool where it is the contacts hold `s (|t| + t(s) . e) / 2` less, and `t(s) . e` is
 //! kept from turning negative. A contact within its cone keeps every bit.
 
@@ -62,10 +65,15 @@ fn sweep(model: &Model, state: &mut State, system: &mut System, body: usize) -> 
         }
         let Some(steepest) = law_of(contact.law).cone(&contact) else { continue };
         let force = Parts::along(contact.force, contact.normal);
-        let Some(direction) = force.beyond(SHALLOWEST) else { continue };
+        let Some(direction) = force.beyond(SHALLOWEST) else {
+            state.contacts.slots[slot].settled |= force.pressing > 0.0;
+            continue;
+        };
         let own = own_compliance(model, state, slot).inverse() * direction;
         let coefficient = Parts::along(own, contact.normal).coefficient(direction, steepest);
-        if force.beyond(coefficient * (1.0 + ROUNDING)).is_none() {
+        let outside = force.beyond(coefficient * (1.0 + ROUNDING)).is_some();
+        state.contacts.slots[slot].settled |= !outside;
+        if !(outside && contact.settled) {
             continue;
         }
         // Any length will do: the forces are affine in it.

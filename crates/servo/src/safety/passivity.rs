@@ -152,6 +152,7 @@ impl Port {
             }
             Some(before) => {
                 self.moved = Motion::between(&before.pose, &now.pose);
+                // By ticks, not by the device's clock: live and offline runs give the same bits.
                 self.velocity = self.moved.over(self.elapsed);
                 self.book_half(self.computed, self.withheld);
             }
