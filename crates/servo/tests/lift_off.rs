@@ -4,7 +4,8 @@
 mod common;
 
 use glam::DVec3;
-use palpate_core::simulation::{Contact, Input, Model, Pose, Scratch, State, ToolInput, step};
+use palpate_core::dynamics::Energy;
+use palpate_core::simulation::{Contact, Input, Model, Pose, Scratch, Snapshot, State, ToolInput, step};
 
 use common::{TOOL, scene, single};
 
@@ -31,11 +32,12 @@ impl Drag {
     }
 }
 
-/// What one tool felt: forces on the device and contacts, by tick.
+/// What one tool felt: forces on the device and contacts, by tick; and energies of the first body at the end, if it moves.
 struct Felt {
     positions: Vec<DVec3>,
     forces: Vec<DVec3>,
     contacts: Vec<Option<Contact>>,
+    energy: Option<Energy>,
 }
 
 impl Felt {
@@ -62,8 +64,10 @@ fn run(model: &Model, drags: &[Drag]) -> Vec<Felt> {
     let mut input = Input::default();
     input.controls.contact_radius = [0.02; palpate_core::simulation::MAX_TOOLS];
     let paths: Vec<Vec<DVec3>> = drags.iter().map(|drag| drag.path().collect()).collect();
-    let mut felt: Vec<Felt> =
-        paths.iter().map(|path| Felt { positions: path.clone(), forces: Vec::new(), contacts: Vec::new() }).collect();
+    let mut felt: Vec<Felt> = paths
+        .iter()
+        .map(|path| Felt { positions: path.clone(), forces: Vec::new(), contacts: Vec::new(), energy: None })
+        .collect();
     for tick in 0..paths[0].len() {
         for (tool, path) in paths.iter().enumerate() {
             input.tools[tool] = ToolInput { pose: Pose::at(path[tick]), active: true, ..ToolInput::default() };
@@ -75,6 +79,9 @@ fn run(model: &Model, drags: &[Drag]) -> Vec<Felt> {
             felt.contacts.push(contact.map(|(contact, _)| *contact));
         }
     }
+    let mut snapshot = Snapshot::new(model);
+    state.snapshot_into(&mut snapshot);
+    felt.iter_mut().for_each(|felt| felt.energy = snapshot.energy(0));
     felt
 }
 
@@ -115,6 +122,12 @@ fn a_drag_is_lifted_without_a_jump() {
             assert!(work > 0.0 && work < peak, "{number}: {work} J of {peak} J");
             let anchors: Vec<_> = felt.contacts.iter().flatten().map(|contact| contact.anchor).collect();
             assert!(anchors.first() != anchors.last(), "it slipped");
+            // The account has the whole work of the tool, and what slips lost of it.
+            if let Some(energy) = felt.energy {
+                let held = energy.kinetic + energy.strain + energy.coupling + energy.dissipated;
+                assert!((energy.work / work - 1.0).abs() < 1e-5, "{} J booked of {work} J", energy.work);
+                assert!((held / work - 1.0).abs() < 1e-3, "{held} J of {work} J");
+            }
         }
     }
 }

@@ -232,9 +232,12 @@ fn nothing_is_damped_where_nothing_is_owed() {
             force: DVec3::Z * 8e3 * (-pose.position.z).max(0.0).powf(1.5),
             ..Wrench::default()
         };
-        let laws: [&dyn Fn(usize, &Pose) -> Wrench; 2] = [&wall(500.0), &hertz];
-        for law in laws {
-            let (outcome, open) = (through(limits, path, law), through(without_controller(limits), path, law));
+        let without = without_controller(limits);
+        let by_law = [
+            (through(limits, path, wall(500.0)), through(without, path, wall(500.0))),
+            (through(limits, path, hertz), through(without, path, hertz)),
+        ];
+        for (outcome, open) in by_law {
             assert!(outcome.out == open.out);
             assert!(outcome.port.owed.abs() < 1e-9);
         }
