@@ -62,7 +62,6 @@ export class MotionPanel {
 
   private setMotion(motion: MotionScene | null): void {
     for (const id of ["motion", "tab-motion", "tab-modes", "hint-strike"]) byId(id).hidden = !motion;
-    byId("panel").classList.toggle("moving", motion !== null);
     byId("repeat").hidden = !motion?.strike;
     if (!motion) return;
     this.impulseSlider.valueAsNumber = 1 - Math.log(motion.impulse / motion.max_impulse) / Math.log(WEAKEST);
