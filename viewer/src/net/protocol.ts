@@ -125,10 +125,10 @@ export interface ContactMessage {
   force: Vec3;
   /** Of the area of contact, m. */
   radius: number;
-  /** How far the tool has come below the rest surface, m. */
-  depth: number;
-  /** Of the force along the normal against the depth, N/m. */
-  stiffness: number;
+  /** How far the tool has come from its first touch with the untouched surface, m; null where it holds on by its patch. */
+  depth: number | null;
+  /** Of the force along the normal against that depth, N/m. */
+  stiffness: number | null;
   /** Whether all of the contact slides. */
   slipping: boolean;
 }

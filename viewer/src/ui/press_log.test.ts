@@ -3,7 +3,7 @@ import { describe, expect, it } from "vitest";
 import type { FrameMessage } from "../net/protocol";
 import { PressLog } from "./press_log";
 
-const frame = (...contacts: { tool: number; mode: string; depth: number; force: number[] }[]) =>
+const frame = (...contacts: { tool: number; mode: string; depth: number | null; force: number[] }[]) =>
   ({ contacts }) as unknown as FrameMessage;
 const press = (tool: number, depth: number, force: number) => ({ tool, mode: "press", depth, force: [0, 0, -force] });
 
@@ -30,7 +30,7 @@ describe("the log of a press", () => {
 
   it("leaves out what is held rather than pressed", () => {
     const log = new PressLog();
-    log.append(frame({ ...press(0, 1e-3, 1), mode: "grab" }), 0);
+    log.append(frame({ ...press(0, 1e-3, 1), mode: "grab", depth: null }), 0);
     expect(log.depth).toEqual([]);
     expect(log.extent()).toEqual({ depth: [0, 0], force: 0 });
   });

@@ -13,9 +13,9 @@ export class PressLog {
 
   /** Takes in the contact of a tool, the driven one or null. */
   append({ contacts }: FrameMessage, tool: number | null): void {
-    const contact = contacts.find((one) => one.tool === tool && one.mode === "press");
+    const contact = contacts.find((one) => one.tool === tool && one.depth !== null);
     // What was pressed last stays until something else is.
-    if (!contact) {
+    if (contact?.depth == null) {
       this.tool = null;
       return;
     }

@@ -49,11 +49,11 @@ export class Readout {
     const { pressing, frame } = state;
     const tool = drivenTool(state);
     const contact = frame?.contacts.find((one) => one.tool === tool);
-    const press = contact?.mode === "press" ? contact : undefined;
-    setText(this.stiffness, press ? newtonsPerMillimetre(press.stiffness) : "–");
-    setText(this.contact, press ? `${millimetres(press.radius)}, ${press.slipping ? "slides" : "holds"}` : "–");
+    const stiffness = contact?.stiffness ?? null;
+    setText(this.stiffness, stiffness === null ? "–" : newtonsPerMillimetre(stiffness));
+    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${contact.slipping ? "slides" : "holds"}` : "–");
     setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
-    const depth = press?.depth ?? pressing?.depth;
+    const depth = contact?.depth ?? pressing?.depth;
     setText(this.depth, depth === undefined ? "–" : millimetres(depth).replace("-", MINUS));
   }
 
