@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 import numpy as np
@@ -14,7 +14,7 @@ from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
-from palpate.viewer.messages import by_body, encode, index, number, vector
+from palpate.viewer.messages import by_body, encode, index, number, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.shown_body import ShownBody, titled
 
@@ -125,6 +125,37 @@ class Session:
         if handler is None:
             raise ViewerError(f"unknown message '{message['type'][:40]}'")
         return handler(message)
+
+    def reshaped(self, message: Mapping[str, Any]) -> Session | None:
+        """Session on the same bodies in which a tool has the shape of a message, not started; None if it has it already.
+
+        Raises
+        ------
+        Error
+            A shape that the tool may not take.
+
+        """
+        tool, name = index(message, "tool", len(self._active)), word(message, "name")
+        tools = list(self.built.scene.tools)
+        if name not in shapes_of(tools[tool]):
+            raise ViewerError(f"shape: a tool is no '{name}'; it may be {' or '.join(shapes_of(tools[tool]))}")
+        if name == tools[tool].shape:
+            return None
+        tools[tool] = tools[tool].model_copy(update={"shape": name})
+        other = Session(replace(self.built, scene=self.built.scene.model_copy(update={"tools": tools})))
+        other._take_over(self)
+        return other
+
+    def _take_over(self, other: Session) -> None:
+        """Set what the sliders of another session on the same bodies have set."""
+        for rank in range(len(self._active)):
+            self.simulation.set_radius(other.simulation.contact_radius_of(rank), rank)
+            self.simulation.set_friction(other.simulation.friction_of(rank), rank)
+        for rank in range(len(self._bodies)):
+            modulus = other.simulation.youngs_modulus_of(rank)
+            if modulus is not None:
+                self.simulation.set_youngs_modulus(modulus, rank)
+        self._set_strain_limit(other._strain_limit, {})
 
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""

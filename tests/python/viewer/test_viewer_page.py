@@ -407,7 +407,7 @@ def test_nothing_is_cut_off(chromium, program, size):
     until(page, lambda s: s["frames"] > 3)
     width, height = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert (width, height) == size
-    for name in ("force-value", "model-select", "stiffness", "radius", "connection"):
+    for name in ("force-value", "model-select", "stiffness", "friction", "connection"):
         box = page.get_by_test_id(name).bounding_box()
         assert box is not None and box["x"] >= 0 and box["x"] + box["width"] <= size[0]
     press(page)

@@ -23,7 +23,7 @@ def built(block, block_green) -> BuiltScene:
 
 
 def test_a_sliding_contact_is_told(block, block_green):
-    """Depth by the distance to the flat top, stiffness by the slope of the force, and Coulomb's bound while it slides."""
+    """Depth by the distance to the flat top, stiffness by the slope of the force, Coulomb's bound while it slides."""
     scene = palpate.Scene(body={"store": "block.palpate"}, tool={"friction": 0.2}, view={"strain_limit": 0})
     built = BuiltScene.of(scene, block, block_green)
 

@@ -70,7 +70,7 @@ def liver(cache):
 def test_two_tools_on_two_bodies(chromium, pair):
     with opened(chromium, pair) as page:
         assert not page.get_by_test_id("pinned-line").is_visible()
-        press(page)
+        press(page, 5)
         alone = settled_force(page)
         page.keyboard.press("n")
         pinned = until(page, lambda s: s["pinned"] == [0])
@@ -85,7 +85,7 @@ def test_two_tools_on_two_bodies(chromium, pair):
         assert np.allclose(second["tools"][0]["force"], alone, rtol=1e-3)
         assert second["force"] == second["tools"][1]["force"] and second["force"][2] > 0
         told = page.get_by_test_id("pinned-line").inner_text()
-        assert float(told.split()[1]) == pytest.approx(np.linalg.norm(alone), rel=0.02)
+        assert float(told.split()[1]) == pytest.approx(np.linalg.norm(alone), abs=0.006)
         # Letting go of the second leaves the first; Escape takes that too.
         page.mouse.up()
         until(page, lambda s: s["contacts"] == 1 and s["tools"][0]["active"] and not s["tools"][1]["active"])
@@ -113,9 +113,9 @@ def test_a_second_finger_feels_the_dent_of_the_first(chromium, liver):
         page.mouse.up()
         press(page, place=beside, contacts=2)
         second = settled_force(page)
-        assert np.linalg.norm(second) > 1.02 * np.linalg.norm(alone)
+        assert np.linalg.norm(second) > 1.01 * np.linalg.norm(alone)
         # What the second finger presses away, the first one need not.
-        assert np.linalg.norm(state(page)["tools"][0]["force"]) < 0.98 * np.linalg.norm(first)
+        assert np.linalg.norm(state(page)["tools"][0]["force"]) < 0.99 * np.linalg.norm(first)
         page.mouse.up()
         until(page, lambda s: s["contacts"] == 1)
         page.keyboard.press("n")
@@ -139,7 +139,7 @@ def test_a_pinned_tool_by_buttons(chromium, pair):
 
 def test_stiffness_and_legend_are_those_of_the_chosen_body(chromium, pair):
     with opened(chromium, pair) as page:
-        press(page)
+        press(page, 8)
         limit = page.locator("#legend-max")
         until(page, lambda s: s["field"]["max"] > 2)
         first = float(limit.inner_text())

@@ -110,17 +110,19 @@ export class Pointer {
     this.begin(event, pick, tool, state);
   }
 
-  private begin(event: PointerEvent, pick: Pick, tool: number, { scene, grab: grabWanted }: State): void {
+  private begin(event: PointerEvent, pick: Pick, tool: number, { scene, grab: grabWanted, pinned }: State): void {
     const { viewport } = this;
     event.stopImmediatePropagation();
     viewport.controls.enabled = false;
     viewport.canvas.setPointerCapture(event.pointerId);
     const { size, tools } = scene!;
     const place: Place = [event.clientX, event.clientY];
+    // Without another tool a dent that is still seen is the one that this tool has just left.
+    const dent = pinned.length > 0 ? pick.dent : 0;
     const gesture =
       grabWanted || wantsGrab(event)
         ? new GrabGesture(pick.point, this.sight(pick), size, place)
-        : new PressGesture(pick, this.sight(pick), size, tools[tool]!.radius, {
+        : new PressGesture({ ...pick, dent }, this.sight(pick), size, tools[tool]!.radius, {
             pointer: place,
             aim: viewport.project(pick.drawn),
             straight: event.shiftKey,

@@ -46,9 +46,11 @@ export class Stage {
       this.watched = { view: new WatchedView(moving.surface, header.size), body: header.motion.body };
       moving.placed.add(this.watched.view.dot);
     }
+    const before = this.bounds.clone();
     this.bounds.makeEmpty();
     for (const body of this.bodies) this.bounds.union(body.bounds);
-    this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
+    // Other tools on the same bodies are no reason to look from elsewhere.
+    if (!this.bounds.equals(before)) this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
     if (this.store.get().layers.cutaway) this.faceCut();
     this.show();
   }

@@ -41,7 +41,8 @@ export class ToolView {
     const { size } = scene;
     this.sphere = new THREE.Mesh(
       new THREE.SphereGeometry(tool.radius, 40, 24),
-      new THREE.MeshStandardMaterial({ color: 0xd5dbe3, roughness: 0.28, metalness: 0.15 }),
+      // Of glass, so that the dent below it is seen.
+      new THREE.MeshStandardMaterial({ color: 0xd5dbe3, roughness: 0.28, metalness: 0.15, transparent: true, opacity: 0.5 }),
     );
     this.ring = new THREE.Mesh(
       new THREE.RingGeometry(0.93, 1, 64),
