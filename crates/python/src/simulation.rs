@@ -136,6 +136,24 @@ impl SimulationCore {
         })
     }
 
+    /// Closest points of the smooth surface of a body (n, 7): position (m), outward normal, signed distance (m), in the
+    /// body's frame; NaN where there is none.
+    fn feet<'py>(&self, py: Python<'py>, body: usize, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = points.as_slice()?.to_vec();
+        let model = self.model.clone();
+        let feet = py.detach(|| {
+            let of_point = |&point: &[f64; 3]| match model.bodies.get(body).and_then(|body| body.foot(point.into())) {
+                Some(foot) => {
+                    let (x, n) = (foot.position, foot.normal);
+                    [x.x, x.y, x.z, n.x, n.y, n.z, foot.distance]
+                }
+                None => [f64::NAN; 7],
+            };
+            points.as_chunks::<3>().0.iter().flat_map(of_point).collect::<Vec<_>>()
+        });
+        Ok(feet.into_pyarray(py))
+    }
+
     /// Young's modulus of a body over that of its Green's function.
     fn set_stiffness_scale(&mut self, py: Python<'_>, body: usize, scale: f64) -> PyResult<()> {
         self.change(py, |settings| {

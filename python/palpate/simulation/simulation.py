@@ -154,6 +154,26 @@ class Simulation:
         self._grab[self._tool(tool)] = False
         self._core.set_target(tool, *self._targets[tool], (0.0, 0.0, 0.0), False, False)
 
+    def closest(self, points: np.ndarray, body: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Closest points of a body's surface as tools under the local law meet it: smooth between the nodes.
+
+        Parameters
+        ----------
+        points
+            (n, 3) m, in the scene.
+
+        Returns
+        -------
+        tuple
+            Points (n, 3), m, outward unit normals (n, 3), both in the scene, and signed distances (n,), m, negative inside;
+            NaN where a point is not finite, or no tool of the scene has the local law.
+
+        """
+        placed = self.bodies[self._body(body)]
+        asked = np.ascontiguousarray(placed.points_to_body(np.asarray(points, dtype=float).reshape(-1, 3)))
+        feet = self._core.feet(body, asked).reshape(-1, 7)
+        return placed.points_to_scene(feet[:, :3]), placed.vectors_to_scene(feet[:, 3:6]), feet[:, 6]
+
     def set_radius(self, contact_radius: float, tool: int | None = None) -> None:
         """Contact radius of contacts that begin from now on, m, of one tool or of all.
 

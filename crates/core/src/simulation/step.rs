@@ -80,6 +80,7 @@ fn law_now(of_tool: LawKind, of_contact: Option<LawKind>, grab: bool) -> LawKind
 /// again.
 fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
     solve::local_forces(model, state, scratch, body, controls);
+    limit::let_through(model, state, body, controls.strain_limit[body]);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);
         let mut ended = false;

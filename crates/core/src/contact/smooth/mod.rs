@@ -22,7 +22,7 @@ use crate::mesh::Surface;
 /// Fans of nodes whose normals are turned farther than this from a triangle's do not belong to it (cosine).
 const SAME_SIDE: f64 = 0.0;
 /// Part of a triangle's size by which a point may lie beside it and still be met by its fans.
-const MARGIN: f64 = 1.5;
+const MARGIN: f64 = 1.2;
 
 /// Fans of a surface, and which of them each triangle meets.
 pub struct SmoothSurface {

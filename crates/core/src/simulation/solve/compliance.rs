@@ -16,16 +16,19 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
     // There are as many slots as pairs of a tool and a body.
     let slot = contacts.empty()?;
     if begun.law == LawKind::Local {
-        contacts.begun += 1;
-        contacts.slots[slot] = Contact { serial: contacts.begun, ..begun };
+        let serial = contacts.next_serial();
+        contacts.slots[slot] = Contact { serial, ..begun };
+        if let Some(motion) = &mut bodies[body].motion {
+            motion.begin_contact(slot);
+        }
         return Some(slot);
     }
     if let Err(refusal) = contacts.patches[slot].admit(green, &scratch.candidate) {
         tools[tool].refused[body] = Some(refusal);
         return None;
     }
-    contacts.begun += 1;
-    contacts.slots[slot] = Contact { serial: contacts.begun, ..begun };
+    let serial = contacts.next_serial();
+    contacts.slots[slot] = Contact { serial, ..begun };
     compliance[slot][slot] = contacts.patches[slot].own_compliance(green);
     for other in contacts.on(body).filter(|&other| other != slot) {
         let block = contacts.patches[slot].compliance_with(green, &contacts.patches[other]);

@@ -25,13 +25,23 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
             None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
         },
         |slot| {
-            let free = moving.map_or(DVec3::ZERO, |motion| motion.free_displacement(slot));
+            let free = moving.map_or_else(|| dent_of_sliding(model, state, body, slot), |m| m.free_displacement(slot));
             state.contacts.slots[slot].displacement - free
         },
     );
     for (i, &slot) in slots[..count].iter().enumerate() {
         state.contacts.slots[slot].force = DVec3::from_slice(&system.right[3 * i..3 * i + 3]);
     }
+}
+
+/// What contacts under the local law do at one that sticks, m, on a body at rest.
+fn dent_of_sliding(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
+    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
+    let sliding = contacts.on(body).filter(|&other| contacts.slots[other].law == LawKind::Local);
+    let dent = |other: usize| {
+        contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
+    };
+    sliding.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
 }
 
 /// Slots of the contacts of a body that stick, in order; returns how many there are.

@@ -62,6 +62,7 @@ impl Law for Local {
             entry: *entry_depth,
             foot,
             share: 1.0,
+            watched: foot.position,
             ..LocalContact::default()
         };
         Ok(Some(Contact {
