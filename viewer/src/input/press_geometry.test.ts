@@ -163,6 +163,21 @@ describe("a press", () => {
     expect(depthIn(settle(gesture))).toBeCloseTo(-RADIUS, 12);
   });
 
+  it("goes half a radius on while the tool is held, and farther when it is let go", () => {
+    const gesture = settle(pressOn(MIDDLE));
+    gesture.hold(true);
+    for (let i = 0; i < 30; i++) gesture.wheel(1);
+    expect(depthIn(settle(gesture))).toBeCloseTo((GENTLE_DEPTH + 0.5) * RADIUS, 12);
+    gesture.hold(true);
+    gesture.wheel(1);
+    expect(depthIn(settle(gesture))).toBeCloseTo((GENTLE_DEPTH + 0.5) * RADIUS, 12);
+    gesture.wheel(-1);
+    expect(depthIn(settle(gesture))).toBeCloseTo((GENTLE_DEPTH + 0.4) * RADIUS, 12);
+    gesture.hold(false);
+    gesture.wheel(10);
+    expect(depthIn(settle(gesture))).toBeCloseTo((GENTLE_DEPTH + 1.4) * RADIUS, 12);
+  });
+
   it("is as deep as a pen is pressed", () => {
     const gesture = pressOn(MIDDLE);
     for (const pressure of [0.2, 1, 0.5]) {

@@ -15,6 +15,8 @@ const SPEED_MAX = 5;
 /** Of the size of the body; and how far a press may be lifted off, over the tool's radius, without letting go. */
 const DEPTH_MAX = 0.25;
 const LIFT_MAX = 1;
+/** While the tool is held for strain its depth is taken so much farther, over the tool's radius: turning back is felt at once. */
+const HELD_ROOM = 0.5;
 /** A drag for depth goes so much slower than the pointer. */
 const DEPTH_PER_DRAG = 0.25;
 const PULL_MAX = 0.25;
@@ -56,6 +58,8 @@ export interface Gesture {
   wheel(notches: number): void;
   /** From 0 to 1. */
   press(pressure: number): void;
+  /** Whether the tool is held, for the body would be strained too far. */
+  hold(held: boolean): void;
   /** Lets time pass and tells whether the tool moves on. */
   advance(seconds: number): boolean;
   /** Centre of the tool. */
@@ -109,6 +113,8 @@ export class PressGesture implements Gesture {
   private following: Following;
   private goal: number;
   private readonly dent: number;
+  /** Depth at which the tool came to be held. */
+  private heldAt: number | null = null;
   private pointer: Place;
   /** The place of the window that the tool follows: the pointer's, but for what was moved for depth alone. */
   private aim: Place;
@@ -159,6 +165,10 @@ export class PressGesture implements Gesture {
     this.goal = this.dent + pressure * PEN_DEPTH * this.radius;
   }
 
+  hold(held: boolean): void {
+    this.heldAt = held ? (this.heldAt ?? this.depth) : null;
+  }
+
   advance(seconds: number): boolean {
     const near = ARRIVED * this.radius;
     this.following = approach(this.following, this.goal, seconds, DEPTH_LAG_S, DEPTH_SPEED_MAX * this.radius);
@@ -175,7 +185,9 @@ export class PressGesture implements Gesture {
   }
 
   private deepen(metres: number): void {
-    this.goal = THREE.MathUtils.clamp(this.goal + metres, -LIFT_MAX * this.radius, DEPTH_MAX * this.size);
+    const room = this.heldAt === null ? Infinity : this.heldAt + HELD_ROOM * this.radius;
+    const deepest = Math.min(DEPTH_MAX * this.size, Math.max(room, this.goal));
+    this.goal = THREE.MathUtils.clamp(this.goal + metres, -LIFT_MAX * this.radius, deepest);
   }
 
   private slide(): void {
@@ -232,6 +244,8 @@ export class GrabGesture implements Gesture {
 
   /** How hard a pen is pressed does not move what is held. */
   press(): void {}
+
+  hold(): void {}
 
   advance(): boolean {
     return false;

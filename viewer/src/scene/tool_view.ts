@@ -71,15 +71,20 @@ export class ToolView {
     this.drawnState = state;
     const [w, x, y, z] = tool.orientation;
     this.group.visible = tool.active;
-    this.sphere.position.set(...tool.position);
     this.sphere.quaternion.set(x, y, z, w);
-    this.limit.update(tool.position, tool.wanted);
+    const shown = touched && shownAt(touched, offset);
+    // A tool that slides is held by its force: it is drawn on the surface that gives no farther.
+    const held = tool.limited && shown !== null && contact?.depth != null;
+    const place = held ? shown.point.clone().addScaledVector(shown.normal, this.tool.radius).toArray() : tool.position;
+    this.sphere.position.set(...place);
+    this.limit.update(place, tool.wanted);
     this.pin.sprite.visible = pinned;
-    this.pin.sprite.position.set(...tool.position);
-    this.arrow.update(tool.position, this.tool.radius, tool.active ? tool.force : [0, 0, 0]);
+    this.pin.sprite.position.set(...place);
+    this.arrow.update(place, this.tool.radius, tool.active ? tool.force : [0, 0, 0]);
     // Where displacements are drawn larger than they are, the tool goes with the surface that it touches.
     this.group.position.fromArray(offset);
-    this.updateRing(contact, touched, offset);
+    this.ring.visible = shown !== null;
+    if (contact && shown) this.drawRing(contact, shown);
     return true;
   }
 
@@ -95,19 +100,9 @@ export class ToolView {
     return { body, place: this.touched.place };
   }
 
-  private updateRing(
-    contact: ContactMessage | null,
-    touched: { body: BodyView; place: SurfacePoint } | null,
-    offset: number[],
-  ): void {
-    this.ring.visible = touched !== null;
-    if (!contact || !touched) return;
-    const { surface, placed } = touched.body;
-    // The contact names its place on the untouched surface; it is drawn where that place has moved to.
-    const shown = new THREE.Vector3(...surface.at(surface.shown, touched.place)).applyMatrix4(placed.matrix);
-    this.ring.position.copy(shown).sub(new THREE.Vector3().fromArray(offset));
-    const normal = new THREE.Vector3(...surface.at(surface.shownNormals, touched.place)).normalize();
-    this.ring.quaternion.setFromUnitVectors(FORWARD, normal.applyQuaternion(placed.quaternion));
+  private drawRing(contact: ContactMessage, { point, normal }: { point: THREE.Vector3; normal: THREE.Vector3 }): void {
+    this.ring.position.copy(point);
+    this.ring.quaternion.setFromUnitVectors(FORWARD, normal);
     this.ring.scale.setScalar(Math.max(contact.radius, RING_MIN * this.scene.size));
   }
 
@@ -121,6 +116,20 @@ export class ToolView {
       mesh.material.dispose();
     }
   }
+}
+
+/** Where a place of the rest surface is drawn, and the normal there, less an offset of the whole tool. */
+function shownAt(
+  { body, place }: { body: BodyView; place: SurfacePoint },
+  offset: number[],
+): { point: THREE.Vector3; normal: THREE.Vector3 } {
+  const { surface, placed } = body;
+  const point = new THREE.Vector3(...surface.at(surface.shown, place)).applyMatrix4(placed.matrix);
+  const normal = new THREE.Vector3(...surface.at(surface.shownNormals, place)).normalize();
+  return {
+    point: point.sub(new THREE.Vector3().fromArray(offset)),
+    normal: normal.applyQuaternion(placed.quaternion),
+  };
 }
 
 function samePoint(a: Vec3, b: Vec3): boolean {
