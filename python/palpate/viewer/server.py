@@ -237,19 +237,24 @@ class ViewerServer:
                 client.wants = replace(client.wants, field=messages.word(message, "name"))
             elif client is not self._controller:
                 raise ViewerError("another viewer has control; this one watches")
-            elif message["type"] == "cancel":
-                if self._building is not None:
-                    self._building.cancel()
-            elif message["type"] == "model":
-                await self._choose(message.get("name"))
-            elif message["type"] == "shape":
-                await self._reshape(message)
             else:
-                session = self._session
-                if await self._worker.call(session.handle, message):
-                    await self._tell_all(await self._worker.call(session.settings))
+                await self._command(message)
         except Error as error:
             await client.send({"type": "error", "text": str(error)})
+
+    async def _command(self, message: dict[str, Any]) -> None:
+        """Do what the controlling client says."""
+        if message["type"] == "cancel":
+            if self._building is not None:
+                self._building.cancel()
+        elif message["type"] == "model":
+            await self._choose(message.get("name"))
+        elif message["type"] == "shape":
+            await self._reshape(message)
+        else:
+            session = self._session
+            if await self._worker.call(session.handle, message):
+                await self._tell_all(await self._worker.call(session.settings))
 
     async def _send_frames(self, client: Client) -> None:
         """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""

@@ -127,7 +127,7 @@ class Session:
         return handler(message)
 
     def reshaped(self, message: Mapping[str, Any]) -> Session | None:
-        """Session on the same bodies in which a tool has the shape of a message, not started; None if it has it already.
+        """Session, not started, on the same bodies, a tool of which has the shape of a message; None if it has it.
 
         Raises
         ------
