@@ -13,8 +13,6 @@ YOUNGS_MODULUS = {"doll": 10e3, "kidney": 15e3, "liver": 8e3, "beam": 20e3}
 # Where a model is held to be pressed, if not on its own supports. The liver lies on its back: hung by its ligaments it
 # swings as a whole (of a press of 5 mm a fifth arrives 5 cm away, lying it is a twelfth). The doll leans back too.
 SUPPORTS = {"doll": "z < 6mm or y > 40mm", "liver": "y > 20mm"}
-# A finger strains an organ far beyond the 10 % to which linear elasticity is honest; the page warns from there on.
-STRAIN_LIMIT = 0.3
 # Modes of a body in motion, by whether it has the paper's size: all of a small one, the lowest of a fine one.
 MODES = {True: {"modes": "all"}, False: {"modes": 200}}
 # Parts of critical damping of the first and the tenth mode: a struck body swings for some seconds.
@@ -32,12 +30,12 @@ def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
     """
     if name not in models.NAMES:
         raise SceneError(f"there is no model '{name}'; there are {', '.join(models.NAMES)}")
-    finger = {"radius": TOOLS[name], "contact_radius": TOOLS[name]}
+    # What slides has no patch of its own; the radius is that of a grab.
+    finger = {"contact": "local", "radius": TOOLS[name], "contact_radius": TOOLS[name]}
     return Scene(
         body={"model": name, "paper": paper},
         supports={"fixed": SUPPORTS.get(name)},
         material={"youngs_modulus": YOUNGS_MODULUS[name]},
         tool=[finger, finger],
-        view={"strain_limit": STRAIN_LIMIT},
         dynamics={**MODES[paper], "damping_ratios": DAMPING_RATIOS} if motion else None,
     )

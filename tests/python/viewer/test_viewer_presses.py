@@ -18,7 +18,7 @@ TOP = [0.04, 0.025, 0.05]
 
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
-    scene = palpate.Scene(body={"store": "block.palpate"}, tool={"contact": "patch"})
+    scene = palpate.Scene(body={"store": "block.palpate"}, tool={"contact": "patch"}, view={"strain_limit": 0.1})
     return BuiltScene.of(scene, block, block_green)
 
 
@@ -113,7 +113,8 @@ def test_fields_are_those_of_the_recovery(built):
 
 def test_a_bare_store_offers_what_its_surface_knows(built, tmp_path):
     built.bodies[0].green.save(tmp_path / "block.palpate")
-    bare = palpate.Scene(body={"store": str(tmp_path / "block.palpate")}, tool={"contact": "patch"}).build()
+    store = {"store": str(tmp_path / "block.palpate")}
+    bare = palpate.Scene(body=store, tool={"contact": "patch"}, view={"strain_limit": 0.1}).build()
 
     async def session():
         async with serving(bare) as server, page(server) as client:

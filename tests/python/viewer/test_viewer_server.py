@@ -90,7 +90,7 @@ def test_sliders_act_at_once_and_are_told_to_all(built):
             await client.say(type="reset")
             settings, _ = await client.receive("settings")
             assert settings["youngs_modulus"][0] == pytest.approx(10e3)
-            assert settings["friction"] == [0.3] and settings["strain_limit"] == 0.1
+            assert settings["friction"] == [0.3] and settings["strain_limit"] == 0.3
             assert simulation.friction_of() == 0.3
 
     asyncio.run(session())
