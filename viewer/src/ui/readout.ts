@@ -51,7 +51,7 @@ export class Readout {
     const contact = frame?.contacts.find((one) => one.tool === tool);
     const stiffness = contact?.stiffness ?? null;
     setText(this.stiffness, stiffness === null ? "–" : newtonsPerMillimetre(stiffness));
-    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${contact.slipping ? "slides" : "holds"}` : "–");
+    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${contact.slipping ? "slides" : "sticks"}` : "–");
     setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
     const depth = contact?.depth ?? pressing?.depth;
     setText(this.depth, depth === undefined ? "–" : millimetres(depth).replace("-", MINUS));

@@ -2,6 +2,8 @@ import * as THREE from "three";
 import { describe, expect, it } from "vitest";
 
 import type { BodyArrays, Vec3 } from "../net/protocol";
+import { closestSurfacePoint } from "./closest_point";
+import { arrowLength } from "./force_arrow";
 import { firstEntry } from "./ray_surface";
 import { Surface } from "./surface";
 
@@ -66,6 +68,48 @@ describe("a ray", () => {
     expect(whole).not.toBeNull();
     expect(firstEntry(positions, triangles, [0, 0, 0.2], [0.003, 0.001, -1], (t) => t === whole!.triangle)).toBeNull();
   });
+});
+
+describe("displacements that are drawn larger than they are", () => {
+  it("move what is drawn, and leave where the surface is", () => {
+    const surface = surfaceOf(ball);
+    const moved = surface.rest.map((x, i) => (i % 3 === 2 ? 0.02 * x : 0));
+    surface.displace(moved, null, 5);
+    const row = 3 * 7;
+    expect(surface.positions[row + 2]).toBeCloseTo(1.02 * surface.rest[row + 2]!, 7);
+    expect(surface.shown[row + 2]).toBeCloseTo(1.1 * surface.rest[row + 2]!, 7);
+    surface.keepAsUntouched();
+    expect(surface.untouchedAsShown(5)[row + 2]).toBeCloseTo(1.1 * surface.rest[row + 2]!, 7);
+    // A ball drawn out by a tenth along z: its normals are those of that ellipsoid.
+    const [x, y, z] = [0, 1, 2].map((axis) => surface.shown[row + axis]!) as Vec3;
+    const normal = new THREE.Vector3(x, y, z / 1.1 ** 2).normalize();
+    expect(normal.angleTo(new THREE.Vector3().fromArray(surface.shownNormals, row))).toBeLessThan(0.02);
+  });
+});
+
+describe("the closest point of the surface", () => {
+  it("is that of all triangles, though most are passed over", () => {
+    const surface = surfaceOf(ball);
+    const triangle = new THREE.Triangle();
+    for (let i = 0; i < 20; i++) {
+      const target = new THREE.Vector3(Math.sin(3 * i), Math.cos(5 * i), Math.sin(7 * i + 1)).setLength(0.03 + 0.003 * i);
+      let nearest = Infinity;
+      for (let t = 0; t < ball.triangles.length / 3; t++) {
+        triangle.setFromAttributeAndIndices(new THREE.BufferAttribute(ball.positions, 3), ...surface.cornersOf(t));
+        nearest = Math.min(nearest, triangle.closestPointToPoint(target, new THREE.Vector3()).distanceTo(target));
+      }
+      const found = surface.at(surface.untouched, closestSurfacePoint(surface, target.toArray()));
+      expect(new THREE.Vector3(...found).distanceTo(target)).toBeCloseTo(nearest, 8);
+    }
+  });
+});
+
+it("the arrow of a force grows with it, up to a bound", () => {
+  const lengths = [0, 0.1, 1, 8, 9, 1000].map((force) => arrowLength(force, 8));
+  expect(lengths[0]).toBe(0);
+  expect(lengths[1]).toBeLessThan(lengths[2]!);
+  expect(lengths[2]).toBeLessThan(lengths[3]!);
+  expect(lengths.slice(3)).toEqual([0.25, 0.25, 0.25]);
 });
 
 describe("a point of the surface between its nodes", () => {
