@@ -83,8 +83,7 @@ export class SettingsPanel {
     const [low, high] = this.moduli;
     if (modulus !== null) this.stiffness.valueAsNumber = Math.log(modulus / low) / Math.log(high / low);
     setText(byId("stiffness-value"), modulus === null ? fixedModulus(state) : pascals(modulus));
-    const moves = scene.motion?.body === body;
-    byId("stiffness-field").title = moves ? "The modes of a body in motion belong to its stiffness" : "";
+    byId("stiffness-field").title = modulus === null ? whyFixed(state) : "";
   }
 
   /** Of the tool that is driven, or that the next press drives: its shape, and the friction or the patch of its contacts. */
@@ -142,7 +141,11 @@ function rangeOf(modulus: number | null): Range {
 /** What is told in place of a stiffness that cannot be changed. */
 function fixedModulus({ scene, body }: Readonly<State>): string {
   const { motion } = scene!;
-  return motion?.body === body && motion.youngs_modulus !== null
-    ? `${pascals(motion.youngs_modulus)}, fixed`
-    : "several materials";
+  return motion?.body === body && motion.youngs_modulus !== null ? pascals(motion.youngs_modulus) : "several";
+}
+
+function whyFixed({ scene, body }: Readonly<State>): string {
+  return scene?.motion?.body === body
+    ? "Fixed: the modes of a body in motion belong to its stiffness"
+    : "Fixed: the body has several materials, or loads";
 }
