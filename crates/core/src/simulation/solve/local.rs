@@ -13,10 +13,10 @@ use crate::contact::patch_weights;
 use crate::contact::smooth::FanWeights;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::Contact;
+use crate::simulation::covering::Covering;
 use crate::simulation::input::Controls;
 use crate::simulation::law::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
 use crate::simulation::model::Model;
-use crate::simulation::scratch::Scratch;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -90,8 +90,15 @@ fn local_tool(model: &Model, controls: &Controls, tool: usize) -> LocalTool {
     LocalTool { radius: fixed.radius, pad: fixed.pad_youngs_modulus, coefficient: controls.friction[tool] }
 }
 
+/// Memory of a tick, as far as contacts under the local law need it.
+pub struct Memory<'a> {
+    pub covering: &'a mut Covering,
+    pub local: &'a mut LocalScratch,
+    pub system: &'a mut System,
+}
+
 /// Forces of the contacts of a body under the local law.
-pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
+pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: usize, controls: &Controls) {
     let mut slots = [0; MAX_CONTACTS];
     let mut count = 0;
     for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
@@ -102,9 +109,9 @@ pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, bod
         return;
     }
     let slots = &slots[..count];
-    scratch.local.others[..count].fill(Others::default());
-    follow_motion(model, state, scratch, slots, body);
-    let Scratch { local, system, .. } = scratch;
+    let Memory { covering, local, system } = memory;
+    local.others[..count].fill(Others::default());
+    follow_motion(model, state, covering, local, slots, body);
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
         // Whatever moves goes on as it did.
@@ -145,7 +152,14 @@ fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> 
 
 /// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
 /// to: by smaller patches the compliance of a single step could outweigh what is left of the half-space.
-fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots: &[usize], body: usize) {
+fn follow_motion(
+    model: &Model,
+    state: &mut State,
+    covering: &mut Covering,
+    local: &mut LocalScratch,
+    slots: &[usize],
+    body: usize,
+) {
     let fixed = &model.bodies[body];
     let State { bodies, contacts, .. } = state;
     let (Some(motion), Some(dynamics), Some(own)) = (&mut bodies[body].motion, &fixed.dynamics, &fixed.local) else {
@@ -153,14 +167,14 @@ fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots:
     };
     for (a, &slot) in slots.iter().enumerate() {
         let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
-        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut scratch.local.weights[a]);
+        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
         own.smooth.weigh(foot, weights);
         let (wide, _) = weights.field(|fan| regular.widths[fan]);
         let centre = fixed.material_point(&fixed.surface_point(foot));
-        let (surface, patches) = (&fixed.green.surface, &mut scratch.patches[body]);
+        let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
         // As many nodes as at the fans around fit.
-        if patch_weights(surface, &fixed.geometry, &centre, wide, patches, &mut scratch.candidate).is_ok() {
-            contacts.patches[slot].admit_touchable(&fixed.green, &scratch.candidate);
+        if patch_weights(surface, &fixed.geometry, &centre, wide, patches, &mut covering.candidate).is_ok() {
+            contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
         let mut moving = DMat3::ZERO;
@@ -168,7 +182,7 @@ fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots:
             let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
             moving += DMat3::from_cols(gradient * moved.x, gradient * moved.y, gradient * moved.z);
         }
-        scratch.local.others[a].moving = Some(moving);
+        local.others[a].moving = Some(moving);
     }
     for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate() {
@@ -176,7 +190,7 @@ fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots:
             if a == b {
                 change += DMat3::IDENTITY * (1.0 / dynamics.coupling);
             }
-            scratch.local.change[a][b] = change;
+            local.change[a][b] = change;
         }
     }
 }
@@ -302,7 +316,8 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         let contact: &mut Contact = &mut state.contacts.slots[slot];
         (contact.force, contact.local.force) = (response.force, response.force);
         (contact.point, contact.normal) = (response.foot.position, response.normal);
-        (contact.displacement, contact.wanted) = (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
+        (contact.displacement, contact.wanted) =
+            (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
         let own = &mut contact.local;
         own.advance = local.places[a] - own.relative;
         own.relative = local.places[a];
