@@ -25,6 +25,8 @@ REACH = 10.0
 # Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
 LOG_KEPT = 4000
 LOG_SENT = 64
+# Shapes of tools that the page can draw by their radius alone.
+DRAWN_SHAPES = ("sphere",)
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -403,8 +405,9 @@ def _thin(rows: np.ndarray, peaks: int | None = None) -> np.ndarray:
 
 
 def shapes_of(tool: ToolTable) -> tuple[str, ...]:
-    """Shapes that a tool may take."""
-    return get_args(type(tool).model_fields["shape"].annotation)
+    """Shapes that a tool may take in the page: its own, and those that the page draws."""
+    known = get_args(type(tool).model_fields["shape"].annotation)
+    return tuple(name for name in known if name in DRAWN_SHAPES or name == tool.shape)
 
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:
