@@ -41,13 +41,14 @@ def press(request, tmp_path):
 
 def settle(simulation: palpate.Simulation, seconds: float = 10.0) -> palpate.Frame:
     """Frame once the simulated hand has arrived and the limit has been found."""
-    end, before = time.monotonic() + seconds, None
+    end, before, same = time.monotonic() + seconds, None, 0
     while time.monotonic() < end:
         time.sleep(0.05)
         frame = simulation.frame()
         assert frame.statistics["fault"] is None
         now = np.concatenate([frame.positions.ravel(), frame.forces.ravel()])
-        if before is not None and np.abs(now - before).max() < 1e-8:
+        same = same + 1 if before is not None and np.abs(now - before).max() < 1e-8 else 0
+        if same == 4:
             return frame
         before = now
     raise AssertionError(f"did not settle: {frame} {frame.contacts}")

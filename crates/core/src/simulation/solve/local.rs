@@ -27,6 +27,8 @@ pub const MOST_STEPS: usize = 16;
 const SETTLED: f64 = 1e-8;
 /// A force that changes by less than this part from step to step stays.
 const SAME: f64 = 1e-8;
+/// A foot that goes farther in a tick, over the tool's radius, has jumped.
+const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
@@ -302,10 +304,24 @@ fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
     longest
 }
 
+/// Whether a foot has come elsewhere than where the tool has gone: off a ridge, or through a body. The force there has
+/// nothing to do with the one before, and might have more energy: such a contact ends, and the next starts from none.
+fn has_jumped(contact: &Contact, response: &LocalResponse, place: DVec3, radius: f64) -> bool {
+    let gone = place.distance(contact.local.relative);
+    response.foot.position.distance(contact.local.foot.position) > 4.0 * gone + FOOT_JUMP * radius
+}
+
 /// Writes the answers down.
 fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
     for (a, &slot) in slots.iter().enumerate() {
         let response = &local.responses[a];
+        let contact = &state.contacts.slots[slot];
+        let (tool, radius) = (contact.tool, model.tools[contact.tool].radius);
+        if has_jumped(contact, response, local.places[a], radius) {
+            state.tools[tool].entry_depth[body] = f64::INFINITY;
+            state.contacts.clear(slot);
+            continue;
+        }
         match &mut state.bodies[body].motion {
             Some(motion) => {
                 let Some(dynamics) = &model.bodies[body].dynamics else { continue };
