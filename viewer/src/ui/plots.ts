@@ -14,7 +14,7 @@ import { PressLog } from "./press_log";
 /** The eye does not follow faster, and every redraw costs the page time. */
 const REDRAW_INTERVAL_MS = 80;
 /** Above these stands what their lines mean. */
-const MOTION_HEIGHT_PX = 102;
+const MOTION_HEIGHT_PX = 108;
 /** In a window lower than this plots give way by so much, or the statistics below would be out of sight. */
 const LOW_WINDOW_PX = 780;
 const LOWER_PX = 22;
