@@ -19,6 +19,11 @@ UNLIMITED = {"max_force": 1e6, "max_slew": 1e12, "ramp": 0.0, "max_stiffness": 1
 CLEAR, HALVINGS = 1e-3, 34
 
 
+def sphere(radius: float, friction: float = 0.0) -> dict[str, Any]:
+    """Table of a rigid sphere under the local law."""
+    return {"shape": "sphere", "radius": radius, "contact": "local", "friction": friction}
+
+
 def loop_of(
     body: Body,
     green: GreensFunction,
@@ -31,24 +36,6 @@ def loop_of(
     table = {"name": "body", "model": "liver"}  # the table asks for a source; the body is given
     scene = Scene(body=table, tool=[dict(tool) for tool in tools], device=limits, view={"strain_limit": 0.0})
     return Simulation(BuiltScene.of(scene, body, green, motion))
-
-
-def forces_at(simulation: Simulation, points: np.ndarray, normals: np.ndarray, radius: float, depth: float) -> np.ndarray:
-    """Forces (n, 3), N, on a device that enters at the first place and slides through all: touching at depth.
-
-    Parameters
-    ----------
-    simulation
-        A loop whose first tool is a sphere.
-    points, normals
-        (n, 3) m, of the untouched surface, and (n, 3), outward.
-    radius, depth
-        Of the tool, and of its lowest point below the surface, m.
-
-    """
-    path = points + (radius - depth) * normals
-    lead = points[0] + np.linspace(radius + CLEAR, radius - depth, 40)[:, None] * normals[0]
-    return simulation.run(np.vstack([lead, path]))[len(lead) :]
 
 
 def touch_heights(simulation: Simulation, points: np.ndarray, normals: np.ndarray, around: float) -> np.ndarray:
@@ -75,6 +62,13 @@ def touch_heights(simulation: Simulation, points: np.ndarray, normals: np.ndarra
         touching = np.linalg.norm(forces, axis=1) > 0
         low, high = np.where(touching, middle, low), np.where(touching, high, middle)
     return (low + high) / 2
+
+
+def swept(simulation: Simulation, points: np.ndarray, normals: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Forces (n, 3), N, on a device that comes down to the first place and slides through all at heights along normals."""
+    path = points + heights[:, None] * normals
+    lead = path[0] + np.linspace(2 * CLEAR + 2e-3, 0, 40, endpoint=False)[:, None] * normals[0]
+    return simulation.run(np.vstack([lead, path]))[len(lead) :]
 
 
 def straight(start: Sequence[float], end: Sequence[float], step: float) -> np.ndarray:

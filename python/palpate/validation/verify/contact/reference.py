@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from palpate.body import Body, Material
 from palpate.mesh import TetMesh
 from palpate.validation.verify.contact.signorini import ContactProblem, Gap, Press
-from palpate.validation.verify.grids import lattice, mapped
+from palpate.validation.verify.contact.tools import sphere
+from palpate.validation.verify.grids import box, lattice, mapped
 from palpate.validation.verify.solution import green_of, quiet_body
 
 SOFT = Material(10e3, 0.45)
@@ -111,19 +113,31 @@ def _growing(length: float, cell: float) -> np.ndarray:
     return ends * (length / ends[-1])
 
 
-def sphere_force(block: Block, radius: float, depth: float) -> Press:
+@cache
+def sphere_press(block: Block, radius: float, depth: float) -> Press:
     """Press a sphere into the middle of the top."""
-    from palpate.validation.verify.contact.tools import sphere
-
     contact = np.sqrt(radius * depth)
     cell = 2 * contact / RESOLUTION
-    reach = cell * np.ceil(1.2 * contact / cell)
-    return block.pressed(sphere(radius), [depth], reach, cell)[0]
+    return block.pressed(sphere(radius), [depth], cell * np.ceil(1.2 * contact / cell), cell)[0]
 
 
 def body_on_table(block: Block, cells: tuple[int, int, int], *, quadratic: bool) -> Body:
     """Return the block with equal cells, from the origin up, for the force loop."""
-    from palpate.validation.verify.grids import box
-
     mesh = box(cells, block.size, quadratic=quadratic)
     return quiet_body(mesh, block.material, mesh.nodes[:, 2] < 1e-9)
+
+
+def finer_in_the_middle(block: Block, cell: float, reach: float, *, quadratic: bool) -> Body:
+    """Return the block with cells of one size around the middle of its top, larger ones outside, for the force loop."""
+    x, y, z = block.size
+    sides = [width / 2 + graded(-width / 2, width / 2, 0.0, reach, cell) for width in (x, y)]
+    mesh = mapped(lattice(*sides, z - graded(0.0, z, 0.0, reach, cell)[::-1]), quadratic=quadratic)
+    return quiet_body(mesh, block.material, mesh.nodes[:, 2] < 1e-9)
+
+
+def top_nodes(body: Body, reach: float = np.inf) -> np.ndarray:
+    """Nodes of the top within a distance of its middle along x and y, m."""
+    nodes = body.mesh.nodes
+    low, high = body.mesh.bounds
+    near = (np.abs(nodes[:, :2] - (low + high)[:2] / 2) < reach * (1 + 1e-9)).all(axis=1)
+    return np.flatnonzero(near & (nodes[:, 2] > high[2] - 1e-9))
