@@ -52,8 +52,9 @@ impl SimulationCore {
             let bodies = parts.into_iter().map(|part| part.build()).collect::<palpate_core::Result<Vec<_>>>()?;
             let tools = tools.into_iter().map(tool).collect::<palpate_core::Result<Vec<_>>>()?;
             let mut settings = Settings { strain_limit, ..Settings::default() };
-            settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius))| *to = *radius);
-            let model = Model::new(bodies, tools.into_iter().map(|(tool, _)| tool).collect())?;
+            settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius, _))| *to = *radius);
+            settings.friction.iter_mut().zip(&tools).for_each(|(to, (_, _, friction))| *to = *friction);
+            let model = Model::new(bodies, tools.into_iter().map(|(tool, _, _)| tool).collect())?;
             settings.contact_radius[..model.tools.len()].iter().try_for_each(|&r| model.check_contact_radius(r))?;
             Ok((Arc::new(model), settings))
         };
@@ -125,6 +126,13 @@ impl SimulationCore {
         py.detach(|| model.check_contact_radius(radius)).map_err(|e| to_python(py, e))?;
         self.change(py, |settings| {
             settings.contact_radius.iter_mut().skip(tool).take(1).for_each(|to| *to = radius);
+        })
+    }
+
+    /// Changes the coefficient of friction of a tool.
+    fn set_friction(&mut self, py: Python<'_>, tool: usize, friction: f64) -> PyResult<()> {
+        self.change(py, |settings| {
+            settings.friction.iter_mut().skip(tool).take(1).for_each(|to| *to = friction);
         })
     }
 

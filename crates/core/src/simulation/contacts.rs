@@ -3,6 +3,8 @@
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
+use super::law::LocalContact;
+use super::tool::LawKind;
 use crate::contact::TouchPatch;
 
 /// What a contact does.
@@ -23,6 +25,8 @@ pub struct Contact {
     // Written when it begins.
     /// What it does; [`Mode::Free`] is an empty slot.
     pub mode: Mode,
+    /// How it touches: a tool that holds on does so by a patch.
+    pub law: LawKind,
     /// Index of the tool.
     pub tool: usize,
     /// Index of the body.
@@ -51,6 +55,8 @@ pub struct Contact {
     pub(super) bound: f64,
     /// Force on the body, N.
     pub force: DVec3,
+    /// Under the local law, what it remembers.
+    pub local: LocalContact,
 }
 
 /// Slots for contacts. The patches stand apart, so that looking through the slots touches little memory.

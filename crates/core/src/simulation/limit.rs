@@ -19,6 +19,7 @@ use super::scratch::Scratch;
 use super::solve::{gather, solve_with};
 use super::state::State;
 use super::strain_watch::StrainWatch;
+use super::tool::LawKind;
 use crate::contact::MAX_PATCH_NODES;
 use crate::strain::{MAX_CONTACTS_WATCHED, provisional_displacement};
 
@@ -28,7 +29,7 @@ const OPENING: f64 = 1.3;
 /// Bounds the displacement of the contact that has just begun in `slot`.
 pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
     let body = &model.bodies[state.contacts.slots[slot].body];
-    if limit <= 0.0 {
+    if limit <= 0.0 || state.contacts.slots[slot].law == LawKind::Local {
         state.contacts.slots[slot].bound = f64::INFINITY;
         return;
     }
