@@ -8,6 +8,9 @@ import numpy as np
 
 from palpate.mesh import TetMesh
 
+# Angle off the normal from which a place is another one, rad.
+ELSEWHERE = 0.6
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -99,3 +102,28 @@ def away_from_supports(curve: Curve, mesh: TetMesh, fixed: np.ndarray, distance:
     from scipy.spatial import cKDTree
 
     return cKDTree(mesh.nodes[fixed]).query(curve.points)[0] > distance
+
+
+def touches_nothing_else(curve: Curve, mesh: TetMesh, radius: float) -> np.ndarray:
+    """Mask (n,) of places on which a sphere can stand without touching the body at another place, as in a crease.
+
+    The sphere touches the place from outside; no point of the surface that is seen from its centre by more than
+    :data:`ELSEWHERE` off the normal may lie within it.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(_dense(mesh))
+    centres = curve.points + radius * curve.normals
+    free = np.ones(len(centres), dtype=bool)
+    for k, (centre, near) in enumerate(zip(centres, tree.query_ball_point(centres, radius), strict=True)):
+        offset = tree.data[near] - centre
+        aside = -offset @ curve.normals[k] < np.cos(ELSEWHERE) * np.linalg.norm(offset, axis=1)
+        free[k] = not aside.any()
+    return free
+
+
+def _dense(mesh: TetMesh) -> np.ndarray:
+    """Points (n, 3), m, all over the drawn surface: a lattice of eight to an edge on each triangle."""
+    i, j = np.array([(i, j) for i in range(9) for j in range(9 - i)]).T / 8
+    lattice = np.column_stack([i, j, 1 - i - j])
+    return np.einsum("qk,tkx->tqx", lattice, mesh.nodes[mesh.surface_triangles]).reshape(-1, 3)

@@ -79,15 +79,11 @@ class ContactProblem:
     @classmethod
     def on_top(cls, green: GreensFunction, mesh: TetMesh) -> ContactProblem:
         """Of the faces on the top whose nodes may all be touched."""
-        top = mesh.nodes[:, 2].max() - 1e-9 * np.ptp(mesh.nodes[:, 2])
-        faces = mesh.surface_faces[(mesh.nodes[mesh.surface_faces, 2] > top).all(axis=1)]
-        faces = faces[np.isin(faces, green.touchable_nodes).all(axis=1)]
+        faces = _top_faces(green, mesh)
         nodes, corners = np.unique(faces, return_inverse=True)
-        load, quadrature = _integrals(mesh.nodes[nodes, :2], corners.reshape(faces.shape))
-        rows = np.searchsorted(green.surface_nodes, nodes)
-        answers = [green.solve(forces={int(node): (0, 0, 1)}).displacements[rows, 2] for node in nodes]
-        places, hats = quadrature
-        return cls(mesh.nodes[nodes, :2], hats.sum(axis=0), load.T @ np.array(answers) @ load, (places, hats))
+        load, (places, hats) = _integrals(mesh.nodes[nodes, :2], corners.reshape(faces.shape))
+        compliance = load.T @ _compliance(green, nodes) @ load
+        return cls(mesh.nodes[nodes, :2], hats.sum(axis=0), compliance, (places, hats))
 
     def press(self, gap: Gap, depths: Sequence[float]) -> list[Press]:
         """Press the tool to each depth of its lowest point below the untouched top, m."""
@@ -106,22 +102,60 @@ class ContactProblem:
         return found
 
 
-def at_nodes(problem_nodes: np.ndarray, compliance: np.ndarray, gap: Gap, depth: float) -> float:
-    """Force when the tool is kept out at the nodes only, as programs do that take the mesh's own points.
+def at_the_meshs_points(
+    green: GreensFunction, mesh: TetMesh, gap: Gap, depths: Sequence[float], penalty: float = 1e8
+) -> list[float]:
+    """Forces when the tool is kept out at the quadrature points of the mesh's own faces, as programs do that have no other.
+
+    The points of a face can only move as its nodes do, so a contact smaller than a face locks. Minimum over `p >= 0` of
+    `p.(B^T Psi B + diag(1/(kappa w))) p/2 - p.(d - g)`, B the shape functions at the points, w their areas.
 
     Parameters
     ----------
-    problem_nodes
-        (n, 2) m, places of the nodes.
-    compliance
-        (n, n) `Psi` along z, m/N.
-    gap, depth
+    green, mesh
+        The body, with the top touchable.
+    gap, depths
         As of :meth:`ContactProblem.press`.
+    penalty
+        kappa, Pa/m: as good as rigid, and there may be more points than a face has freedoms.
 
     """
+    faces = _top_faces(green, mesh)
+    nodes, local = np.unique(faces, return_inverse=True)
+    at, weight = _triangle_rule()
+    corners = mesh.nodes[faces[:, :3], :2]
+    shapes = _shapes(at, faces.shape[1])
+    points = np.einsum("qk,fkx->fqx", at, corners).reshape(-1, 2)
+    areas = np.outer(_areas(corners), weight).ravel()
+    near = np.flatnonzero(gap(points) < 2 * max(depths))
+    rows = np.zeros((len(near), len(nodes)))
+    local = local.reshape(faces.shape)
+    for row, point in zip(rows, near, strict=True):
+        row[local[point // len(at)]] = shapes[point % len(at)]
+    compliance = rows @ _compliance(green, nodes) @ rows.T + np.diag(1 / (penalty * areas[near]))
     factor = scipy.linalg.cholesky(compliance, lower=True)
-    right = depth - np.minimum(gap(problem_nodes), 1e3 * depth)
-    return float(nnls(factor.T, scipy.linalg.solve_triangular(factor, right, lower=True), maxiter=5000)[0].sum())
+    gaps = gap(points[near])
+    solved = [scipy.linalg.solve_triangular(factor, depth - gaps, lower=True) for depth in depths]
+    return [float(nnls(factor.T, right, maxiter=5000)[0].sum()) for right in solved]
+
+
+def _top_faces(green: GreensFunction, mesh: TetMesh) -> np.ndarray:
+    """Faces on the top whose nodes may all be touched, (k, 3 or 6)."""
+    top = mesh.nodes[:, 2].max() - 1e-9 * np.ptp(mesh.nodes[:, 2])
+    faces = mesh.surface_faces[(mesh.nodes[mesh.surface_faces, 2] > top).all(axis=1)]
+    return faces[np.isin(faces, green.touchable_nodes).all(axis=1)]
+
+
+def _compliance(green: GreensFunction, nodes: np.ndarray) -> np.ndarray:
+    """`Psi` along z between nodes (n, n), m/N."""
+    rows = np.searchsorted(green.surface_nodes, nodes)
+    return np.array([green.solve(forces={int(node): (0, 0, 1)}).displacements[rows, 2] for node in nodes])
+
+
+def _areas(corners: np.ndarray) -> np.ndarray:
+    """Areas (f,), m^2, of triangles of the plane (f, 3, 2)."""
+    (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    return np.abs(a * d - b * c) / 2
 
 
 def _integrals(places: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
@@ -131,8 +165,7 @@ def _integrals(places: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, tuple
     load = np.zeros((len(places),) * 2)
     points, hats = [], []
     corners = places[faces[:, :3]]
-    (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    areas = np.abs(a * d - b * c) / 2
+    areas = _areas(corners)
     for part in PARTS[width]:
         barycentric = at @ PLACES[part]
         shapes = _shapes(barycentric, width)
