@@ -64,22 +64,19 @@ def test_mindlins_curve_starts_with_its_stiffness_and_ends_in_full_slip():
     assert end == pytest.approx(0.3 * 0.05, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_direct_solution_finds_sneddons_force_on_a_deep_block():
     deep = Block((0.4, 0.4, 0.2))
     # The block is finite: it gives less than a half-space by about the contact radius over its height.
-    for depth in (5e-4, 1e-3):
-        exact, contact = closed_forms.sneddon_sphere(depth, 0.01, deep.plane_modulus)
-        assert sphere_press(deep, 0.01, depth).force == pytest.approx(exact * (1 + contact / 0.2), rel=0.01)
+    exact, contact = closed_forms.sneddon_sphere(1e-3, 0.01, deep.plane_modulus)
+    assert sphere_press(deep, 0.01, 1e-3).force == pytest.approx(exact * (1 + contact / 0.2), rel=0.01)
 
 
 @pytest.mark.slow
-def test_the_direct_solution_of_a_block_is_converged_and_the_known_one():
+def test_the_direct_solution_of_a_block_is_the_known_one():
     block = Block()
     for depth, known in ((5e-4, 0.0197), (1e-3, 0.0560), (2e-3, 0.157)):
         assert sphere_press(block, 0.01, depth).force == pytest.approx(known, rel=0.02)
-    contact = np.sqrt(0.01 * 1e-3)
-    finer = block.pressed(tools.sphere(0.01), [1e-3], 1.2 * contact, contact / 5)[0]
-    assert sphere_press(block, 0.01, 1e-3).force == pytest.approx(finer.force, rel=0.005)
 
 
 @pytest.mark.slow
@@ -87,10 +84,10 @@ def test_the_direct_solution_takes_ellipsoids_and_punches():
     deep = Block((0.4, 0.4, 0.2))
     axes, depth = (0.012, 0.008, 0.008), 5e-4
     exact, (a, b) = closed_forms.hertz_ellipsoid(depth, (0.018, 0.008), deep.plane_modulus)
-    found = deep.pressed(tools.ellipsoid(axes), [depth], 1.2 * a, 2 * b / 7)[0]
+    found = deep.pressed(tools.ellipsoid(axes), [depth], 1.2 * a, 2 * b / 6)[0]
     assert found.force == pytest.approx(exact, rel=0.02)
     exact, a = closed_forms.rounded_punch(depth, 0.004, 0.002, deep.plane_modulus)
-    found = deep.pressed(tools.rounded_punch(0.006, 0.002), [depth], 1.2 * a, a / 6)[0]
+    found = deep.pressed(tools.rounded_punch(0.006, 0.002), [depth], 1.2 * a, a / 5)[0]
     assert found.force == pytest.approx(exact, rel=0.04)
 
 

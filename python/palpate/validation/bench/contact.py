@@ -132,9 +132,7 @@ def _own_rows(body: Body, name: str) -> list[Row]:
     """By the local law, and at the mesh's own points."""
     green = green_of(body, touch=top_nodes(body, 0.035))
     places = _places(body)
-    nodal = [
-        at_the_meshs_points(green, body.mesh, tools.sphere(RADIUS, tuple(place)), DEPTHS) for place in places
-    ]
+    nodal = [at_the_meshs_points(green, body.mesh, tools.sphere(RADIUS, tuple(place)), DEPTHS) for place in places]
     local, cost = _local_forces(body, green, places)
     return [Row("Palpate", name, local, cost), Row("Signorini at mesh points", name, np.array(nodal))]
 

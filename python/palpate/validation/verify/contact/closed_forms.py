@@ -32,7 +32,9 @@ def sneddon_sphere(depth: float, radius: float, plane_modulus: float) -> tuple[f
     return plane_modulus * ((radius**2 + a**2) * np.arctanh(a / radius) - a * radius), a
 
 
-def hertz_ellipsoid(depth: float, radii: tuple[float, float], plane_modulus: float) -> tuple[float, tuple[float, float]]:
+def hertz_ellipsoid(
+    depth: float, radii: tuple[float, float], plane_modulus: float
+) -> tuple[float, tuple[float, float]]:
     """Force and semi-axes of the contact of a paraboloid with two radii of curvature (Johnson 1985, 4.26).
 
     With the gap `A x^2 + B y^2`, `A <= B`, semi-axes a >= b, `e^2 = 1 - b^2/a^2` and complete integrals K(e), E(e),

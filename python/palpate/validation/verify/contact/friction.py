@@ -28,7 +28,9 @@ def friction() -> Outcome:
         checks.append(Check(f"beyond the cone, friction {mu:g}", max(beyond, 0.0), 0.0, "Coulomb", 1e-6))
     slip = partial_slip(0.3)
     checks.append(Check("partial slip: largest error over mu F_n", slip.error, 0.0, "Mindlin 1949", 0.05))
-    return Outcome(checks, {"contact-partial-slip.png": partial(plot_partial_slip, slip.shifts, slip.forces, slip.exact)})
+    return Outcome(
+        checks, {"contact-partial-slip.png": partial(plot_partial_slip, slip.shifts, slip.forces, slip.exact)}
+    )
 
 
 def dragged(mu: float, drags: int = 60, ticks: int = 500) -> tuple[np.ndarray, np.ndarray]:

@@ -20,16 +20,40 @@ from palpate.validation.verify.grids import box, lattice, mapped
 from palpate.validation.verify.solution import green_of, quiet_body
 
 SOFT = Material(10e3, 0.45)
-# Contact radius over the distance of surface nodes under the contact, and ratio of neighbouring cells beside it.
-RESOLUTION, GROWTH = 7.0, 1.7
+# Contact radius over the distance of surface nodes under the contact; ratio of neighbouring cells beside it, and of those
+# from the fourth on.
+RESOLUTION, GROWTH, GROWTH_FAR, NEAR_CELLS = 7.0, 1.6, 2.3, 3
+
+
+@dataclass(frozen=True)
+class Nodule:
+    """A ball of another Young's modulus, Pa, in the middle of a block: depth of its centre below the top, and radius, m."""
+
+    depth: float
+    radius: float
+    youngs_modulus: float
+
+    def elements(self, mesh: TetMesh, share: int) -> np.ndarray:
+        """Mask (m,) of elements of a mesh of one of ``share`` equal parts of the block, its top at z = 0.
+
+        Those with the closest centres, as many as have the volume of the ball: steps of a lattice would make it another one.
+        """
+        corners = mesh.nodes[mesh.tets[:, :4]]
+        volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+        order = np.argsort(np.linalg.norm(corners.mean(axis=1) + (0, 0, self.depth), axis=1), kind="stable")
+        volume = 4 / 3 * np.pi * self.radius**3 / share
+        inside = np.zeros(len(mesh.tets), dtype=bool)
+        inside[order[np.cumsum(volumes[order]) < volume]] = True
+        return inside
 
 
 @dataclass(frozen=True)
 class Block:
-    """A block on a table: widths along x and y, and its height, m."""
+    """A block on a table: widths along x and y, and its height, m; and what is hidden in it."""
 
     size: tuple[float, float, float] = (0.1, 0.1, 0.05)
     material: Material = SOFT
+    nodule: Nodule | None = None
 
     @property
     def plane_modulus(self) -> float:
@@ -64,7 +88,7 @@ class Block:
 
         """
         mesh, fixed, parts = self._mesh(reach, cell, beside, place)
-        body = quiet_body(mesh, self.material, fixed)
+        body = self._body(mesh, fixed, parts)
         top = np.abs(mesh.nodes[:, 2]) < 1e-9
         near = (np.abs(mesh.nodes[:, :2] - beside) < reach * (1 + 1e-9)).all(axis=1)
         problem = ContactProblem.on_top(green_of(body, touch=np.flatnonzero(top & near)), mesh)
@@ -72,6 +96,17 @@ class Block:
             Press(press.depth, parts * press.force, parts * press.area, press.pressures)
             for press in problem.press(gap, depths)
         ]
+
+    def _fine(self, reach: float) -> float:
+        """How far from the contact elements are small, m."""
+        return reach if self.nodule is None else max(reach, self.nodule.depth + self.nodule.radius)
+
+    def _body(self, mesh: TetMesh, fixed: np.ndarray, parts: int) -> Body:
+        if self.nodule is None:
+            return quiet_body(mesh, self.material, fixed)
+        labels = self.nodule.elements(mesh, parts).astype(np.int64)
+        hard = Material(self.nodule.youngs_modulus, self.material.poissons_ratio)
+        return quiet_body(TetMesh(mesh.nodes, mesh.tets, labels), {0: self.material, 1: hard}, fixed)
 
     def _mesh(
         self, reach: float, cell: float, beside: tuple[float, float], place: tuple[float, float] | None
@@ -83,9 +118,9 @@ class Block:
             middle = place is None or abs(place[axis] - width / 2) < 1e-12
             low = 0.0 if middle else -place[axis]
             high = width / 2 if middle else width - place[axis]
-            axes.append(graded(low, high, beside[axis], reach, cell))
+            axes.append(graded(low, high, beside[axis], self._fine(reach), cell))
             halves.append(middle)
-        down = -graded(0.0, self.size[2], 0.0, reach, cell)[::-1]
+        down = -graded(0.0, self.size[2], 0.0, self._fine(reach), cell)[::-1]
         mesh = mapped(lattice(*axes, down), quadratic=True)
         fixed = np.zeros(mesh.nodes.shape, dtype=bool)
         for axis in (axis for axis in range(2) if halves[axis]):
@@ -102,23 +137,28 @@ def graded(low: float, high: float, centre: float, reach: float, cell: float) ->
 
 
 def _growing(length: float, cell: float) -> np.ndarray:
-    """Ends of cells that grow by a ratio near :data:`GROWTH` and fill ``length``."""
+    """Ends of cells that grow by about the ratios above and fill ``length``."""
     if length <= 1e-12:
         return np.zeros(0)
-    steps, total = [], 0.0
-    while total < length:
-        steps.append(cell * GROWTH ** (len(steps) + 1))
-        total += steps[-1]
+    steps: list[float] = []
+    while sum(steps) < length:
+        near = len(steps) < NEAR_CELLS
+        steps.append((steps[-1] if steps else cell) * (GROWTH if near else GROWTH_FAR))
     ends = np.cumsum(steps)
     return ends * (length / ends[-1])
+
+
+def cell_under(radius: float, depth: float) -> tuple[float, float]:
+    """Half-width of the fine part of the top under a sphere, and edge of its elements, m."""
+    contact = np.sqrt(radius * depth)
+    cell = 2 * contact / RESOLUTION
+    return cell * np.ceil(1.2 * contact / cell), cell
 
 
 @cache
 def sphere_press(block: Block, radius: float, depth: float) -> Press:
     """Press a sphere into the middle of the top."""
-    contact = np.sqrt(radius * depth)
-    cell = 2 * contact / RESOLUTION
-    return block.pressed(sphere(radius), [depth], cell * np.ceil(1.2 * contact / cell), cell)[0]
+    return block.pressed(sphere(radius), [depth], *cell_under(radius, depth))[0]
 
 
 def body_on_table(block: Block, cells: tuple[int, int, int], *, quadratic: bool) -> Body:

@@ -96,7 +96,9 @@ class ContactProblem:
         found = []
         for depth in depths:
             right = scale * (depth * self.areas - gaps)
-            pressures = scale * nnls(factor.T, scipy.linalg.solve_triangular(factor, right, lower=True), maxiter=5000)[0]
+            pressures = (
+                scale * nnls(factor.T, scipy.linalg.solve_triangular(factor, right, lower=True), maxiter=5000)[0]
+            )
             area = float(self.areas[pressures > 0].sum())
             found.append(Press(depth, float(self.areas @ pressures), area, pressures))
         return found
