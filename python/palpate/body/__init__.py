@@ -9,15 +9,4 @@ from palpate.body.moduli import moduli_of_store, surface_moduli
 from palpate.body.problem import description, problem_arrays
 from palpate.body.supports import Fixed
 
-__all__ = [
-    "Body",
-    "Fixed",
-    "Loads",
-    "Material",
-    "description",
-    "free_end",
-    "moduli_of_store",
-    "parse",
-    "problem_arrays",
-    "surface_moduli",
-]
+__all__ = ["Body", "Fixed", "Loads", "Material", "description", "free_end", "moduli_of_store", "parse", "problem_arrays", "surface_moduli"]

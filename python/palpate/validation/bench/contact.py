@@ -1,9 +1,9 @@
-"""A sphere pressed into a block whose elements are as large as the sphere: who gets the force right?
+"""A sphere pressed into a block whose elements are as large as the sphere, by Palpate and by others.
 
-All take the same 4-node tetrahedra, 10 mm between nodes, and press at the same places of an element: over a node, over the
-middles of its edges, inside of its faces. What is right comes from a direct solution on a mesh that resolves the contact
-(`verify.contact.reference`). Beside Palpate's local law stands what its own operator gives when the tool is kept out at
-the quadrature points of the faces instead (Signorini), and, where they are installed, MuJoCo and Drake.
+All take the same 4-node tetrahedra, 10 mm between nodes, and press at the same places of an element: over a node, over
+the middles of its edges, inside of its faces. What is right comes from a direct solution on a mesh that resolves the
+contact (`verify.contact.reference`). Beside Palpate's local law stands what its own operator gives when the tool is kept
+out at the quadrature points of the faces instead (Signorini), and, where they are installed, MuJoCo and Drake.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def _own_rows(body: Body, name: str) -> list[Row]:
 
 
 def _local_forces(body: Body, green: GreensFunction, places: np.ndarray) -> tuple[np.ndarray, float]:
-    """Forces in the tick (places, depths), and its median computing time, us."""
+    """Return forces in the tick (places, depths), and its median computing time, us."""
     simulation = loop_of(body, green, [sphere(RADIUS)])
     top = body.mesh.bounds[1, 2] + RADIUS
     forces = []
@@ -171,7 +171,7 @@ def _peer_rows(report: Callable[[str], None]) -> list[Row]:
 
 
 def _at_depths(depths: np.ndarray, pushes: Sequence[float]) -> np.ndarray:
-    """Forces (places, :data:`DEPTHS`) from the depths (places, pushes) of given forces: lines between logarithms."""
+    """Interpolate forces (places, :data:`DEPTHS`) between the logarithms of depths (places, pushes) of given ones."""
     wanted = np.log(DEPTHS)
     forces = []
     for row in np.log(depths):

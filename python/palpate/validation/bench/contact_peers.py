@@ -37,10 +37,10 @@ def missing() -> dict[str, str]:
 def mujoco_forces(
     mesh: TetMesh, material: Material, radius: float, places: np.ndarray, depths: Sequence[float]
 ) -> tuple[np.ndarray, float]:
-    """Forces (places, depths), N, on the block, and the seconds of one step in contact.
+    """Return forces (places, depths), N, on the block, and the seconds of one step in contact.
 
-    A flex of linear elements ("flexcomp" of dimension 3) under a sphere of a mocap body; the contact is as hard as the time
-    step allows.
+    A flex of linear elements ("flexcomp" of dimension 3) under a sphere of a mocap body; the contact is as hard as the
+    time step allows.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def mujoco_forces(
 def drake_depths(
     mesh: TetMesh, material: Material, radius: float, places: np.ndarray, forces: Sequence[float]
 ) -> tuple[np.ndarray, float]:
-    """Depths (places, forces), m, and the seconds of one step; arguments as of :func:`mujoco_forces`.
+    """Return depths (places, forces), m, and the seconds of one step; arguments as of :func:`mujoco_forces`.
 
     A linear deformable body under a sphere on a vertical slider that is pushed down by a constant force; hydroelastic
     contact, which cannot be given a depth.

@@ -45,7 +45,7 @@ def tick_rows() -> list[TickRow]:
 
 
 def compute_us(simulation: Simulation, path: np.ndarray) -> np.ndarray:
-    """Computing time of every tick of a path (t, 3), us."""
+    """Measure the computing time of every tick of a path (t, 3), us."""
     positions = np.ascontiguousarray(path[:, None])
     upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (*positions.shape[:2], 4)).copy()
     raw = simulation._core.run(positions, upright, np.zeros(positions.shape[:2], dtype=bool), [], [])

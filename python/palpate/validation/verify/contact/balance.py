@@ -9,7 +9,6 @@ from palpate.fields import Interior
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere
-from palpate.validation.verify.contact.reference import top_nodes
 from palpate.validation.verify.grids import box
 from palpate.validation.verify.solution import green_of, quiet_body
 
@@ -41,7 +40,7 @@ def imbalance(forces: np.ndarray, reactions: np.ndarray, loads: np.ndarray) -> f
 
 
 def dragged(ticks: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Forces on the devices, and from `K u` of the shape at every tick the reactions of the supports, as of imbalance."""
+    """Return forces on the devices, reactions of the supports from `K u` of every tick's shape, and loads."""
     mesh = box((5, 5, 3), (0.08, 0.08, 0.048), quadratic=True)
     loads = Loads(gravity=(0.0, 0.0, 9.81))
     body = quiet_body(mesh, Material(10e3, 0.4, 1000.0), mesh.nodes[:, 2] < 1e-9, loads)
@@ -54,7 +53,7 @@ def dragged(ticks: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _reactions(body: Body, shapes: np.ndarray) -> np.ndarray:
-    """Sums (ticks, 3), N, of the forces of the supports, from displacements (ticks, s, 3), m, of the surface."""
+    """Return sums (ticks, 3), N, of the forces of the supports, from displacements (ticks, s, 3), m, of the surface."""
     interior, stiffness = Interior(body), body.stiffness()
     supported = body.fixed_mask
     loads = body.load_vector().reshape(-1, 3)

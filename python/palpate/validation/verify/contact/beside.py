@@ -43,6 +43,6 @@ def edges_and_neighbours() -> Outcome:
 
 
 def pressed(simulation: Simulation, touching: np.ndarray) -> np.ndarray:
-    """Normal forces (tools,), N, of tools that go straight down by the depth from where they touch, (tools, 3) m."""
+    """Return normal forces (tools,), N, of tools that go down by the depth from where they touch, (tools, 3) m."""
     paths = [straight(place + (0, 0, DEPTH), place - (0, 0, DEPTH), 5e-5) for place in touching]
     return simulation.run(np.stack(paths, axis=1))[-1, :, 2]

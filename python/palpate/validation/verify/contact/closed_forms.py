@@ -72,8 +72,8 @@ def hertz_ellipsoid(
 def rounded_punch(depth: float, flat: float, rounding: float, plane_modulus: float) -> tuple[float, float]:
     """Force and contact radius of a flat punch whose rim is rounded (Ciavarella 1999, Jaeger 1995).
 
-    Sneddon's integrals `d = a int f'/sqrt(a^2 - r^2) dr`, `F = 2 E* int r^2 f'/sqrt(a^2 - r^2) dr` over the contact, of the
-    profile `f = (r - b)^2 / (2 R)` outside of the flat part; with `cos t = b/a`,
+    Sneddon's integrals `d = a int f'/sqrt(a^2 - r^2) dr`, `F = 2 E* int r^2 f'/sqrt(a^2 - r^2) dr` over the contact, of
+    the profile `f = (r - b)^2 / (2 R)` outside of the flat part; with `cos t = b/a`,
 
         d = a/R (a sin t - b t),   F = 2 E*/R [a^3 (sin t - sin^3 t / 3) - a^2 b/2 (t + sin t cos t)].
 
@@ -107,8 +107,8 @@ def rounded_punch(depth: float, flat: float, rounding: float, plane_modulus: flo
 def mindlin_force(shift: np.ndarray, normal_force: float, friction: float, tangential_stiffness: float) -> np.ndarray:
     """Friction at a sideways shift under a constant normal force (Mindlin 1949; Cattaneo 1938; Johnson 1985, 7.42).
 
-    `Q = mu P [1 - (1 - s/s_max)^1.5]` up to full slip at `s_max = 3 mu P / (2 k_t)`, where `k_t = 8 a G / (2 - nu)` is the
-    stiffness of a contact of radius a that sticks.
+    `Q = mu P [1 - (1 - s/s_max)^1.5]` up to full slip at `s_max = 3 mu P / (2 k_t)`, where `k_t = 8 a G / (2 - nu)` is
+    the stiffness of a contact of radius a that sticks.
     """
     full = 1.5 * friction * normal_force / tangential_stiffness
     return friction * normal_force * (1 - (1 - np.clip(np.asarray(shift) / full, 0.0, 1.0)) ** 1.5)

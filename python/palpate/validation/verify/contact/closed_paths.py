@@ -90,7 +90,7 @@ class ClosedPaths:
 
 
 def _quaternions(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternions w x y z of rotation vectors (..., 3), rad."""
+    """Return unit quaternions w x y z of rotation vectors (..., 3), rad."""
     angle = np.linalg.norm(rotation, axis=-1, keepdims=True)
     part = np.sinc(angle / (2 * np.pi)) / 2  # sin(angle/2) / angle
     return np.concatenate([np.cos(angle / 2), part * rotation], axis=-1)

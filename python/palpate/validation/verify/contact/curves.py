@@ -80,7 +80,7 @@ def _node_normals(mesh: TetMesh) -> np.ndarray:
 
 
 def _loops(pairs: np.ndarray) -> list[np.ndarray]:
-    """Closed chains of points, each of which occurs in two pairs."""
+    """Find closed chains of points, each of which occurs in two pairs."""
     order = np.argsort(pairs.ravel(), kind="stable")
     beside = order.reshape(-1, 2)  # the two places in ``pairs`` at which each point stands
     other = pairs.ravel()[order ^ 1].reshape(beside.shape)

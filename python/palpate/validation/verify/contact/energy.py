@@ -83,7 +83,7 @@ class EnergyBench:
         return loop_of(self.body, self.green, tools, device, self.motion if condition.moving else None)
 
     def paths(self, condition: Condition, count: int) -> ClosedPaths:
-        """Closed paths of all tools; two of them come as close as two radii."""
+        """Make closed paths of all tools; two of them come as close as two radii."""
         low, high = self.body.mesh.bounds
         middle = (low + high) / 2
         apart = 0.0 if condition.tools == 1 else 0.016
@@ -93,7 +93,7 @@ class EnergyBench:
         )
 
     def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and torques (paths, ticks, tools, 3); a body in motion starts each path at rest."""
+        """Return forces and torques (paths, ticks, tools, 3); a body in motion starts each path at rest."""
         simulation = self.simulation(condition)
         if not condition.moving:
             recording = simulation.play(*paths.script())

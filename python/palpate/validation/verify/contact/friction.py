@@ -34,7 +34,7 @@ def friction() -> Outcome:
 
 
 def dragged(mu: float, drags: int = 60, ticks: int = 500) -> tuple[np.ndarray, np.ndarray]:
-    """Forces on the device and normals (n, 3) of random drags over the flat block."""
+    """Return forces on the device and normals (n, 3) of random drags over the flat block."""
     simulation, body = flat_loop((10, 10, 5), quadratic=True, friction=mu)
     low, high = body.mesh.bounds
     centre = np.array([[*(low + high)[:2] / 2, high[2]]])

@@ -65,7 +65,7 @@ def touch_heights(simulation: Simulation, points: np.ndarray, normals: np.ndarra
 
 
 def swept(simulation: Simulation, points: np.ndarray, normals: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Forces (n, 3), N, on a device that comes down to the first place and slides through all at heights along normals."""
+    """Return forces (n, 3), N, on a device that comes down to the first place and slides at heights along normals."""
     path = points + heights[:, None] * normals
     lead = path[0] + np.linspace(2 * CLEAR + 2e-3, 0, 40, endpoint=False)[:, None] * normals[0]
     return simulation.run(np.vstack([lead, path]))[len(lead) :]

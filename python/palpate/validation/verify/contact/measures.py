@@ -25,7 +25,7 @@ def ripple(forces: np.ndarray) -> float:
 
 
 def roughness(step: float, forces: np.ndarray, window: float = WINDOW) -> tuple[float, float]:
-    """Root mean square and largest of `F / cubic - 1`, the cubic fitted to the magnitudes of a window around each place.
+    """Root mean square and largest of `F / cubic - 1`, the cubic fitted to magnitudes in a window around each place.
 
     Half a window at both ends, where a fit is one-sided, is left out.
 

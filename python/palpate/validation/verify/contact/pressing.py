@@ -1,4 +1,4 @@
-"""A sphere pressed into a block whose elements are larger than the contact: force in the tick beside a direct solution."""
+"""A sphere pressed into elements larger than its contact: force in the tick beside a direct solution."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def meshes() -> dict[tuple[str, float], Body]:
 
 
 def pressed(body: Body, depths: np.ndarray, radius: float = RADIUS) -> np.ndarray:
-    """Forces (n,), N, along z on a device that presses a sphere into the middle of the top, deeper at each place."""
+    """Return forces (n,), N, along z on a device that presses a sphere into the middle of the top, ever deeper."""
     simulation = loop_of(body, green_of(body, touch=top_nodes(body, REACH)), [sphere(radius)])
     low, high = body.mesh.bounds
     top = np.array([*(low + high)[:2] / 2, high[2] + radius])

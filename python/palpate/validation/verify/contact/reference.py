@@ -20,14 +20,14 @@ from palpate.validation.verify.grids import box, lattice, mapped
 from palpate.validation.verify.solution import green_of, quiet_body
 
 SOFT = Material(10e3, 0.45)
-# Contact radius over the distance of surface nodes under the contact; ratio of neighbouring cells beside it, and of those
-# from the fourth on.
+# Contact radius over the distance of surface nodes under the contact; ratio of neighbouring cells beside it, and of
+# those from the fourth on.
 RESOLUTION, GROWTH, GROWTH_FAR, NEAR_CELLS = 7.0, 1.6, 2.3, 3
 
 
 @dataclass(frozen=True)
 class Nodule:
-    """A ball of another Young's modulus, Pa, in the middle of a block: depth of its centre below the top, and radius, m."""
+    """A ball of another Young's modulus, Pa, in the middle of a block: depth of its centre and radius, m."""
 
     depth: float
     radius: float
@@ -36,7 +36,7 @@ class Nodule:
     def elements(self, mesh: TetMesh, share: int) -> np.ndarray:
         """Mask (m,) of elements of a mesh of one of ``share`` equal parts of the block, its top at z = 0.
 
-        Those with the closest centres, as many as have the volume of the ball: steps of a lattice would make it another one.
+        Those with the closest centres, as many as have the volume of the ball: steps of a lattice would change it.
         """
         corners = mesh.nodes[mesh.tets[:, :4]]
         volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
@@ -69,7 +69,7 @@ class Block:
         beside: tuple[float, float] = (0.0, 0.0),
         place: tuple[float, float] | None = None,
     ) -> list[Press]:
-        """Forces on the whole tool.
+        """Press a tool; forces are those on all of it.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ def graded(low: float, high: float, centre: float, reach: float, cell: float) ->
 
 
 def _growing(length: float, cell: float) -> np.ndarray:
-    """Ends of cells that grow by about the ratios above and fill ``length``."""
+    """Return ends of cells that grow by about the ratios above and fill ``length``."""
     if length <= 1e-12:
         return np.zeros(0)
     steps: list[float] = []

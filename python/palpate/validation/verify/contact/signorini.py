@@ -1,14 +1,14 @@
 """The contact problem solved directly: a rigid tool without friction pressed into the top of a body, by Signorini.
 
 With pressure `p = sum_j p_j phi_j`, phi_j the linear hat of a node on the flat triangles of the faces, N_i the shape
-functions of the element, and `M_ij = int N_i phi_j dA`, the nodal forces are `M p` and the top sinks by `Psi M p`. The tool
-at depth d over the gap g may nowhere, in the mean under a hat, lie below the surface:
+functions of the element, and `M_ij = int N_i phi_j dA`, the nodal forces are `M p` and the top sinks by `Psi M p`. The
+tool at depth d over the gap g may nowhere, in the mean under a hat, lie below the surface:
 
     A = M^T Psi M,   w = A p - (d m - G) >= 0,   p >= 0,   p . w = 0,   m_j = int phi_j dA,   G_j = int phi_j g dA,
 
-a linear complementarity problem with a symmetric positive definite matrix, so `p` is the minimum of `p.A p/2 - p.(d m - G)`
-over `p >= 0`: non-negative least squares with the Cholesky factor of A (Lawson and Hanson 1974). Hats instead of nodes,
-since the consistent nodal forces of a uniform pressure vanish at the corners of a 6-node face: their sign says nothing.
+a linear complementarity problem with a symmetric positive definite matrix, so `p` is the minimum of
+`p.A p/2 - p.(d m - G)` over `p >= 0`: non-negative least squares with the Cholesky factor of A (Lawson and Hanson 1974).
+Hats instead of nodes, since the consistent nodal forces of a uniform pressure vanish at the corners of a 6-node face: their sign says nothing.
 
 Nothing of the force loop is used, and the contact is resolved by elements much smaller than it.
 """
@@ -107,7 +107,7 @@ class ContactProblem:
 def at_the_meshs_points(
     green: GreensFunction, mesh: TetMesh, gap: Gap, depths: Sequence[float], penalty: float = 1e8
 ) -> list[float]:
-    """Forces when the tool is kept out at the quadrature points of the mesh's own faces, as programs do that have no other.
+    """Press a tool that is kept out at the quadrature points of the mesh's own faces, as most programs do; forces, N.
 
     The points of a face can only move as its nodes do, so a contact smaller than a face locks. Minimum over `p >= 0` of
     `p.(B^T Psi B + diag(1/(kappa w))) p/2 - p.(d - g)`, B the shape functions at the points, w their areas.

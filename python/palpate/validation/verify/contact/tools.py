@@ -1,4 +1,4 @@
-"""Undersides of rigid tools, exactly: height over the lowest point, m, at places (n, 2) of the plane; infinite beside them."""
+"""Undersides of rigid tools: height over the lowest point, m, at places (n, 2) of the plane; infinite beside them."""
 
 from __future__ import annotations
 
