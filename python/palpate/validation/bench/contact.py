@@ -2,8 +2,8 @@
 
 All take the same 4-node tetrahedra, 10 mm between nodes, and press at the same places of an element: over a node, over
 the middles of its edges, inside of its faces. What is right comes from a direct solution on a mesh that resolves the
-contact (`verify.contact.reference`). Beside Palpate's local law stands what its own operator gives when the tool is kept
-out at the quadrature points of the faces instead (Signorini), and, where they are installed, MuJoCo and Drake.
+contact (`verify.contact.reference`). Beside Palpate's local law stands what its own operator gives when the tool is
+kept out at the quadrature points of the faces instead (Signorini), and, where they are installed, MuJoCo and Drake.
 """
 
 from __future__ import annotations

@@ -7,8 +7,9 @@ tool at depth d over the gap g may nowhere, in the mean under a hat, lie below t
     A = M^T Psi M,   w = A p - (d m - G) >= 0,   p >= 0,   p . w = 0,   m_j = int phi_j dA,   G_j = int phi_j g dA,
 
 a linear complementarity problem with a symmetric positive definite matrix, so `p` is the minimum of
-`p.A p/2 - p.(d m - G)` over `p >= 0`: non-negative least squares with the Cholesky factor of A (Lawson and Hanson 1974).
-Hats instead of nodes, since the consistent nodal forces of a uniform pressure vanish at the corners of a 6-node face: their sign says nothing.
+`p.A p/2 - p.(d m - G)` over `p >= 0`: non-negative least squares with the Cholesky factor of A (Lawson and Hanson
+1974). Hats instead of nodes, since the consistent nodal forces of a uniform pressure vanish at the corners of a 6-node
+face: their sign says nothing.
 
 Nothing of the force loop is used, and the contact is resolved by elements much smaller than it.
 """
