@@ -16,8 +16,8 @@ from palpate.validation.verify.contact.reference import Block, Nodule
 EXAMPLE = Path(__file__).parents[3] / "examples" / "nodule.toml"
 MIDDLE, TOP, DEPTH = 0.04, 0.04, 1.5e-3
 # Young's modulus of the nodule, Pa, and its radius, m: contrasts of about 7, 14 and 28 per cent.
-NODULES = ((11e3, 5e-3), (26e3, 5e-3), (36e3, 7e-3))
-# Twice what the direct solution needs to be converged to half a point.
+NODULES = ((11e3, 5e-3), (26e3, 5e-3), (13.5e3, 7e-3))
+# Edge of the elements of the direct solution under the tool and around the nodule, m.
 CELL = 1.5e-3
 
 
