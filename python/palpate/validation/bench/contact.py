@@ -30,6 +30,8 @@ DEPTHS = (2.5e-4, 5e-4, 1e-3, 1.5e-3, 2e-3)
 CELLS = (10, 10, 5)
 # Places of an element of the top around the middle of the block, in cells: a node, middles of edges, insides of faces.
 PLACES = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [1 / 3, 2 / 3], [2 / 3, 1 / 3]])
+# The elements that all take, and Palpate's operator with the contact of the others.
+COARSE, AT_POINTS = "4 nodes, 10 mm", "Signorini at mesh points"
 # What Drake's sphere is pushed with, N.
 PUSHES = (0.03, 0.1, 0.25, 0.6)
 
@@ -82,7 +84,7 @@ def run(report: Callable[[str], None] = lambda _: None, ticks: bool = True) -> R
     report("the direct solution")
     truth = np.array([sphere_press(BLOCK, RADIUS, depth).force for depth in DEPTHS])
     rows = []
-    for quadratic, name in ((False, "4 nodes, 10 mm"), (True, "10 nodes, 5 mm")):
+    for quadratic, name in ((False, COARSE), (True, "10 nodes, 5 mm")):
         report(f"Palpate, {name}")
         rows += _own_rows(body_on_table(BLOCK, CELLS, quadratic=quadratic), name)
     # The points of the mesh's own faces: on the mesh that all take.
@@ -115,9 +117,8 @@ def as_json(results: Results) -> dict:
 
 
 def plot(results: Results, path: Path) -> None:
-    """Force against depth: what is right, and every method with the range of its places."""
-    methods = [row for row in results.rows if not row.method.startswith("Signorini")]
-    series = {f"{row.method}, {row.mesh}": row.forces for row in methods}
+    """Force against depth: what is right, and those that took the same elements, with the range of their places."""
+    series = {row.method: row.forces for row in results.rows if row.mesh == COARSE and row.method != AT_POINTS}
     plot_contact(np.array(DEPTHS), results.truth, series, path)
 
 
@@ -134,7 +135,7 @@ def _own_rows(body: Body, name: str) -> list[Row]:
     places = _places(body)
     nodal = [at_the_meshs_points(green, body.mesh, tools.sphere(RADIUS, tuple(place)), DEPTHS) for place in places]
     local, cost = _local_forces(body, green, places)
-    return [Row("Palpate", name, local, cost), Row("Signorini at mesh points", name, np.array(nodal))]
+    return [Row("Palpate", name, local, cost), Row(AT_POINTS, name, np.array(nodal))]
 
 
 def _local_forces(body: Body, green: GreensFunction, places: np.ndarray) -> tuple[np.ndarray, float]:
@@ -156,17 +157,17 @@ def _tick_times(simulation, path: np.ndarray) -> np.ndarray:
 
 
 def _peer_rows(report: Callable[[str], None]) -> list[Row]:
-    rows, mesh, name = [], body_on_table(BLOCK, CELLS, quadratic=False).mesh, "4 nodes, 10 mm"
-    places = _places(body_on_table(BLOCK, CELLS, quadratic=False))
+    body = body_on_table(BLOCK, CELLS, quadratic=False)
+    rows, mesh, places = [], body.mesh, _places(body)
     found = contact_peers.installed()
     if "MuJoCo" in found:
         report("MuJoCo")
         forces, step = contact_peers.mujoco_forces(mesh, BLOCK.material, RADIUS, places, DEPTHS)
-        rows.append(Row("MuJoCo", name, forces, 1e6 * step))
+        rows.append(Row("MuJoCo", COARSE, forces, 1e6 * step))
     if "Drake" in found:
         report("Drake")
         depths, step = contact_peers.drake_depths(mesh, BLOCK.material, RADIUS, places, PUSHES)
-        rows.append(Row("Drake", name, _at_depths(depths, PUSHES), 1e6 * step))
+        rows.append(Row("Drake", COARSE, _at_depths(depths, PUSHES), 1e6 * step))
     return rows
 
 

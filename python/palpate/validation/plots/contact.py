@@ -48,8 +48,8 @@ def plot_contact(depths: np.ndarray, truth: np.ndarray, series: Mapping[str, np.
     fine = np.linspace(0, depths[-1], 100)
     power = np.exp(np.interp(np.log(np.maximum(fine, depths[0])), np.log(depths), np.log(truth)))
     power[fine < depths[0]] = truth[0] * (fine[fine < depths[0]] / depths[0]) ** 1.5
-    axes.plot(1e3 * fine, power, color="0.1", linewidth=5, alpha=0.35, label="right: direct solution, resolved mesh")
-    for (name, forces), color in zip(series.items(), (COLORS[1], COLORS[2], COLORS[0], COLORS[3]), strict=False):
+    axes.plot(1e3 * fine, power, color="0.1", linewidth=5, alpha=0.35, label="right: resolved mesh, solved directly")
+    for (name, forces), color in zip(series.items(), (COLORS[1], COLORS[0], COLORS[3]), strict=False):
         own = name.startswith("Palpate")
         x = 1e3 * np.concatenate([[0.0], depths])
         low, mean, high = (np.concatenate([[0.0], of(forces, axis=0)]) for of in (np.min, np.mean, np.max))
@@ -59,6 +59,6 @@ def plot_contact(depths: np.ndarray, truth: np.ndarray, series: Mapping[str, np.
     axes.set_ylabel("force [N]")
     axes.set_xlim(0, 1.02e3 * depths[-1])
     axes.set_ylim(bottom=0)
-    axes.set_title("a rigid sphere, R = 10 mm, in a block of 10 kPa on elements of 10 mm", loc="left")
-    axes.legend(frameon=False, loc="upper left")
+    axes.set_title("a rigid sphere, R = 10 mm, pressed into elements of 10 mm, E = 10 kPa", loc="left")
+    axes.legend(frameon=False, loc="upper left", title="band: places of an element", alignment="left")
     write_figure(figure, path)
