@@ -62,7 +62,7 @@ def mujoco_forces(
 
     model = mujoco.MjModel.from_xml_string(_mujoco_xml(mesh, material, radius))
     top = mesh.nodes[:, 2].max() + radius + SKIN
-    forces, started, steps = np.zeros((len(places), len(depths))), time.perf_counter(), 0
+    forces, started, steps = np.zeros((len(places), len(depths))), time.process_time(), 0
     for row, place in zip(forces, places, strict=True):
         data = mujoco.MjData(model)
         for k, depth in enumerate(depths):
@@ -71,7 +71,7 @@ def mujoco_forces(
                 mujoco.mj_step(model, data)
             steps += SETTLING
             row[k] = -data.qfrc_constraint.reshape(-1, 3)[:, 2].sum()
-    return forces, (time.perf_counter() - started) / steps
+    return forces, (time.process_time() - started) / steps
 
 
 def drake_depths(
@@ -86,7 +86,7 @@ def drake_depths(
 
     import meshio
 
-    depths, started, steps = np.zeros((len(places), len(forces))), time.perf_counter(), 0
+    depths, started, steps = np.zeros((len(places), len(forces))), time.process_time(), 0
     with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:
         file = Path(folder) / "block.vtk"
         meshio.Mesh(mesh.nodes, [("tetra", mesh.tets)]).write(file, file_format="vtk42")
@@ -94,7 +94,7 @@ def drake_depths(
             for k, force in enumerate(forces):
                 row[k] = _drake_depth(file, material, radius, (*place, mesh.nodes[:, 2].max()), force)
                 steps += round(REST / DRAKE_STEP)
-    return depths, (time.perf_counter() - started) / steps
+    return depths, (time.process_time() - started) / steps
 
 
 def _mujoco_xml(mesh: TetMesh, material: Material, radius: float) -> str:
