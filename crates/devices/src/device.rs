@@ -75,6 +75,12 @@ pub struct DeviceLimits {
     pub max_stiffness: f64,
     /// Strongest damping it holds without oscillating, N s/m.
     pub max_damping: f64,
+    /// Strongest damping of rotation it holds without oscillating, N m s/rad.
+    pub max_angular_damping: f64,
+    /// Viscous damping of its mechanics at the tip, N s/m, where it is known.
+    pub own_damping: Option<f64>,
+    /// Time from a measurement to the force that answers it beyond that of the tick, s: a driver's queue, a bus.
+    pub delay: f64,
     /// Fastest that a hand moves its tip, m/s: what looks faster is a fault of its sensors. `None` for a device without
     /// sensors, whose pose is commanded and may jump.
     pub max_speed: Option<f64>,
@@ -91,10 +97,29 @@ impl DeviceLimits {
         max_torque: f64::INFINITY,
         max_stiffness: f64::INFINITY,
         max_damping: f64::INFINITY,
+        max_angular_damping: f64::INFINITY,
+        own_damping: None,
+        delay: 0.0,
         max_speed: None,
         workspace: None,
         rate: None,
     };
+
+    /// Stiffest contact that the device holds at a time `period` between two ticks, N/m.
+    ///
+    /// A force held for a tick while the tip moves on at `v` lags the spring `K` by half a period, and by the delay: it gives
+    /// out `K v^2 (T/2 + d)` of power. The device's own damping takes `b v^2`, so the loop is passive for
+    ///
+    /// ```text
+    /// K <= b / (T/2 + d)
+    /// ```
+    ///
+    /// Source: Colgate and Schenkel, Passivity of a class of sampled-data systems (J. Robotic Systems 14, 1997), for the
+    /// spring without delay; Diolaiti et al. (IEEE Trans. Robotics 22, 2006) with it.
+    pub fn largest_stiffness(&self, period: f64) -> f64 {
+        let passive = self.own_damping.map_or(f64::INFINITY, |damping| damping / (0.5 * period + self.delay));
+        self.max_stiffness.min(passive)
+    }
 }
 
 /// One haptic device. `read` and `write` belong to the tick: they never allocate, lock or block, and never panic. A driver
@@ -114,4 +139,50 @@ pub trait Device: Send {
 
     /// What it can render; asked once, before the first tick.
     fn limits(&self) -> DeviceLimits;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mass `m` with damping `b` on a sampled spring `K`, held over each period and late by whole ones: its free motion
+    /// within a period is exact. Whether it comes to rest.
+    fn comes_to_rest(stiffness: f64, damping: f64, period: f64, late_ticks: usize) -> bool {
+        let mass = 0.05;
+        let decay = (-damping * period / mass).exp();
+        let (mut x, mut v) = (1e-3, 0.0);
+        let mut seen = vec![x; late_ticks + 1];
+        let mut largest = 0.0_f64;
+        for tick in 0..40_000 {
+            seen.rotate_right(1);
+            seen[0] = x;
+            // Towards the speed at which damping balances the held force.
+            let steady = -stiffness * seen[late_ticks] / damping;
+            x += steady * period + (v - steady) * mass / damping * (1.0 - decay);
+            v = steady + (v - steady) * decay;
+            largest = if tick < 39_000 { 0.0 } else { largest.max(x.abs()) };
+        }
+        largest < 1e-3
+    }
+
+    #[test]
+    fn a_spring_within_colgates_bound_comes_to_rest() {
+        for (period, late_ticks) in [(1e-3, 0), (2.5e-4, 0), (1e-3, 1), (1e-3, 3)] {
+            let delay = late_ticks as f64 * period;
+            let limits = DeviceLimits { own_damping: Some(0.8), delay, ..DeviceLimits::UNLIMITED };
+            let largest = limits.largest_stiffness(period);
+            assert!((largest * (0.5 * period + delay) / 0.8 - 1.0).abs() < 1e-12);
+            assert!(comes_to_rest(0.98 * largest, 0.8, period, late_ticks));
+            // The bound is Colgate's for any hand; a mass alone needs about as much.
+            assert!(!comes_to_rest(1.3 * largest, 0.8, period, late_ticks), "{period} {late_ticks}");
+        }
+    }
+
+    #[test]
+    fn the_lower_bound_counts() {
+        let limits = DeviceLimits { max_stiffness: 700.0, own_damping: Some(0.2), ..DeviceLimits::UNLIMITED };
+        assert_eq!(limits.largest_stiffness(1e-3), 400.0);
+        assert_eq!(limits.largest_stiffness(1e-4), 700.0);
+        assert_eq!(DeviceLimits::UNLIMITED.largest_stiffness(1e-3), f64::INFINITY);
+    }
 }

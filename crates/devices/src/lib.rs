@@ -1,6 +1,7 @@
 //! Haptic devices behind one trait. A driver knows poses and wrenches in world coordinates, nothing of bodies.
 
 mod device;
+pub mod known;
 mod rotation;
 pub mod simulated;
 

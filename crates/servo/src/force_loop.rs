@@ -11,7 +11,7 @@ use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
 use crate::preparer::{StrainPreparer, StrainWorker};
-use crate::safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
+use crate::safety::{Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
 use crate::settings::{Settings, refuse_unless};
 use crate::subnormals::FlushSubnormals;
 use crate::timing::{Clock, Timing};
@@ -66,9 +66,10 @@ impl ForceLoop {
         refuse_unless(tools == given, || format!("a scene of {tools} tools takes as many devices, got {given}"))?;
         limits.check()?;
         settings.check(&model)?;
+        let moves = model.bodies.iter().any(|body| body.moves());
         let mut stages = Vec::new();
         for (tool, device) in devices.iter().enumerate() {
-            stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?));
+            stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?, moves));
         }
         let (ends, handle) = handoffs(&model, &settings);
         let (state, scratch) = (State::new(&model), Scratch::new(&model));
@@ -131,10 +132,22 @@ impl ForceLoop {
         self.limited = bodies;
     }
 
-    /// Time between two ticks that the devices ask for at least, s.
-    pub(crate) fn shortest_period(&self) -> f64 {
-        let rates = self.devices.iter().filter_map(|device| device.limits().rate);
-        rates.fold(0.0, |period, rate| period.max(1.0 / rate))
+    /// Whether the devices can be ticked with a time `period` between two ticks, s. Whoever calls [`ForceLoop::tick`] from a
+    /// driver's callback asks with the callback's.
+    ///
+    /// # Errors
+    /// A device that takes fewer wrenches a second, or whose own damping is too weak for the tool's largest stiffness at that
+    /// rate: see `DeviceLimits::largest_stiffness`.
+    pub fn check_period(&self, period: f64) -> Result<()> {
+        for (tool, device) in self.devices.iter().enumerate() {
+            let limits = device.limits();
+            let (rate, most) = (1.0 / period, limits.rate.unwrap_or(f64::INFINITY));
+            refuse_unless(period >= 1.0 / most, || {
+                format!("a device takes at most {most} wrenches a second, the loop has {rate}")
+            })?;
+            check_stiffness(&self.model, tool, &limits, Some(period))?;
+        }
+        Ok(())
     }
 
     pub(crate) fn set_realtime(&mut self, realtime: RealtimeStatus) {
@@ -199,6 +212,7 @@ impl ForceLoop {
             common.into_iter().for_each(|reason| stage.latch(reason));
             let wrench = stage.apply(output.wrench_on_device[tool], period);
             self.status.wrenches[tool] = wrench;
+            self.status.ports[tool] = stage.energy();
             if let Err(fault) = device.write(wrench) {
                 stage.latch(FaultReason::Device(fault));
             }

@@ -24,7 +24,7 @@ pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
 pub use offline::{RecordedContact, Recording, Script, run};
 pub use preparer::{StrainPreparer, StrainWorker};
-pub use safety::{Fault, FaultReason, SafetyLimits, SafetyStage};
+pub use safety::{Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
 pub use servo::Servo;
 pub use settings::Settings;
 pub use statistics::{Histogram, Summary};

@@ -5,7 +5,7 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS};
 use palpate_devices::{Reading, Wrench};
 
-use crate::safety::Fault;
+use crate::safety::{Fault, PortEnergy};
 use crate::statistics::Summary;
 
 /// What the operating system granted.
@@ -34,6 +34,8 @@ pub struct Status {
     pub wrenches: [Wrench; MAX_TOOLS],
     /// What the devices said.
     pub readings: [Reading; MAX_TOOLS],
+    /// Energy at the devices' ports.
+    pub ports: [PortEnergy; MAX_TOOLS],
     /// Whether the limit of strain keeps each tool from following its device.
     pub limited: [bool; MAX_TOOLS],
     /// Time that ticks take as a whole, statistics and hand-off included, us.

@@ -50,10 +50,8 @@ impl Servo {
         })?;
         let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings)?;
         let worker = force_loop.limit_strain(&mut handle, strain)?;
-        let (period, shortest) = (1.0 / rate, force_loop.shortest_period());
-        refuse_unless(period >= shortest, || {
-            format!("a device takes at most {} wrenches a second, the loop has {rate}", 1.0 / shortest)
-        })?;
+        let period = 1.0 / rate;
+        force_loop.check_period(period)?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
         // Locking the memory of a large process takes a tenth of a second: wait, so that the first target set after the

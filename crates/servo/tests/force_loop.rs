@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use palpate_core::simulation::{Input, Model, Pose, Scratch, Snapshot, State, Strike, step};
 use palpate_devices::simulated::{Target, simulated};
-use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench};
+use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench, known};
 use palpate_servo::{
     Fault, FaultReason, ForceLoop, LoopHandle, SafetyLimits, Script, Servo, Settings, StrainPreparer, now_ns, run,
 };
@@ -149,6 +149,7 @@ fn what_does_not_fit_the_scene_is_an_error() {
     refused(make(3, patient(), settings()), "2 tools takes as many devices, got 3");
     refused(make(2, SafetyLimits { max_force: f64::NAN, ..patient() }, settings()), "largest force");
     refused(make(2, SafetyLimits { ramp: -1.0, ..patient() }, settings()), "ramp");
+    refused(make(2, SafetyLimits { max_damping: f64::NAN, ..patient() }, settings()), "strongest damping");
     refused(make(2, patient(), Settings { watch: Some((2, 0)), ..settings() }), "no body 2");
     refused(make(2, patient(), Settings { watch: Some((1, 100_000)), ..settings() }), "no surface node 100000");
     let strike = Strike { body: 7, ..Strike::default() };
@@ -165,11 +166,32 @@ fn what_does_not_fit_the_scene_is_an_error() {
         let servo = Servo::start(scene, vec![with_limits(limits)], patient(), settings(), rate, strain);
         servo.err().map(|error| error.to_string())
     };
-    refused(start(weak, 500.0), "holds 2000 N/m");
+    refused(start(weak, 500.0), "holds at most 2000 N/m: lower max_stiffness to 2000");
     let slow = DeviceLimits { max_stiffness: f64::INFINITY, ..weak };
     refused(start(slow, 1000.0), "at most 800");
     assert_eq!(start(slow, 800.0), None);
+    // 2 b / T is 3200 N/m for 2 N s/m at 800 Hz, and 6400 for twice that; a millisecond of delay leaves 2461 of those.
+    let damped = |own_damping, delay| DeviceLimits { own_damping: Some(own_damping), delay, ..slow };
+    refused(start(damped(2.0, 0.0), 800.0), "holds at most 3200 N/m at 800 Hz: lower max_stiffness to 3200");
+    assert_eq!(start(damped(4.0, 0.0), 800.0), None);
+    refused(start(damped(4.0, 1e-3), 800.0), "holds at most 2461 N/m at 800 Hz");
+    refused(start(DeviceLimits { max_damping: f64::NAN, ..slow }, 800.0), "strongest damping of NaN");
+    refused(start(DeviceLimits { delay: -1e-3, ..slow }, 800.0), "delay of -0.001");
     refused(start(DeviceLimits::UNLIMITED, 99.0), "100 to 10000 Hz");
+}
+
+/// A tool that may ask for 5000 N/m is refused by every device that holds less, with what it holds.
+#[test]
+fn known_devices_refuse_what_they_do_not_hold() {
+    for (name, limits) in known::ALL {
+        let device = Box::new(Scripted { read: |now_ns| Ok(pressing(now_ns)), write: |_| Ok(()), limits });
+        let refused = ForceLoop::new(single(false), vec![device], patient(), settings()).err();
+        let expected = (limits.max_stiffness < 5000.0).then(|| {
+            let held = limits.max_stiffness;
+            format!("tool 0 may ask for 5000 N/m, its device holds at most {held} N/m: lower max_stiffness to {held}")
+        });
+        assert_eq!(refused.map(|error| error.to_string()), expected, "{name}");
+    }
 }
 
 #[test]

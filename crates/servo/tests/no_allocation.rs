@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
-use palpate_core::simulation::{Mode, Pose, Snapshot, Strike};
+use palpate_core::simulation::{Contact, Mode, Pose, Snapshot, Strike};
 use palpate_core::strain::StrainMeasure;
 use palpate_devices::{Buttons, Reading};
 use palpate_servo::{ForceLoop, LoopHandle, Published, SafetyLimits, Settings, StrainPreparer};
@@ -83,10 +83,18 @@ fn kinds(tick: u64, before: &[(u64, usize)], published: &Published) -> Vec<&'sta
         both(state.tools[0].refused[1].is_some(), "refused"),
         both(set.watch.is_some(), "watch"),
         both(status.limited[0], "limited"),
+        both(status.ports.iter().any(|port| port.owed > 0.0), "owed"),
+        both(state.contacts.iter().any(|(contact, _)| is_steep(contact)), "steep"),
     ]
     .into_iter()
     .flatten()
     .collect()
+}
+
+/// Whether a press carries more along the surface than into it: it may slip.
+fn is_steep(contact: &Contact) -> bool {
+    let pressing = -contact.force.dot(contact.normal);
+    contact.mode == Mode::Press && (contact.force + contact.normal * pressing).length() > pressing
 }
 
 /// Serial and body of the contacts.
@@ -146,10 +154,11 @@ fn no_kind_of_tick_allocates() {
         let counts = count(force_loop, handle);
         let allocating: Vec<_> = counts.iter().filter(|(_, (_, sum))| *sum > 0).collect();
         assert!(allocating.is_empty(), "kinds of tick that allocate, with ticks and allocations: {allocating:?}");
-        let all = ["free", "begin", "hold", "end", "grab", "two tools", "two bodies", "strike", "reset", "fault"];
+        let all =
+            ["free", "begin", "hold", "end", "grab", "two tools", "two bodies", "strike", "reset", "fault", "owed"];
         let kinds: Vec<_> = match limited {
             true => vec!["limited"],
-            false => all.into_iter().chain(["refused", "watch"]).chain(moving.then_some("motion")).collect(),
+            false => all.into_iter().chain(["refused", "watch", "steep"]).chain(moving.then_some("motion")).collect(),
         };
         for kind in kinds {
             assert!(counts.contains_key(kind), "no tick was of the kind '{kind}': {counts:?}");

@@ -109,8 +109,8 @@ class Frame(ComparedByValue):
         One a body of the scene.
     statistics
         ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, ``refused`` (for each
-        tool None or why no contact began), ``fault`` (None or what is wrong) and ``realtime`` (priority granted, memory
-        locked).
+        tool None or why no contact began), ``fault`` (None or what is wrong), ``realtime`` (priority granted, memory
+        locked) and ``port_energy`` (for each tool J given to the hand, owed by the safety stage, and never paid back).
 
     """
 

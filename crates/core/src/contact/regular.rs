@@ -56,6 +56,8 @@ impl Moduli {
 pub struct RegularCompliance {
     /// `C_reg`, symmetric, m/N; zero where nothing can be touched.
     pub blocks: Vec<DMat3>,
+    /// `b`, m.
+    pub widths: Vec<f64>,
 }
 
 /// A body as its regular compliance needs it.
@@ -77,20 +79,25 @@ impl RegularCompliance {
     pub fn new(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
         let count = body.smooth.fans().len();
         let block = |(scratch, patch): &mut (PatchScratch, Patch), fan: usize| {
-            if body.smooth.touchable[fan] { at_fan(body, fan, radius, max_stiffness, scratch, patch) } else { DMat3::ZERO }
+            if body.smooth.touchable[fan] {
+                at_fan(body, fan, radius, max_stiffness, scratch, patch)
+            } else {
+                (DMat3::ZERO, 0.0)
+            }
         };
         let memory = || (PatchScratch::new(&body.green.surface), Patch::default());
         #[cfg(feature = "offline")]
-        let blocks = {
+        let found: Vec<_> = {
             use rayon::prelude::*;
             (0..count).into_par_iter().map_init(memory, block).collect()
         };
         #[cfg(not(feature = "offline"))]
-        let blocks = {
+        let found: Vec<_> = {
             let mut memory = memory();
             (0..count).map(|fan| block(&mut memory, fan)).collect()
         };
-        Self { blocks }
+        let (blocks, widths) = found.into_iter().unzip();
+        Self { blocks, widths }
     }
 }
 
@@ -101,7 +108,7 @@ fn at_fan(
     max_stiffness: f64,
     scratch: &mut PatchScratch,
     patch: &mut Patch,
-) -> DMat3 {
+) -> (DMat3, f64) {
     let (surface, fan) = (&body.green.surface, &body.smooth.fans()[rank]);
     let corner = surface.triangles[fan.triangle as usize].iter().position(|&n| n == fan.node).unwrap_or(0);
     let mut barycentric = [0.0; 3];
@@ -129,7 +136,7 @@ fn at_fan(
     let rendered = (1.0 / max_stiffness - smallest_eigenvalue(&whole)).max(0.0);
     let regular = whole - half_space + DMat3::IDENTITY * rendered;
     let floor = -STIFFEST / (modulus * radius);
-    regular + DMat3::IDENTITY * (floor - smallest_eigenvalue(&regular)).max(0.0)
+    (regular + DMat3::IDENTITY * (floor - smallest_eigenvalue(&regular)).max(0.0), wide)
 }
 
 #[cfg(test)]
@@ -141,7 +148,8 @@ mod tests {
     fn the_constant_is_its_integral() {
         let simpson = |f: &dyn Fn(f64) -> f64, from: f64, to: f64, n: usize| {
             let h = (to - from) / n as f64;
-            let term = |i: usize| f(from + h * i as f64) * if i == 0 || i == n { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
+            let term =
+                |i: usize| f(from + h * i as f64) * if i == 0 || i == n { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
             (0..=n).map(term).sum::<f64>() * h / 3.0
         };
         let bessel = |t: f64| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::input::Placement;
-use crate::contact::smooth::SmoothSurface;
+use crate::contact::smooth::{FootPoint, SmoothSurface};
 use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
@@ -125,6 +125,28 @@ impl BodyModel {
     /// Displacements of the surface dofs under the reference loads, m (3s).
     pub fn free_displacements(&self) -> &[f64] {
         &self.free
+    }
+
+    /// Closest point of the smooth surface that the local law meets, in the body's frame; `None` without that law, or for a
+    /// point that is not finite.
+    pub fn foot(&self, point: DVec3) -> Option<FootPoint> {
+        self.local.as_ref()?.smooth.foot_anywhere(&self.loaded, &self.query, point)
+    }
+
+    /// A foot as a point of the drawn triangle below it.
+    pub(super) fn surface_point(&self, foot: &FootPoint) -> SurfacePoint {
+        let [a, b, c] = self.loaded.corners(foot.triangle);
+        let normal = (b - a).cross(c - a);
+        let scale = 1.0 / normal.length_squared();
+        let of_a = ((c - b).cross(foot.position - b).dot(normal) * scale).clamp(0.0, 1.0);
+        let of_b = ((a - c).cross(foot.position - c).dot(normal) * scale).clamp(0.0, 1.0 - of_a);
+        SurfacePoint {
+            position: foot.position,
+            triangle: foot.triangle,
+            barycentric: [of_a, of_b, 1.0 - of_a - of_b],
+            normal: foot.normal,
+            signed_distance: foot.distance,
+        }
     }
 
     /// Point of the loaded surface, untouched by tools, that is closest to `point`.

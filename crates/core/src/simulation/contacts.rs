@@ -31,7 +31,7 @@ pub struct Contact {
     pub tool: usize,
     /// Index of the body.
     pub body: usize,
-    /// Counts the contacts since the start: tells one from another in the same slot.
+    /// Counts the contacts since the start, and in the lowest [`REVISIONS`] bits how often one has slid to another place.
     pub serial: u64,
     /// Contact point on the untouched surface, m.
     pub point: DVec3,
@@ -49,6 +49,10 @@ pub struct Contact {
     pub wanted: DVec3,
     /// Whether the limit of strain keeps the tool from it.
     pub limited: bool,
+    /// How far its anchor has slipped since it was followed last, m.
+    pub(super) slipped: DVec3,
+    /// Whether its force has been within its cone since it began.
+    pub(super) settled: bool,
     /// Whether it has pressed since it began.
     pub(super) pressed: bool,
     /// Bound on its length while the limit is not known yet, m.
@@ -73,7 +77,16 @@ impl Default for Contacts {
     }
 }
 
+/// Bits of a serial that count the places of one contact.
+pub(super) const REVISIONS: u32 = 16;
+
 impl Contacts {
+    /// Serial of a contact that begins.
+    pub(super) fn next_serial(&mut self) -> u64 {
+        self.begun += 1;
+        self.begun << REVISIONS
+    }
+
     /// The contacts and their patches.
     pub fn iter(&self) -> impl Iterator<Item = (&Contact, &TouchPatch)> {
         self.slots.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free)

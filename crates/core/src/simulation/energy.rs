@@ -27,7 +27,7 @@ impl Account {
         self.energy.dissipated += step.dissipated;
     }
 
-    /// Books what springs and the modes left out hold.
+    /// Books what springs, indentations and the modes left out hold.
     pub fn book_contacts(
         &mut self,
         contacts: &Contacts,
@@ -38,20 +38,24 @@ impl Account {
         self.energy.coupling = 0.0;
         for &a in slots {
             let force = contacts.slots[a].force;
-            self.energy.coupling += 0.5 * force.length_squared() / coupling;
+            self.energy.coupling += 0.5 * force.length_squared() / coupling + contacts.slots[a].local.energy;
+            self.energy.dissipated += contacts.slots[a].local.dissipated;
             let beyond: DVec3 = slots.iter().map(|&b| residual[a][b] * contacts.slots[b].force).sum();
             self.energy.strain += 0.5 * force.dot(beyond);
         }
     }
 
-    /// Books the work of the tools: forces change linearly within a step, so it is their mean times the tool's displacement.
+    /// Books the work of the tools: forces change linearly within a step, so it is their mean times the tool's displacement. Of
+    /// that a slip of the anchor takes its part out.
     pub fn book_work(&mut self, contacts: &Contacts, body: usize) {
         let mut now = [None; MAX_CONTACTS];
         for slot in contacts.on(body) {
             let contact = &contacts.slots[slot];
             now[slot] = Some((contact.force, contact.displacement));
             if let Some((force, displacement)) = self.last[slot] {
-                self.energy.work += 0.5 * (force + contact.force).dot(contact.displacement - displacement);
+                let mean = 0.5 * (force + contact.force);
+                self.energy.work += mean.dot(contact.displacement + contact.slipped - displacement);
+                self.energy.dissipated += mean.dot(contact.slipped);
             }
         }
         self.last = now;

@@ -9,6 +9,7 @@
 mod admissible;
 mod body;
 mod contacts;
+mod covering;
 mod energy;
 mod input;
 mod law;
@@ -16,6 +17,7 @@ mod limit;
 mod model;
 mod motion;
 mod scratch;
+mod slip;
 mod snapshot;
 mod solve;
 mod state;

@@ -5,6 +5,7 @@ use super::input::{Controls, Input, Output};
 use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
+use super::slip::slip;
 use super::state::State;
 use super::tool::LawKind;
 use super::{limit, solve, time};
@@ -54,9 +55,9 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                     state.contacts.clear(slot);
                 }
             }
-            None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], scratch) {
+            None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], &mut scratch.covering) {
                 Ok(Some(begun)) => {
-                    if let Some(slot) = solve::add_contact(model, state, begun, scratch) {
+                    if let Some(slot) = solve::add_contact(model, state, begun, &scratch.covering) {
                         limit::begin(model, state, slot, input.controls.strain_limit[body]);
                     }
                 }
@@ -79,9 +80,12 @@ fn law_now(of_tool: LawKind, of_contact: Option<LawKind>, grab: bool) -> LawKind
 /// Forces of all contacts of a body together; a contact whose law ends it by its force is let go, and the rest solved
 /// again.
 fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
-    solve::local_forces(model, state, scratch, body, controls);
+    let Scratch { covering, local, system } = scratch;
+    solve::local_forces(model, state, solve::Memory { covering, local, system }, body, controls);
+    limit::let_through(model, state, body, controls.strain_limit[body]);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);
+        slip(model, state, &mut scratch.system, body);
         let mut ended = false;
         for slot in 0..state.contacts.slots.len() {
             let contact = &mut state.contacts.slots[slot];

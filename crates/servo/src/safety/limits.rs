@@ -17,6 +17,10 @@ pub struct SafetyLimits {
     pub max_slew: f64,
     /// Fastest change of the torque other than a release, N m/s.
     pub max_torque_slew: f64,
+    /// Strongest damping that the passivity controller may put in, N s/m.
+    pub max_damping: f64,
+    /// Strongest damping of rotation that it may put in, N m s/rad.
+    pub max_angular_damping: f64,
     /// Time over which forces are let in after the start and after a reset, s.
     pub ramp: f64,
     /// Longest time that a device may go without a new measurement while its tool is in the scene, s.
@@ -31,13 +35,16 @@ pub struct SafetyLimits {
 
 impl Default for SafetyLimits {
     /// A desktop device: 8 N and 0.5 N m, from zero to full in 16 ms, a quarter of a second to come in; a hand's fastest
-    /// movements are near 10 m/s, and drivers give up a cable after about 50 ms.
+    /// movements are near 10 m/s, and drivers give up a cable after about 50 ms. The damping is the strongest of the devices
+    /// in `palpate_devices::known`: one that states none has no motors that could oscillate.
     fn default() -> Self {
         Self {
             max_force: 8.0,
             max_torque: 0.5,
             max_slew: 500.0,
             max_torque_slew: 30.0,
+            max_damping: 30.0,
+            max_angular_damping: 0.07,
             ramp: 0.25,
             max_reading_age: 0.05,
             max_speed: 10.0,
@@ -65,6 +72,9 @@ impl SafetyLimits {
         for (name, value) in limits {
             refuse_unless(value > 0.0, || format!("safety: the {name} must be positive, got {value}"))?;
         }
+        for (name, value) in [("damping", self.max_damping), ("damping of rotation", self.max_angular_damping)] {
+            refuse_unless(value >= 0.0, || format!("safety: the strongest {name} must not be negative, got {value}"))?;
+        }
         refuse_unless(self.ramp >= 0.0 && self.ramp.is_finite(), || {
             format!("safety: the ramp must not be negative, got {} s", self.ramp)
         })?;
@@ -74,22 +84,47 @@ impl SafetyLimits {
     /// With those of the device of a tool.
     ///
     /// # Errors
-    /// A contact stiffer than the device holds: the model would have to be another.
+    /// A limit of the device that limits nothing, or a contact stiffer than it holds at any rate.
     pub(crate) fn with_device(&self, model: &Model, tool: usize, device: &DeviceLimits) -> Result<Self> {
-        for (name, value) in [("force", device.max_force), ("torque", device.max_torque)] {
-            refuse_unless(value >= 0.0, || format!("the device of tool {tool} states a largest {name} of {value}"))?;
+        let stated = [
+            ("largest force", device.max_force),
+            ("largest torque", device.max_torque),
+            ("strongest damping", device.max_damping),
+            ("strongest damping of rotation", device.max_angular_damping),
+            ("damping of its own", device.own_damping.unwrap_or(0.0)),
+            ("delay", device.delay),
+        ];
+        for (name, value) in stated {
+            refuse_unless(value >= 0.0, || format!("the device of tool {tool} states a {name} of {value}"))?;
         }
-        let (asked, held) = (model.tools[tool].max_stiffness, device.max_stiffness);
-        refuse_unless(asked <= held, || {
-            format!(
-                "tool {tool} may ask for {asked} N/m, its device holds {held} N/m: lower the tool's maximum stiffness"
-            )
-        })?;
+        check_stiffness(model, tool, device, None)?;
         Ok(Self {
+            max_damping: self.max_damping.min(device.max_damping),
+            max_angular_damping: self.max_angular_damping.min(device.max_angular_damping),
             max_force: self.max_force.min(device.max_force),
             max_torque: self.max_torque.min(device.max_torque),
             max_speed: device.max_speed.map_or(f64::INFINITY, |speed| self.max_speed.min(speed)),
             ..*self
         })
     }
+}
+
+/// Refuses a tool that may ask for a stiffer contact than its device holds with a time `period` between two ticks, s; `None`
+/// where that is not known yet. The model would have to be another: a force that is capped is not that of the body.
+///
+/// # Errors
+/// The tool, with the largest stiffness that may stand there.
+pub fn check_stiffness(model: &Model, tool: usize, device: &DeviceLimits, period: Option<f64>) -> Result<()> {
+    let asked = model.tools[tool].max_stiffness;
+    let (held, rate) = match period {
+        Some(period) => (device.largest_stiffness(period), format!(" at {:.0} Hz", 1.0 / period)),
+        None => (device.max_stiffness, String::new()),
+    };
+    refuse_unless(asked <= held, || {
+        // Rounded down: what the message says is accepted.
+        let held = held.floor();
+        format!(
+            "tool {tool} may ask for {asked} N/m, its device holds at most {held} N/m{rate}: lower max_stiffness to {held}"
+        )
+    })
 }

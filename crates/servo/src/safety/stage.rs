@@ -1,9 +1,11 @@
 //! The stage of one tool.
 
+use glam::DVec3;
 use palpate_devices::{DeviceFault, Reading, Wrench};
 
+use super::passivity::{DampingLimits, Port, PortEnergy};
 use super::reading::ReadingCheck;
-use super::vector::LimitedVector;
+use super::vector::{LimitedVector, clamped};
 use super::{FaultReason, SafetyLimits};
 
 /// The stage's memory.
@@ -15,20 +17,30 @@ pub struct SafetyStage {
     force: LimitedVector,
     torque: LimitedVector,
     readings: ReadingCheck,
+    port: Port,
+    /// Whether bodies move, so that energy may come back from one that was let go.
+    keeps_energy: bool,
     fault: Option<FaultReason>,
 }
 
 impl SafetyStage {
-    /// A stage at the start of its ramp.
-    pub fn new(limits: SafetyLimits) -> Self {
+    /// A stage at the start of its ramp. A scene whose bodies move `keeps_energy` when it is let go.
+    pub fn new(limits: SafetyLimits, keeps_energy: bool) -> Self {
         Self {
             limits,
             age: 0.0,
             force: LimitedVector::default(),
             torque: LimitedVector::default(),
             readings: ReadingCheck::default(),
+            port: Port::default(),
+            keeps_energy,
             fault: None,
         }
+    }
+
+    /// Energy at the device's port since the start.
+    pub fn energy(&self) -> PortEnergy {
+        self.port.energy()
     }
 
     /// The latched fault, if any.
@@ -43,13 +55,18 @@ impl SafetyStage {
 
     /// Clears the fault and ramps in anew.
     pub fn reset(&mut self) {
-        *self = Self::new(self.limits);
+        self.port.close();
+        *self = Self { port: self.port.clone(), ..Self::new(self.limits, self.keeps_energy) };
     }
 
     /// Takes up what a device said at `now_ns`; latches where it cannot be believed. `None` where it said nothing.
     pub fn admit(&mut self, said: Result<Reading, DeviceFault>, now_ns: u64, period: f64) -> Option<Reading> {
         let checked = said.map_err(FaultReason::Device);
-        let checked = checked.and_then(|reading| self.readings.check(&reading, now_ns, period, &self.limits));
+        let checked = checked.and_then(|reading| {
+            self.readings.check(&reading, now_ns, period, &self.limits)?;
+            self.port.follow(&reading, period);
+            Ok(())
+        });
         checked.unwrap_or_else(|fault| self.latch(fault));
         said.ok()
     }
@@ -64,20 +81,34 @@ impl SafetyStage {
         if self.fault.is_some() {
             self.force.reset();
             self.torque.reset();
+            self.port.close();
             return Wrench::default();
         }
         let limits = &self.limits;
         let share = if self.age < limits.ramp { self.age / limits.ramp } else { 1.0 };
-        Wrench {
-            force: self.force.pass(computed.force, share, limits.max_force, limits.max_slew * period),
-            torque: self.torque.pass(computed.torque, share, limits.max_torque, limits.max_torque_slew * period),
-        }
+        let asked = Wrench {
+            force: clamped(computed.force, share, limits.max_force),
+            torque: clamped(computed.torque, share, limits.max_torque),
+        };
+        let damping = self.port.damping(&computed, &asked, DampingLimits::from(limits), period);
+        // A difference of nothing changes no bit, and does not pass the clamp again.
+        let damped = |asked: DVec3, damping: DVec3, most: f64| match damping == DVec3::ZERO {
+            true => asked,
+            false => clamped(asked - damping, 1.0, most),
+        };
+        let out = Wrench {
+            force: self.force.pass(damped(asked.force, damping.force, limits.max_force), limits.max_slew * period),
+            torque: self
+                .torque
+                .pass(damped(asked.torque, damping.torque, limits.max_torque), limits.max_torque_slew * period),
+        };
+        self.port.book(computed, out, self.keeps_energy);
+        out
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
     use palpate_devices::{Pose, Twist};
 
     use super::*;
@@ -94,7 +125,7 @@ mod tests {
     }
 
     fn settled(limits: SafetyLimits) -> SafetyStage {
-        let mut stage = SafetyStage::new(limits);
+        let mut stage = SafetyStage::new(limits, false);
         (0..1000).for_each(|_| _ = stage.apply(Wrench::default(), PERIOD));
         stage
     }
@@ -108,7 +139,7 @@ mod tests {
     #[test]
     fn ramps_in_at_the_start_and_after_a_reset() {
         let limits = SafetyLimits { max_slew: 1e9, ..SafetyLimits::default() };
-        let mut stage = SafetyStage::new(limits);
+        let mut stage = SafetyStage::new(limits, false);
         for _ in 0..2 {
             let out: Vec<f64> = (0..300).map(|_| stage.apply(force(DVec3::X), PERIOD).force.x).collect();
             assert!((out[124] - 0.5).abs() < 1e-9);

@@ -5,6 +5,9 @@ use glam::{DMat3, DVec3};
 
 use super::fans::Fan;
 
+/// Squared distance within which a node does not draw the surface towards itself, over its squared reach.
+const SHARP: f64 = 0.03;
+
 /// Value, gradient and Hessian of a blended function at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Blend {
@@ -25,13 +28,32 @@ pub fn weight(fan: &Fan, offset: DVec3) -> Option<(f64, DVec3, DMat3)> {
     Some((left * left * left, offset * first, hessian))
 }
 
+/// The weight that quadrics are blended with: that of [`weight`] over `(t + SHARP)^2`, `t = r^2 / reach^2`, so that the surface
+/// passes close by the nodes.
+fn sharp_weight(fan: &Fan, offset: DVec3) -> Option<(f64, DVec3, DMat3)> {
+    let squared_reach = fan.reach * fan.reach;
+    let t = offset.length_squared() / squared_reach;
+    let left = 1.0 - t;
+    if left <= 0.0 {
+        return None;
+    }
+    let near = 1.0 / (t + SHARP);
+    let (a, b) = (left * near, near * near);
+    let value = left * a * a;
+    let first = -3.0 * a * a - 2.0 * value * near;
+    let second = 6.0 * left * b + 12.0 * a * a * near + 6.0 * value * b;
+    let hessian = outer(offset * (4.0 * second / (squared_reach * squared_reach)), offset)
+        + DMat3::from_diagonal(DVec3::splat(2.0 * first / squared_reach));
+    Some((value, offset * (2.0 * first / squared_reach), hessian))
+}
+
 /// Blends the quadrics of some fans; `None` where no weight is positive.
 pub fn blend<'a>(fans: impl Iterator<Item = &'a Fan>, x: DVec3) -> Option<Blend> {
     let (mut w, mut wx, mut wxx) = (0.0, DVec3::ZERO, DMat3::ZERO);
     let (mut n, mut nx, mut nxx) = (0.0, DVec3::ZERO, DMat3::ZERO);
     for fan in fans {
         let offset = x - fan.position;
-        let Some((weight, slope, bend)) = weight(fan, offset) else { continue };
+        let Some((weight, slope, bend)) = sharp_weight(fan, offset) else { continue };
         let curved = fan.curvature * offset;
         let value = fan.normal.dot(offset) + 0.5 * offset.dot(curved);
         let gradient = fan.normal + curved;

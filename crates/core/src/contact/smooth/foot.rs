@@ -13,8 +13,8 @@ use crate::mesh::Surface;
 
 /// Newton steps at most; three or four are usual.
 const STEPS: usize = 12;
-/// A step this small, over the spacing of the nodes, is none.
-const SETTLED: f64 = 1e-11;
+/// Beyond a step this small, over the spacing of the nodes, the surface is its own quadric to round-off.
+const SETTLED: f64 = 1e-5;
 /// Triangles crossed within a step at most.
 const CROSSINGS: usize = 16;
 /// The surface is not followed where it would turn back: least `1 + s kappa`.
@@ -94,9 +94,11 @@ impl SmoothSurface {
                 let turning = inverse * shape;
                 let turning = (turning + turning.transpose()) * 0.5;
                 let shift = across - turning * distance;
+                let (position, normal) = (x + dx, (normal + shape * dx).normalize());
+                let distance = (p - position).dot(normal);
                 return Search::Found(FootPoint {
                     triangle,
-                    position: x,
+                    position,
                     normal,
                     distance,
                     turning,

@@ -2,30 +2,37 @@
 //!
 //! With a footprint that does not move, `f = C^-1 d` is the gradient of `d^T C^-1 d / 2`: a closed path of the tool does no
 //! net work. The anchor lies where the surface, sagged under the reference loads, was met: the tool's displacement from it
-//! is the whole `d - W^T u_free`. A press lets go where it would pull; its tangential energy is then lost, never gained.
+//! is the whole `d - W^T u_free`. A press lets go where it would pull. Before it does, its anchor slips (`slip`), so that its
+//! tangential force ends with the pressing one; the energy of that is lost, never gained.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use super::{Approach, Law};
 use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
 use crate::simulation::body::BodyDynamics;
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::scratch::Scratch;
+use crate::simulation::covering::Covering;
 use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A grab reaches this many tool radii from the surface.
 const GRAB_REACH: f64 = 2.0;
+
+/// A press carries no more tangential force than this many times its pressing force. Steep enough that a tool sticks however
+/// it is used: a half-space is softer along its surface than into it, so that a drag must be more than five times as long as the
+/// press is deep; far above any dry friction. Low enough that what is left for the last tick of a lift, five times
+/// the pressing force that one tick takes away, is not felt.
+const STEEPEST_CONE: f64 = 5.0;
 
 /// Which nodes a contact takes, and with what weights.
 pub trait Footprint: Sync {
     /// The law that it makes.
     fn kind(&self) -> LawKind;
 
-    /// Weighs the nodes around `centre`, a point of the unloaded surface, into `scratch.candidate`.
+    /// Weighs the nodes around `centre`, a point of the unloaded surface, into `covering.candidate`.
     ///
     /// # Errors
     /// More nodes than a tick can weigh.
-    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal>;
+    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, covering: &mut Covering) -> Result<(), Refusal>;
 }
 
 /// The sticking law on a footprint.
@@ -36,7 +43,7 @@ impl<F: Footprint> Law for Sticking<F> {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        scratch: &mut Scratch,
+        covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let Some(closest) = approach.closest() else { return Ok(None) };
         let radius = approach.tool.radius;
@@ -49,7 +56,7 @@ impl<F: Footprint> Law for Sticking<F> {
         if !reaches {
             return Ok(None);
         }
-        self.0.cover(approach, &approach.body.material_point(&closest), scratch)?;
+        self.0.cover(approach, &approach.body.material_point(&closest), covering)?;
         let excess = if approach.grab { 0.0 } else { depth - *entry_depth };
         let anchor = approach.position + closest.normal * excess;
         Ok(Some(Contact {
@@ -69,6 +76,7 @@ impl<F: Footprint> Law for Sticking<F> {
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
         contact.wanted = approach.position - contact.anchor;
         contact.displacement = contact.wanted;
+        contact.slipped = DVec3::ZERO;
         match contact.mode {
             Mode::Grab if !approach.grab => return false,
             Mode::Press if approach.grab => contact.mode = Mode::Grab,
@@ -88,5 +96,10 @@ impl<F: Footprint> Law for Sticking<F> {
 
     fn end(&self, contact: &Contact) -> bool {
         contact.mode == Mode::Press && contact.force.dot(contact.normal) >= 0.0
+    }
+
+    /// A tool that holds on carries any force.
+    fn cone(&self, contact: &Contact) -> Option<f64> {
+        (contact.mode == Mode::Press).then_some(STEEPEST_CONE)
     }
 }

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::simulation::MAX_CONTACTS;
+use crate::simulation::contacts::Contact;
 use crate::simulation::law::law_of;
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
@@ -25,13 +26,39 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
             None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
         },
         |slot| {
-            let free = moving.map_or(DVec3::ZERO, |motion| motion.free_displacement(slot));
+            let free = moving.map_or_else(|| dent_of_sliding(model, state, body, slot), |m| m.free_displacement(slot));
             state.contacts.slots[slot].displacement - free
         },
     );
     for (i, &slot) in slots[..count].iter().enumerate() {
         state.contacts.slots[slot].force = DVec3::from_slice(&system.right[3 * i..3 * i + 3]);
     }
+}
+
+/// Compliance of a contact, its law's with it, while the forces of all others stay as they are, m/N.
+pub fn own_compliance(model: &Model, state: &State, slot: usize) -> DMat3 {
+    let contact = &state.contacts.slots[slot];
+    let body = &state.bodies[contact.body];
+    let own = match &body.motion {
+        Some(motion) => motion.compliance(slot, slot),
+        None => state.compliance[slot][slot] * (1.0 / body.stiffness_scale),
+    };
+    with_law(model, contact, own)
+}
+
+fn with_law(model: &Model, contact: &Contact, own: DMat3) -> DMat3 {
+    let (tool, dynamics) = (&model.tools[contact.tool], model.bodies[contact.body].dynamics.as_ref());
+    own + DMat3::from_diagonal(DVec3::splat(law_of(contact.law).respond(tool, dynamics, &own)))
+}
+
+/// What contacts under the local law do at one that sticks, m, on a body at rest.
+fn dent_of_sliding(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
+    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
+    let sliding = contacts.on(body).filter(|&other| contacts.slots[other].law == LawKind::Local);
+    let dent = |other: usize| {
+        contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
+    };
+    sliding.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
 }
 
 /// Slots of the contacts of a body that stick, in order; returns how many there are.
@@ -56,12 +83,7 @@ pub fn solve_with(
     for (i, &a) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[a];
         for (j, &b) in slots.iter().enumerate() {
-            let mut block = compliance(a, b);
-            if a == b {
-                let tool = &model.tools[contact.tool];
-                let added = law_of(contact.law).respond(tool, model.bodies[contact.body].dynamics.as_ref(), &block);
-                block += DMat3::from_diagonal(DVec3::splat(added));
-            }
+            let block = if a == b { with_law(model, contact, compliance(a, a)) } else { compliance(a, b) };
             for row in 0..3 {
                 for column in 0..3 {
                     system.matrix[3 * i + row][3 * j + column] = block.col(column)[row];

@@ -9,13 +9,14 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::patch_weights;
 use crate::contact::smooth::FanWeights;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::Contact;
+use crate::simulation::covering::Covering;
 use crate::simulation::input::Controls;
 use crate::simulation::law::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
 use crate::simulation::model::Model;
-use crate::simulation::scratch::Scratch;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -23,7 +24,11 @@ use crate::simulation::tool::LawKind;
 /// Most steps; three or four are usual.
 pub const MOST_STEPS: usize = 16;
 /// A step of this length, over the tool's radius, is none.
-const SETTLED: f64 = 1e-10;
+const SETTLED: f64 = 1e-8;
+/// A force that changes by less than this part from step to step stays.
+const SAME: f64 = 1e-8;
+/// A foot that goes farther in a tick, over the tool's radius, has jumped.
+const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
@@ -33,10 +38,22 @@ pub struct LocalScratch {
     responses: Vec<LocalResponse>,
     /// Compliance between contacts, and what the others do at each.
     between: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
+    /// Compliance of one step less that at rest, on a body in motion, with the coupling on the diagonal.
+    change: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
     others: [Others; MAX_CONTACTS],
     /// What every contact counts from.
     from: [DVec3; MAX_CONTACTS],
     places: [DVec3; MAX_CONTACTS],
+    steps: [DVec3; MAX_CONTACTS],
+    /// Largest change of a force in the latest step, over that force.
+    changed: f64,
+}
+
+impl LocalScratch {
+    /// Takes the step.
+    fn go(&mut self) {
+        self.places.iter_mut().zip(&self.steps).for_each(|(place, step)| *place += *step);
+    }
 }
 
 impl Default for LocalScratch {
@@ -45,9 +62,12 @@ impl Default for LocalScratch {
             weights: vec![FanWeights::default(); MAX_CONTACTS],
             responses: vec![LocalResponse::default(); MAX_CONTACTS],
             between: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
+            change: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
             others: [Others::default(); MAX_CONTACTS],
             from: [DVec3::ZERO; MAX_CONTACTS],
             places: [DVec3::ZERO; MAX_CONTACTS],
+            steps: [DVec3::ZERO; MAX_CONTACTS],
+            changed: 0.0,
         }
     }
 }
@@ -72,8 +92,15 @@ fn local_tool(model: &Model, controls: &Controls, tool: usize) -> LocalTool {
     LocalTool { radius: fixed.radius, pad: fixed.pad_youngs_modulus, coefficient: controls.friction[tool] }
 }
 
+/// Memory of a tick, as far as contacts under the local law need it.
+pub struct Memory<'a> {
+    pub covering: &'a mut Covering,
+    pub local: &'a mut LocalScratch,
+    pub system: &'a mut System,
+}
+
 /// Forces of the contacts of a body under the local law.
-pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
+pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: usize, controls: &Controls) {
     let mut slots = [0; MAX_CONTACTS];
     let mut count = 0;
     for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
@@ -84,13 +111,16 @@ pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, bod
         return;
     }
     let slots = &slots[..count];
-    let Scratch { local, system, .. } = scratch;
+    let Memory { covering, local, system } = memory;
+    local.others[..count].fill(Others::default());
+    follow_motion(model, state, covering, local, slots, body);
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
-        local.places[a] = contact.local.relative;
-        local.from[a] = contact.local.tool - sticking_displacement(state, body, slot);
-        local.responses[a].force = contact.force;
-        local.others[a] = Others::default();
+        // Whatever moves goes on as it did.
+        local.places[a] = contact.local.relative + contact.local.advance;
+        local.from[a] = contact.local.tool - free_displacement(model, state, body, slot);
+        local.responses[a].force = contact.local.force;
+        local.others[a].slope = DVec3::ZERO;
     }
     for step in 0..MOST_STEPS {
         if !meet(model, state, local, slots, body, controls, step) {
@@ -98,19 +128,73 @@ pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, bod
         }
         let longest = advance(local, system, slots.len());
         let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
-        if longest < SETTLED * radius {
+        if longest < SETTLED * radius && step > 0 && local.changed < SAME {
             break;
         }
+        if step + 1 < MOST_STEPS {
+            local.go();
+        }
     }
-    // Forces belong to the places they were found at.
-    if meet(model, state, local, slots, body, controls, MOST_STEPS) {
-        take_up(model, state, local, slots, body);
-    }
+    take_up(model, state, local, slots, body);
 }
 
-/// Displacement at a contact by those of the body that stick, m.
-fn sticking_displacement(_state: &State, _body: usize, _slot: usize) -> DVec3 {
-    DVec3::ZERO
+/// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, and what
+/// contacts that stick did to it a tick ago, m.
+fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
+    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
+    if let Some(motion) = &state.bodies[body].motion {
+        return motion.free_displacement(slot);
+    }
+    let sticking = contacts.on(body).filter(|&other| contacts.slots[other].law != LawKind::Local);
+    let dent = |other: usize| {
+        contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
+    };
+    sticking.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
+}
+
+/// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
+/// to: by smaller patches the compliance of a single step could outweigh what is left of the half-space.
+fn follow_motion(
+    model: &Model,
+    state: &mut State,
+    covering: &mut Covering,
+    local: &mut LocalScratch,
+    slots: &[usize],
+    body: usize,
+) {
+    let fixed = &model.bodies[body];
+    let State { bodies, contacts, .. } = state;
+    let (Some(motion), Some(dynamics), Some(own)) = (&mut bodies[body].motion, &fixed.dynamics, &fixed.local) else {
+        return;
+    };
+    for (a, &slot) in slots.iter().enumerate() {
+        let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
+        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
+        own.smooth.weigh(foot, weights);
+        let (wide, _) = weights.field(|fan| regular.widths[fan]);
+        let centre = fixed.material_point(&fixed.surface_point(foot));
+        let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
+        // As many nodes as at the fans around fit.
+        if patch_weights(surface, &fixed.geometry, &centre, wide, patches, &mut covering.candidate).is_ok() {
+            contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
+        }
+        motion.follow_contact(&dynamics.modes, contacts, slot);
+        let mut moving = DMat3::ZERO;
+        for (fan, _, gradient) in weights.with_gradients() {
+            let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
+            moving += DMat3::from_cols(gradient * moved.x, gradient * moved.y, gradient * moved.z);
+        }
+        local.others[a].moving = Some(moving);
+    }
+    for (a, &slot) in slots.iter().enumerate() {
+        for (b, &other) in slots.iter().enumerate() {
+            let mut change = motion.change_in_a_step(&dynamics.modes, slot, other);
+            if a == b {
+                change += DMat3::IDENTITY * (1.0 / dynamics.coupling);
+            }
+            local.change[a][b] = change;
+        }
+    }
 }
 
 /// Answers of all contacts at their places. A contact that has come where nothing may be touched is let go: false.
@@ -123,6 +207,7 @@ fn meet(
     controls: &Controls,
     step: usize,
 ) -> bool {
+    local.changed = 0.0;
     for (a, &slot) in slots.iter().enumerate() {
         let tool = state.contacts.slots[slot].tool;
         let answer = local_body(model, state, tool, body).and_then(|met| {
@@ -131,13 +216,20 @@ fn meet(
             evaluate(met, tool, contact, local.places[a], known, local.others[a], &mut local.weights[a])
         });
         match answer {
-            Some(answer) => local.responses[a] = answer,
+            Some(answer) => {
+                let change = (answer.force - local.responses[a].force).length();
+                local.changed = local.changed.max(change / answer.force.length().max(f64::MIN_POSITIVE));
+                local.responses[a] = answer;
+            }
             None => {
                 state.contacts.clear(slot);
                 return false;
             }
         }
         local.between[a][a] = local.responses[a].compliance;
+        if state.bodies[body].motion.is_some() {
+            local.between[a][a] += local.change[a][a];
+        }
     }
     if slots.len() > 1 && step < FOLLOWED {
         couple(model, state, local, slots, body);
@@ -150,8 +242,10 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
     let green = &model.bodies[body].green;
     let scale = state.bodies[body].stiffness_scale;
     for (a, &slot) in slots.iter().enumerate() {
-        cover(model, state, &local.weights[a], slot, body);
-        local.others[a] = Others::default();
+        if state.bodies[body].motion.is_none() {
+            cover(model, state, &local.weights[a], slot, body);
+        }
+        local.others[a].slope = DVec3::ZERO;
     }
     let Some(fans) = model.bodies[body].local.as_ref().map(|own| own.smooth.fans()) else { return };
     for (a, _) in slots.iter().enumerate() {
@@ -164,6 +258,9 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
                 slope += gradient * (own.dot(of_node * force) / scale);
             }
             local.between[a][b] = block;
+            if state.bodies[body].motion.is_some() {
+                local.between[a][b] += local.change[a][b];
+            }
             local.others[a].slope += slope;
         }
     }
@@ -201,22 +298,44 @@ fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
     for a in 0..count {
         let step = DVec3::from_slice(&system.right[3 * a..3 * a + 3]);
         let step = if step.is_finite() { step } else { DVec3::ZERO };
-        local.places[a] += step;
+        local.steps[a] = step;
         longest = longest.max(step.length());
     }
     longest
+}
+
+/// Whether a foot has come elsewhere than where the tool has gone: off a ridge, or through a body. The force there has
+/// nothing to do with the one before, and might have more energy: such a contact ends, and the next starts from none.
+fn has_jumped(contact: &Contact, response: &LocalResponse, place: DVec3, radius: f64) -> bool {
+    let gone = place.distance(contact.local.relative);
+    response.foot.position.distance(contact.local.foot.position) > 4.0 * gone + FOOT_JUMP * radius
 }
 
 /// Writes the answers down.
 fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
     for (a, &slot) in slots.iter().enumerate() {
         let response = &local.responses[a];
-        cover(model, state, &local.weights[a], slot, body);
+        let contact = &state.contacts.slots[slot];
+        let (tool, radius) = (contact.tool, model.tools[contact.tool].radius);
+        if has_jumped(contact, response, local.places[a], radius) {
+            state.tools[tool].entry_depth[body] = f64::INFINITY;
+            state.contacts.clear(slot);
+            continue;
+        }
+        match &mut state.bodies[body].motion {
+            Some(motion) => {
+                let Some(dynamics) = &model.bodies[body].dynamics else { continue };
+                motion.keep_residual(&dynamics.modes, slot, &response.compliance);
+            }
+            None => cover(model, state, &local.weights[a], slot, body),
+        }
         let contact: &mut Contact = &mut state.contacts.slots[slot];
-        contact.force = response.force;
+        (contact.force, contact.local.force) = (response.force, response.force);
         (contact.point, contact.normal) = (response.foot.position, response.normal);
-        (contact.displacement, contact.wanted) = (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
+        (contact.displacement, contact.wanted) =
+            (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
         let own = &mut contact.local;
+        own.advance = local.places[a] - own.relative;
         own.relative = local.places[a];
         own.turned = own.orientation;
         own.foot = response.foot;
@@ -224,6 +343,8 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         (own.torque, own.radius, own.slipping) = (response.torque, response.sphere.radius, response.friction.slipping);
         let along = response.normal.dot(response.compliance * response.normal);
         own.stiffness = response.sphere.stiffness / (1.0 + along * response.sphere.stiffness);
+        own.energy = response.sphere.energy + response.springs().energy();
+        own.dissipated = response.friction.dissipated;
         own.depth = model.tools[contact.tool].radius - response.foot.normal.dot(own.tool - response.foot.position);
     }
 }

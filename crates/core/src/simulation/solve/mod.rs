@@ -5,5 +5,5 @@ mod forces;
 mod local;
 
 pub use compliance::add_contact;
-pub use forces::{contact_forces, gather, solve_with};
-pub use local::{LocalScratch, local_forces};
+pub use forces::{contact_forces, gather, own_compliance, solve_with};
+pub use local::{LocalScratch, Memory, local_forces};

@@ -14,6 +14,8 @@ pub struct LocalContact {
     pub orientation: DQuat,
     /// Where it is over the surface at rest, `p' = p - u`: what moves with the body below it does not count, m.
     pub relative: DVec3,
+    /// How far it went there in the last tick, m.
+    pub(in crate::simulation) advance: DVec3,
     /// How it was turned a tick ago.
     pub(in crate::simulation) turned: DQuat,
     /// Approach at which it began, m: a tool that appears inside starts from no force.
@@ -32,6 +34,12 @@ pub struct LocalContact {
     pub stiffness: f64,
     /// Whether it slips.
     pub slipping: bool,
+    /// Force on the body before the limit of strain, N.
+    pub(in crate::simulation) force: DVec3,
+    /// Energy of the indentation and of the springs, J.
+    pub(in crate::simulation) energy: f64,
+    /// What friction took out in the last tick, J.
+    pub(in crate::simulation) dissipated: f64,
     /// Share of its force that the limit of strain lets through.
     pub(in crate::simulation) share: f64,
     /// Place at which its strain was last asked for, m.

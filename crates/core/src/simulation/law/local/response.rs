@@ -13,8 +13,6 @@ use crate::mesh::Surface;
 const CLOSEST_FIT: f64 = 0.1;
 /// The force is inclined by the body's change of compliance by no more than this, over the pressing force.
 const STEEPEST: f64 = 0.5;
-/// Rounds in which the inclination and the force that it follows from agree.
-const ROUNDS: usize = 3;
 
 /// What a tool meets of a body.
 #[derive(Clone, Copy)]
@@ -45,6 +43,9 @@ pub struct LocalTool {
 pub struct Others {
     /// Derivative of `f^T sum_b C_ab f_b` by the place of the tool, N.
     pub slope: DVec3,
+    /// Of a body in motion the derivative of the surface's displacement `u_k` by the place, columns by `k`: it takes the place
+    /// of the compliance's, for `f . du(x)/dp'` at rest is `f^T (dC/dp') f / 2`.
+    pub moving: Option<DMat3>,
 }
 
 /// The answer at one place.
@@ -62,8 +63,6 @@ pub struct LocalResponse {
     pub friction: Answer,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
-    /// Approach, m.
-    pub depth: f64,
 }
 
 /// Energy of the local contact at a place and its gradient without friction.
@@ -97,29 +96,33 @@ pub fn evaluate(
     for (fan, weight) in weights.iter() {
         compliance += body.regular[fan] * (weight / body.scale);
     }
+    // A matrix is the identity by default.
+    let jacobian = DMat3::ZERO;
     let mut response =
-        LocalResponse { foot, force, compliance, normal: foot.normal, sphere, depth, ..LocalResponse::default() };
+        LocalResponse { foot, compliance, normal: foot.normal, sphere, jacobian, ..LocalResponse::default() };
     if sphere.force == 0.0 {
-        response.force = DVec3::ZERO;
         return Some(response);
     }
     let lever = -foot.normal * tool.radius;
     let rotation = rotation_between(contact);
     let displacement = place - contact.relative + rotation.cross(lever);
-    for _ in 0..ROUNDS {
-        let mut slope = others.slope;
-        for (fan, _, gradient) in weights.with_gradients() {
-            slope += gradient * (0.5 / body.scale * response.force.dot(body.regular[fan] * response.force));
+    // The inclination of the force follows from the force of the step before: they agree where the steps end.
+    let mut slope = others.slope;
+    match others.moving {
+        Some(moving) => slope += moving * force,
+        None => {
+            for (fan, _, gradient) in weights.with_gradients() {
+                slope += gradient * (0.5 / body.scale * force.dot(body.regular[fan] * force));
+            }
         }
-        let push = slope.clamp_length_max(STEEPEST * sphere.force) - gradient;
-        let pressing = push.length();
-        response.normal = push / pressing;
-        let stiffness = tangential * sphere.stiffness;
-        let bound = tool.coefficient * pressing;
-        response.friction =
-            contact.friction.answer(displacement, bound, tool.coefficient, stiffness, response.normal);
-        response.force = response.friction.force - push;
     }
+    let push = slope.clamp_length_max(STEEPEST * sphere.force) - gradient;
+    let pressing = push.length();
+    response.normal = push / pressing;
+    let stiffness = tangential * sphere.stiffness;
+    let bound = tool.coefficient * pressing;
+    response.friction = contact.friction.answer(displacement, bound, tool.coefficient, stiffness, response.normal);
+    response.force = response.friction.force - push;
     let (n, turning) = (foot.normal, foot.turning);
     let along = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
     response.jacobian = along(n, n) * sphere.stiffness - turning * sphere.force + response.friction.by_displacement
