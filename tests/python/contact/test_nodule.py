@@ -19,7 +19,7 @@ MIDDLE, TOP, DEPTH = 0.04, 0.04, 1.5e-3
 NODULES = ((11e3, 5e-3), (26e3, 5e-3), (13.5e3, 7e-3))
 # Edge of the elements of the direct solution under the tool and around the nodule, m.
 CELL = 2e-3
-# Part of the direct solution's contrast that the tick shows at least. `C_reg` is that of a patch of 1.6 radii of the tool,
+# Part of the direct contrast that the tick shows at least. `C_reg` is that of a patch of 1.6 radii of the tool,
 # here 8 mm, wider than these nodules are deep (3 and 5 mm): it spreads over soft tissue beside them.
 SHOWN = 0.35
 
