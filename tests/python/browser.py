@@ -88,14 +88,39 @@ def until(page, condition, seconds: float = 30.0) -> dict:
     raise AssertionError(f"waited {seconds} s in vain; the last state was {seen}")
 
 
-def press(page, pixels: float = 40.0, steps: int = 20) -> dict:
-    """Press on the visible top and push deeper by dragging down; the button stays down."""
-    x, y = page.evaluate("window.palpate.pickPoint()")
+def press(page, notches: int = 0, place: tuple[float, float] | None = None, contacts: int = 1) -> dict:
+    """Press on the visible top, or at a place, and go deeper by the wheel; the button stays down.
+
+    Returns once the tool has come to the depth that the pointer wants.
+    """
+    x, y = place or page.evaluate("window.palpate.pickPoint()")
     page.mouse.move(x, y)
     page.mouse.down()
+    settled_depth(page)
+    seen = until(page, lambda s: s["contacts"] == contacts and s["forceMagnitude"] > 0.01)
+    for _ in range(notches):
+        page.mouse.wheel(0, 100)
+    return (settled_depth(page) and state(page)) if notches else seen
+
+
+def settled_depth(page) -> float:
+    """Depth that the pointer wants, m, once it has come to its goal."""
+    before = -1.0
+    for _ in range(100):
+        now = state(page)["depth"]
+        if now == before:
+            return now
+        before = now
+        time.sleep(0.05)
+    raise AssertionError("the depth does not settle")
+
+
+def drag(page, start: tuple[float, float], end: tuple[float, float], steps: int = 20) -> None:
+    """Move the pointer that is down along a line."""
     for step in range(1, steps + 1):
-        page.mouse.move(x, y + pixels * step / steps)
-    return until(page, lambda s: s["contacts"] == 1 and s["forceMagnitude"] > 0.05)
+        part = step / steps
+        page.mouse.move(start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1]))
+        time.sleep(0.01)
 
 
 def settled_force(page) -> np.ndarray:

@@ -5,7 +5,7 @@ import type { ClientMessage, FrameMessage, SceneMessage } from "./net/protocol";
 import { Store } from "./store";
 
 const body = { youngs_modulus: 1e4, tets: 1, fields: [{ name: "displacement", title: "Displacement" }] };
-const tool = { radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01 };
+const tool = { radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01, friction: 0.3, shape: "sphere" };
 
 function scene(tools: number): SceneMessage {
   return { bodies: [body], tools: new Array(tools).fill(tool), motion: null } as unknown as SceneMessage;

@@ -49,12 +49,15 @@ export class Control {
         type: "settings",
         youngs_modulus: scene.bodies.map((body) => body.youngs_modulus),
         contact_radius: scene.tools.map((tool) => tool.contact_radius),
+        friction: scene.tools.map((tool) => tool.friction),
+        shape: scene.tools.map((tool) => tool.shape),
+        strain_limit: scene.strain_limit,
         time_scale: scene.motion?.time_scale ?? null,
       },
       frame: null,
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,
-      tab: scene.motion ? "motion" : "loop",
+      tab: scene.motion ? "motion" : "force",
       strike: strike && scene.motion !== null,
       impulse: scene.motion?.impulse ?? 0,
     });
@@ -201,6 +204,36 @@ export class Control {
     this.changedMs = performance.now();
     this.store.update({ settings: { ...settings, contact_radius: settings.contact_radius.with(tool, radius) } });
     this.sendLimited(`radius ${tool}`, { type: "set", contact_radius: radius, tool });
+  }
+
+  /** Of the tool that is driven, or that the next press drives. */
+  setFriction(friction: number): void {
+    const { settings } = this.store.get();
+    const tool = drivenTool(this.store.get()) ?? 0;
+    if (!settings) return;
+    this.changedMs = performance.now();
+    this.store.update({ settings: { ...settings, friction: settings.friction.with(tool, friction) } });
+    this.sendLimited(`friction ${tool}`, { type: "set", friction, tool });
+  }
+
+  /** The strain at which tools are held; 0 never holds them. */
+  setStrainLimit(limit: number): void {
+    const { settings } = this.store.get();
+    if (!settings) return;
+    this.changedMs = performance.now();
+    this.store.update({ settings: { ...settings, strain_limit: limit } });
+    this.sendLimited("strain limit", { type: "set", strain_limit: limit });
+  }
+
+  /** Of the tool that the next press drives. */
+  chooseShape(name: string): void {
+    this.release();
+    this.send({ type: "shape", tool: drivenTool(this.store.get()) ?? 0, name });
+  }
+
+  /** How many times as large as they are displacements are drawn. */
+  showScaled(shownScale: number): void {
+    this.store.update({ shownScale });
   }
 
   setTimeScale(scale: number): void {

@@ -3,7 +3,7 @@ import { describe, expect, it } from "vitest";
 import { Store, drivenTool } from "./store";
 import type { SceneMessage } from "./net/protocol";
 
-const tool = { radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01 };
+const tool = { radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01, friction: 0.3, shape: "sphere" };
 
 describe("the store", () => {
   it("tells a listener at once, and of every change of its keys", () => {

@@ -13,9 +13,11 @@ import type {
 
 export type Axis = "x" | "y" | "z";
 export type Layer = "colors" | "wireframe" | "supports" | "cutaway" | "plots";
-export type Tab = "motion" | "loop" | "modes";
+export type Tab = "motion" | "force" | "loop" | "modes";
+/** Displacements may be drawn so many times as large as they are. */
+export const SHOWN_SCALE_MAX = 10;
 
-/** The tool that the pointer drives: depth of a press or length of a pull, m. */
+/** The tool that the pointer drives, with the depth of a press or the length of a pull that the pointer wants, m. */
 export interface Pressing {
   tool: number;
   grab: boolean;
@@ -38,6 +40,8 @@ export interface State {
   layers: Readonly<Record<Layer, boolean>>;
   /** The axis across which the body is cut open, and the share of its extent that is taken away. */
   cut: Readonly<{ axis: Axis; share: number }>;
+  /** Displacements are drawn so many times. */
+  shownScale: number;
   /** Name of the field in colours; null until one is chosen. */
   field: string | null;
   /** The body that stiffness and legend belong to. */
@@ -68,9 +72,10 @@ export function initialState(): State {
     notices: [],
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
     cut: { axis: "y", share: 0.5 },
+    shownScale: 1,
     field: null,
     body: 0,
-    tab: "loop",
+    tab: "force",
     grab: false,
     strike: false,
     impulse: 0,

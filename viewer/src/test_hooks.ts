@@ -102,10 +102,10 @@ function pickPoint(stage: Stage, { surface, placed, bounds }: BodyView, body: nu
   const { viewport } = stage;
   const centre = bounds.getCenter(new THREE.Vector3());
   const size = bounds.getSize(new THREE.Vector3()).length();
-  const place = (i: number) => new THREE.Vector3().fromArray(surface.positions, 3 * i).applyMatrix4(placed.matrix);
+  const place = (i: number) => new THREE.Vector3().fromArray(surface.shown, 3 * i).applyMatrix4(placed.matrix);
   const score = (i: number) => {
     const { x, y, z } = place(i).sub(centre);
-    const normal = new THREE.Vector3().fromArray(surface.normals, 3 * i).applyQuaternion(placed.quaternion);
+    const normal = new THREE.Vector3().fromArray(surface.shownNormals, 3 * i).applyQuaternion(placed.quaternion);
     // Higher and flatter is better, further from the middle is worse.
     return z / size + 0.5 * normal.z - 2 * (Math.hypot(x, y) / size);
   };

@@ -42,6 +42,9 @@ struct Outcome {
 
 /// Ticks along a path, measured `every` so many of them, before a law that depends on the tick too; the work of what goes
 /// out by the trapezoid rule.
+/// A wrench by tick and pose.
+type Law = dyn Fn(usize, &Pose) -> Wrench;
+
 fn follow(stage: &mut SafetyStage, path: &[Pose], every: usize, law: impl Fn(usize, &Pose) -> Wrench) -> Outcome {
     let (mut stored, mut outcome) = (0.0, Outcome { given: 0.0, peak: 0.0, port: stage.energy(), out: Vec::new() });
     let mut last: Option<(Pose, Wrench, Wrench)> = None;
@@ -232,12 +235,9 @@ fn nothing_is_damped_where_nothing_is_owed() {
             force: DVec3::Z * 8e3 * (-pose.position.z).max(0.0).powf(1.5),
             ..Wrench::default()
         };
-        let without = without_controller(limits);
-        let by_law = [
-            (through(limits, path, wall(500.0)), through(without, path, wall(500.0))),
-            (through(limits, path, hertz), through(without, path, hertz)),
-        ];
-        for (outcome, open) in by_law {
+        let laws: [&Law; 2] = [&wall(500.0), &hertz];
+        for law in laws {
+            let (outcome, open) = (through(limits, path, law), through(without_controller(limits), path, law));
             assert!(outcome.out == open.out);
             assert!(outcome.port.owed.abs() < 1e-9);
         }

@@ -12,6 +12,7 @@ from palpate.cli.app import app
 
 if TYPE_CHECKING:
     from palpate.validation.bench import dynamics as dynamics_bench
+    from palpate.validation.bench.contact import Results as ContactResults
     from palpate.validation.bench.elements import Row as ElementRow
     from palpate.validation.bench.paper import Row
     from palpate.validation.bench.precompute import Result
@@ -39,6 +40,57 @@ def paper(
         print(json.dumps(bench.as_json(rows), indent=2))
         return
     _print_table(rows)
+
+
+@bench_app.command()
+def contact(
+    out: Annotated[Path | None, typer.Option(help="Folder for the plot, as PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Force of a sphere on elements larger than the contact: Palpate, MuJoCo and Drake beside a direct solution.
+
+    Peers: pip install 'palpate[bench]'. Example: palpate bench contact --out plots
+    """
+    from palpate.progress import narrated
+    from palpate.validation.bench import contact as bench
+
+    with narrated("pressing; with all peers it takes some minutes"):
+        results = bench.run()
+    if as_json:
+        print(json.dumps(bench.as_json(results), indent=2))
+    else:
+        _print_contact(results)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        bench.plot(results, out / "contact.png")
+
+
+def _print_contact(results: ContactResults) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from palpate.validation.bench.contact import DEPTHS
+
+    table = Table(title="Force over that of the direct solution, and half its range over the places of an element")
+    table.add_column("", no_wrap=True)
+    table.add_column("elements", no_wrap=True)
+    for depth in DEPTHS:
+        table.add_column(f"{1e3 * depth:g} mm", justify="right", no_wrap=True)
+    table.add_column("step [us]", justify="right")
+    table.add_row("direct solution", "resolved", *(f"{1e3 * force:.1f} mN" for force in results.truth), "")
+    for row in results.rows:
+        ratios, spread = row.means / results.truth, 100 * row.spread
+        cells = (f"{ratio:.2f} +-{part:.2g} %" for ratio, part in zip(ratios, spread, strict=True))
+        table.add_row(row.method, row.mesh, *cells, "" if row.step_us is None else f"{row.step_us:.1f}")
+    Console().print(table)
+    ticks = Table(title="A tick of a sliding sphere, and numpy solving three equations, in us", title_justify="left")
+    for heading in ("surface nodes", "median", "worst", "numpy"):
+        ticks.add_column(heading, justify="right")
+    for tick in results.ticks:
+        ticks.add_row(str(tick.surface_nodes), *(f"{v:.1f}" for v in (tick.median, tick.worst, tick.numpy)))
+    Console().print(ticks)
+    for peer, package in results.missing.items():
+        print(f"{peer} was left out: pip install {package}")
 
 
 @bench_app.command()

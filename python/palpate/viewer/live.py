@@ -20,7 +20,7 @@ async def _serve(server: ViewerServer, browser: bool) -> None:
     await server.start()
     try:
         print(f"Palpate is at {server.address}", flush=True)
-        print("Press on the body with the left mouse button. Ctrl-C here ends.", flush=True)
+        print("Hold the left mouse button on the body to press, drag to slide. Ctrl-C here ends.", flush=True)
         if browser and _has_desktop():
             await asyncio.to_thread(webbrowser.open, server.address)
         finished = asyncio.Event()

@@ -18,7 +18,7 @@ import numpy as np
 from palpate.errors import ViewerError
 from palpate.vectors import three_numbers
 
-VERSION = 4
+VERSION = 5
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}

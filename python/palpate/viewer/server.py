@@ -237,17 +237,24 @@ class ViewerServer:
                 client.wants = replace(client.wants, field=messages.word(message, "name"))
             elif client is not self._controller:
                 raise ViewerError("another viewer has control; this one watches")
-            elif message["type"] == "cancel":
-                if self._building is not None:
-                    self._building.cancel()
-            elif message["type"] == "model":
-                await self._choose(message.get("name"))
             else:
-                session = self._session
-                if await self._worker.call(session.handle, message):
-                    await self._tell_all(await self._worker.call(session.settings))
+                await self._command(message)
         except Error as error:
             await client.send({"type": "error", "text": str(error)})
+
+    async def _command(self, message: dict[str, Any]) -> None:
+        """Do what the controlling client says."""
+        if message["type"] == "cancel":
+            if self._building is not None:
+                self._building.cancel()
+        elif message["type"] == "model":
+            await self._choose(message.get("name"))
+        elif message["type"] == "shape":
+            await self._reshape(message)
+        else:
+            session = self._session
+            if await self._worker.call(session.handle, message):
+                await self._tell_all(await self._worker.call(session.settings))
 
     async def _send_frames(self, client: Client) -> None:
         """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""
@@ -303,6 +310,15 @@ class ViewerServer:
             raise ViewerError("another model is being prepared")
         self._building = LongWork()
         self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name), self._building))
+
+    async def _reshape(self, message: dict[str, Any]) -> None:
+        """Give a tool another shape: another loop on the same bodies."""
+        if self._building is not None:
+            raise ViewerError("another model is being prepared")
+        session = await self._worker.call(self._session.reshaped, message)
+        if session is not None:
+            await self._worker.call(self._exchange, session)
+            await self._tell_all(await self._worker.call(session.settings))
 
     async def _switch(self, name: str, scene: Scene, building: LongWork) -> None:
         solving = self._reporter(f"Solving the {name}", building)

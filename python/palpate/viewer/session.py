@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, get_args
 
 import numpy as np
 
 from palpate.errors import ViewerError
 from palpate.scene import BuiltScene
+from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
-from palpate.viewer.messages import by_body, encode, index, number, vector
+from palpate.viewer.messages import by_body, encode, index, number, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.shown_body import ShownBody, titled
 
@@ -24,6 +25,8 @@ REACH = 10.0
 # Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
 LOG_KEPT = 4000
 LOG_SENT = 64
+# Shapes of tools that the page can draw by their radius alone.
+DRAWN_SHAPES = ("sphere",)
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -55,6 +58,7 @@ class Session:
         low, high = placed.min(axis=0), placed.max(axis=0)
         self._centre, self.size = 0.5 * (low + high), float((high - low).max())
         self._active = [False] * len(scene.tools)
+        self._strain_limit = scene.view.strain_limit
         largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
         moving = next((body for body, one in enumerate(built.bodies) if one.motion is not None), None)
@@ -88,6 +92,9 @@ class Session:
             "type": "settings",
             "youngs_modulus": [self.simulation.youngs_modulus_of(body) for body in range(len(self._bodies))],
             "contact_radius": [self.simulation.contact_radius_of(tool) for tool in range(len(self._active))],
+            "friction": [self.simulation.friction_of(tool) for tool in range(len(self._active))],
+            "shape": [tool.shape for tool in self.built.scene.tools],
+            "strain_limit": self._strain_limit,
             "time_scale": None if self._moving is None else self._moving.time_scale,
         }
 
@@ -121,6 +128,37 @@ class Session:
             raise ViewerError(f"unknown message '{message['type'][:40]}'")
         return handler(message)
 
+    def reshaped(self, message: Mapping[str, Any]) -> Session | None:
+        """Session, not started, on the same bodies, a tool of which has the shape of a message; None if it has it.
+
+        Raises
+        ------
+        Error
+            A shape that the tool may not take.
+
+        """
+        tool, name = index(message, "tool", len(self._active)), word(message, "name")
+        tools = list(self.built.scene.tools)
+        if name not in shapes_of(tools[tool]):
+            raise ViewerError(f"shape: a tool is no '{name}'; it may be {' or '.join(shapes_of(tools[tool]))}")
+        if name == tools[tool].shape:
+            return None
+        tools[tool] = tools[tool].model_copy(update={"shape": name})
+        other = Session(replace(self.built, scene=self.built.scene.model_copy(update={"tools": tools})))
+        other._take_over(self)
+        return other
+
+    def _take_over(self, other: Session) -> None:
+        """Set what the sliders of another session on the same bodies have set."""
+        for rank in range(len(self._active)):
+            self.simulation.set_radius(other.simulation.contact_radius_of(rank), rank)
+            self.simulation.set_friction(other.simulation.friction_of(rank), rank)
+        for rank in range(len(self._bodies)):
+            modulus = other.simulation.youngs_modulus_of(rank)
+            if modulus is not None:
+                self.simulation.set_youngs_modulus(modulus, rank)
+        self._set_strain_limit(other._strain_limit, {})
+
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
         scene = self.built.scene
@@ -130,21 +168,27 @@ class Session:
             "name": scene.name,
             "title": titled(scene.name),
             "size": self.size,
-            "strain_limit": view.strain_limit,
+            "strain_limit": self._strain_limit,
             "max_force": scene.device.max_force,
             "bodies": [body.header(self.simulation.youngs_modulus_of(i)) for i, body in enumerate(self._bodies)],
-            "tools": [
-                {
-                    "radius": table.radius,
-                    "contact_radius": self.simulation.contact_radius_of(tool),
-                    "max_contact_radius": self._max_radii[tool],
-                }
-                for tool, table in enumerate(scene.tools)
-            ],
+            "tools": [self._tool_entry(tool) for tool in range(len(scene.tools))],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
         }
         return encode(header, by_body([body.arrays() for body in self._bodies]))
+
+    def _tool_entry(self, tool: int) -> dict[str, Any]:
+        """Entry of the scene message."""
+        table = self.built.scene.tools[tool]
+        return {
+            "shape": table.shape,
+            "shapes": choices(shapes_of(table)),
+            "contact": table.contact,
+            "friction": self.simulation.friction_of(tool),
+            "radius": table.radius,
+            "contact_radius": self.simulation.contact_radius_of(tool),
+            "max_contact_radius": self._max_radii[tool],
+        }
 
     def frame_message(self, number: int, log_seen: tuple[int, int], wants: Wants) -> tuple[bytes, tuple[int, int]]:
         """Binary message of the latest tick, and up to where it carries log and history."""
@@ -181,6 +225,8 @@ class Session:
     def _contact_header(self, contact: Contact) -> dict[str, Any]:
         """Entry of a frame message: the place in the body's frame, the force on the body in that of the scene."""
         body = self.built.bodies[contact.body]
+        # What holds on, by its law or by a grab, does so by its patch: it has no depth of its own.
+        local = contact.mode == "press" and self.built.scene.tools[contact.tool].contact == "local"
         return {
             "tool": contact.tool,
             "body": contact.body,
@@ -188,6 +234,10 @@ class Session:
             "point": body.points_to_body(contact.point).tolist(),
             "normal": body.vectors_to_body(contact.normal).tolist(),
             "force": contact.force.tolist(),
+            "radius": float(contact.radius) if local else self.simulation.contact_radius_of(contact.tool),
+            "depth": float(contact.depth) if local else None,
+            "stiffness": float(contact.stiffness) if local else None,
+            "slipping": bool(contact.slipping),
         }
 
     def _tool_header(self, frame: Frame, tool: int) -> dict[str, Any]:
@@ -229,6 +279,8 @@ class Session:
         known: dict[str, Callable[[float, Mapping[str, Any]], None]] = {
             "youngs_modulus": self._set_youngs_modulus,
             "contact_radius": self._set_radius,
+            "friction": self._set_friction,
+            "strain_limit": self._set_strain_limit,
             "time_scale": self._set_time_scale,
         }
         keys = set(message) - {"type", "body", "tool"}
@@ -245,8 +297,20 @@ class Session:
     def _set_time_scale(self, time_scale: float, _message: Mapping[str, Any]) -> None:
         self._in_motion("slow motion").set_time_scale(time_scale)
 
+    def _tools(self, message: Mapping[str, Any]) -> Sequence[int]:
+        """Return the tool that a message names, or all of them."""
+        return [index(message, "tool", len(self._active))] if "tool" in message else range(len(self._active))
+
+    def _set_friction(self, friction: float, message: Mapping[str, Any]) -> None:
+        for tool in self._tools(message):
+            self.simulation.set_friction(friction, tool)
+
+    def _set_strain_limit(self, limit: float, _message: Mapping[str, Any]) -> None:
+        self.simulation.set_strain_limit(limit)
+        self._strain_limit = limit
+
     def _set_radius(self, radius: float, message: Mapping[str, Any]) -> None:
-        tools = [index(message, "tool", len(self._active))] if "tool" in message else range(len(self._active))
+        tools = self._tools(message)
         largest = min(self._max_radii[tool] for tool in tools)
         if radius > largest:
             raise ViewerError(f"the contact radius goes up to {1e3 * largest:.3g} mm on this body")
@@ -257,6 +321,8 @@ class Session:
         self.release()
         for rank, tool in enumerate(self.built.scene.tools):
             self.simulation.set_radius(tool.contact_radius, rank)
+            self.simulation.set_friction(tool.friction, rank)
+        self._set_strain_limit(self.built.scene.view.strain_limit, {})
         for rank in range(len(self._bodies)):
             if self.simulation.youngs_modulus_of(rank) is not None:
                 self.simulation.set_youngs_modulus(self.built.bodies[rank].green.youngs_modulus, rank)
@@ -336,6 +402,12 @@ def _thin(rows: np.ndarray, peaks: int | None = None) -> np.ndarray:
     if peaks is not None and stride > 1 and len(rows):
         thin[:, peaks] = np.maximum.reduceat(rows[:, peaks], np.arange(0, len(rows), stride))
     return thin
+
+
+def shapes_of(tool: ToolTable) -> tuple[str, ...]:
+    """Shapes that a tool may take in the page: its own, and those that the page draws."""
+    known = get_args(type(tool).model_fields["shape"].annotation)
+    return tuple(name for name in known if name in DRAWN_SHAPES or name == tool.shape)
 
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:

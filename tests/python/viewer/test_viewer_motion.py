@@ -26,7 +26,12 @@ def built(block, block_green) -> BuiltScene:
 def moving(block, block_green) -> BuiltScene:
     """The block in motion, with a strike of its own."""
     strike = {"point": TOP, "impulse": [0, 0, -1e-3]}
-    scene = palpate.Scene(body={"store": "block.palpate"}, dynamics={"strike": strike})
+    scene = palpate.Scene(
+        body={"store": "block.palpate"},
+        tool={"contact": "patch"},
+        view={"strain_limit": 0.1},
+        dynamics={"strike": strike},
+    )
     motion = scene.dynamics.build(block, scene.device.max_stiffness, progress=False)
     return BuiltScene.of(scene, block, block_green, motion)
 

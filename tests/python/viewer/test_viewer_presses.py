@@ -18,7 +18,57 @@ TOP = [0.04, 0.025, 0.05]
 
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
-    return BuiltScene.of(palpate.Scene.of_store("block.palpate"), block, block_green)
+    scene = palpate.Scene(body={"store": "block.palpate"}, tool={"contact": "patch"}, view={"strain_limit": 0.1})
+    return BuiltScene.of(scene, block, block_green)
+
+
+def test_a_sliding_contact_is_told(block, block_green):
+    """Depth by the distance to the flat top, stiffness by the slope of the force, Coulomb's bound while it slides."""
+    scene = palpate.Scene(body={"store": "block.palpate"}, tool={"friction": 0.2}, view={"strain_limit": 0})
+    built = BuiltScene.of(scene, block, block_green)
+
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            told, _ = await client.receive("scene")
+            (tool,) = told["tools"]
+            assert (tool["contact"], tool["friction"], tool["shape"]) == ("local", 0.2, "sphere")
+            assert {"name": "sphere", "title": "Sphere"} in tool["shapes"]
+
+            async def pressed(x, depth):
+                centre = [x, TOP[1], TOP[2] + tool["radius"] - depth]
+                await client.say(type="press", tool=0, position=centre, grab=False)
+                arrived = lambda h: h["time"] > 0.6 and np.allclose(h["tools"][0]["position"], centre, atol=1e-8)  # noqa: E731
+                header, _ = await settled(client, arrived)
+                return header["contacts"][0]
+
+            await pressed(TOP[0], 1e-3)
+            depths = (1.4e-3, 1.5e-3, 1.6e-3)
+            contacts = [await pressed(TOP[0], depth) for depth in depths]
+            assert [contact["depth"] for contact in contacts] == pytest.approx(depths, rel=1e-6)
+            pushes = [-contact["force"][2] for contact in contacts]
+            assert contacts[1]["stiffness"] == pytest.approx((pushes[2] - pushes[0]) / 0.2e-3, rel=0.02)
+            assert 0 < contacts[0]["radius"] < contacts[1]["radius"] < tool["radius"]
+            dragged = await pressed(TOP[0] - 6e-3, 1.6e-3)
+            along = np.hypot(dragged["force"][0], dragged["force"][1])
+            assert along == pytest.approx(-0.2 * dragged["force"][2], rel=0.05)
+            await client.say(type="set", friction=0)
+            free = await pressed(TOP[0] + 1e-3, 1.6e-3)
+            assert abs(free["force"][0]) < 0.1 * abs(free["force"][2])
+
+    asyncio.run(session())
+
+
+def test_what_holds_on_tells_no_depth(built):
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            await client.say(type="press", tool=0, position=TOP, grab=False)
+            header, _ = await client.frame_where(lambda h: len(h["contacts"]) == 1)
+            (contact,) = header["contacts"]
+            assert contact["depth"] is None and contact["stiffness"] is None
+            assert contact["radius"] == scene["tools"][0]["contact_radius"]
+
+    asyncio.run(session())
 
 
 def test_fields_are_those_of_the_recovery(built):
@@ -63,7 +113,8 @@ def test_fields_are_those_of_the_recovery(built):
 
 def test_a_bare_store_offers_what_its_surface_knows(built, tmp_path):
     built.bodies[0].green.save(tmp_path / "block.palpate")
-    bare = palpate.Scene.of_store(tmp_path / "block.palpate").build()
+    store = {"store": str(tmp_path / "block.palpate")}
+    bare = palpate.Scene(body=store, tool={"contact": "patch"}, view={"strain_limit": 0.1}).build()
 
     async def session():
         async with serving(bare) as server, page(server) as client:
@@ -116,7 +167,7 @@ def test_the_tool_is_limited(built):
 
 def test_two_fingers_on_one_body_are_one_solve(block, block_green):
     """Both presses feel each other: `K u = sum w_i f_i` with `w_i . u = d_i`, by scikit-fem's matrix and SciPy."""
-    finger = {"radius": 5e-3, "contact_radius": 12e-3}
+    finger = {"contact": "patch", "radius": 5e-3, "contact_radius": 12e-3}
     built = BuiltScene.of(palpate.Scene(body={"store": "block.palpate"}, tool=[finger, finger]), block, block_green)
     places = np.array([[0.03, 0.015, 0.05], [0.07, 0.035, 0.05]])
     depths = np.array([[0, 0, -1e-3], [0, 0, -2e-3]])

@@ -26,7 +26,9 @@ TOP = [0.04, 0.025, 0.05]
 
 @pytest.fixture(scope="module")
 def built(block, block_green) -> BuiltScene:
-    return BuiltScene.of(palpate.Scene.of_store("block.palpate"), block, block_green)
+    """With the law of the patch, which an answer of the Green's function can be compared with."""
+    scene = palpate.Scene(body={"store": "block.palpate"}, tool={"contact": "patch"})
+    return BuiltScene.of(scene, block, block_green)
 
 
 def get(server, path="/", host=None):
@@ -79,9 +81,17 @@ def test_sliders_act_at_once_and_are_told_to_all(built):
             await client.say(type="set", body=0, youngs_modulus=-1)
             error, _ = await client.receive("error")
             assert "positive" in error["text"]
+            for key, value in {"friction": 0.8, "strain_limit": 0.25}.items():
+                await client.say(type="set", **{key: value})
+                settings, _ = await client.receive("settings")
+                assert settings[key] in (value, [value])
+            simulation = server._session.simulation
+            assert simulation.friction_of() == 0.8
             await client.say(type="reset")
             settings, _ = await client.receive("settings")
             assert settings["youngs_modulus"][0] == pytest.approx(10e3)
+            assert settings["friction"] == [0.3] and settings["strain_limit"] == 0.3
+            assert simulation.friction_of() == 0.3
 
     asyncio.run(session())
 
@@ -213,12 +223,19 @@ def test_host_header(host, bound, ours):
         '{"type": "set"}',
         '{"type": "set", "body": 0, "youngs_modulus": "soft"}',
         '{"type": "set", "contact_radius": 1e9}',
+        '{"type": "set", "friction": -0.1}',
+        '{"type": "set", "friction": 0.3, "tool": 1}',
+        '{"type": "set", "strain_limit": 1.5}',
+        '{"type": "set", "strain_limit": null}',
         '{"type": "set", "contact_radius": 0.004, "tool": 1}',
         '{"type": "set", "youngs_modulus": 1e4}',
         '{"type": "set", "youngs_modulus": 1e4, "body": 1}',
         '{"type": "set", "body": 0, "tool": 0}',
         '{"type": "set", "token": 1}',
         '{"type": "model", "name": "spleen"}',
+        '{"type": "shape", "tool": 0, "name": "banana"}',
+        '{"type": "shape", "tool": 1, "name": "sphere"}',
+        '{"type": "shape", "tool": 0}',
         '{"type": "shutdown"}',
         "[" * 3000,
     ],

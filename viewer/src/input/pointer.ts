@@ -1,22 +1,24 @@
-// The pointer as a haptic device: on a body it presses or grabs, elsewhere the camera's controls have it.
+// The pointer as a haptic device: on a body it presses, slides or grabs, elsewhere the camera's controls have it.
 
 import * as THREE from "three";
 
 import type { Control } from "../control";
-import { RateLimit } from "../net/rate_limit";
 import type { Pick } from "../scene/body_view";
 import type { Stage } from "../scene/stage";
 import type { Viewport } from "../scene/viewport";
 import { drivenTool, inControl } from "../store";
 import type { State, Store } from "../store";
 import { GrabGesture, PressGesture } from "./press_geometry";
-import type { CameraAxes, Gesture } from "./press_geometry";
+import type { CameraAxes, Gesture, Place, Sight } from "./press_geometry";
 
-/** The server takes 250 messages a second; a mouse may report 1000. */
+/** So often the tool is told where to go while it moves; a mouse may report four times as often. */
 const SEND_INTERVAL_MS = 4;
-/** One notch of a wheel is 100 pixels; it moves the tool by this share of the size of the scene. */
-const WHEEL_STEP = 0.002;
+/** After a pause of the page, which may be long, time goes on as if it had been so short, s. */
+const STEP_MAX_S = 0.05;
 const WHEEL_NOTCH_PX = 100;
+/** Bits of mouse buttons among those that are held. */
+const FIRST_BUTTON = 1;
+const SECOND_BUTTON = 2;
 /** A click may slip so far; more is a drag. */
 const CLICK_PX = 8;
 /** Larger bodies are not searched under every hovering pointer, it would slow the page. */
@@ -28,10 +30,12 @@ interface Drag {
   tool: number;
   gesture: Gesture;
   down: PointerEvent;
-  /** m. */
-  metresPerPixel: number;
-  x: number;
-  y: number;
+  place: Place;
+  /** When the gesture was last let move on, ms, and the timer that does. */
+  movedMs: number;
+  timer: number;
+  /** What was sent last. */
+  sent: THREE.Vector3 | null;
 }
 
 export class Pointer {
@@ -39,7 +43,6 @@ export class Pointer {
   events = 0;
   private drag: Drag | null = null;
   private readonly viewport: Viewport;
-  private readonly limit = new RateLimit(SEND_INTERVAL_MS, () => this.send());
   private handedOver = false;
   /** Where a click began that strikes if the pointer does not move. */
   private aim: PointerEvent | null = null;
@@ -50,12 +53,17 @@ export class Pointer {
     store.subscribe(["pressing"], ({ pressing }) => {
       if (!pressing) this.drop();
     });
-    store.subscribe(["frame"], () => this.tellDepth());
+    store.subscribe(["frame"], ({ frame }) => {
+      if (this.drag) this.drag.gesture.hold(frame?.tools[this.drag.tool]?.limited ?? false);
+      this.tellDepth();
+    });
+    // Another place of the tool for the same place of the pointer: the surface is drawn elsewhere.
+    store.subscribe(["shownScale"], () => control.letGo(false));
   }
 
   /** Depth of the press or length of the pull where the pointer wants it, m. */
   get wantedDepth(): number | null {
-    return this.drag && this.drag.gesture.depthOf(this.drag.gesture.centre());
+    return this.drag && this.drag.gesture.depth;
   }
 
   private listen(): void {
@@ -72,6 +80,7 @@ export class Pointer {
         if (event.pointerId === this.aim?.pointerId) this.finishAim(event);
       });
     }
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => this.onWheel(event), { capture: true, passive: false });
     window.addEventListener("blur", () => this.control.letGo(false));
     document.addEventListener("visibilitychange", () => {
@@ -89,7 +98,7 @@ export class Pointer {
       return;
     }
     // A second finger while the first one orbits belongs to the camera.
-    if (event.button !== 0 || event.ctrlKey || event.metaKey || !event.isPrimary) return;
+    if (event.button !== 0 || !event.isPrimary) return;
     const state = this.store.get();
     if (!inControl(state)) return;
     if (state.scene?.motion && (event.altKey || state.strike)) {
@@ -104,31 +113,39 @@ export class Pointer {
     this.begin(event, pick, tool, state);
   }
 
-  private begin(event: PointerEvent, pick: Pick, tool: number, { scene, grab: grabWanted }: State): void {
+  private begin(event: PointerEvent, pick: Pick, tool: number, { scene, grab: grabWanted, pinned }: State): void {
     const { viewport } = this;
     event.stopImmediatePropagation();
     viewport.controls.enabled = false;
     viewport.canvas.setPointerCapture(event.pointerId);
-    const grab = event.shiftKey || grabWanted;
     const { size, tools } = scene!;
-    const gesture = grab
-      ? new GrabGesture(pick, this.cameraAxes(), size)
-      : new PressGesture(pick, this.cameraAxes(), size, tools[tool]!.radius);
-    const metresPerPixel = viewport.metresPerPixel(pick.shown);
-    this.drag = { tool, gesture, down: event, metresPerPixel, x: event.clientX, y: event.clientY };
+    const place: Place = [event.clientX, event.clientY];
+    // Without another tool a dent that is still seen is the one that this tool has just left.
+    const dent = pinned.length > 0 ? pick.dent : 0;
+    const gesture =
+      grabWanted || wantsGrab(event)
+        ? new GrabGesture(pick.point, this.sight(pick), size, place)
+        : new PressGesture({ ...pick, dent }, this.sight(pick), size, tools[tool]!.radius, {
+            pointer: place,
+            aim: viewport.project(pick.drawn),
+            straight: event.shiftKey,
+          });
+    const timer = window.setInterval(() => this.advance(), SEND_INTERVAL_MS);
+    this.drag = { tool, gesture, down: event, place, movedMs: performance.now(), timer, sent: null };
+    if (event.pointerType === "pen") gesture.press(event.pressure);
     this.tellDepth();
-    this.limit.request();
+    this.send(this.drag);
   }
 
   /** Gives the pointer back to the camera. */
   private drop(): void {
     if (!this.drag) return;
-    const { pointerId } = this.drag.down;
+    const { down, timer } = this.drag;
     this.drag = null;
-    this.limit.cancel();
+    window.clearInterval(timer);
     this.viewport.controls.enabled = true;
     const { canvas } = this.viewport;
-    if (canvas.hasPointerCapture(pointerId)) canvas.releasePointerCapture(pointerId);
+    if (canvas.hasPointerCapture(down.pointerId)) canvas.releasePointerCapture(down.pointerId);
   }
 
   private finishAim(event: PointerEvent): void {
@@ -147,21 +164,20 @@ export class Pointer {
     const { drag } = this;
     if (!drag || event.pointerId !== drag.down.pointerId) return;
     this.events += 1;
-    const { x, y, metresPerPixel } = drag;
-    drag.gesture.move((event.clientX - x) * metresPerPixel, (event.clientY - y) * metresPerPixel);
-    drag.x = event.clientX;
-    drag.y = event.clientY;
-    this.limit.request();
+    // The first button was let go before the second one.
+    if ((event.buttons & FIRST_BUTTON) === 0) return this.control.letGo(true);
+    drag.place = [event.clientX, event.clientY];
+    if (event.pointerType === "pen") drag.gesture.press(event.pressure);
+    drag.gesture.moveTo(drag.place, event.shiftKey || (event.buttons & SECOND_BUTTON) !== 0);
   }
 
   private onWheel(event: WheelEvent): void {
     if (!this.drag) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    // Lines and pages, which some browsers report, are about a notch each.
-    const notches = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY / WHEEL_NOTCH_PX : event.deltaY / 3;
-    this.drag.gesture.wheel(notches * WHEEL_STEP * (this.store.get().scene?.size ?? 0));
-    this.limit.request();
+    // Lines and pages, which some browsers report, are about a notch each. With Shift a wheel scrolls sideways.
+    const turned = event.deltaY || event.deltaX;
+    this.drag.gesture.wheel(event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? turned / WHEEL_NOTCH_PX : turned / 3);
   }
 
   private onHover(event: PointerEvent): void {
@@ -174,15 +190,15 @@ export class Pointer {
   private cursor(event: PointerEvent): string {
     const { strike, grab, scene } = this.store.get();
     if (scene?.motion && (event.altKey || strike)) return "pointer";
-    return event.shiftKey || grab ? "grab" : "crosshair";
+    return grab || wantsGrab(event) ? "grab" : "crosshair";
   }
 
   /** Two fingers are for the camera: it is told of the first one, which it never saw, before it sees the second. */
-  private handOver({ down, x, y }: Drag): void {
+  private handOver({ down, place: [clientX, clientY] }: Drag): void {
     this.control.letGo(false);
     this.handedOver = true;
     const { pointerId, pointerType } = down;
-    const again = { pointerId, pointerType, clientX: x, clientY: y, isPrimary: true, bubbles: true, button: 0 };
+    const again = { pointerId, pointerType, clientX, clientY, isPrimary: true, bubbles: true, button: 0 };
     this.viewport.canvas.dispatchEvent(new PointerEvent("pointerdown", again));
     this.handedOver = false;
   }
@@ -191,17 +207,37 @@ export class Pointer {
     return this.stage.pick(this.viewport.rayThrough(event.clientX, event.clientY));
   }
 
-  private send(): void {
-    if (this.drag) this.control.press(this.drag.tool, this.drag.gesture.centre().toArray(), this.drag.gesture.grab);
+  /** Lets the tool go on towards what the pointer wants. */
+  private advance(): void {
+    const { drag } = this;
+    if (!drag) return;
+    const nowMs = performance.now();
+    drag.gesture.advance(Math.min((nowMs - drag.movedMs) / 1000, STEP_MAX_S));
+    drag.movedMs = nowMs;
+    this.send(drag);
   }
 
-  /** While the tool is limited, its own depth is told, not that of the pointer. */
+  private send(drag: Drag): void {
+    const centre = drag.gesture.centre();
+    if (drag.sent?.equals(centre)) return;
+    drag.sent = centre;
+    this.control.press(drag.tool, centre.toArray(), drag.gesture.grab);
+  }
+
   private tellDepth(): void {
     if (!this.drag) return;
     const { tool, gesture } = this.drag;
-    const driven = this.store.get().frame?.tools[tool];
-    const place = driven?.limited ? new THREE.Vector3(...driven.position) : gesture.centre();
-    this.store.update({ pressing: { tool, grab: gesture.grab, depth: gesture.depthOf(place) } });
+    this.store.update({ pressing: { tool, grab: gesture.grab, depth: gesture.depth } });
+  }
+
+  /** What the pointer meets of a body, as the camera stands. */
+  private sight({ body, shown }: Pick): Sight {
+    const { viewport, stage } = this;
+    return {
+      axes: this.cameraAxes(),
+      metresPerPixel: viewport.metresPerPixel(shown),
+      surfaceAt: ([x, y]) => stage.bodies[body]?.untouchedAlong(viewport.rayThrough(x, y)) ?? null,
+    };
   }
 
   private cameraAxes(): CameraAxes {
@@ -210,4 +246,9 @@ export class Pointer {
     this.viewport.camera.matrixWorld.extractBasis(right, up, backward);
     return { right, up, forward: backward.negate() };
   }
+}
+
+/** Control, or the command key of a Mac. */
+function wantsGrab({ ctrlKey, metaKey }: PointerEvent): boolean {
+  return ctrlKey || metaKey;
 }

@@ -1,16 +1,29 @@
-// From movements of the pointer, in m across the line of sight, to the centre of the tool.
+// From movements of the pointer to the centre of the tool. A press starts where the tool just touches; the tool then keeps
+// on the surface under the pointer, and how deep it is has a goal of its own. Lengths in m, places of the window in pixels.
 
 import * as THREE from "three";
 
-import type { Pick } from "../scene/body_view";
-
-/** Depth of a press below what is seen at the moment it begins, over the size of the body: a click is felt at once. */
-const DEPTH_AT_START = 0.01;
+/** Depth, over the tool's radius, that a button held down leads to; of a pen, at full pressure; and of a notch of the wheel. */
+export const GENTLE_DEPTH = 0.4;
+export const PEN_DEPTH = 2;
+const NOTCH_DEPTH = 0.1;
+/** Depth follows its goal in about 5 of these times, s: half a second from the touch to a gentle press. */
+const DEPTH_LAG_S = 0.1;
+/** Speed of the depth, tool radii a second, and of the tool, body sizes a second. */
+const DEPTH_SPEED_MAX = 6;
+const SPEED_MAX = 5;
+/** Of the size of the body; and how far a press may be lifted off, over the tool's radius, without letting go. */
 const DEPTH_MAX = 0.25;
-/** A press may be lifted this far off the surface without letting go of the button. */
-const LIFT_MAX = 0.05;
-const SHEAR_MAX = 0.25;
+const LIFT_MAX = 1;
+/** While the tool is held for strain its depth is taken so much farther, over the tool's radius: turning back is felt at once. */
+const HELD_ROOM = 0.5;
+/** A drag for depth goes so much slower than the pointer. */
+const DEPTH_PER_DRAG = 0.25;
 const PULL_MAX = 0.25;
+/** Closer than this, over the radius of the tool, is there. */
+const ARRIVED = 1e-4;
+/** Halvings that find the outline of a body between two places of the pointer. */
+const HALVINGS = 8;
 
 export interface CameraAxes {
   right: THREE.Vector3;
@@ -19,57 +32,181 @@ export interface CameraAxes {
   forward: THREE.Vector3;
 }
 
-/** Where a gesture begins: a point of the untouched surface, the outward normal and the dent there. */
-export type Touched = { [Key in "untouched" | "normal" | "dent"]: Pick[Key] };
+/** A place of the window, in pixels. */
+export type Place = readonly [x: number, y: number];
 
-/** What the pointer does with the body until it is let go. Lengths in m. */
-export interface Gesture {
-  readonly grab: boolean;
-  /** right and down as seen; inward away from the viewer, by the wheel. */
-  move(right: number, down: number): void;
-  wheel(inward: number): void;
-  /** Centre of the tool. */
-  centre(): THREE.Vector3;
-  /** Depth of a press, length of a pull, with the tool's centre at a place. */
-  depthOf(centre: THREE.Vector3): number;
+/** A point of the untouched surface, and the outward normal there. */
+export interface Touched {
+  point: THREE.Vector3;
+  normal: THREE.Vector3;
 }
 
-/** Down pushes into the body along its normal, up lifts, left and right shear along the surface. */
+/** What the pointer meets of the body that it presses. */
+export interface Sight {
+  axes: CameraAxes;
+  metresPerPixel: number;
+  /** The point of the untouched surface under a place of the window; null beside the body. */
+  surfaceAt(place: Place): Touched | null;
+}
+
+/** What the pointer does with the body until it is let go. */
+export interface Gesture {
+  readonly grab: boolean;
+  /** The pointer goes to a place; with `deepening` it only changes the depth, down is deeper. */
+  moveTo(place: Place, deepening: boolean): void;
+  /** Away from the viewer is positive. */
+  wheel(notches: number): void;
+  /** From 0 to 1. */
+  press(pressure: number): void;
+  /** Whether the tool is held, for the body would be strained too far. */
+  hold(held: boolean): void;
+  /** Lets time pass and tells whether the tool moves on. */
+  advance(seconds: number): boolean;
+  /** Centre of the tool. */
+  centre(): THREE.Vector3;
+  /** Depth of a press, length of a pull, as the pointer has it now. */
+  readonly depth: number;
+}
+
+/** A value that follows a goal, and its rate. */
+export interface Following {
+  value: number;
+  rate: number;
+}
+
+/**
+ * A critically damped approach to a goal: `x'' = (g - x) / T^2 - 2 x' / T`, exact for any step, and never faster than `rateMax`.
+ *
+ * A goal farther than `2 T rateMax` is taken for one at that distance: then `x'' <= (2 / T) (rateMax - x')`, so that a rate
+ * within the bound stays there.
+ */
+export function approach({ value, rate }: Following, goal: number, seconds: number, lag: number, rateMax: number): Following {
+  const reach = 2 * lag * rateMax;
+  const near = value + THREE.MathUtils.clamp(goal - value, -reach, reach);
+  const [gap, decay] = [value - near, Math.exp(-seconds / lag)];
+  const slope = rate + gap / lag;
+  return {
+    value: near + (gap + slope * seconds) * decay,
+    rate: (rate - (slope * seconds) / lag) * decay,
+  };
+}
+
+/** Centre of a sphere that is so deep below the tangent plane of a point of the surface. */
+export function centreAt({ point, normal }: Touched, radius: number, depth: number): THREE.Vector3 {
+  return point.clone().addScaledVector(normal, radius - depth);
+}
+
+/** The last place that is still on the body, on the way from one that is to one beside it. */
+export function outline(on: Place, beside: Place, isOn: (place: Place) => boolean): Place {
+  let [inner, outer] = [on, beside];
+  for (let i = 0; i < HALVINGS; i++) {
+    const middle: Place = [(inner[0] + outer[0]) / 2, (inner[1] + outer[1]) / 2];
+    if (isOn(middle)) inner = middle;
+    else outer = middle;
+  }
+  return inner;
+}
+
+/** The tool slides on the surface under the pointer; beside the body it goes on across the line of sight, and so rolls off. */
 export class PressGesture implements Gesture {
   readonly grab = false;
-  private pushed: number;
-  private sheared = 0;
-  private readonly tangent: THREE.Vector3;
+  private following: Following;
+  private goal: number;
+  private readonly dent: number;
+  /** Depth at which the tool came to be held. */
+  private heldAt: number | null = null;
+  private pointer: Place;
+  /** The place of the window that the tool follows: the pointer's, but for what was moved for depth alone. */
+  private aim: Place;
+  /** The last aim on the body, the surface there, and how far beside the body the tool is from it. */
+  private onBody: Place;
+  private touched: Touched;
+  private readonly beside = new THREE.Vector3();
+  /** Centre of the tool; it goes where the pointer wants it no faster than a hand. */
+  private readonly at: THREE.Vector3;
 
+  /**
+   * `dent` is how deep the surface lies already, by another tool; a press that goes `straight` in waits for its depth
+   * to be told. `aim` is where the touched point is seen while nothing touches the body.
+   */
   constructor(
-    private readonly pick: Touched,
-    axes: CameraAxes,
+    first: Touched & { dent: number },
+    private readonly sight: Sight,
     private readonly size: number,
-    private readonly toolRadius: number,
+    private readonly radius: number,
+    { pointer, aim, straight }: { pointer: Place; aim: Place; straight: boolean },
   ) {
-    this.pushed = DEPTH_AT_START * size + pick.dent;
-    this.tangent = axes.right.clone().projectOnPlane(pick.normal).normalize();
+    this.touched = { point: first.point.clone(), normal: first.normal.clone() };
+    this.following = { value: first.dent, rate: 0 };
+    this.dent = first.dent;
+    this.goal = this.dent + (straight ? 0 : GENTLE_DEPTH * radius);
+    this.pointer = pointer;
+    this.aim = this.onBody = aim;
+    this.at = this.wanted();
   }
 
-  move(right: number, down: number): void {
-    // Clamped step by step, so that turning back at a limit is felt at once.
-    this.pushed = THREE.MathUtils.clamp(this.pushed + down, -LIFT_MAX * this.size, DEPTH_MAX * this.size);
-    this.sheared = THREE.MathUtils.clamp(this.sheared + right, -SHEAR_MAX * this.size, SHEAR_MAX * this.size);
+  get depth(): number {
+    return this.following.value;
   }
 
-  wheel(inward: number): void {
-    this.move(0, inward);
+  moveTo(place: Place, deepening: boolean): void {
+    const [right, down] = [place[0] - this.pointer[0], place[1] - this.pointer[1]];
+    this.pointer = place;
+    if (deepening) return this.deepen(DEPTH_PER_DRAG * this.sight.metresPerPixel * down);
+    this.aim = [this.aim[0] + right, this.aim[1] + down];
+    this.slide();
+  }
+
+  wheel(notches: number): void {
+    this.deepen(notches * NOTCH_DEPTH * this.radius);
+  }
+
+  press(pressure: number): void {
+    this.goal = this.dent + pressure * PEN_DEPTH * this.radius;
+  }
+
+  hold(held: boolean): void {
+    this.heldAt = held ? (this.heldAt ?? this.depth) : null;
+  }
+
+  advance(seconds: number): boolean {
+    const near = ARRIVED * this.radius;
+    this.following = approach(this.following, this.goal, seconds, DEPTH_LAG_S, DEPTH_SPEED_MAX * this.radius);
+    const deepened = Math.abs(this.goal - this.following.value) < near && Math.abs(this.following.rate) < near;
+    if (deepened) this.following = { value: this.goal, rate: 0 };
+    const [way, reach] = [this.wanted().sub(this.at), SPEED_MAX * this.size * seconds];
+    const arrived = way.length() <= reach;
+    this.at.add(way.clampLength(0, reach));
+    return !deepened || !arrived;
   }
 
   centre(): THREE.Vector3 {
-    return this.pick.untouched
-      .clone()
-      .addScaledVector(this.pick.normal, this.toolRadius - this.pushed)
-      .addScaledVector(this.tangent, this.sheared);
+    return this.at.clone();
   }
 
-  depthOf(centre: THREE.Vector3): number {
-    return this.toolRadius - centre.clone().sub(this.pick.untouched).dot(this.pick.normal);
+  private deepen(metres: number): void {
+    const room = this.heldAt === null ? Infinity : this.heldAt + HELD_ROOM * this.radius;
+    const deepest = Math.min(DEPTH_MAX * this.size, Math.max(room, this.goal));
+    this.goal = THREE.MathUtils.clamp(this.goal + metres, -LIFT_MAX * this.radius, deepest);
+  }
+
+  private slide(): void {
+    const found = this.sight.surfaceAt(this.aim);
+    if (found) {
+      this.touched = found;
+      this.onBody = this.aim;
+      this.beside.set(0, 0, 0);
+      return;
+    }
+    this.onBody = outline(this.onBody, this.aim, (place) => this.sight.surfaceAt(place) !== null);
+    this.touched = this.sight.surfaceAt(this.onBody) ?? this.touched;
+    const { axes, metresPerPixel } = this.sight;
+    this.beside.copy(axes.right).multiplyScalar((this.aim[0] - this.onBody[0]) * metresPerPixel);
+    this.beside.addScaledVector(axes.up, (this.onBody[1] - this.aim[1]) * metresPerPixel);
+  }
+
+  private wanted(): THREE.Vector3 {
+    return centreAt(this.touched, this.radius, this.depth).add(this.beside);
   }
 }
 
@@ -78,27 +215,44 @@ export class GrabGesture implements Gesture {
   readonly grab = true;
   private readonly pull = new THREE.Vector3();
 
+  /** A notch of the wheel moves by a part of the size of the body. */
+  static readonly NOTCH = 0.002;
+
   constructor(
-    private readonly pick: Touched,
-    private readonly axes: CameraAxes,
+    private readonly held: THREE.Vector3,
+    private readonly sight: Omit<Sight, "surfaceAt">,
     private readonly size: number,
+    private pointer: Place,
   ) {}
 
-  move(right: number, down: number): void {
-    this.pull.addScaledVector(this.axes.right, right).addScaledVector(this.axes.up, -down);
+  get depth(): number {
+    return this.pull.length();
+  }
+
+  moveTo(place: Place): void {
+    const { axes, metresPerPixel } = this.sight;
+    this.pull.addScaledVector(axes.right, (place[0] - this.pointer[0]) * metresPerPixel);
+    this.pull.addScaledVector(axes.up, (this.pointer[1] - place[1]) * metresPerPixel);
+    this.pull.clampLength(0, PULL_MAX * this.size);
+    this.pointer = place;
+  }
+
+  wheel(notches: number): void {
+    this.pull.addScaledVector(this.sight.axes.forward, notches * GrabGesture.NOTCH * this.size);
     this.pull.clampLength(0, PULL_MAX * this.size);
   }
 
-  wheel(inward: number): void {
-    this.pull.addScaledVector(this.axes.forward, inward).clampLength(0, PULL_MAX * this.size);
+  /** How hard a pen is pressed does not move what is held. */
+  press(): void {}
+
+  hold(): void {}
+
+  advance(): boolean {
+    return false;
   }
 
   // The tool takes hold where its centre is when the grab begins, so that is the touched point itself.
   centre(): THREE.Vector3 {
-    return this.pick.untouched.clone().add(this.pull);
-  }
-
-  depthOf(centre: THREE.Vector3): number {
-    return centre.distanceTo(this.pick.untouched);
+    return this.held.clone().add(this.pull);
   }
 }

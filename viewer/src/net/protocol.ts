@@ -1,10 +1,10 @@
-// Messages of the websocket, version 4. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 5. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>".
 
-export const PROTOCOL_VERSION = 4;
+export const PROTOCOL_VERSION = 5;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -30,7 +30,7 @@ export interface SceneMessage {
   title: string;
   /** Longest side of what all bodies fill. */
   size: number;
-  /** A tool is limited where a body would be strained more; 0 for never. */
+  /** A tool is held where a body would be strained more; 0 for never. */
   strain_limit: number;
   /** Of every tool. */
   max_force: number;
@@ -57,6 +57,13 @@ export interface BodyMessage {
 }
 
 export interface ToolMessage {
+  shape: string;
+  /** The shapes that it may take. */
+  shapes: Choice[];
+  /** The law of its contacts: "local" slides and rubs, the others hold on to what they touch. */
+  contact: "local" | "patch" | "node";
+  /** Coefficient of friction. */
+  friction: number;
   radius: number;
   contact_radius: number;
   max_contact_radius: number;
@@ -116,6 +123,14 @@ export interface ContactMessage {
   normal: Vec3;
   /** On the body, in the frame of the scene. */
   force: Vec3;
+  /** Of the area of contact, m. */
+  radius: number;
+  /** How far the tool has come from its first touch with the untouched surface, m; null where it holds on by its patch. */
+  depth: number | null;
+  /** Of the force along the normal against that depth, N/m. */
+  stiffness: number | null;
+  /** Whether all of the contact slides. */
+  slipping: boolean;
 }
 
 /** What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa. */
@@ -190,6 +205,10 @@ export interface SettingsMessage {
   youngs_modulus: (number | null)[];
   /** Of each tool. */
   contact_radius: number[];
+  friction: number[];
+  shape: string[];
+  /** 0 for none. */
+  strain_limit: number;
   time_scale: number | null;
 }
 
@@ -214,7 +233,10 @@ export type ClientMessage =
   | { type: "release"; tool?: number }
   | { type: "set"; youngs_modulus: number; body: number }
   | { type: "set"; contact_radius: number; tool?: number }
+  | { type: "set"; friction: number; tool?: number }
+  | { type: "set"; strain_limit: number }
   | { type: "set"; time_scale: number }
+  | { type: "shape"; tool: number; name: string }
   | { type: "reset" }
   | { type: "strike"; body: number; point: Vec3; impulse: Vec3 }
   | { type: "repeat" }

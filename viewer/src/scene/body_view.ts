@@ -8,20 +8,28 @@ import { ColorMap } from "./color_map";
 import { CutawayView } from "./cutaway_view";
 import { tissueColor } from "./field_material";
 import { createGroundShadow } from "./ground_shadow";
+import { firstEntry } from "./ray_surface";
 import { SolidView } from "./solid_view";
 import { SupportsView } from "./supports_view";
 import { Surface } from "./surface";
+import type { SurfacePoint } from "./surface";
 import { WireframeView } from "./wireframe_view";
 
-/** A touched point in the scene: where it is seen, and while nothing is touched with the outward normal there. */
-export interface Pick {
-  body: number;
-  shown: THREE.Vector3;
-  untouched: THREE.Vector3;
+/** A point of the surface while nothing touches it, in the scene, m: where it is, the outward normal, and where it is drawn. */
+export interface UntouchedPoint {
+  point: THREE.Vector3;
   normal: THREE.Vector3;
+  drawn: THREE.Vector3;
+}
+
+/** A point of a body that is seen. */
+export interface Pick extends UntouchedPoint {
+  body: number;
+  /** Where it is seen now. */
+  shown: THREE.Vector3;
   /** How deep other tools have pressed the surface in there, along the normal, m. */
   dent: number;
-  /** In the body's frame: the same point at rest under the body's own loads, and that normal. */
+  /** In the body's frame: the same point at rest under the body's own loads, and the normal. */
   inBody: { settled: Vec3; normal: Vec3 };
 }
 
@@ -60,6 +68,9 @@ export class BodyView {
   private cutaway: CutawayView | null = null;
   private cutawayShown = false;
   private drawn: Pose | null = null;
+  private touched = false;
+  /** Displacements are drawn so many times. */
+  private scale = 1;
 
   /** size is that of the scene, m. */
   constructor(
@@ -101,6 +112,12 @@ export class BodyView {
     this.drawn = null;
   }
 
+  /** Draws displacements times a scale from the next pose on. */
+  exaggerate(scale: number): void {
+    this.scale = scale;
+    this.drawn = null;
+  }
+
   /** Removes what lies beyond a plane of the scene, at rest. */
   cut(plane: THREE.Plane): void {
     const { normal, constant } = plane.clone().applyMatrix4(this.placed.matrix.clone().invert());
@@ -117,13 +134,18 @@ export class BodyView {
       if (same(drawn.arrays.scalar, scalar)) return false;
     }
     this.drawn = pose;
+    this.touched = pose.touched;
     this.uniforms.colorMap.value = (pose.signed ? ColorMap.diverging : ColorMap.sequential).texture;
-    this.surface.displace(displacements, pose.interior ? arrays.surface_nodes : null);
+    // A mode shape has a size of its own.
+    const scale = pose.showsMode ? 1 : this.scale;
+    this.surface.displace(displacements, pose.interior ? arrays.surface_nodes : null, scale);
     // A mode shape is only shown: a tool meets the body at rest.
     if (pose.showsMode) this.surface.settle();
     else if (!pose.touched) this.surface.keepAsUntouched();
     this.solid.update(scalar);
-    if (this.cutawayShown) this.cutaway?.displaceAll(displacements, scalar, pose.interior ? null : arrays.surface_nodes);
+    if (this.cutawayShown) {
+      this.cutaway?.displaceAll(displacements, scalar, pose.interior ? null : arrays.surface_nodes, scale);
+    }
     return true;
   }
 
@@ -143,6 +165,23 @@ export class BodyView {
     return null;
   }
 
+  /** The untouched surface along a ray of the scene; null beside the body and where it is cut away. */
+  untouchedAlong({ ray }: THREE.Raycaster): UntouchedPoint | null {
+    const { surface, placed } = this;
+    const { origin, direction } = ray.clone().applyMatrix4(placed.matrix.clone().invert());
+    const cutaway = this.cutawayShown ? this.cutaway : null;
+    const skips = (triangle: number) => cutaway?.removes(triangle) ?? false;
+    const hit = firstEntry(this.untouchedDrawn, surface.triangles, origin.toArray(), direction.toArray(), skips);
+    return hit && this.untouchedAt({ corners: surface.cornersOf(hit.triangle), weights: hit.weights });
+  }
+
+  /** How much farther a point of the surface is drawn from where it is than it has moved, in the scene, m. */
+  exaggerationAt(point: SurfacePoint): THREE.Vector3 {
+    const { surface, placed } = this;
+    const shown = new THREE.Vector3(...surface.at(surface.shown, point));
+    return shown.sub(new THREE.Vector3(...surface.at(surface.positions, point))).applyQuaternion(placed.quaternion);
+  }
+
   dispose(): void {
     this.group.removeFromParent();
     this.solid.dispose();
@@ -158,17 +197,30 @@ export class BodyView {
   private pickAt(shown: THREE.Vector3, triangle: number, weights: Vec3): Pick {
     const { surface, placed } = this;
     const place = { corners: surface.cornersOf(triangle), weights };
-    const normalInBody = new THREE.Vector3(...surface.at(surface.untouchedNormals, place)).normalize();
-    const normal = normalInBody.clone().applyQuaternion(placed.quaternion);
-    const untouched = new THREE.Vector3(...surface.at(surface.untouched, place)).applyMatrix4(placed.matrix);
+    const untouched = this.untouchedAt(place);
+    const now = new THREE.Vector3(...surface.at(surface.positions, place));
+    const moved = now.sub(new THREE.Vector3(...surface.at(surface.untouched, place))).applyQuaternion(placed.quaternion);
     return {
+      ...untouched,
       body: this.index,
       shown: shown.clone(),
-      untouched,
-      normal,
-      dent: this.drawn?.touched ? untouched.clone().sub(shown).dot(normal) : 0,
-      inBody: { settled: surface.at(surface.settled, place), normal: normalInBody.toArray() },
+      dent: this.touched ? -moved.dot(untouched.normal) : 0,
+      inBody: { settled: surface.at(surface.settled, place), normal: surface.smoothPoint(place).normal },
     };
+  }
+
+  private untouchedAt(place: SurfacePoint): UntouchedPoint {
+    const { surface, placed } = this;
+    const { place: point, normal } = surface.smoothPoint(place);
+    return {
+      point: new THREE.Vector3(...point).applyMatrix4(placed.matrix),
+      normal: new THREE.Vector3(...normal).applyQuaternion(placed.quaternion),
+      drawn: new THREE.Vector3(...surface.at(this.untouchedDrawn, place)).applyMatrix4(placed.matrix),
+    };
+  }
+
+  private get untouchedDrawn(): Float32Array {
+    return this.scale === 1 ? this.surface.untouched : this.surface.untouchedAsShown(this.scale);
   }
 }
 

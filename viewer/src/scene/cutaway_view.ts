@@ -52,7 +52,7 @@ export class CutawayView {
     this.mesh = new THREE.Mesh(tetGeometry(arrays.tets, this.centres), material);
     this.mesh.frustumCulled = false;
     const { nodes } = arrays;
-    this.displaceAll(new Float32Array(nodes.length), new Uint8Array(nodes.length / 3), null);
+    this.displaceAll(new Float32Array(nodes.length), new Uint8Array(nodes.length / 3), null, 1);
   }
 
   /** Removes what lies beyond the plane: normal . x > offset, at rest. */
@@ -67,14 +67,14 @@ export class CutawayView {
     return x * this.centres[at]! + y * this.centres[at + 1]! + z * this.centres[at + 2]! > offset;
   }
 
-  /** Displacements, m, and values of the field, 0..255, of the nodes in rows (all nodes if null). */
-  displaceAll(displacements: Float32Array, scalar: Uint8Array, rows: Uint32Array | null): void {
+  /** Displacements, m, drawn times a scale, and values of the field, 0..255, of the nodes in rows (all nodes if null). */
+  displaceAll(displacements: Float32Array, scalar: Uint8Array, rows: Uint32Array | null, scale: number): void {
     const { nodes } = this.arrays;
     const count = rows ? rows.length : nodes.length / 3;
     for (let i = 0; i < count; i++) {
       const node = rows ? rows[i]! : i;
       for (let axis = 0; axis < 3; axis++) {
-        this.texels[4 * node + axis] = nodes[3 * node + axis]! + displacements[3 * i + axis]!;
+        this.texels[4 * node + axis] = nodes[3 * node + axis]! + scale * displacements[3 * i + axis]!;
       }
       this.texels[4 * node + 3] = scalar[i]! / 255;
     }

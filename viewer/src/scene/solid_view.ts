@@ -4,6 +4,7 @@ import * as THREE from "three";
 
 import { createFieldMaterial } from "./field_material";
 import type { FieldUniforms } from "./field_material";
+import { SHOWN_SCALE_MAX } from "../store";
 import type { Surface } from "./surface";
 
 const VERTEX = {
@@ -21,13 +22,13 @@ export class SolidView {
       new THREE.BufferAttribute(array, itemSize, normalized).setUsage(THREE.DynamicDrawUsage);
     this.scalar = dynamic(new Uint8Array(surface.count), 1, true);
     geometry.setIndex(new THREE.BufferAttribute(surface.triangles, 1));
-    geometry.setAttribute("position", dynamic(surface.positions, 3));
-    geometry.setAttribute("normal", dynamic(surface.normals, 3));
+    geometry.setAttribute("position", dynamic(surface.shown, 3));
+    geometry.setAttribute("normal", dynamic(surface.shownNormals, 3));
     geometry.setAttribute("scalar", this.scalar);
     geometry.setAttribute("shade", new THREE.BufferAttribute(mottle(surface.rest, size), 1));
     geometry.computeBoundingSphere();
-    // Room for the largest deformation, so that the sphere that picking consults never goes stale.
-    geometry.boundingSphere!.radius += size / 2;
+    // Room for the largest deformation as it may be drawn, so that the sphere that picking consults never goes stale.
+    geometry.boundingSphere!.radius += (SHOWN_SCALE_MAX * size) / 2;
     const material = createFieldMaterial(
       {
         color,

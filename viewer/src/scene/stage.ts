@@ -26,7 +26,11 @@ export class Stage {
       this.show();
     });
     store.subscribe(["cut"], () => this.cut());
-    store.subscribe(["settings", "pinned"], ({ frame }) => {
+    // Drawn with the next frame.
+    store.subscribe(["shownScale"], ({ shownScale }) => {
+      for (const body of this.bodies) body.exaggerate(shownScale);
+    });
+    store.subscribe(["pinned"], ({ frame }) => {
       if (frame && this.updateTools(frame)) viewport.invalidate();
     });
   }
@@ -36,14 +40,17 @@ export class Stage {
     this.bodies = header.bodies.map((body, i) => new BodyView(i, body, bodies[i]!, header.size));
     this.tools = header.tools.map((tool) => new ToolView(header, tool, this.bodies));
     for (const { group } of [...this.bodies, ...this.tools]) this.viewport.scene.add(group);
+    for (const body of this.bodies) body.exaggerate(this.store.get().shownScale);
     const moving = header.motion && this.bodies[header.motion.body];
     if (header.motion && moving) {
       this.watched = { view: new WatchedView(moving.surface, header.size), body: header.motion.body };
       moving.placed.add(this.watched.view.dot);
     }
+    const before = this.bounds.clone();
     this.bounds.makeEmpty();
     for (const body of this.bodies) this.bounds.union(body.bounds);
-    this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
+    // Other tools on the same bodies are no reason to look from elsewhere.
+    if (!this.bounds.equals(before)) this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
     if (this.store.get().layers.cutaway) this.faceCut();
     this.show();
   }
@@ -80,14 +87,13 @@ export class Stage {
   }
 
   private updateTools(frame: FrameMessage): boolean {
-    const { settings, pinned } = this.store.get();
+    const { pinned } = this.store.get();
     let changed = false;
     this.tools.forEach((view, i) => {
       const tool = frame.tools[i];
       if (!tool) return;
       const contact = frame.contacts.find((one) => one.tool === i) ?? null;
-      const contactRadius = settings?.contact_radius[i] ?? 0;
-      changed = view.update({ tool, contact, contactRadius, pinned: pinned.includes(i) }) || changed;
+      changed = view.update({ tool, contact, pinned: pinned.includes(i) }) || changed;
     });
     return changed;
   }

@@ -1,4 +1,4 @@
-// The touchable surface: positions of its nodes at rest, untouched and deformed, and values at any point of it.
+// The touchable surface: positions of its nodes at rest, untouched, deformed and as drawn, and values at any point of it.
 
 import type { BodyArrays, Vec3 } from "../net/protocol";
 
@@ -13,8 +13,9 @@ export class Surface {
   readonly rest: Float32Array;
   /** Deformed positions (s, 3), m. */
   readonly positions: Float32Array;
-  /** Unit normals of the deformed surface (s, 3). */
-  readonly normals: Float32Array;
+  /** Where they are drawn (s, 3), m: displacements may be shown larger than they are; and unit normals of that shape. */
+  readonly shown: Float32Array;
+  readonly shownNormals: Float32Array;
   /** Positions and normals while no tool touches: where the body's own loads have put it. */
   readonly untouched: Float32Array;
   readonly untouchedNormals: Float32Array;
@@ -24,6 +25,8 @@ export class Surface {
   /** Corners of the triangles (k, 3) as rows of the arrays above. */
   readonly triangles: Uint32Array;
   readonly count: number;
+  /** Of a triangle at rest, m, doubled: no edge is ever stretched beyond it. */
+  readonly longestEdge: number;
 
   constructor(arrays: BodyArrays) {
     this.count = arrays.surface_nodes.length;
@@ -34,9 +37,11 @@ export class Surface {
       this.rest.set(arrays.nodes.subarray(3 * node, 3 * node + 3), 3 * rank);
     });
     this.triangles = arrays.surface_triangles.map((node) => rankOfNode[node]!);
+    this.longestEdge = 2 * longestEdge(this.rest, this.triangles);
     this.positions = this.rest.slice();
-    this.normals = new Float32Array(3 * this.count);
-    vertexNormals(this.rest, this.triangles, this.normals);
+    this.shown = this.rest.slice();
+    this.shownNormals = new Float32Array(3 * this.count);
+    vertexNormals(this.rest, this.triangles, this.shownNormals);
     this.settled = this.rest.map((x, i) => x + arrays.free[i]!);
     this.settledNormals = new Float32Array(3 * this.count);
     vertexNormals(this.settled, this.triangles, this.settledNormals);
@@ -44,22 +49,27 @@ export class Surface {
     this.untouchedNormals = this.settledNormals.slice();
   }
 
-  /** Displaces the surface; rowOf gives the row of a surface node in the displacements. */
-  displace(displacements: Float32Array, rowOf: Uint32Array | null): void {
-    const { positions, rest } = this;
+  /**
+   * Displaces the surface, and draws the displacements times a scale; rowOf gives the row of a surface node in the
+   * displacements.
+   */
+  displace(displacements: Float32Array, rowOf: Uint32Array | null, scale: number): void {
+    const { positions, shown, rest } = this;
     for (let i = 0; i < this.count; i++) {
       const row = 3 * (rowOf ? rowOf[i]! : i);
-      positions[3 * i] = rest[3 * i]! + displacements[row]!;
-      positions[3 * i + 1] = rest[3 * i + 1]! + displacements[row + 1]!;
-      positions[3 * i + 2] = rest[3 * i + 2]! + displacements[row + 2]!;
+      for (let axis = 0; axis < 3; axis++) {
+        const [at, moved] = [3 * i + axis, displacements[row + axis]!];
+        positions[at] = rest[at]! + moved;
+        shown[at] = rest[at]! + scale * moved;
+      }
     }
-    vertexNormals(positions, this.triangles, this.normals);
+    vertexNormals(shown, this.triangles, this.shownNormals);
   }
 
   /** Takes the shape now for that of the untouched body. */
   keepAsUntouched(): void {
     this.untouched.set(this.positions);
-    this.untouchedNormals.set(this.normals);
+    vertexNormals(this.untouched, this.triangles, this.untouchedNormals);
   }
 
   /** Takes the body at rest for the untouched one. */
@@ -78,13 +88,44 @@ export class Surface {
     return result;
   }
 
+  /** Where the untouched surface is drawn (s, 3), m. */
+  untouchedAsShown(scale: number): Float32Array {
+    return this.untouched.map((x, i) => this.rest[i]! + scale * (x - this.rest[i]!));
+  }
+
+  /**
+   * A point of the untouched surface and the unit normal there, both continuous across the edges of triangles.
+   *
+   * A flat triangle lies below a curved surface. The tangent planes of its corners lie above it by twice as much, where
+   * the surface is one of second order: half of their mean distance is taken (Phong tessellation, Boubekeur and Alexa
+   * 2008, with the factor 1/2).
+   */
+  smoothPoint(point: SurfacePoint): { place: Vec3; normal: Vec3 } {
+    const { untouched, untouchedNormals } = this;
+    const flat = this.at(untouched, point);
+    const place: Vec3 = [...flat];
+    point.corners.forEach((corner, k) => {
+      const row = 3 * corner;
+      let above = 0;
+      for (let axis = 0; axis < 3; axis++) above += (untouched[row + axis]! - flat[axis]!) * untouchedNormals[row + axis]!;
+      const share = 0.5 * point.weights[k]! * above;
+      for (let axis = 0; axis < 3; axis++) place[axis]! += share * untouchedNormals[row + axis]!;
+    });
+    const [x, y, z] = this.at(untouchedNormals, point);
+    const length = Math.hypot(x, y, z) || 1;
+    return { place, normal: [x / length, y / length, z / length] };
+  }
+
   cornersOf(triangle: number): [number, number, number] {
     const t = this.triangles;
     return [t[3 * triangle]!, t[3 * triangle + 1]!, t[3 * triangle + 2]!];
   }
 }
 
-/** Normals of the nodes, each triangle weighted by its area: its cross product, not normalised, does just that. */
+/**
+ * Unit normals of the nodes: each triangle's cross product over the squares of the two edges at the corner (Max 1999),
+ * exact where the nodes lie on a sphere. Weights by area are off by degrees where triangles differ in shape.
+ */
 function vertexNormals(positions: Float32Array, triangles: Uint32Array, normals: Float32Array): void {
   normals.fill(0);
   for (let t = 0; t < triangles.length; t += 3) {
@@ -100,11 +141,12 @@ function vertexNormals(positions: Float32Array, triangles: Uint32Array, normals:
     const nx = uy * vz - uz * vy;
     const ny = uz * vx - ux * vz;
     const nz = ux * vy - uy * vx;
-    for (const corner of [a, b, c]) {
-      normals[corner]! += nx;
-      normals[corner + 1]! += ny;
-      normals[corner + 2]! += nz;
-    }
+    const ab = ux * ux + uy * uy + uz * uz;
+    const ac = vx * vx + vy * vy + vz * vz;
+    const bc = (vx - ux) ** 2 + (vy - uy) ** 2 + (vz - uz) ** 2;
+    addScaled(normals, a, nx, ny, nz, ab * ac);
+    addScaled(normals, b, nx, ny, nz, ab * bc);
+    addScaled(normals, c, nx, ny, nz, ac * bc);
   }
   for (let i = 0; i < normals.length; i += 3) {
     const length = Math.hypot(normals[i]!, normals[i + 1]!, normals[i + 2]!) || 1;
@@ -112,4 +154,27 @@ function vertexNormals(positions: Float32Array, triangles: Uint32Array, normals:
     normals[i + 1]! /= length;
     normals[i + 2]! /= length;
   }
+}
+
+function longestEdge(positions: Float32Array, triangles: Uint32Array): number {
+  let longest = 0;
+  for (let t = 0; t < triangles.length; t++) {
+    const a = 3 * triangles[t]!;
+    const b = 3 * triangles[t % 3 === 2 ? t - 2 : t + 1]!;
+    const length = Math.hypot(
+      positions[b]! - positions[a]!,
+      positions[b + 1]! - positions[a + 1]!,
+      positions[b + 2]! - positions[a + 2]!,
+    );
+    longest = Math.max(longest, length);
+  }
+  return longest;
+}
+
+/** A triangle without area adds nothing. */
+function addScaled(normals: Float32Array, at: number, x: number, y: number, z: number, over: number): void {
+  if (over === 0) return;
+  normals[at]! += x / over;
+  normals[at + 1]! += y / over;
+  normals[at + 2]! += z / over;
 }

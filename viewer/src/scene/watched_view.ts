@@ -21,7 +21,7 @@ export class WatchedView {
   /** row is that of a surface node, null where nothing is watched. */
   update(row: number | null): void {
     this.dot.visible = row !== null;
-    if (row !== null) this.dot.position.fromArray(this.surface.positions, 3 * row);
+    if (row !== null) this.dot.position.fromArray(this.surface.shown, 3 * row);
   }
 
   dispose(): void {

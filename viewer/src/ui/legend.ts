@@ -29,6 +29,10 @@ export class Legend {
       byId("legend-supports").hidden = !layers.supports;
       byId("legend-wireframe").hidden = !layers.wireframe;
     });
+    store.subscribe(["shownScale"], ({ shownScale }) => {
+      byId("legend-scale").hidden = shownScale === 1;
+      setText(byId("legend-scale-text"), `Deformation drawn ${shownScale}x, colours and numbers true`);
+    });
     store.subscribe(["frame", "body"], ({ frame, body }) => {
       const field = frame?.fields[body];
       if (field) this.show(field);

@@ -13,7 +13,7 @@ const TIME_SCALES: [id: string, scale: number][] = [
   ["speed-4", 1 / 4],
   ["speed-10", 1 / 10],
 ];
-const TABS: Tab[] = ["motion", "loop", "modes"];
+const TABS: Tab[] = ["motion", "force", "loop", "modes"];
 
 export class MotionPanel {
   private readonly impulseSlider = byId<HTMLInputElement>("impulse");
@@ -43,7 +43,7 @@ export class MotionPanel {
       byId("modes").hidden = tab !== "modes";
       byId("plot-pairs").hidden = tab === "modes";
       // Room for what belongs to the motion; the loop's timing stands below the loop's plots.
-      byId("statistics").hidden = tab !== "loop";
+      byId("statistics").hidden = tab === "motion" || tab === "modes";
     });
     let shown = 0;
     store.subscribe(["frame"], ({ frame }) => {
@@ -61,8 +61,7 @@ export class MotionPanel {
   }
 
   private setMotion(motion: MotionScene | null): void {
-    for (const id of ["motion", "tabs", "hint-strike"]) byId(id).hidden = !motion;
-    byId("panel").classList.toggle("moving", motion !== null);
+    for (const id of ["motion", "tab-motion", "tab-modes", "hint-strike"]) byId(id).hidden = !motion;
     byId("repeat").hidden = !motion?.strike;
     if (!motion) return;
     this.impulseSlider.valueAsNumber = 1 - Math.log(motion.impulse / motion.max_impulse) / Math.log(WEAKEST);

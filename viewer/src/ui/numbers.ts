@@ -31,6 +31,17 @@ export function pascals(value: number): string {
   return `${value.toPrecision(3)} Pa`;
 }
 
+/** A stiffness of a contact in N/m, told in N/mm. */
+export function newtonsPerMillimetre(stiffness: number): string {
+  const value = stiffness / 1000;
+  return value.toFixed(value >= 9.995 ? 1 : value >= 0.9995 ? 2 : 3);
+}
+
+/** A part of one, told in per cent. */
+export function percent(part: number): string {
+  return `${Number((100 * part).toFixed(1))} %`;
+}
+
 /** A length in m, told in mm. */
 export function millimetres(metres: number): string {
   return `${(1000 * metres).toFixed(1)} mm`;

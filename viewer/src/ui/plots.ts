@@ -1,28 +1,26 @@
-// Live plots against time: force and computing time of the loop; displacement and energy of a body in motion.
+// Live plots: force against time and against depth; computing time of the loop; displacement and energy of a body in motion.
 
-import uPlot from "uplot";
-import "uplot/dist/uPlot.min.css";
+import type uPlot from "uplot";
 
 import type { FrameData } from "../net/protocol";
-import type { Store } from "../store";
+import { drivenTool } from "../store";
+import type { Store, Tab } from "../store";
 import { byId } from "./dom";
 import { HistoryLog } from "./history_log";
 import { LogWindow, WINDOW_S } from "./log_window";
+import { HEIGHT_PX, createPlot } from "./plot";
+import { PressLog } from "./press_log";
 
 /** The eye does not follow faster, and every redraw costs the page time. */
 const REDRAW_INTERVAL_MS = 80;
-const HEIGHT_PX = 112;
 /** Above these stands what their lines mean. */
-const MOTION_HEIGHT_PX = 102;
+const MOTION_HEIGHT_PX = 108;
 /** In a window lower than this plots give way by so much, or the statistics below would be out of sight. */
 const LOW_WINDOW_PX = 780;
 const LOWER_PX = 22;
-// Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
-const FONT = "11px system-ui, sans-serif";
-const TEXT_COLOR = "#9aa5b4";
-const GRID = { stroke: "#2a303a", width: 1 };
 /** Spans below these are noise, and would only dance: N, us, mm. */
-const FORCE_SPAN_MIN = 0.5;
+const FORCE_SPAN_MIN = 0.1;
+const DEPTH_SPAN_MIN = 1;
 const COMPUTE_SPAN_MIN = 50;
 const DISPLACEMENT_SPAN_MIN = 0.02;
 /** Energies of soft bodies are small. */
@@ -40,9 +38,11 @@ export class Plots {
   /** Body time shown of a motion, s, and where it begins; null for what has just been. */
   private span = 1;
   private origin: number | null = null;
-  private pair: "loop" | "motion" = "loop";
-  private readonly plots: Record<"force" | "compute" | "displacement" | "energy", uPlot>;
+  private tab: Exclude<Tab, "modes"> = "force";
+  private readonly press = new PressLog();
+  private readonly plots: Record<"force" | "press" | "compute" | "displacement" | "energy", uPlot>;
   private drawnMs = 0;
+  private driven: number | null = null;
 
   constructor(store: Store) {
     const recent = { range: (): [number, number] => [-WINDOW_S, 0], label: () => "time before now (s)" };
@@ -50,7 +50,18 @@ export class Plots {
       range: (): [number, number] => (this.origin === null ? [-this.span, 0] : [0, this.span]),
       label: () => (this.origin === null ? "body time before now (s)" : "body time since the strike (s)"),
     };
+    const deep = {
+      range: (): [number, number] => {
+        const [low, high] = this.press.extent().depth;
+        return [low, Math.max(low + DEPTH_SPAN_MIN, high + 0.05 * (high - low))];
+      },
+      label: () => "depth (mm)",
+      round: true,
+    };
+    const upToPressed = (): [number, number] => [0, Math.max(FORCE_SPAN_MIN, 1.15 * this.press.extent().force)];
+    const trail = () => ({ along: this.press.depth, up: this.press.force });
     this.plots = {
+      press: createPlot("plot-press", deep, "force (N)", ["#ffb454"], upToPressed, trail),
       force: createPlot("plot-force", recent, "force (N)", ["#ffb454"], above(FORCE_SPAN_MIN)),
       compute: createPlot("plot-compute", recent, "per tick (µs)", ["#6fc3ff"], above(COMPUTE_SPAN_MIN)),
       displacement: createPlot("plot-displacement", moved, "moved (mm)", ["#ff8f80", "#7ddc9a", "#6fc3ff"], around),
@@ -61,8 +72,9 @@ export class Plots {
   }
 
   /** Takes in what a frame carries, drawn or not. */
-  append({ log, history }: FrameData): void {
+  append({ header, log, history }: FrameData): void {
     this.log.append(log);
+    this.press.append(header, this.driven);
     this.history.append(history);
   }
 
@@ -70,6 +82,7 @@ export class Plots {
     store.subscribe(["layers"], ({ layers }) => (this.shown = layers.plots));
     store.subscribe(["scene"], ({ scene }) => {
       this.log.clear();
+      this.press.clear();
       this.history.clear();
       this.span = scene?.motion?.span ?? 1;
       // The log of the loop is about the first tool.
@@ -77,12 +90,12 @@ export class Plots {
     });
     store.subscribe(["tab"], ({ tab }) => {
       if (tab === "modes") return;
-      this.pair = tab;
-      byId("plots-loop").hidden = tab !== "loop";
-      byId("plots-motion").hidden = tab !== "motion";
+      this.tab = tab;
+      for (const one of ["force", "loop", "motion"]) byId(`plots-${one}`).hidden = tab !== one;
       this.resize();
       this.refresh(true);
     });
+    store.subscribe(["scene", "pressing", "pinned"], (state) => (this.driven = drivenTool(state)));
     store.subscribe(["frame"], ({ frame, scene }) => {
       this.origin = scene?.motion?.strike ? (frame?.motion?.struck_at ?? null) : null;
       this.refresh();
@@ -94,10 +107,12 @@ export class Plots {
     const nowMs = performance.now();
     if (!this.shown || (!force && nowMs - this.drawnMs < REDRAW_INTERVAL_MS)) return;
     this.drawnMs = nowMs;
-    if (this.pair === "motion") return this.drawMotion();
+    if (this.tab === "motion") return this.drawMotion();
     const { time, force: newtons, compute } = this.log.read();
+    if (this.tab === "loop") return this.plots.compute.setData([time, compute]);
     this.plots.force.setData([time, newtons]);
-    this.plots.compute.setData([time, compute]);
+    // Its line is drawn over it.
+    this.plots.press.setData([this.press.extent().depth, [null, null]]);
   }
 
   private drawMotion(): void {
@@ -111,10 +126,10 @@ export class Plots {
   }
 
   private resize(): void {
-    const { force, compute, displacement, energy } = this.plots;
-    for (const plot of [force, compute, displacement, energy]) {
+    const { displacement, energy } = this.plots;
+    for (const plot of Object.values(this.plots)) {
       const width = plot.root.parentElement!.clientWidth;
-      const tall = plot === force || plot === compute ? HEIGHT_PX : MOTION_HEIGHT_PX;
+      const tall = plot === displacement || plot === energy ? MOTION_HEIGHT_PX : HEIGHT_PX;
       const height = window.innerHeight < LOW_WINDOW_PX ? tall - LOWER_PX : tall;
       if (width > 0 && width !== plot.width) plot.setSize({ width, height });
     }
@@ -131,41 +146,3 @@ const around: uPlot.Scale.Range = (_plot, low, high) => {
   const largest = Math.max(DISPLACEMENT_SPAN_MIN, Math.abs(low ?? 0), Math.abs(high ?? 0));
   return [-1.15 * largest, 1.15 * largest];
 };
-
-interface TimeAxis {
-  range(): [number, number];
-  label(): string;
-}
-
-function createPlot(id: string, time: TimeAxis, label: string, colors: string[], range: uPlot.Scale.Range): uPlot {
-  const box = byId(id);
-  const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
-  const options: uPlot.Options = {
-    width: 0,
-    height: HEIGHT_PX,
-    padding: [8, 10, 0, 0],
-    legend: { show: false },
-    cursor: { show: false },
-    scales: { x: { time: false, range: () => time.range() }, y: { range } },
-    axes: [
-      {
-        ...axis,
-        size: 17,
-        label: time.label(),
-        labelSize: 13,
-        labelGap: 0,
-        splits: () => fifths(...time.range()),
-        values: (_plot, splits) => splits.map((split) => String(Number(Math.abs(split).toPrecision(3)))),
-      },
-      { ...axis, size: 38, space: 20, label, labelSize: 14, labelGap: 0 },
-    ],
-    series: [{}, ...colors.map((stroke) => ({ stroke, width: 1.25, points: { show: false } }))],
-    hooks: { drawClear: [(plot) => void (plot.axes[0]!.label = time.label())] },
-  };
-  const nothing = [[], ...colors.map(() => [])] as unknown as uPlot.AlignedData;
-  return new uPlot(options, nothing, box);
-}
-
-function fifths(low: number, high: number): number[] {
-  return Array.from({ length: 6 }, (_, i) => low + ((high - low) * i) / 5);
-}

@@ -1,9 +1,9 @@
-// Force, depth and strain over the picture.
+// Force, felt stiffness, depth, contact and strain over the picture.
 
 import { drivenTool } from "../store";
 import type { State, Store } from "../store";
 import { byId, setText } from "./dom";
-import { MINUS, signed, threeDigits } from "./numbers";
+import { MINUS, millimetres, newtonsPerMillimetre, percent, signed, threeDigits } from "./numbers";
 
 /** Linear elasticity leaves out the square of the gradient; beyond about 10 % that shows. */
 const STRAIN_HONEST_MAX = 0.1;
@@ -13,6 +13,8 @@ const STRAIN_ROUNDING = 0.0005;
 export class Readout {
   private readonly magnitude = byId("force-value");
   private readonly components = [byId("force-x"), byId("force-y"), byId("force-z")];
+  private readonly stiffness = byId("stiffness-felt");
+  private readonly contact = byId("contact-value");
   private readonly pinned = byId("pinned-value");
   private readonly depthLabel = byId("depth-label");
   private readonly depth = byId("depth-value");
@@ -24,10 +26,7 @@ export class Readout {
   constructor(store: Store) {
     store.subscribe(["frame", "pinned", "pressing"], (state) => this.showForces(state));
     store.subscribe(["frame"], (state) => this.showStrain(state));
-    store.subscribe(["pressing"], ({ pressing }) => {
-      setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
-      setText(this.depth, pressing ? `${(1000 * pressing.depth).toFixed(1).replace("-", MINUS)} mm` : "–");
-    });
+    store.subscribe(["frame", "pressing"], (state) => this.showContact(state));
   }
 
   /** The force on the device of the driven tool, and in a second line those of pinned ones. */
@@ -45,16 +44,28 @@ export class Readout {
     if (driven?.refused) setText(this.refused, driven.refused);
   }
 
-  private showStrain({ frame, scene }: Readonly<State>): void {
+  /** Of the driven tool: what is told of the contact itself, and until there is one what the pointer wants. */
+  private showContact(state: Readonly<State>): void {
+    const { pressing, frame } = state;
+    const tool = drivenTool(state);
+    const contact = frame?.contacts.find((one) => one.tool === tool);
+    const stiffness = contact?.stiffness ?? null;
+    setText(this.stiffness, stiffness === null ? "–" : newtonsPerMillimetre(stiffness));
+    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${contact.slipping ? "slides" : "sticks"}` : "–");
+    setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
+    const depth = contact?.depth ?? pressing?.depth;
+    setText(this.depth, depth === undefined ? "–" : millimetres(depth).replace("-", MINUS));
+  }
+
+  private showStrain({ frame, settings }: Readonly<State>): void {
     const strain = frame?.strain ?? 0;
     setText(this.strain, (100 * strain).toFixed(1));
     const limited = frame?.tools.some((tool) => tool.limited) ?? false;
     this.limit.hidden = !limited;
-    if (scene && limited) setText(this.limit, `Limited to ${Number((100 * scene.strain_limit).toFixed(1))} % strain`);
+    if (settings && limited) setText(this.limit, `Held at ${percent(settings.strain_limit)} strain`);
     this.warning.hidden = strain < STRAIN_HONEST_MAX + STRAIN_ROUNDING;
     if (!this.warning.hidden) {
-      const percent = Math.round(100 * strain);
-      setText(this.warning, `${percent} % strain: linear elasticity is honest to about 10 %`);
+      setText(this.warning, `${Math.round(100 * strain)} % strain: linear elasticity is honest to about 10 %`);
     }
   }
 }

@@ -1,16 +1,20 @@
 """Plots of sessions and measurements, as PNG."""
 
 from palpate.validation.plots.accuracy import plot_convergence, plot_felt_stiffness
+from palpate.validation.plots.contact import plot_contact, plot_partial_slip, plot_pressing
 from palpate.validation.plots.sessions import plot_history, plot_log, write_columns, write_log
 from palpate.validation.plots.style import COLORS, empty_figure, write_figure
 
 __all__ = [
     "COLORS",
     "empty_figure",
+    "plot_contact",
     "plot_convergence",
     "plot_felt_stiffness",
     "plot_history",
     "plot_log",
+    "plot_partial_slip",
+    "plot_pressing",
     "write_columns",
     "write_figure",
     "write_log",

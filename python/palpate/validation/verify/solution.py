@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,9 @@ from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
 
 
-def quiet_body(mesh: TetMesh, material: Material, fixed: Fixed, loads: Loads | None = None) -> Body:
+def quiet_body(
+    mesh: TetMesh, material: Material | Mapping[int, Material], fixed: Fixed, loads: Loads | None = None
+) -> Body:
     """Make a body; locking is what some benchmarks show, so nobody needs to be warned of it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LockingWarning)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from palpate.errors import Error
 from palpate.validation.verify import bending, curved, exactness, felt, half_space, vibration
 from palpate.validation.verify.check import Benchmark
+from palpate.validation.verify.contact import balance, beside, energy, friction, pressing, sliding
 
 BENCHMARKS = {
     benchmark.name: benchmark
@@ -27,6 +28,13 @@ BENCHMARKS = {
         Benchmark("free", "Frequencies of a free beam, length 10 depths, 10 nodes", vibration.free_beam),
         Benchmark("fv52", "NAFEMS FV52, plate on hard simple supports, 10 nodes", vibration.plate, slow=True),
         Benchmark("felt", "Stiffness felt on a block", felt.felt_stiffness, slow=True),
+        Benchmark("hertz", "A sphere in the tick, R = 10 mm, on a block of 10 kPa", pressing.hertz, slow=True),
+        Benchmark("beside", "A sphere beside an edge, and beside another", beside.edges_and_neighbours, slow=True),
+        Benchmark("slide", "Sliding without friction at constant depth", sliding.ripple, slow=True),
+        Benchmark("sweep", "Sweeps by the micrometre", sliding.jumps, slow=True),
+        Benchmark("friction", "Coulomb's cone, Mindlin's partial slip", friction.friction, slow=True),
+        Benchmark("energy", "Work given out over random closed paths", energy.closed_paths, slow=True),
+        Benchmark("balance", "All forces on a body, tick by tick", balance.balance),
     )
 }
 

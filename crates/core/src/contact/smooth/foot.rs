@@ -39,30 +39,18 @@ pub struct FootPoint {
     pub on_crease: bool,
 }
 
-/// What ended the search on the smooth side of a triangle.
-enum Search {
-    Found(FootPoint),
-    Left,
-}
-
 impl SmoothSurface {
     /// The foot of `p`, followed from `start`, a triangle and a point near it. `None` for a point that is not finite.
     pub fn foot(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3, start: (u32, DVec3)) -> Option<FootPoint> {
-        if let Search::Found(foot) = self.follow(surface, p, start) {
-            return Some(foot);
-        }
-        self.foot_anywhere(surface, query, p)
+        self.follow(surface, p, start).or_else(|| self.foot_anywhere(surface, query, p))
     }
 
     /// The foot of `p` from wherever the drawn surface is closest.
     pub fn foot_anywhere(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3) -> Option<FootPoint> {
         let closest = query.closest(surface, p)?;
-        if self.is_within(&closest) {
-            if let Search::Found(foot) = self.follow(surface, p, (closest.triangle, closest.position)) {
-                return Some(foot);
-            }
-        }
-        Some(on_crease(&closest))
+        let start = (closest.triangle, closest.position);
+        let smooth = if self.is_within(&closest) { self.follow(surface, p, start) } else { None };
+        Some(smooth.unwrap_or_else(|| on_crease(&closest)))
     }
 
     /// Whether the closest point of the drawn surface is on no crease.
@@ -72,9 +60,10 @@ impl SmoothSurface {
         !(0..3).any(|k| creases[k] && closest.barycentric[(k + 2) % 3] < 1e-9)
     }
 
-    fn follow(&self, surface: &Surface, p: DVec3, (mut triangle, mut x): (u32, DVec3)) -> Search {
+    /// On the smooth side of a triangle; `None` where it ends.
+    fn follow(&self, surface: &Surface, p: DVec3, (mut triangle, mut x): (u32, DVec3)) -> Option<FootPoint> {
         for step in 0..STEPS {
-            let Some(at) = blend(self.own(triangle), x) else { return Search::Left };
+            let at = blend(self.own(triangle), x)?;
             let size = at.gradient.length();
             let normal = at.gradient / size;
             let across = DMat3::IDENTITY - outer(normal, normal);
@@ -82,8 +71,8 @@ impl SmoothSurface {
             let distance = (p - x).dot(normal);
             let stretch = DMat3::IDENTITY + shape * distance;
             let determinant = stretch.determinant();
-            if !(determinant > LEAST_STRETCH) {
-                return Search::Left;
+            if determinant.is_nan() || determinant <= LEAST_STRETCH {
+                return None;
             }
             let inverse = stretch.inverse();
             let along = p - x - normal * distance;
@@ -96,26 +85,15 @@ impl SmoothSurface {
                 let shift = across - turning * distance;
                 let (position, normal) = (x + dx, (normal + shape * dx).normalize());
                 let distance = (p - position).dot(normal);
-                return Search::Found(FootPoint {
-                    triangle,
-                    position,
-                    normal,
-                    distance,
-                    turning,
-                    shift,
-                    on_crease: false,
-                });
+                return Some(FootPoint { triangle, position, normal, distance, turning, shift, on_crease: false });
             }
             if dx.length() > spacing {
                 dx *= spacing / dx.length();
             }
             x += dx;
-            match self.triangle_below(surface, triangle, x) {
-                Some(next) => triangle = next,
-                None => return Search::Left,
-            }
+            triangle = self.triangle_below(surface, triangle, x)?;
         }
-        Search::Left
+        None
     }
 
     /// The triangle over which `x` lies, walked to from another; `None` beyond a crease.

@@ -1,0 +1,1 @@
+"""Contact: closed forms, direct solutions of the contact problem, and measurements in the force loop beside them."""

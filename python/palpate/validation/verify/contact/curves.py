@@ -1,0 +1,129 @@
+"""Paths along the surface of a curved body: a plane's section, with normals that change evenly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.mesh import TetMesh
+
+# Angle off the normal from which a place is another one, rad.
+ELSEWHERE = 0.6
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Places a step apart on a surface.
+
+    Attributes
+    ----------
+    points, normals
+        (n, 3) m on the flat triangles that the surface is drawn by, and (n, 3) outward, interpolated between the nodes.
+    step
+        m.
+
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    step: float
+
+    def part(self, keep: np.ndarray) -> Curve:
+        """Longest run of consecutive places of a mask (n,)."""
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], keep.astype(int), [0]])))
+        first, last = max(ends.reshape(-1, 2), key=lambda run: run[1] - run[0])
+        return Curve(self.points[first:last], self.normals[first:last], self.step)
+
+
+def section(mesh: TetMesh, origin: np.ndarray, normal: np.ndarray, step: float) -> Curve:
+    """Longest closed curve in which a plane cuts the surface.
+
+    Parameters
+    ----------
+    mesh
+        A body.
+    origin, normal
+        Of the plane, (3,) m and (3,).
+    step
+        m.
+
+    """
+    side = (mesh.nodes - origin) @ normal
+    above = side > 0
+    ends = np.sort(mesh.surface_triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    crossed = ends[above[ends[..., 0]] != above[ends[..., 1]]]  # two edges of each triangle that is cut, in turn
+    edges, joined = np.unique(crossed, axis=0, return_inverse=True)
+    part = (side[edges[:, 0]] / (side[edges[:, 0]] - side[edges[:, 1]]))[:, None]
+
+    def on_edges(values: np.ndarray) -> np.ndarray:
+        return values[edges[:, 0]] * (1 - part) + values[edges[:, 1]] * part
+
+    points, normals = on_edges(mesh.nodes), on_edges(_node_normals(mesh))
+    loops = [np.append(loop, loop[0]) for loop in _loops(joined.reshape(-1, 2))]
+    lengths = [np.cumsum(np.linalg.norm(np.diff(points[loop], axis=0), axis=1)) for loop in loops]
+    longest = int(np.argmax([length[-1] for length in lengths]))
+    arc, loop = np.append(0.0, lengths[longest]), loops[longest]
+    at = np.arange(0.0, arc[-1], step)
+    points, normals = (np.column_stack([np.interp(at, arc, k) for k in rows[loop].T]) for rows in (points, normals))
+    return Curve(points, normals / np.linalg.norm(normals, axis=1)[:, None], step)
+
+
+def _node_normals(mesh: TetMesh) -> np.ndarray:
+    """Means of the normals of the triangles around each node, weighted by area, (nodes, 3)."""
+    a, b, c = np.moveaxis(mesh.nodes[mesh.surface_triangles], 1, 0)
+    areas = np.cross(b - a, c - a)
+    normals = np.zeros(mesh.nodes.shape)
+    for corner in mesh.surface_triangles.T:
+        np.add.at(normals, corner, areas)
+    return normals
+
+
+def _loops(pairs: np.ndarray) -> list[np.ndarray]:
+    """Find closed chains of points, each of which occurs in two pairs."""
+    order = np.argsort(pairs.ravel(), kind="stable")
+    beside = order.reshape(-1, 2)  # the two places in ``pairs`` at which each point stands
+    other = pairs.ravel()[order ^ 1].reshape(beside.shape)
+    waiting, loops = set(range(len(beside))), []
+    while waiting:
+        first = min(waiting)
+        loop, before, point = [first], first, int(other[first, 0])
+        while point != first:
+            loop.append(point)
+            onwards = other[point, 1] if other[point, 0] == before else other[point, 0]
+            before, point = point, int(onwards)
+        waiting -= set(loop)
+        loops.append(np.array(loop))
+    return loops
+
+
+def away_from_supports(curve: Curve, mesh: TetMesh, fixed: np.ndarray, distance: float) -> np.ndarray:
+    """Mask (n,) of places farther from every fixed node than a distance, m."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(mesh.nodes[fixed]).query(curve.points)[0] > distance
+
+
+def touches_nothing_else(curve: Curve, mesh: TetMesh, radius: float) -> np.ndarray:
+    """Mask (n,) of places on which a sphere can stand without touching the body at another place, as in a crease.
+
+    The sphere touches the place from outside; no point of the surface that is seen from its centre by more than
+    :data:`ELSEWHERE` off the normal may lie within it.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(_dense(mesh))
+    centres = curve.points + radius * curve.normals
+    free = np.ones(len(centres), dtype=bool)
+    for k, (centre, near) in enumerate(zip(centres, tree.query_ball_point(centres, radius), strict=True)):
+        offset = tree.data[near] - centre
+        aside = -offset @ curve.normals[k] < np.cos(ELSEWHERE) * np.linalg.norm(offset, axis=1)
+        free[k] = not aside.any()
+    return free
+
+
+def _dense(mesh: TetMesh) -> np.ndarray:
+    """Points (n, 3), m, all over the drawn surface: a lattice of eight to an edge on each triangle."""
+    i, j = np.array([(i, j) for i in range(9) for j in range(9 - i)]).T / 8
+    lattice = np.column_stack([i, j, 1 - i - j])
+    return np.einsum("qk,tkx->tqx", lattice, mesh.nodes[mesh.surface_triangles]).reshape(-1, 3)

@@ -1,0 +1,108 @@
+"""What hands get back of the work that they put in: over closed paths, nothing."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate.body import Body
+from palpate.dynamics import modes
+from palpate.scene import BodyMotion
+from palpate.simulation import Simulation
+from palpate.validation.verify.check import Check, Outcome
+from palpate.validation.verify.contact import measures
+from palpate.validation.verify.contact.closed_paths import ClosedPaths
+from palpate.validation.verify.contact.loop import loop_of, sphere
+from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
+from palpate.validation.verify.solution import green_of
+
+RADIUS, TOLERANCE = 0.01, 1e-3
+FRICTIONS = (0.0, 0.3, 1.0)
+# Closed paths in all, divided among friction, one and two tools, rest and motion, and limits of the device.
+PATHS, TICKS = 10_000, 400
+# Limits that scenes have unless they say otherwise.
+DEFAULT_DEVICE: dict = {}
+PASSIVE = "passivity"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is tried: friction, tools, a body in motion, a device with the usual limits."""
+
+    friction: float
+    tools: int
+    moving: bool
+    limited: bool
+
+    def __str__(self) -> str:
+        tools = "one tool" if self.tools == 1 else "two tools"
+        body = "in motion" if self.moving else "at rest"
+        return f"friction {self.friction:g}, {tools}, {body}{', usual device' if self.limited else ''}"
+
+
+CONDITIONS = [
+    Condition(friction, tools, moving, limited)
+    for friction in FRICTIONS
+    for tools in (1, 2)
+    for moving in (False, True)
+    for limited in (False, True)
+]
+
+
+def closed_paths() -> Outcome:
+    """Random closed paths: press, slide, turn, lift."""
+    body = body_on_table(Block(), (6, 6, 3), quadratic=True)
+    bench = EnergyBench(body)
+    checks = []
+    for condition in CONDITIONS:
+        given, peak = bench.measured(condition, PATHS // len(CONDITIONS) + 1)
+        title = f"{condition}: most given out over the peak"
+        checks.append(Check(title, max(measures.leak(given, peak), 0.0), 0.0, PASSIVE, TOLERANCE))
+    return Outcome(checks)
+
+
+class EnergyBench:
+    """Loops over one block."""
+
+    def __init__(self, body: Body, count: int = 60):
+        self.body = body
+        self.green = green_of(body, touch=top_nodes(body))
+        with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
+            basis = modes(body, count, path=Path(folder) / "modes.palpate", progress=False)
+        # Newmark with delta = 0.6, the default of scenes; the first mode damped by a twentieth.
+        damping = 4 * np.pi * basis.frequencies[0] * 0.05
+        self.motion = BodyMotion(basis, (1e-3, 0.3025, 0.6, float(damping), 0.0), False, 5000.0)
+
+    def simulation(self, condition: Condition) -> Simulation:
+        """Force loop for a condition."""
+        tools = [sphere(RADIUS, condition.friction)] * condition.tools
+        device = DEFAULT_DEVICE if condition.limited else None
+        return loop_of(self.body, self.green, tools, device, self.motion if condition.moving else None)
+
+    def paths(self, condition: Condition, count: int) -> ClosedPaths:
+        """Make closed paths of all tools; two of them come as close as two radii."""
+        low, high = self.body.mesh.bounds
+        middle = (low + high) / 2
+        apart = 0.0 if condition.tools == 1 else 0.016
+        centres = np.array([[middle[0] + side * apart, middle[1], high[2]] for side in (-1, 1)[: condition.tools]])
+        return ClosedPaths.over(
+            centres, RADIUS, paths=count, ticks=TICKS, slide=0.012, depth=(5e-4, 3e-3), seed=CONDITIONS.index(condition)
+        )
+
+    def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
+        """Return forces and torques (paths, ticks, tools, 3); a body in motion starts each path at rest."""
+        simulation = self.simulation(condition)
+        if not condition.moving:
+            recording = simulation.play(*paths.script())
+            return paths.of_script(recording.forces), paths.of_script(recording.torques)
+        played = [simulation.play(*path) for path in zip(paths.positions, paths.orientations, strict=True)]
+        return np.stack([each.forces for each in played]), np.stack([each.torques for each in played])
+
+    def measured(self, condition: Condition, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Work given out and most put in, (paths,) J each."""
+        paths = self.paths(condition, count)
+        forces, torques = self.played(condition, paths)
+        return measures.given_out(paths.positions, forces, paths.orientations, torques)

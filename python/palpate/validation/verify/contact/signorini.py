@@ -1,0 +1,202 @@
+"""The contact problem solved directly: a rigid tool without friction pressed into the top of a body, by Signorini.
+
+With pressure `p = sum_j p_j phi_j`, phi_j the linear hat of a node on the flat triangles of the faces, N_i the shape
+functions of the element, and `M_ij = int N_i phi_j dA`, the nodal forces are `M p` and the top sinks by `Psi M p`. The
+tool at depth d over the gap g may nowhere, in the mean under a hat, lie below the surface:
+
+    A = M^T Psi M,   w = A p - (d m - G) >= 0,   p >= 0,   p . w = 0,   m_j = int phi_j dA,   G_j = int phi_j g dA,
+
+a linear complementarity problem with a symmetric positive definite matrix, so `p` is the minimum of
+`p.A p/2 - p.(d m - G)` over `p >= 0`: non-negative least squares with the Cholesky factor of A (Lawson and Hanson
+1974). Hats instead of nodes, since the consistent nodal forces of a uniform pressure vanish at the corners of a 6-node
+face: their sign says nothing.
+
+Nothing of the force loop is used, and the contact is resolved by elements much smaller than it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from scipy.optimize import nnls
+
+from palpate.green import GreensFunction
+from palpate.mesh import TetMesh
+
+# Height of the tool's underside over its lowest point (n,), m, at places (n, 2) of the plane, m; may be infinite.
+Gap = Callable[[np.ndarray], np.ndarray]
+
+# Barycentric coordinates of a face's nodes: corners, then middles of 01, 12, 20; and its flat triangles.
+PLACES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+PARTS = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
+
+
+@dataclass(frozen=True)
+class Press:
+    """A tool at rest in the body.
+
+    Attributes
+    ----------
+    depth, force
+        m, N.
+    area
+        Of all hats that carry pressure, m^2.
+    pressures
+        (n,) Pa, at the nodes.
+
+    """
+
+    depth: float
+    force: float
+    area: float
+    pressures: np.ndarray
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """Compliance of a part of a body's flat top, for hats of pressure on it.
+
+    Attributes
+    ----------
+    places
+        (n, 2) m, of the nodes.
+    areas
+        (n,) m^2, integrals of the hats.
+    compliance
+        (n, n) `M^T Psi M`, m^3/Pa.
+    quadrature
+        Places (q, 2), hats of the nodes there (q, n) times area.
+
+    """
+
+    places: np.ndarray
+    areas: np.ndarray
+    compliance: np.ndarray
+    quadrature: tuple[np.ndarray, np.ndarray]
+
+    @classmethod
+    def on_top(cls, green: GreensFunction, mesh: TetMesh) -> ContactProblem:
+        """Of the faces on the top whose nodes may all be touched."""
+        faces = _top_faces(green, mesh)
+        nodes, corners = np.unique(faces, return_inverse=True)
+        load, (places, hats) = _integrals(mesh.nodes[nodes, :2], corners.reshape(faces.shape))
+        compliance = load.T @ _compliance(green, nodes) @ load
+        return cls(mesh.nodes[nodes, :2], hats.sum(axis=0), compliance, (places, hats))
+
+    def press(self, gap: Gap, depths: Sequence[float]) -> list[Press]:
+        """Press the tool to each depth of its lowest point below the untouched top, m."""
+        places, hats = self.quadrature
+        # Far outside of the tool no pressure acts; a large height keeps the numbers finite.
+        height = np.minimum(gap(places), 1e3 * max(depths))
+        gaps = hats.T @ height
+        scale = 1 / np.sqrt(np.diag(self.compliance))
+        factor = scipy.linalg.cholesky(scale[:, None] * self.compliance * scale, lower=True)
+        found = []
+        for depth in depths:
+            right = scale * (depth * self.areas - gaps)
+            pressures = (
+                scale * nnls(factor.T, scipy.linalg.solve_triangular(factor, right, lower=True), maxiter=5000)[0]
+            )
+            area = float(self.areas[pressures > 0].sum())
+            found.append(Press(depth, float(self.areas @ pressures), area, pressures))
+        return found
+
+
+def at_the_meshs_points(
+    green: GreensFunction, mesh: TetMesh, gap: Gap, depths: Sequence[float], penalty: float = 1e8
+) -> list[float]:
+    """Press a tool that is kept out at the quadrature points of the mesh's own faces, as most programs do; forces, N.
+
+    The points of a face can only move as its nodes do, so a contact smaller than a face locks. Minimum over `p >= 0` of
+    `p.(B^T Psi B + diag(1/(kappa w))) p/2 - p.(d - g)`, B the shape functions at the points, w their areas.
+
+    Parameters
+    ----------
+    green, mesh
+        The body, with the top touchable.
+    gap, depths
+        As of :meth:`ContactProblem.press`.
+    penalty
+        kappa, Pa/m: as good as rigid, and there may be more points than a face has freedoms.
+
+    """
+    faces = _top_faces(green, mesh)
+    nodes, local = np.unique(faces, return_inverse=True)
+    at, weight = _triangle_rule()
+    corners = mesh.nodes[faces[:, :3], :2]
+    shapes = _shapes(at, faces.shape[1])
+    points = np.einsum("qk,fkx->fqx", at, corners).reshape(-1, 2)
+    areas = np.outer(_areas(corners), weight).ravel()
+    near = np.flatnonzero(gap(points) < 2 * max(depths))
+    rows = np.zeros((len(near), len(nodes)))
+    local = local.reshape(faces.shape)
+    for row, point in zip(rows, near, strict=True):
+        row[local[point // len(at)]] = shapes[point % len(at)]
+    compliance = rows @ _compliance(green, nodes) @ rows.T + np.diag(1 / (penalty * areas[near]))
+    factor = scipy.linalg.cholesky(compliance, lower=True)
+    gaps = gap(points[near])
+    solved = [scipy.linalg.solve_triangular(factor, depth - gaps, lower=True) for depth in depths]
+    return [float(nnls(factor.T, right, maxiter=5000)[0].sum()) for right in solved]
+
+
+def _top_faces(green: GreensFunction, mesh: TetMesh) -> np.ndarray:
+    """Faces on the top whose nodes may all be touched, (k, 3 or 6)."""
+    top = mesh.nodes[:, 2].max() - 1e-9 * np.ptp(mesh.nodes[:, 2])
+    faces = mesh.surface_faces[(mesh.nodes[mesh.surface_faces, 2] > top).all(axis=1)]
+    return faces[np.isin(faces, green.touchable_nodes).all(axis=1)]
+
+
+def _compliance(green: GreensFunction, nodes: np.ndarray) -> np.ndarray:
+    """`Psi` along z between nodes (n, n), m/N."""
+    rows = np.searchsorted(green.surface_nodes, nodes)
+    return np.array([green.solve(forces={int(node): (0, 0, 1)}).displacements[rows, 2] for node in nodes])
+
+
+def _areas(corners: np.ndarray) -> np.ndarray:
+    """Areas (f,), m^2, of triangles of the plane (f, 3, 2)."""
+    (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    return np.abs(a * d - b * c) / 2
+
+
+def _integrals(places: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """`M` (n, n), and quadrature points (q, 2) with hats times area (q, n), on straight-edged faces of a plane."""
+    width = faces.shape[1]
+    at, weight = _triangle_rule()
+    load = np.zeros((len(places),) * 2)
+    points, hats = [], []
+    corners = places[faces[:, :3]]
+    areas = _areas(corners)
+    for part in PARTS[width]:
+        barycentric = at @ PLACES[part]
+        shapes = _shapes(barycentric, width)
+        share = areas / len(PARTS[width])
+        for q, hat in enumerate(at):
+            points.append(np.einsum("k,fkx->fx", barycentric[q], corners))
+            row = np.zeros((len(faces), len(places)))
+            for local, value in zip(part, hat, strict=True):
+                weighted = share * weight[q] * value
+                row[np.arange(len(faces)), faces[:, local]] = weighted
+                for i in range(width):
+                    np.add.at(load, (faces[:, i], faces[:, local]), shapes[q, i] * weighted)
+            hats.append(row)
+    return load, (np.concatenate(points), np.concatenate(hats))
+
+
+def _shapes(barycentric: np.ndarray, width: int) -> np.ndarray:
+    """Shape functions (q, width) of a 3-node or 6-node face."""
+    if width == 3:
+        return barycentric
+    a, b, c = barycentric.T
+    return np.column_stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
+
+
+def _triangle_rule() -> tuple[np.ndarray, np.ndarray]:
+    """Six points of degree four (Dunavant 1985): barycentric coordinates (6, 3), and parts of the area (6,)."""
+    points, weights = [], []
+    for a, w in ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)):
+        points += [np.roll([1 - 2 * a, a, a], k) for k in range(3)]
+        weights += 3 * [w]
+    return np.array(points), np.array(weights)

@@ -1,0 +1,78 @@
+"""`palpate bench contact` with peers played by known laws: its figures, its table, its plot, and who is missing."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from palpate.cli import main
+from palpate.validation.bench import contact, contact_peers
+from palpate.validation.bench.contact_tick import TickRow
+from palpate.validation.verify.contact.reference import Block, body_on_table
+
+
+def run_cli(monkeypatch, *arguments: str) -> int:
+    monkeypatch.setattr("sys.argv", ["palpate", *arguments])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return stop.value.code or 0
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Only two places and depths; MuJoCo is a spring of 100 N/m, Drake is not there."""
+
+    def spring(mesh, material, radius, places, depths):
+        assert mesh.tets.shape[1] == 4
+        assert (len(mesh.nodes), np.ptp(mesh.nodes, axis=0).tolist()) == (726, [0.1, 0.1, 0.05])
+        return 100.0 * np.tile(depths, (len(places), 1)), 0.01
+
+    monkeypatch.setattr(contact, "DEPTHS", (5e-4, 1e-3))
+    monkeypatch.setattr(contact, "PLACES", contact.PLACES[:2])
+    monkeypatch.setattr(contact_peers, "installed", lambda: ["MuJoCo"])
+    monkeypatch.setattr(contact_peers, "mujoco_forces", spring)
+    monkeypatch.setattr(contact, "tick_rows", lambda: [TickRow(100, 2.0, 3.0, 10.0)])
+
+
+@pytest.mark.slow
+def test_the_bench_puts_all_beside_the_direct_solution(quick, monkeypatch, capsys, tmp_path):
+    assert run_cli(monkeypatch, "bench", "contact", "--json", "--out", str(tmp_path)) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["missing"] == {"Drake": "drake"}
+    ratios = {(row["method"], row["mesh"]): np.array(row["ratios"]) for row in found["methods"]}
+    assert np.abs(ratios["Palpate", contact.COARSE] - 1).max() < 0.07
+    assert np.abs(ratios["Palpate", "10 nodes, 5 mm"] - 1).max() < 0.03
+    assert (ratios[contact.AT_POINTS, contact.COARSE] > 2).all()  # 0.078 and 0.179 N and more, contact locks
+    np.testing.assert_allclose(ratios["MuJoCo", contact.COARSE], 100 * np.array([5e-4, 1e-3]) / found["truth"])
+    assert (tmp_path / "contact.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_forces_of_a_peer_that_takes_forces_are_interpolated_at_depths(monkeypatch):
+    depths = np.geomspace(1e-4, 1e-2, 7)
+    monkeypatch.setattr(contact, "DEPTHS", (2.5e-4, 1e-3, 3e-3))
+    found = contact._at_depths(depths[None] * [[1.0], [2.0]], 40.0 * depths**1.5)
+    exact = 40.0 * np.array(contact.DEPTHS) ** 1.5
+    np.testing.assert_allclose(found, [exact, exact / 2**1.5], rtol=1e-9)
+
+
+def check_peer(peer: str) -> None:
+    """On large elements a peer's force is too large, or its depth too small."""
+    block = Block()
+    mesh, middle = body_on_table(block, (5, 5, 3), quadratic=False).mesh, np.array([[0.05, 0.05]])
+    if peer == "MuJoCo":
+        force = contact_peers.mujoco_forces(mesh, block.material, 0.01, middle, [1e-3])[0][0, 0]
+        assert 0.0557 < force < 1.0
+    else:
+        depth = contact_peers.drake_depths(mesh, block.material, 0.01, middle, [0.0557])[0][0, 0]
+        assert 0 < depth < 1e-3
+
+
+# Peers are no dependency of the tests: where none is installed there is no test, rather than one that is skipped.
+if contact_peers.installed():
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("peer", contact_peers.installed())
+    def test_peers_press_too_hard(peer):
+        check_peer(peer)

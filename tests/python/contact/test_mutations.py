@@ -1,0 +1,120 @@
+"""Every check of contact fails when the law is wrong: what was measured is falsified, and judged as the table does.
+
+The falsifications: force times 1.05, the wrong sign, forces of the tick before, and the part of the force along the
+surface that comes from the change of the compliance turned around (as an operator with its indices swapped would).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.validation.verify.contact import balance, energy, friction, measures, pressing, sliding
+from palpate.validation.verify.contact.reference import body_on_table, sphere_press
+
+
+def stale(forces: np.ndarray, axis: int = 0) -> np.ndarray:
+    """Forces of the tick before."""
+    late = np.roll(forces, 1, axis=axis)
+    first = [slice(None)] * forces.ndim
+    first[axis] = slice(0, 1)
+    late[tuple(first)] = forces[tuple(first)]
+    return late
+
+
+@pytest.mark.slow
+def test_a_force_five_per_cent_off_is_not_that_of_the_direct_solution():
+    body = body_on_table(pressing.BLOCK, (10, 10, 5), quadratic=True)
+    forces = pressed = pressing.pressed(body, np.array(pressing.DEPTHS))
+    truth = np.array([sphere_press(pressing.BLOCK, pressing.RADIUS, depth).force for depth in pressing.DEPTHS])
+    tolerances = np.array(pressing.TOLERANCES["10 nodes", 5.0])
+
+    def passes(forces: np.ndarray) -> np.ndarray:
+        return np.abs(forces / truth - 1) <= tolerances
+
+    assert passes(forces).all()
+    assert not passes(1.05 * pressed).any()
+    assert not passes(-pressed).any()
+    assert not passes(stale(pressed))[1:].any()
+
+
+@pytest.mark.slow
+def test_exponent_and_evenness_see_other_laws():
+    depths = np.geomspace(1e-4, 1e-3, 9)
+    hertz = depths**1.5
+    assert abs(measures.exponent(depths, hertz) - 1.5) < 1e-12
+    # A patch that sticks is a spring; Winkler's foundation goes with the square.
+    for power in (1.0, 2.0):
+        assert abs(measures.exponent(depths, depths**power) - 1.5) > 0.05
+
+    simulation, body = sliding.flat_loop((10, 10, 5), quadratic=True)
+    slide = sliding.flat_slide(simulation, body, length=0.01)
+    assert measures.ripple(slide.forces) < 0.003
+    # 5 % more on one side of an element's edge, and a force that turns over.
+    kinked = slide.forces * np.where(np.arange(len(slide.forces)) < 50, 1.05, 1.0)[:, None]
+    assert measures.ripple(kinked) > 0.003
+    assert measures.largest_jump(kinked) > 1 or np.abs(slide.forces).max() < 0.1
+    turned = slide.forces * np.where(np.arange(len(slide.forces)) < 50, -1.0, 1.0)[:, None]
+    assert measures.largest_jump(turned) > 1
+    assert measures.attraction(turned, slide.normals) > 0
+    along = slide.step * np.arange(2001)
+    even = np.tile([0.0, 0.0, 0.1], (2001, 1))
+    rough = even * (1 + 0.05 * (np.arange(2001) // 50 % 2))[:, None]  # elements of 5 mm, every other one 5 % harder
+    assert measures.roughness(along[1], even)[0] < 1e-12
+    rms, largest = measures.roughness(along[1], rough)
+    assert rms > 0.005
+    assert largest > 0.02
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return energy.EnergyBench(body_on_table(energy.Block(), (6, 6, 3), quadratic=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tools", [1, 2])
+def test_closed_paths_see_stale_turned_and_misdirected_forces(bench, tools):
+    condition = energy.Condition(0.0, tools, moving=False, limited=False)
+    paths = bench.paths(condition, 120)
+    forces, torques = bench.played(condition, paths)
+
+    def leak(forces: np.ndarray) -> float:
+        return measures.leak(*measures.given_out(paths.positions, forces, paths.orientations, torques))
+
+    assert leak(forces) <= energy.TOLERANCE
+    assert leak(stale(forces, axis=1)) > energy.TOLERANCE
+    # The wrong sign draws the hand in: by the same rule it gets back more than it ever put in.
+    assert leak(-forces) > energy.TOLERANCE or measures.attraction(-forces, np.array([0.0, 0.0, 1.0])) > 0
+    # Without friction all force along the flat top comes from the change of C_reg.
+    misdirected = forces * np.array([-1.0, -1.0, 1.0])
+    assert leak(misdirected) > energy.TOLERANCE
+
+
+@pytest.mark.slow
+def test_the_cone_and_mindlins_curve_see_wrong_friction():
+    forces, normals = friction.dragged(0.3, drags=10)
+    assert measures.beyond_cone(forces, normals, 0.3) <= 1e-6
+    assert measures.beyond_cone(forces * np.array([1.05, 1.05, 1.0]), normals, 0.3) > 1e-6
+    touching = np.linalg.norm(forces, axis=1) > 0
+    late = np.where(touching[:, None], np.column_stack([stale(forces)[:, :2], forces[:, 2]]), forces)
+    assert measures.beyond_cone(late, normals, 0.3) > 1e-6
+    assert measures.attraction(-forces, normals) > 0
+
+    slip = friction.partial_slip(0.3)
+    assert slip.error <= 0.05
+    for factor in (1.08, -1.0):
+        wrong = friction.PartialSlip(slip.shifts, factor * slip.forces, slip.exact, slip.limit)
+        assert wrong.error > 0.05
+
+
+def test_the_balance_sees_all_of_them():
+    forces, reactions, loads = balance.dragged()
+    assert balance.imbalance(forces, reactions, loads) <= 1e-9
+    wrong = {
+        "times 1.05": 1.05 * forces,
+        "wrong sign": -forces,
+        "stale": stale(forces),
+        "turned along the surface": forces * np.array([-1.0, 1.0, 1.0]),
+    }
+    for name, falsified in wrong.items():
+        assert balance.imbalance(falsified, reactions, loads) > 1e-9, name
