@@ -25,6 +25,7 @@ def built(body: palpate.Body, path, known: bool = True) -> BuiltScene:
         body={"store": str(path)},
         tool={"radius": RADIUS, "contact_radius": 0.012},
         device={"ramp": 0, "max_force": 100},
+        view={"strain_limit": LIMIT},
     )
     return BuiltScene.of(scene, body, green) if known else scene.build()
 

@@ -10,7 +10,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::contact::patch_weights;
-use crate::contact::smooth::FanWeights;
+use crate::contact::smooth::{FanWeights, FootPoint};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::Contact;
 use crate::simulation::covering::Covering;
@@ -27,6 +27,9 @@ pub const MOST_STEPS: usize = 16;
 const SETTLED: f64 = 1e-8;
 /// A force that changes by less than this part from step to step stays.
 const SAME: f64 = 1e-8;
+/// A tool is taken no deeper into the surface at rest than this, over its radius: its centre would leave the outside, where
+/// the closest point is one. A half-space under a sphere is strained by 60 % there.
+const MOST_DEPTH: f64 = 1.2;
 /// A foot that goes farther in a tick, over the tool's radius, has jumped.
 const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
@@ -122,11 +125,16 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
         local.responses[a].force = contact.local.force;
         local.others[a].slope = DVec3::ZERO;
     }
+    let mut deepest = [0.0; MAX_CONTACTS];
+    for (a, &slot) in slots.iter().enumerate() {
+        let contact = &state.contacts.slots[slot];
+        deepest[a] = (1.0 - MOST_DEPTH) * model.tools[contact.tool].radius - contact.local.entry;
+    }
     for step in 0..MOST_STEPS {
         if !meet(model, state, local, slots, body, controls, step) {
             return;
         }
-        let longest = advance(local, system, slots.len());
+        let longest = advance(local, system, &deepest, slots.len());
         let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
         if longest < SETTLED * radius && step > 0 && local.changed < SAME {
             break;
@@ -275,7 +283,7 @@ fn cover(model: &Model, state: &mut State, weights: &FanWeights, slot: usize, bo
 }
 
 /// One step of Newton's method; the longest of all.
-fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
+fn advance(local: &mut LocalScratch, system: &mut System, deepest: &[f64; MAX_CONTACTS], count: usize) -> f64 {
     for a in 0..count {
         let mut residual = local.places[a] - local.from[a];
         for b in 0..count {
@@ -298,10 +306,18 @@ fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
     for a in 0..count {
         let step = DVec3::from_slice(&system.right[3 * a..3 * a + 3]);
         let step = if step.is_finite() { step } else { DVec3::ZERO };
+        let step = held_out(step, &local.responses[a].foot, deepest[a]);
         local.steps[a] = step;
         longest = longest.max(step.length());
     }
     longest
+}
+
+/// A step that takes a tool no deeper than it is to go: shortened along the normal. Beyond, the force stays what it is there,
+/// however far the device goes on where the body gives no farther, as at a support.
+fn held_out(step: DVec3, foot: &FootPoint, deepest: f64) -> DVec3 {
+    let beyond = deepest - (foot.distance + step.dot(foot.normal));
+    if beyond > 0.0 { step + foot.normal * beyond } else { step }
 }
 
 /// Whether a foot has come elsewhere than where the tool has gone: off a ridge, or through a body. The force there has
