@@ -56,7 +56,7 @@ def test_a_nodule_is_felt_where_it_is_by_no_more_than_the_direct_solution_says()
     tool = plain.scene.tools[0].radius
     without = felt(plain, line)
     # The mesh of a direct solution follows the nodule; its error cancels only against the same mesh without one.
-    base = {radius: direct(tool, Nodule(0.01, radius, 5e3)) for radius in {5e-3, 7e-3}}
+    base = {radius: direct(tool, Nodule(0.01, radius, 5e3)) for radius in (5e-3, 7e-3)}
     for youngs_modulus, radius in NODULES:
         gain = felt(scene(youngs_modulus, radius).build(progress=False), line) / without - 1
         expected = direct(tool, Nodule(0.01, radius, youngs_modulus)) / base[radius] - 1
