@@ -20,6 +20,8 @@ from palpate.validation.verify.contact.reference import Block, body_on_table, to
 from palpate.validation.verify.solution import green_of
 
 RADIUS, TOLERANCE = 0.01, 1e-3
+# Farthest that a path leads from its middle along x and y, m.
+SLIDE = 0.012
 FRICTIONS = (0.0, 0.3, 1.0)
 # Closed paths in all, divided among friction, one and two tools, rest and motion, and limits of the device.
 PATHS, TICKS = 10_000, 400
@@ -86,10 +88,10 @@ class EnergyBench:
         """Make closed paths of all tools; two of them come as close as two radii."""
         low, high = self.body.mesh.bounds
         middle = (low + high) / 2
-        apart = 0.0 if condition.tools == 1 else 0.016
+        apart = 0.0 if condition.tools == 1 else SLIDE + RADIUS
         centres = np.array([[middle[0] + side * apart, middle[1], high[2]] for side in (-1, 1)[: condition.tools]])
         return ClosedPaths.over(
-            centres, RADIUS, paths=count, ticks=TICKS, slide=0.012, depth=(5e-4, 3e-3), seed=CONDITIONS.index(condition)
+            centres, RADIUS, paths=count, ticks=TICKS, slide=SLIDE, depth=(5e-4, 3e-3), seed=CONDITIONS.index(condition)
         )
 
     def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
