@@ -28,9 +28,9 @@ use crate::green::GreensFunction;
 const HALF_SPACE: f64 = 0.766_544;
 /// `b` over the mean spacing of nodes around: at 2 the ripple of a sliding contact is 1 %, at 3 it is 0.03 %.
 const SPACINGS: f64 = 3.0;
-/// `b` over the tool's radius: a contact is smaller than its tool, and on a rigid support the law stays monotonic for
-/// contact radii up to `b / 1.53`.
-const RADII: f64 = 1.6;
+/// `b` over the tool's radius: a contact is smaller than its tool. A wider one would take a nodule at the depth of the tool's
+/// radius for the half-space.
+const RADII: f64 = 1.0;
 /// Where more nodes than a patch takes lie within `b`, it is shortened by this factor until they fit.
 const SHORTER: f64 = 0.9;
 /// Stiffest regular part over `1 / (E* R)`: the local compliance of the largest contact, `1 / (2 E* R)`, outweighs it.

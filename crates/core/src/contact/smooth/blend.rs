@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use super::fans::Fan;
 
 /// Squared distance within which a node does not draw the surface towards itself, over its squared reach.
-const SHARP: f64 = 0.03;
+const SHARP: f64 = 0.25;
 
 /// Value, gradient and Hessian of a blended function at a point.
 #[derive(Clone, Copy, Debug)]

@@ -12,7 +12,7 @@ use crate::mesh::Surface;
 /// Cosine of the turn beyond which an edge is a crease: 50 degrees.
 const CREASE: f64 = 0.642_787_609_686_539_4;
 /// Reach of a fan's blending weight over its longest edge.
-const REACH: f64 = 1.6;
+const REACH: f64 = 1.8;
 /// Neighbours as far as this, over the longest edge, take part in the fit.
 const FIT: f64 = 2.2;
 /// Curvature is at most this over the longest edge: a mesh cannot show more.

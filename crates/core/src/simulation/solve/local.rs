@@ -30,6 +30,9 @@ const SAME: f64 = 1e-8;
 /// A tool is taken no deeper into the surface at rest than this, over its radius: its centre would leave the outside, where
 /// the closest point is one. A half-space under a sphere is strained by 60 % there.
 const MOST_DEPTH: f64 = 1.2;
+/// Radius of the patch by which a body in motion is met, over the tool's, at least: in a step a body may be as good as rigid,
+/// and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of the patch.
+const WIDER: f64 = 1.6;
 /// A foot that goes farther in a tick, over the tool's radius, has jumped.
 const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
@@ -179,7 +182,8 @@ fn follow_motion(
         let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
         let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
         own.smooth.weigh(foot, weights);
-        let (wide, _) = weights.field(|fan| regular.widths[fan]);
+        let radius = model.tools[contacts.slots[slot].tool].radius;
+        let wide = weights.field(|fan| regular.widths[fan]).0.max(WIDER * radius);
         let centre = fixed.material_point(&fixed.surface_point(foot));
         let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
         // As many nodes as at the fans around fit.
