@@ -5,6 +5,7 @@ mod compliance;
 mod curved;
 mod face;
 mod lattice;
+pub mod local;
 mod moments;
 mod patch;
 mod quadrature;
