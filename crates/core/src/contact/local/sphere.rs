@@ -187,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Twenty-point Gauss quadrature of force and stiffness between neighbouring depths, halving the intervals with the root.
+    /// Gauss quadrature of force and stiffness in steps of the root of the depth.
     #[test]
     fn energy_and_force_are_integrals_to_round_off() {
         const NODES: [(f64, f64); 5] = [
