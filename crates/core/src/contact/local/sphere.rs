@@ -3,12 +3,16 @@
 //! Sneddon (The relation between load and penetration in the axisymmetric Boussinesq problem for a punch of arbitrary
 //! profile, 1965, section 5): with the contact radius `a`, `x = a/R` and `t = artanh x`,
 //!
-//!     d = R x t          F = E* R^2 [(1 + x^2) t - x]          dF/dd = 2 E* a
+//! ```text
+//! d = R x t          F = E* R^2 [(1 + x^2) t - x]          dF/dd = 2 E* a
+//! ```
 //!
 //! Hertz's parabola is the limit of small `x`. The parameter solved for is `t`, not `a`: `d = R t tanh t` keeps its relative
 //! precision at every depth, while `1 - a/R` falls below round-off at `d = 18 R`. The energy is
 //!
-//!     U = int F dd = E* R^3 [f q - x q^2 + int_0^x (s artanh s)^2 ds],    q = d/R, f = F/(E* R^2)
+//! ```text
+//! U = int F dd = E* R^3 [f q - x q^2 + int_0^x (s artanh s)^2 ds],    q = d/R, f = F/(E* R^2)
+//! ```
 //!
 //! by parts twice, with `dF = 2 E* a dd`. Below `x = 1/2` these differences cancel, and power series in `x^2` take over.
 
