@@ -3,8 +3,10 @@
 //! Every law here gives a stored energy and its exact derivatives. Lengths in m, forces in N, moduli in Pa; the approach
 //! `d` is how far the tool's tip would reach below the undeformed surface.
 
+mod ellipse;
 mod modulus;
 mod sphere;
 
+pub use ellipse::{EllipseContact, indent_ellipse};
 pub use modulus::effective_modulus;
 pub use sphere::{SphereContact, indent_sphere};
