@@ -10,6 +10,7 @@ mod moments;
 mod patch;
 mod quadrature;
 mod refusal;
+pub mod shape;
 mod touchable;
 
 pub use closest::{SurfacePoint, SurfaceQuery};
