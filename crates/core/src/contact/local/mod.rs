@@ -3,6 +3,7 @@
 //! Every law here gives a stored energy and its exact derivatives. Lengths in m, forces in N, moduli in Pa; the approach
 //! `d` is how far the tool's tip would reach below the undeformed surface.
 
+pub mod cells;
 mod ellipse;
 mod modulus;
 mod sphere;

@@ -219,4 +219,4 @@ fn umbilic(normal: DVec3, curvature: f64) -> PrincipalCurvatures {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

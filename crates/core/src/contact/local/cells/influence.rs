@@ -1,0 +1,134 @@
+//! Displacement of a half-space under uniform pressure on the cells of a regular grid.
+//!
+//! Love (The stress produced in a semi-infinite solid by pressure on part of the boundary, 1929; Johnson, Contact
+//! Mechanics, 1985, eq. 3.25): a pressure `p` on the rectangle `|x| < a, |y| < b` lifts the surface at `(x, y)` by
+//!
+//! ```text
+//! u = p/(pi E*) [F(x + a, y + b) - F(x - a, y + b) - F(x + a, y - b) + F(x - a, y - b)]
+//! F(x, y) = x asinh(y/|x|) + y asinh(x/|y|)
+//! ```
+//!
+//! `F` is homogeneous: in cells of sides `hx` and `hy = alpha hx`, with forces in place of pressures,
+//! `u_i = sum_j T(i - j) f_j/(pi E* sqrt(hx hy))`, where `T` depends on `alpha` only. `T` is symmetric to the bit.
+
+use pulp::{Arch, NullaryFnOnce};
+
+/// Most cells along a side of the grid.
+pub const MAX_CELLS: usize = 16;
+/// Offsets between cells of a row, from `-15` to `15`, filled up to a whole number of vectors.
+const OFFSETS: usize = 2 * MAX_CELLS;
+
+/// A number for each cell, row by row.
+pub type Grid = [[f64; MAX_CELLS]; MAX_CELLS];
+
+/// `T` or a derivative of it by distance of rows and offset of columns plus 15.
+pub type Kernel = [[f64; OFFSETS]; MAX_CELLS];
+
+/// Influence of cells on each other.
+#[derive(Clone, Debug)]
+pub struct Influence {
+    arch: Arch,
+    aspect: f64,
+    kernel: Kernel,
+    kernel_by_aspect: Kernel,
+}
+
+impl Influence {
+    /// Of square cells.
+    pub fn new() -> Self {
+        let zero = [[0.0; OFFSETS]; MAX_CELLS];
+        let mut influence = Self { arch: Arch::new(), aspect: f64::NAN, kernel: zero, kernel_by_aspect: zero };
+        influence.set_aspect(1.0);
+        influence
+    }
+
+    /// Prepares cells of an aspect `hy/hx`; costs nothing where it has not changed.
+    pub fn set_aspect(&mut self, aspect: f64) {
+        if aspect == self.aspect {
+            return;
+        }
+        self.aspect = aspect;
+        // Values and derivatives by y of F at the corners (i + 1/2, aspect (j + 1/2)).
+        let (mut value, mut by_y) = ([[0.0; MAX_CELLS]; MAX_CELLS], [[0.0; MAX_CELLS]; MAX_CELLS]);
+        for j in 0..MAX_CELLS {
+            let y = aspect * (j as f64 + 0.5);
+            for i in 0..MAX_CELLS {
+                let x = i as f64 + 0.5;
+                let r = x.hypot(y);
+                by_y[j][i] = ((x + r) / y).ln();
+                value[j][i] = x * ((y + r) / x).ln() + y * by_y[j][i];
+            }
+        }
+        let root = aspect.sqrt();
+        for j in 0..MAX_CELLS {
+            for i in 0..MAX_CELLS {
+                // F is odd in x and in y, its derivative by y even in y.
+                let (left, below) = (i.checked_sub(1), j.checked_sub(1));
+                let at = |f: &Grid, i: Option<usize>, j: Option<usize>, odd: f64| {
+                    let sign = if i.is_none() { -1.0 } else { 1.0 } * if j.is_none() { odd } else { 1.0 };
+                    sign * f[j.unwrap_or(0)][i.unwrap_or(0)]
+                };
+                let (right, above) = (Some(i), Some(j));
+                let sum =
+                    at(&value, right, above, -1.0) - at(&value, left, above, -1.0) - at(&value, right, below, -1.0)
+                        + at(&value, left, below, -1.0);
+                let upper = (j as f64 + 0.5) * (at(&by_y, right, above, 1.0) - at(&by_y, left, above, 1.0));
+                let lower = (j as f64 - 0.5) * (at(&by_y, right, below, 1.0) - at(&by_y, left, below, 1.0));
+                let (influence, by_aspect) = (sum / root, (upper - lower - 0.5 * sum / aspect) / root);
+                for column in [MAX_CELLS - 1 + i, MAX_CELLS - 1 - i] {
+                    self.kernel[j][column] = influence;
+                    self.kernel_by_aspect[j][column] = by_aspect;
+                }
+            }
+        }
+    }
+
+    /// `T q` on the first `cells` rows.
+    pub fn product(&self, cells: usize, q: &Grid, out: &mut Grid) {
+        self.arch.dispatch(Product { kernel: &self.kernel, cells, q, out });
+    }
+
+    /// `dT/dalpha q` on the first `cells` rows.
+    pub fn product_by_aspect(&self, cells: usize, q: &Grid, out: &mut Grid) {
+        self.arch.dispatch(Product { kernel: &self.kernel_by_aspect, cells, q, out });
+    }
+}
+
+/// The product as a struct: a closure might be compiled for the narrowest vectors.
+struct Product<'a> {
+    kernel: &'a Kernel,
+    cells: usize,
+    q: &'a Grid,
+    out: &'a mut Grid,
+}
+
+impl NullaryFnOnce for Product<'_> {
+    type Output = ();
+
+    /// Two rows at once hide the latency of additions. Cells that carry nothing are passed over.
+    #[inline(always)]
+    fn call(self) {
+        for pair in 0..self.cells.div_ceil(2) {
+            let (first, second) = (2 * pair, 2 * pair + 1);
+            let (mut a, mut b) = ([0.0; MAX_CELLS], [0.0; MAX_CELLS]);
+            for (row, sources) in self.q.iter().enumerate().take(self.cells) {
+                let (near, far) = (&self.kernel[first.abs_diff(row)], &self.kernel[second.abs_diff(row)]);
+                for (column, &source) in sources.iter().enumerate().take(self.cells) {
+                    if source == 0.0 {
+                        continue;
+                    }
+                    let start = MAX_CELLS - 1 - column;
+                    let (near, far) = (&near[start..start + MAX_CELLS], &far[start..start + MAX_CELLS]);
+                    for i in 0..MAX_CELLS {
+                        a[i] += source * near[i];
+                    }
+                    for i in 0..MAX_CELLS {
+                        b[i] += source * far[i];
+                    }
+                }
+            }
+            self.out[first] = a;
+            self.out[second] = b;
+        }
+    }
+}
