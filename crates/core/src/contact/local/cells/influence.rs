@@ -11,6 +11,7 @@
 //! `F` is homogeneous: in cells of sides `hx` and `hy = alpha hx`, with forces in place of pressures,
 //! `u_i = sum_j T(i - j) f_j/(pi E* sqrt(hx hy))`, where `T` depends on `alpha` only. `T` is symmetric to the bit.
 
+use glam::{DMat4, DVec4};
 use pulp::{Arch, NullaryFnOnce};
 
 /// Most cells along a side of the grid.
@@ -31,13 +32,15 @@ pub struct Influence {
     aspect: f64,
     kernel: Kernel,
     kernel_by_aspect: Kernel,
+    stencil: [[f64; 2]; 2],
 }
 
 impl Influence {
     /// Of square cells.
     pub fn new() -> Self {
         let zero = [[0.0; OFFSETS]; MAX_CELLS];
-        let mut influence = Self { arch: Arch::new(), aspect: f64::NAN, kernel: zero, kernel_by_aspect: zero };
+        let mut influence =
+            Self { arch: Arch::new(), aspect: f64::NAN, kernel: zero, kernel_by_aspect: zero, stencil: [[0.0; 2]; 2] };
         influence.set_aspect(1.0);
         influence
     }
@@ -59,7 +62,13 @@ impl Influence {
                 value[j][i] = x * ((y + r) / x).ln() + y * by_y[j][i];
             }
         }
-        let root = aspect.sqrt();
+        self.fill(&value, &by_y);
+        self.stencil = self.local_inverse();
+    }
+
+    /// Kernels from values and derivatives at the corners.
+    fn fill(&mut self, value: &Grid, by_y: &Grid) {
+        let (aspect, root) = (self.aspect, self.aspect.sqrt());
         for j in 0..MAX_CELLS {
             for i in 0..MAX_CELLS {
                 // F is odd in x and in y, its derivative by y even in y.
@@ -69,11 +78,10 @@ impl Influence {
                     sign * f[j.unwrap_or(0)][i.unwrap_or(0)]
                 };
                 let (right, above) = (Some(i), Some(j));
-                let sum =
-                    at(&value, right, above, -1.0) - at(&value, left, above, -1.0) - at(&value, right, below, -1.0)
-                        + at(&value, left, below, -1.0);
-                let upper = (j as f64 + 0.5) * (at(&by_y, right, above, 1.0) - at(&by_y, left, above, 1.0));
-                let lower = (j as f64 - 0.5) * (at(&by_y, right, below, 1.0) - at(&by_y, left, below, 1.0));
+                let sum = at(value, right, above, -1.0) - at(value, left, above, -1.0) - at(value, right, below, -1.0)
+                    + at(value, left, below, -1.0);
+                let upper = (j as f64 + 0.5) * (at(by_y, right, above, 1.0) - at(by_y, left, above, 1.0));
+                let lower = (j as f64 - 0.5) * (at(by_y, right, below, 1.0) - at(by_y, left, below, 1.0));
                 let (influence, by_aspect) = (sum / root, (upper - lower - 0.5 * sum / aspect) / root);
                 for column in [MAX_CELLS - 1 + i, MAX_CELLS - 1 - i] {
                     self.kernel[j][column] = influence;
@@ -81,6 +89,38 @@ impl Influence {
                 }
             }
         }
+    }
+
+    /// Rows of the inverse of `T` on a cell and its eight neighbours, by distance in rows and in columns.
+    ///
+    /// `T` falls off with distance as `1/r`, so its inverse like the root of the Laplacian is nearly local.
+    fn local_inverse(&self) -> [[f64; 2]; 2] {
+        let t = |i: usize, j: usize| self.kernel[j][MAX_CELLS - 1 + i];
+        let folded = DMat4::from_cols_array(&[
+            t(0, 0),
+            t(1, 0),
+            t(0, 1),
+            t(1, 1),
+            2.0 * t(1, 0),
+            t(0, 0) + t(2, 0),
+            2.0 * t(1, 1),
+            t(0, 1) + t(2, 1),
+            2.0 * t(0, 1),
+            2.0 * t(1, 1),
+            t(0, 0) + t(0, 2),
+            t(1, 0) + t(1, 2),
+            4.0 * t(1, 1),
+            2.0 * (t(0, 1) + t(2, 1)),
+            2.0 * (t(1, 0) + t(1, 2)),
+            t(0, 0) + t(2, 0) + t(0, 2) + t(2, 2),
+        ]);
+        let [middle, beside, above, across] = (folded.inverse() * DVec4::X).to_array();
+        [[middle, beside], [above, across]]
+    }
+
+    /// An approximate `T^-1 r`, symmetric and positive definite on any set of cells, where `r` is zero outside of the set.
+    pub fn precondition(&self, cells: usize, r: &Grid, out: &mut Grid) {
+        self.arch.dispatch(Stencil { stencil: &self.stencil, cells, r, out });
     }
 
     /// `T q` on the first `cells` rows.
@@ -129,6 +169,41 @@ impl NullaryFnOnce for Product<'_> {
             }
             self.out[first] = a;
             self.out[second] = b;
+        }
+    }
+}
+
+/// Sums over neighbours.
+struct Stencil<'a> {
+    stencil: &'a [[f64; 2]; 2],
+    cells: usize,
+    r: &'a Grid,
+    out: &'a mut Grid,
+}
+
+impl NullaryFnOnce for Stencil<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        const NONE: &[f64; MAX_CELLS] = &[0.0; MAX_CELLS];
+        let [[middle, beside], [above, across]] = *self.stencil;
+        for j in 0..self.cells {
+            let (row, next) = (&self.r[j], if j + 1 < self.cells { &self.r[j + 1] } else { NONE });
+            let before = if j > 0 { &self.r[j - 1] } else { NONE };
+            // Rows above and below count alike.
+            let mut rows = [0.0; MAX_CELLS + 2];
+            let mut own = [0.0; MAX_CELLS + 2];
+            for i in 0..MAX_CELLS {
+                rows[i + 1] = before[i] + next[i];
+                own[i + 1] = row[i];
+            }
+            for i in 0..MAX_CELLS {
+                self.out[j][i] = middle * own[i + 1]
+                    + beside * (own[i] + own[i + 2])
+                    + above * rows[i + 1]
+                    + across * (rows[i] + rows[i + 2]);
+            }
         }
     }
 }

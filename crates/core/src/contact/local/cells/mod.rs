@@ -17,7 +17,7 @@ use grid::{PosedTool, Rectangle};
 pub use influence::MAX_CELLS;
 use influence::{Grid, Influence};
 use pressure::PressureScratch;
-pub use pressure::{Convergence, MAX_ITERATIONS, TOLERANCE};
+pub use pressure::{Convergence, MAX_PRODUCTS, TOLERANCE};
 
 /// How many cells a side of the grid has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

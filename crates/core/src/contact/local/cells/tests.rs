@@ -73,7 +73,18 @@ fn wrench_is_gradient() {
         ("punchflat", ToolShape::punch(0.006, 0.001).unwrap(), DVec3::new(0.0, 0.0, 0.5)),
         ("punch", ToolShape::punch(0.006, 0.001).unwrap(), DVec3::new(0.05, 0.02, 0.5)),
         ("punchtilt", ToolShape::punch(0.006, 0.001).unwrap(), DVec3::new(0.4, 0.1, 0.5)),
-        ("surface", ToolShape::Surface(Box::new({ let (v,t) = crate::contact::shape::tests::sphere_mesh(0.008, 4); super::super::super::shape::SurfaceShape::new(&v.iter().map(|v| *v * DVec3::new(1.5,1.0,0.7)).collect::<Vec<_>>(), &t).unwrap() })), DVec3::new(0.3, 0.2, 0.5)),
+        (
+            "surface",
+            ToolShape::Surface(Box::new({
+                let (v, t) = crate::contact::shape::tests::sphere_mesh(0.008, 4);
+                super::super::super::shape::SurfaceShape::new(
+                    &v.iter().map(|v| *v * DVec3::new(1.5, 1.0, 0.7)).collect::<Vec<_>>(),
+                    &t,
+                )
+                .unwrap()
+            })),
+            DVec3::new(0.3, 0.2, 0.5),
+        ),
     ];
     for (name, shape, angles) in &cases {
         for curvature in [[0.0; 3], [20.0, 5.0, 10.0]] {
@@ -81,14 +92,32 @@ fn wrench_is_gradient() {
                 let problem = turned(shape, *angles, depth, curvature);
                 let contact = cold(&problem);
                 let energy = |v: DVec3, w: DVec3| {
-                    let pose = ToolPose { position: problem.pose.position + v, rotation: DQuat::from_scaled_axis(w) * problem.pose.rotation };
+                    let pose = ToolPose {
+                        position: problem.pose.position + v,
+                        rotation: DQuat::from_scaled_axis(w) * problem.pose.rotation,
+                    };
                     cold(&CellProblem { pose, ..problem }).energy
                 };
                 let (h, ha) = (1e-7, 1e-5);
-                let force = DVec3::from_array(DVec3::AXES.map(|e| (energy(-h * e, DVec3::ZERO) - energy(h * e, DVec3::ZERO)) / (2.0 * h)));
-                let torque = DVec3::from_array(DVec3::AXES.map(|e| (energy(DVec3::ZERO, -ha * e) - energy(DVec3::ZERO, ha * e)) / (2.0 * ha)));
+                let force = DVec3::from_array(
+                    DVec3::AXES.map(|e| (energy(-h * e, DVec3::ZERO) - energy(h * e, DVec3::ZERO)) / (2.0 * h)),
+                );
+                let torque = DVec3::from_array(
+                    DVec3::AXES.map(|e| (energy(DVec3::ZERO, -ha * e) - energy(DVec3::ZERO, ha * e)) / (2.0 * ha)),
+                );
                 let arm = contact.force.length() * 0.006;
-                println!("{name} k={:?} d={depth}: F {} {:?} err {:.1e} torque err {:.1e}  tau {} T {} it {:?} k {}", curvature[0], contact.normal_force, contact.force, force.distance(contact.force) / contact.force.length(), torque.distance(contact.torque) / arm, contact.torque, torque, contact.convergence, contact.stiffness);
+                println!(
+                    "{name} k={:?} d={depth}: F {} {:?} err {:.1e} torque err {:.1e}  tau {} T {} it {:?} k {}",
+                    curvature[0],
+                    contact.normal_force,
+                    contact.force,
+                    force.distance(contact.force) / contact.force.length(),
+                    torque.distance(contact.torque) / arm,
+                    contact.torque,
+                    torque,
+                    contact.convergence,
+                    contact.stiffness
+                );
             }
         }
     }
