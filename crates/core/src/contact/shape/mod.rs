@@ -149,14 +149,15 @@ impl ToolShape {
         })
     }
 
-    /// Where the line `origin + s direction` (a unit vector), from an origin outside, first enters the shape.
-    pub fn line_entry(&self, origin: DVec3, direction: DVec3) -> Option<LineEntry> {
+    /// Where the line `origin + s direction` (a unit vector), from an origin outside, first enters the shape. Entries beyond
+    /// `reach` may be left out.
+    pub fn line_entry(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<LineEntry> {
         match *self {
             Self::Sphere { radius } => ellipsoid::line_entry(DVec3::splat(radius), origin, direction),
             Self::Ellipsoid { semi_axes } => ellipsoid::line_entry(semi_axes, origin, direction),
             Self::Capsule { radius, half_length } => capsule::line_entry(radius, half_length, origin, direction),
             Self::Punch { radius, rounding } => punch::line_entry(radius, rounding, origin, direction),
-            Self::Surface(ref surface) => surface.line_entry(origin, direction),
+            Self::Surface(ref surface) => surface.line_entry(origin, direction, reach),
         }
     }
 

@@ -23,6 +23,8 @@ const PREFILTER_SWEEPS: usize = 12;
 const SUPPORT_DIRECTIONS: usize = 256;
 /// Steps along a line until it enters; a line that grazes the surface for longer is taken as passing by.
 const MAX_LINE_STEPS: usize = 32;
+/// Newton's step along a line, over the size of the surface, that is the last one.
+const LAST_STEP: f64 = 1e-6;
 /// Fewest triangles that close a surface.
 const LEAST_TRIANGLES: usize = 4;
 
@@ -131,27 +133,25 @@ impl SurfaceShape {
 
     /// Where a line from an origin outside enters: by the distance itself as long as it is large, for nothing lies within it,
     /// then by Newton's steps no longer than two grid cells.
-    pub(super) fn line_entry(&self, origin: DVec3, direction: DVec3) -> Option<LineEntry> {
+    pub(super) fn line_entry(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<LineEntry> {
         // The ball that holds the surface bounds the search.
         let middle = (self.centre - origin).dot(direction);
-        let chord =
-            self.bounding_radius * self.bounding_radius - (origin + middle * direction).distance_squared(self.centre);
-        if !(chord > 0.0) {
-            return None;
-        }
-        let mut distance = (middle - chord.sqrt()).max(0.0);
-        let last = middle + chord.sqrt();
+        let squared_aside = (origin + middle * direction).distance_squared(self.centre);
+        let half_chord = (self.bounding_radius * self.bounding_radius - squared_aside).max(0.0).sqrt();
+        let last = reach.min(middle + half_chord);
+        let mut distance = (middle - half_chord).max(0.0);
         for _ in 0..MAX_LINE_STEPS {
-            let (value, gradient) = self.signed_distance(origin + distance * direction);
-            let slope = gradient.dot(direction);
-            if value.abs() < 1e-9 * self.bounding_radius {
-                return Some(LineEntry { distance, normal: gradient });
-            }
-            let newton = if slope < 0.0 { -value / slope } else { f64::INFINITY };
-            distance += newton.abs().min(2.0 * self.spacing).max(value.abs()).copysign(value);
-            if distance > last {
+            if distance >= last {
                 return None;
             }
+            let (value, gradient) = self.signed_distance(origin + distance * direction);
+            let slope = gradient.dot(direction);
+            let newton = if slope < 0.0 { -value / slope } else { f64::INFINITY };
+            // The next step would change the distance by the square of this one.
+            if newton.abs() < LAST_STEP * self.bounding_radius {
+                return Some(LineEntry { distance: distance + newton, normal: gradient });
+            }
+            distance += newton.abs().min(2.0 * self.spacing).max(value.abs()).copysign(value);
         }
         None
     }

@@ -125,7 +125,8 @@ fn curvatures_are_those_of_the_boundary() {
                 let (curvature, along) = (told.curvatures[k], told.directions[k]);
                 assert!(along.dot(normal).abs() < 1e-12);
                 let h = 1e-3 / curvature;
-                let fall = |by: f64| shape.line_entry(support + by * along + normal, -normal).unwrap().distance - 1.0;
+                let fall =
+                    |by: f64| shape.line_entry(support + by * along + normal, -normal, 2.0).unwrap().distance - 1.0;
                 let measured = (fall(h) + fall(-h)) / (h * h);
                 assert!((measured / curvature - 1.0).abs() < 1e-3, "{shape:?} {normal}: {measured} {curvature}");
             }
@@ -152,7 +153,7 @@ fn lines_enter_where_the_distance_is_first_zero() {
                 s += shape.signed_distance(origin + s * direction).0.min(shape.bounding_radius());
             }
             let passes = s > 6.0 * shape.bounding_radius();
-            let entry = shape.line_entry(origin, direction);
+            let entry = shape.line_entry(origin, direction, 1.0);
             assert_eq!(entry.is_none(), passes, "{shape:?} {k}");
             if let Some(entry) = entry {
                 met += 1;
@@ -186,7 +187,7 @@ fn a_sphere_of_triangles_is_a_sphere() {
                 assert!(error < 1.2e-3 * radius, "{k}: {distance}");
                 assert!(gradient.distance(direction) < 0.03, "{k}: {}", gradient.distance(direction));
             }
-            let entry = shape.line_entry(2.0 * radius * direction, -direction).unwrap();
+            let entry = shape.line_entry(2.0 * radius * direction, -direction, 1.0).unwrap();
             assert!((entry.distance - radius).abs() < 1.2e-3 * radius);
             // Kept vertices lie within 0.17 of any direction.
             assert!((shape.support(direction).dot(direction) / radius - 1.0).abs() < 0.015);

@@ -13,12 +13,13 @@ use super::influence::{Grid, Influence, MAX_CELLS};
 pub const MAX_PRODUCTS: usize = 40;
 /// Overlap or gap left under a tool, over its depth, at which the solution is accepted.
 pub const TOLERANCE: f64 = 1e-7;
-/// Steps towards the stiffness of a punch; two leave 1 % from a uniform start.
-const PUNCH_STEPS: usize = 3;
+/// Steps towards the stiffness of a punch; they leave 1e-3 from a uniform start.
+const PUNCH_STEPS: usize = 2;
 
-/// Memory of a solution.
+/// Memory of a solution; beyond the cells in use, pressures and directions are zero.
 #[derive(Clone, Debug)]
 pub struct PressureScratch {
+    cells: usize,
     residual: Grid,
     direction: Grid,
     image: Grid,
@@ -47,12 +48,15 @@ impl PressureScratch {
     /// Zeros.
     pub fn new() -> Self {
         let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-        Self { residual: zero, direction: zero, image: zero, trial: zero, trial_image: zero }
+        Self { cells: MAX_CELLS, residual: zero, direction: zero, image: zero, trial: zero, trial_image: zero }
     }
 
     /// Solves for `q` (m), whose values are where to start. Nothing is carried where `gap` (m) is not negative: the surface
     /// under pressure is nowhere raised. `depth` is the largest overlap, m.
     pub fn solve(&mut self, influence: &Influence, cells: usize, gap: &Grid, depth: f64, q: &mut Grid) -> Convergence {
+        if cells != self.cells {
+            *self = Self { cells, ..Self::new() };
+        }
         let mut told = Convergence { products: 1, miss: 0.0 };
         self.start(influence, cells, gap, q);
         let mut scaled_before = f64::INFINITY;
@@ -90,7 +94,7 @@ impl PressureScratch {
             }
         }
         influence.product(cells, q, &mut self.image);
-        let (work, energy) = (-total(cells, q, Some(gap)), total(cells, q, Some(&self.image)));
+        let (work, energy) = (-dot(q, gap), dot(q, &self.image));
         let scale = if energy > 0.0 { work / energy } else { 0.0 };
         for j in 0..cells {
             for i in 0..cells {
@@ -143,7 +147,7 @@ impl PressureScratch {
             }
         }
         influence.precondition(cells, &self.trial, &mut self.trial_image);
-        let scaled = total(cells, &self.trial, Some(&self.trial_image));
+        let scaled = dot(&self.trial, &self.trial_image);
         let ratio = scaled / *scaled_before;
         *scaled_before = scaled;
         for j in 0..cells {
@@ -158,8 +162,8 @@ impl PressureScratch {
     /// Length of the step against the direction that lowers the energy most; the direction's image is in `image`.
     fn step_along_direction(&mut self, influence: &Influence, cells: usize) -> f64 {
         influence.product(cells, &self.direction, &mut self.image);
-        let along = total(cells, &self.direction, Some(&self.residual));
-        let curvature = total(cells, &self.direction, Some(&self.image));
+        let along = dot(&self.direction, &self.residual);
+        let curvature = dot(&self.direction, &self.image);
         if curvature > 0.0 { along / curvature } else { 0.0 }
     }
 
@@ -218,8 +222,8 @@ impl PressureScratch {
     }
 
     /// `q.T q` of the solution, m^2.
-    pub fn energy(&self, cells: usize, gap: &Grid, q: &Grid) -> f64 {
-        total(cells, q, Some(&self.residual)) - total(cells, q, Some(gap))
+    pub fn energy(&self, gap: &Grid, q: &Grid) -> f64 {
+        dot(q, &self.residual) - dot(q, gap)
     }
 
     /// `1.T^-1 1` over the cells that carry pressure: the stiffness of a flat punch that covers them, which is that of the
@@ -238,11 +242,11 @@ impl PressureScratch {
             }
         }
         influence.product(cells, p, &mut self.image);
-        let (sum, energy) = (total(cells, p, None), total(cells, p, Some(&self.image)));
-        if !(sum > 0.0 && energy > 0.0) {
+        let (sum_of_p, energy) = (sum(p), dot(p, &self.image));
+        if !(sum_of_p > 0.0 && energy > 0.0) {
             return 0.0;
         }
-        let scale = sum / energy;
+        let scale = sum_of_p / energy;
         for j in 0..cells {
             for i in 0..cells {
                 p[j][i] *= scale;
@@ -260,17 +264,22 @@ impl PressureScratch {
             }
         }
         // 2 sum(p) - p.(residual + 1)
-        total(cells, p, None) - total(cells, p, Some(&self.residual))
+        sum(p) - dot(p, &self.residual)
     }
 }
 
-/// Sum of the products of two grids, or of the first one's entries.
-fn total(cells: usize, a: &Grid, b: Option<&Grid>) -> f64 {
-    let mut sum = 0.0;
-    for j in 0..cells {
-        for i in 0..cells {
-            sum += if a[j][i] == 0.0 { 0.0 } else { a[j][i] * b.map_or(1.0, |b| b[j][i]) };
+/// Sum of the products of two grids, column by column in a fixed order.
+pub fn dot(a: &Grid, b: &Grid) -> f64 {
+    let mut sums = [0.0; MAX_CELLS];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..MAX_CELLS {
+            sums[i] += a[i] * b[i];
         }
     }
-    sum
+    sums.iter().sum()
+}
+
+/// Sum of all entries.
+fn sum(a: &Grid) -> f64 {
+    a.iter().flatten().sum()
 }

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::grid::PosedTool;
 use super::influence::Grid;
+use super::pressure::dot;
 use super::{CellContact, CellScratch, Cells, OsculatingSurface};
 
 /// Normals flatter than this do not press: the wall of a tool is no contact along the normal.
@@ -32,9 +33,10 @@ impl CellScratch {
                 self.gap[j][i] = 0.0;
                 // From the plane through the tool's lowest point.
                 let origin = to_tool * (at.with_z(-depth) - tool.tip);
-                let Some(entry) = tool.shape.line_entry(origin, upwards) else { continue };
+                let height = depth + surface.height(at);
+                let Some(entry) = tool.shape.line_entry(origin, upwards, height) else { continue };
                 let normal = tool.rotation * entry.normal;
-                let gap = entry.distance - depth - surface.height(at);
+                let gap = entry.distance - height;
                 if gap < 0.0 && normal.z < -LEAST_NORMAL {
                     self.gap[j][i] = gap;
                     self.slopes[0][j][i] = -normal.dot(axes[0]) / normal.z;
@@ -79,7 +81,7 @@ impl CellScratch {
                 moment += force * at.with_z(height);
             }
         }
-        let elastic = cells.force_scale * self.solver.energy(cells.count, &self.gap, q);
+        let elastic = cells.force_scale * self.solver.energy(&self.gap, q);
         contact.energy = work - 0.5 * elastic;
         self.add_influence(cells, q, elastic, &mut by_place);
         by_place.move_with_tool(tool, cells, &mut contact);
@@ -94,13 +96,7 @@ impl CellScratch {
     /// The influence `T/(pi E* sqrt(hx hy))` changes with the cells' sides, by the root and by the aspect `hy/hx`.
     fn add_influence(&mut self, cells: &Cells, q: &Grid, elastic: f64, by_place: &mut ByPlace) {
         self.influence.product_by_aspect(cells.count, q, &mut self.image);
-        let mut by_aspect = 0.0;
-        for j in 0..cells.count {
-            for i in 0..cells.count {
-                by_aspect += q[j][i] * self.image[j][i];
-            }
-        }
-        by_aspect *= 0.5 * cells.force_scale * cells.sides[1] / cells.sides[0];
+        let by_aspect = dot(q, &self.image) * 0.5 * cells.force_scale * cells.sides[1] / cells.sides[0];
         by_place.side[0] += (0.25 * elastic + by_aspect) / cells.sides[0];
         by_place.side[1] += (0.25 * elastic - by_aspect) / cells.sides[1];
     }
