@@ -10,8 +10,10 @@ use glam::{DMat3, DVec3};
 
 use super::super::super::shape::ToolShape;
 
-/// Halvings of the right angle in which the direction of a side's support lies, down to 2e-8.
-const SUPPORT_STEPS: usize = 26;
+/// Most steps towards the direction of a side's support.
+const MAX_SUPPORT_STEPS: usize = 50;
+/// How far an arc of the tool may rise over its chord to be straight, over the tool's size: the arc is then 3e-7 long.
+const STRAIGHT: f64 = 1e-14;
 /// Tools whose long axis stands more upright than this sine keep the grid along the first tangent.
 const LEAST_SINE: f64 = 1e-3;
 
@@ -76,21 +78,33 @@ impl PosedTool<'_> {
         if above.z <= 0.0 {
             return Side { coordinate: above.dot(direction), gradient: direction, support: above };
         }
-        // Supports sink as their direction turns downwards; it is halved between the last two.
+        // Supports sink as their direction turns downwards. The next direction is across the chord of the last two, which ends
+        // on a polyhedron, and in between by their heights, which ends elsewhere.
         let (mut level, mut steep) = (direction, DVec3::NEG_Z);
         let mut below = self.support(steep);
-        for _ in 0..SUPPORT_STEPS {
-            let middle = (level + steep).normalize();
-            let support = self.support(middle);
-            if support.z > 0.0 {
-                (level, above) = (middle, support);
-            } else {
-                (steep, below) = (middle, support);
+        let mut chord = above - below;
+        let straight = STRAIGHT * self.shape.bounding_radius();
+        for step in 0..MAX_SUPPORT_STEPS {
+            let across = direction - DVec3::Z * (chord.dot(direction) / chord.z);
+            let by_height = level * -below.z + steep * above.z;
+            let next = if step % 2 == 0 { across } else { by_height }.normalize();
+            let support = self.support(next);
+            if support.z.abs() <= straight {
+                let gradient = next / next.dot(direction);
+                return Side { coordinate: direction.dot(support), gradient, support };
             }
+            // Nothing lies beyond the chord.
+            if step % 2 == 0 && (support - above).dot(next) <= straight {
+                break;
+            }
+            if support.z > 0.0 {
+                (level, above) = (next, support);
+            } else {
+                (steep, below) = (next, support);
+            }
+            chord = above - below;
         }
-        // Between the two the body is straight to round-off: an arc that is short, or a flat part on which the support jumps
-        // from one end to the other. Its slope is `mu`, and it meets the plane in between.
-        let chord = above - below;
+        // The chord's slope is `mu`, and it meets the plane between its ends.
         let support = below - chord * (below.z / chord.z);
         let gradient = direction - DVec3::Z * (chord.dot(direction) / chord.z);
         Side { coordinate: direction.dot(support), gradient, support }
