@@ -125,8 +125,8 @@ impl ToolShape {
         }
     }
 
-    /// The point that reaches farthest in a direction of any length; of a surface, that of its convex hull to the
-    /// precision of 256 directions.
+    /// The point that reaches farthest in a direction of any length; of a surface from a file, one that reaches as far or, by
+    /// up to 2 % of its size, farther.
     pub fn support(&self, direction: DVec3) -> DVec3 {
         match *self {
             Self::Sphere { radius } => radius * direction.normalize_or_zero(),

@@ -21,6 +21,8 @@ const MARGIN: f64 = 2.0;
 const PREFILTER_SWEEPS: usize = 12;
 /// Directions in which the farthest vertices are kept.
 const SUPPORT_DIRECTIONS: usize = 256;
+/// How far the splines may bulge out of a surface, in grid cells.
+const OVERSHOOT: f64 = 0.05;
 /// Steps along a line until it enters; a line that grazes the surface for longer is taken as passing by.
 const MAX_LINE_STEPS: usize = 32;
 /// Newton's step along a line, over the size of the surface, that is the last one.
@@ -29,7 +31,7 @@ const LAST_STEP: f64 = 1e-6;
 const LEAST_TRIANGLES: usize = 4;
 
 /// A closed surface in a tool's own frame.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct SurfaceShape {
     /// Position of the first node, m.
     corner: DVec3,
@@ -40,9 +42,19 @@ pub struct SurfaceShape {
     coefficients: Vec<f32>,
     /// Vertices that reach farthest in some direction, m.
     extreme_points: Vec<DVec3>,
+    /// No point of the surface lies farther outside of their hull, m.
+    hull_margin: f64,
     centre: DVec3,
     bounding_radius: f64,
     long_axis: DVec3,
+}
+
+impl std::fmt::Debug for SurfaceShape {
+    /// Without its thousands of numbers.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let nodes = &self.nodes;
+        f.debug_struct("SurfaceShape").field("spacing", &self.spacing).field("nodes", nodes).finish_non_exhaustive()
+    }
 }
 
 impl SurfaceShape {
@@ -62,12 +74,14 @@ impl SurfaceShape {
         let nodes = ((high - low) / spacing).to_array().map(|cells| (cells + 2.0 * MARGIN).ceil() as usize + 1);
         let corner = low - DVec3::splat(MARGIN * spacing);
         let centre = 0.5 * (low + high);
+        let extreme_points = extreme_points(used);
         Ok(Self {
+            hull_margin: hull_margin(used, &extreme_points) + OVERSHOOT * spacing,
             corner,
             spacing,
             nodes,
             coefficients: prefiltered(&distances(&mesh, corner, spacing, nodes), nodes),
-            extreme_points: extreme_points(used),
+            extreme_points,
             centre,
             bounding_radius: used().map(|v| v.distance(centre)).fold(0.0, f64::max),
             long_axis: long_axis(vertices, &triangles),
@@ -119,7 +133,8 @@ impl SurfaceShape {
         (value, gradient / self.spacing)
     }
 
-    /// Farthest of the vertices that are kept.
+    /// Farthest of the vertices that are kept, moved on by what the others may lie beyond them: a plane that this point does
+    /// not reach, nothing reaches.
     pub(super) fn support(&self, direction: DVec3) -> DVec3 {
         let mut farthest = (f64::NEG_INFINITY, DVec3::ZERO);
         for &point in &self.extreme_points {
@@ -128,7 +143,7 @@ impl SurfaceShape {
                 farthest = (reach, point);
             }
         }
-        farthest.1
+        farthest.1 + self.hull_margin * direction.normalize_or_zero()
     }
 
     /// Where a line from an origin outside enters: by the distance itself as long as it is large, for nothing lies within it,
@@ -254,14 +269,20 @@ fn prefiltered(values: &[f64], nodes: [usize; 3]) -> Vec<f32> {
     solved.into_iter().map(|c| c as f32).collect()
 }
 
-/// Vertices that reach farthest in directions spread evenly over a sphere, along a spiral of the golden angle.
-fn extreme_points<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DVec3> {
+/// Directions spread evenly over a sphere, along a spiral of the golden angle.
+fn spiral(count: usize) -> impl Iterator<Item = DVec3> {
     let golden_angle = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    let mut points: Vec<DVec3> = Vec::new();
-    for k in 0..SUPPORT_DIRECTIONS {
-        let z = 1.0 - (2 * k + 1) as f64 / SUPPORT_DIRECTIONS as f64;
+    (0..count).map(move |k| {
+        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
         let (sin, cos) = (golden_angle * k as f64).sin_cos();
-        let direction = ((1.0 - z * z).sqrt() * DVec3::new(cos, sin, 0.0)).with_z(z);
+        ((1.0 - z * z).sqrt() * DVec3::new(cos, sin, 0.0)).with_z(z)
+    })
+}
+
+/// Vertices that reach farthest in some directions.
+fn extreme_points<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DVec3> {
+    let mut points: Vec<DVec3> = Vec::new();
+    for direction in spiral(SUPPORT_DIRECTIONS) {
         let farther = |a: DVec3, b: DVec3| if b.dot(direction) > a.dot(direction) { b } else { a };
         if let Some(point) = vertices().reduce(farther)
             && !points.contains(&point)
@@ -270,6 +291,15 @@ fn extreme_points<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DV
         }
     }
     points
+}
+
+/// How much farther than the kept vertices others reach, in directions between those asked for.
+fn hull_margin<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I, kept: &[DVec3]) -> f64 {
+    let reach = |points: &mut dyn Iterator<Item = DVec3>, direction: DVec3| {
+        points.map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let beyond = |d| reach(&mut vertices(), d) - reach(&mut kept.iter().copied(), d);
+    spiral(4 * SUPPORT_DIRECTIONS + 1).map(beyond).fold(0.0, f64::max)
 }
 
 /// Axis of the largest second moment of the surface about its middle, by powers of the matrix of moments.

@@ -130,7 +130,7 @@ pub struct CellContact {
     pub energy: f64,
     /// Area of the cells under pressure, m^2.
     pub area: f64,
-    /// Largest overlap with the tangent plane, m.
+    /// How far the tool's support reaches below the tangent plane, m.
     pub depth: f64,
     /// Derivative of the energy with respect to each curvature of the surface, J m.
     pub energy_by_curvature: [f64; 3],

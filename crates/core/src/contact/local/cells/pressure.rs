@@ -148,7 +148,7 @@ impl PressureScratch {
         }
         influence.precondition(cells, &self.trial, &mut self.trial_image);
         let scaled = dot(&self.trial, &self.trial_image);
-        let ratio = scaled / *scaled_before;
+        let ratio = if scaled > 0.0 { scaled / *scaled_before } else { 0.0 };
         *scaled_before = scaled;
         for j in 0..cells {
             for i in 0..cells {
