@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use palpate_core::contact::Moduli;
 use palpate_core::dynamics::{Energy, ModalModel, exact_step};
 use palpate_core::simulation::{
     BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel,
@@ -15,20 +16,24 @@ use crate::green::GreenCore;
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
 /// and the spring between tools and patches, N/m.
 pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
-/// Green's function, position (m), orientation (unit quaternion w x y z), and what moves the body.
-pub type BodyArguments<'py> = (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>);
-/// Radius (m), contact radius (m), contact law, largest stiffness (N/m).
-pub type ToolArguments = (f64, f64, String, f64);
+/// Young's modulus (s, Pa) and Poisson's ratio (s) at the surface nodes.
+pub type ModuliArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+/// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, and its elastic constants.
+pub type BodyArguments<'py> =
+    (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>, Option<ModuliArguments<'py>>);
+/// Radius (m), contact radius (m), contact law, largest stiffness (N/m), friction, Young's modulus of the pad (Pa).
+pub type ToolArguments = (f64, f64, String, f64, f64, Option<f64>);
 
-/// Tool, body, mode, (point, normal, force, torque, anchor, displacement) in the world, whether it is limited, nodes and
-/// weights of a contact.
-pub type ContactRecord = (usize, usize, &'static str, [[f64; 3]; 6], bool, Vec<u32>, Vec<f64>);
+/// Tool, body, mode, (point, normal, force, torque, anchor, displacement) in the world, whether it is limited and slips,
+/// contact radius (m), depth (m) and stiffness (N/m) under the local law, nodes and weights of a contact.
+pub type ContactRecord = (usize, usize, &'static str, [[f64; 3]; 6], [bool; 2], [f64; 3], Vec<u32>, Vec<f64>);
 
 /// A body with everything that Python gave of it, free of the interpreter.
 pub struct BodyParts {
     green: std::sync::Arc<palpate_core::green::GreensFunction>,
     placement: Placement,
     modes: Option<ModesParts>,
+    moduli: Option<Moduli>,
 }
 
 /// [`DynamicsArguments`] free of the interpreter.
@@ -36,7 +41,7 @@ type ModesParts = (Vec<f64>, Vec<f64>, SchemeArguments, bool, f64);
 
 /// Takes arguments out of the interpreter's hands.
 pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
-    let (green, position, orientation, dynamics) = arguments;
+    let (green, position, orientation, dynamics, moduli) = arguments;
     let modes = dynamics
         .as_ref()
         .map(|(eigenvalues, shapes, scheme, exact, coupling)| -> PyResult<_> {
@@ -45,13 +50,22 @@ pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
         .transpose()?;
     let placement =
         Placement { position: DVec3::from(*position), rotation: DMat3::from_quat(quaternion(*orientation)) };
-    Ok(BodyParts { green: green.green.clone(), placement, modes })
+    let moduli = moduli
+        .as_ref()
+        .map(|(youngs, poissons)| -> PyResult<_> {
+            Ok(Moduli { youngs: youngs.as_slice()?.to_vec(), poissons: poissons.as_slice()?.to_vec() })
+        })
+        .transpose()?;
+    Ok(BodyParts { green: green.green.clone(), placement, modes, moduli })
 }
 
 impl BodyParts {
     /// The body as a tick sees it.
     pub fn build(self) -> Result<BodyModel> {
-        let body = BodyModel::new(self.green, self.placement)?;
+        let mut body = BodyModel::new(self.green, self.placement)?;
+        if let Some(moduli) = self.moduli {
+            body = body.with_moduli(moduli)?;
+        }
         let Some((eigenvalues, shapes, arguments, exact, coupling)) = self.modes else { return Ok(body) };
         let ((newmark, rayleigh), dt) = (scheme(arguments)?, arguments.0);
         let step = |k, c| if exact { exact_step(k, c, dt) } else { newmark.mode_step(k, c) };
@@ -60,11 +74,11 @@ impl BodyParts {
     }
 }
 
-/// A tool, and the contact radius it starts with, m.
-pub fn tool(arguments: ToolArguments) -> Result<(ToolModel, f64)> {
-    let (radius, contact_radius, law, max_stiffness) = arguments;
+/// A tool, the contact radius (m) and the friction that it starts with.
+pub fn tool(arguments: ToolArguments) -> Result<(ToolModel, f64, f64)> {
+    let (radius, contact_radius, law, max_stiffness, friction, pad_youngs_modulus) = arguments;
     let law = LawKind::parse(&law).ok_or_else(|| Error::Invalid(format!("there is no contact law '{law}'")))?;
-    Ok((ToolModel { radius, law, max_stiffness }, contact_radius))
+    Ok((ToolModel { radius, law, pad_youngs_modulus, max_stiffness }, contact_radius, friction))
 }
 
 /// From w x y z, made of length one to the last bit.
@@ -107,14 +121,15 @@ pub fn contact_records(model: &Model, state: &Snapshot) -> Vec<ContactRecord> {
             placement.point_to_world(contact.point),
             placement.vector_to_world(contact.normal),
             placement.vector_to_world(contact.force),
-            DVec3::ZERO,
+            -placement.vector_to_world(contact.local.torque),
             placement.point_to_world(contact.anchor),
             placement.vector_to_world(contact.displacement),
         ];
         let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
-        let limited = contact.limited;
+        let flags = [contact.limited, contact.local.slipping];
+        let numbers = [contact.local.radius, contact.local.depth, contact.local.stiffness];
         let vectors = vectors.map(|v| v.to_array());
-        (contact.tool, contact.body, mode, vectors, limited, nodes.to_vec(), weights.to_vec())
+        (contact.tool, contact.body, mode, vectors, flags, numbers, nodes.to_vec(), weights.to_vec())
     };
     let contacts = state.contacts.iter();
     contacts.map(|(contact, patch)| record(contact, patch.patch().nodes(), patch.patch().weights())).collect()

@@ -52,8 +52,9 @@ impl SimulationCore {
             let bodies = parts.into_iter().map(|part| part.build()).collect::<palpate_core::Result<Vec<_>>>()?;
             let tools = tools.into_iter().map(tool).collect::<palpate_core::Result<Vec<_>>>()?;
             let mut settings = Settings { strain_limit, ..Settings::default() };
-            settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius))| *to = *radius);
-            let model = Model::new(bodies, tools.into_iter().map(|(tool, _)| tool).collect())?;
+            settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius, _))| *to = *radius);
+            settings.friction.iter_mut().zip(&tools).for_each(|(to, (_, _, friction))| *to = *friction);
+            let model = Model::new(bodies, tools.into_iter().map(|(tool, _, _)| tool).collect())?;
             settings.contact_radius[..model.tools.len()].iter().try_for_each(|&r| model.check_contact_radius(r))?;
             Ok((Arc::new(model), settings))
         };
@@ -126,6 +127,36 @@ impl SimulationCore {
         self.change(py, |settings| {
             settings.contact_radius.iter_mut().skip(tool).take(1).for_each(|to| *to = radius);
         })
+    }
+
+    /// Changes the coefficient of friction of a tool.
+    fn set_friction(&mut self, py: Python<'_>, tool: usize, friction: f64) -> PyResult<()> {
+        self.change(py, |settings| {
+            settings.friction.iter_mut().skip(tool).take(1).for_each(|to| *to = friction);
+        })
+    }
+
+    /// Closest points of the smooth surface of a body (n, 7): position (m), outward normal, signed distance (m), in the
+    /// body's frame; NaN where there is none.
+    fn feet<'py>(
+        &self,
+        py: Python<'py>,
+        body: usize,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = points.as_slice()?.to_vec();
+        let model = self.model.clone();
+        let feet = py.detach(|| {
+            let of_point = |&point: &[f64; 3]| match model.bodies.get(body).and_then(|body| body.foot(point.into())) {
+                Some(foot) => {
+                    let (x, n) = (foot.position, foot.normal);
+                    [x.x, x.y, x.z, n.x, n.y, n.z, foot.distance]
+                }
+                None => [f64::NAN; 7],
+            };
+            points.as_chunks::<3>().0.iter().flat_map(of_point).collect::<Vec<_>>()
+        });
+        Ok(feet.into_pyarray(py))
     }
 
     /// Young's modulus of a body over that of its Green's function.

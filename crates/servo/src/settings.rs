@@ -8,6 +8,8 @@ use palpate_core::{Error, Result};
 pub struct Settings {
     /// Contact radius of each tool's contacts that begin from now on, m.
     pub contact_radius: [f64; MAX_TOOLS],
+    /// Coulomb's coefficient of friction of each tool.
+    pub friction: [f64; MAX_TOOLS],
     /// Young's modulus of each body over that of its Green's function.
     pub stiffness_scale: [f64; MAX_BODIES],
     /// Largest strain to which tools may take a body; zero for any.
@@ -28,6 +30,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             contact_radius: [0.0; MAX_TOOLS],
+            friction: [0.0; MAX_TOOLS],
             stiffness_scale: [1.0; MAX_BODIES],
             strain_limit: 0.0,
             resets: 0,
@@ -52,6 +55,11 @@ impl Settings {
                 format!("the contact radius of tool {tool} must not be negative, got {radius} m")
             })?;
         }
+        for (tool, &friction) in self.friction.iter().enumerate() {
+            refuse_unless(not_negative(friction), || {
+                format!("the friction of tool {tool} must not be negative, got {friction}")
+            })?;
+        }
         for (body, &scale) in self.stiffness_scale.iter().enumerate() {
             refuse_unless(scale > 0.0 && scale.is_finite(), || {
                 format!("the stiffness scale of body {body} must be positive, got {scale}")
@@ -68,6 +76,7 @@ impl Settings {
     pub(crate) fn controls(&self, before: &Settings, period: f64, limited: &[bool; MAX_BODIES]) -> Controls {
         Controls {
             contact_radius: self.contact_radius,
+            friction: self.friction,
             stiffness_scale: self.stiffness_scale,
             strain_limit: limited.map(|limited| if limited { self.strain_limit } else { 0.0 }),
             reset: self.resets != before.resets,

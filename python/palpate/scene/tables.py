@@ -14,10 +14,12 @@ from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
-from palpate.scene.table import Force, Length, Number, Point, Radius, Stiffness, Table, Time
+from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
+# Rubber on dry glass comes to about 2; beyond this a coefficient is a slip of the pen.
+MOST_FRICTION = 10.0
 
 Quaternion = tuple[Number, Number, Number, Number]
 
@@ -94,15 +96,19 @@ class BodyTable(Table):
 
 
 class ToolTable(Table):
-    """A spherical tool: its radius, how it touches, and the radius of the patch it presses.
+    """A spherical tool: its radius, how it touches, and what it rubs with.
 
-    ``contact = "patch"`` spreads the force over a disc of ``contact_radius``; ``"node"`` takes the closest node, as the
-    paper does, whose stiffness goes to zero with the size of the elements.
+    ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
+    ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
+    ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
+    goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law.
     """
 
     shape: Literal["sphere"] = "sphere"
     radius: Length = 5e-3
-    contact: Literal["patch", "node"] = "patch"
+    contact: Literal["local", "patch", "node"] = "local"
+    friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
+    pad_youngs_modulus: Pressure | None = None
     contact_radius: Radius = 5e-3
 
 

@@ -32,6 +32,14 @@ class Contact(ComparedByValue):
         Of the tool from the anchor (3,), m, in the world, as far as the limit of strain lets it.
     limited
         Whether the tool goes farther than that.
+    slipping
+        Whether a contact under the local law slips; one that sticks to its patch never does.
+    radius
+        Contact radius under the local law, m; what follows is 0 under the others.
+    depth
+        Approach of the tool and the untouched surface, m: how far it has come from first touch.
+    stiffness
+        Felt along the normal, N/m: change of the force with the depth.
     nodes, weights
         (k,) nodes of the body's mesh in the patch, and their weights (k,), which sum to one.
 
@@ -47,6 +55,10 @@ class Contact(ComparedByValue):
     anchor: np.ndarray
     displacement: np.ndarray
     limited: bool
+    slipping: bool
+    radius: float
+    depth: float
+    stiffness: float
     nodes: np.ndarray
     weights: np.ndarray
 

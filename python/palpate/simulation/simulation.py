@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
-from palpate.body import Body
+from palpate.body import Body, moduli_of_store, surface_moduli
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
-from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
+from palpate.scene import MOST_FRICTION, BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.frame import BodyFrame, Contact, Frame
 from palpate.simulation.recording import LOG_DTYPE, Recording
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
@@ -54,11 +54,22 @@ class Simulation:
         device, tools = self.scene.device, self.scene.tools
         self._scales = [1.0] * len(self.bodies)
         self._radii = [tool.contact_radius for tool in tools]
+        self._friction = [tool.friction for tool in tools]
         self._targets: list[tuple[Any, Any]] = [((0.0, 0.0, 0.0), UPRIGHT)] * len(tools)
         self._grab = [False] * len(tools)
         self._core = _native.SimulationCore(
-            [_body_arguments(body) for body in self.bodies],
-            [(tool.radius, tool.contact_radius, tool.contact, device.max_stiffness) for tool in tools],
+            [_body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
+            [
+                (
+                    tool.radius,
+                    tool.contact_radius,
+                    tool.contact,
+                    device.max_stiffness,
+                    tool.friction,
+                    tool.pad_youngs_modulus,
+                )
+                for tool in tools
+            ],
             (device.max_force, device.max_slew, device.ramp),
             self.scene.view.strain_limit,
             device.rate,
@@ -143,6 +154,26 @@ class Simulation:
         self._grab[self._tool(tool)] = False
         self._core.set_target(tool, *self._targets[tool], (0.0, 0.0, 0.0), False, False)
 
+    def closest(self, points: np.ndarray, body: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Closest points of a body's surface as tools under the local law meet it: smooth between the nodes.
+
+        Parameters
+        ----------
+        points
+            (n, 3) m, in the scene.
+
+        Returns
+        -------
+        tuple
+            Points (n, 3), m, outward unit normals (n, 3), both in the scene, and signed distances (n,), m, negative inside;
+            NaN where a point is not finite, or no tool of the scene has the local law.
+
+        """
+        placed = self.bodies[self._body(body)]
+        asked = np.ascontiguousarray(placed.points_to_body(np.asarray(points, dtype=float).reshape(-1, 3)))
+        feet = self._core.feet(body, asked).reshape(-1, 7)
+        return placed.points_to_scene(feet[:, :3]), placed.vectors_to_scene(feet[:, 3:6]), feet[:, 6]
+
     def set_radius(self, contact_radius: float, tool: int | None = None) -> None:
         """Contact radius of contacts that begin from now on, m, of one tool or of all.
 
@@ -156,6 +187,26 @@ class Simulation:
         for changed in tools:
             self._core.set_contact_radius(changed, float(contact_radius))
             self._radii[changed] = float(contact_radius)
+
+    def set_friction(self, friction: float, tool: int | None = None) -> None:
+        """Coulomb's coefficient of friction from now on, of one tool or of all; 0 slides freely.
+
+        Raises
+        ------
+        SceneError
+            A coefficient that is negative, or greater than 10.
+
+        """
+        if not 0.0 <= friction <= MOST_FRICTION:
+            raise SceneError(f"friction must lie between 0 and {MOST_FRICTION:g}, got {friction}")
+        tools = range(len(self._friction)) if tool is None else [self._tool(tool)]
+        for changed in tools:
+            self._core.set_friction(changed, float(friction))
+            self._friction[changed] = float(friction)
+
+    def friction_of(self, tool: int = 0) -> float:
+        """Coulomb's coefficient of friction of a tool."""
+        return self._friction[self._tool(tool)]
 
     def contact_radius_of(self, tool: int = 0) -> float:
         """Contact radius of contacts of a tool that begin from now on, m."""
@@ -450,9 +501,9 @@ class Simulation:
         return chosen
 
     def _contact(self, record: tuple[Any, ...]) -> Contact:
-        tool, body, mode, vectors, limited, nodes, weights = record
+        tool, body, mode, vectors, flags, numbers, nodes, weights = record
         nodes = self.bodies[body].green.surface_nodes[nodes]
-        return Contact(tool, body, mode, *map(np.array, vectors), limited, nodes, np.array(weights))
+        return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights))
 
     def _tool(self, tool: int) -> int:
         if not 0 <= tool < len(self._radii):
@@ -465,11 +516,16 @@ class Simulation:
         return body
 
 
-def _body_arguments(body: BuiltBody) -> tuple[Any, ...]:
+def _body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
     """Arrays of one body in the order of the native module."""
     motion = body.motion
     moving = None
     if motion is not None:
         shapes = motion.basis.shapes[body.green.surface_nodes].reshape(-1, len(motion.basis))
         moving = (motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling)
-    return body.green._core, body.position, body.orientation, moving
+    moduli = None
+    if local:
+        green = body.green
+        known = body.body is not None
+        moduli = surface_moduli(body.body) if known else moduli_of_store(green.description, len(green.surface_nodes))
+    return body.green._core, body.position, body.orientation, moving, moduli

@@ -174,7 +174,8 @@ def test_the_tool_is_limited_in_motion(moving):
             await client.say(type="press", tool=0, position=[*TOP[:2], TOP[2] + radius + 1e-3], grab=False)
             await client.receive("frame")
             await client.say(type="press", tool=0, position=[*TOP[:2], TOP[2] + radius - 0.02], grab=False)
-            header, _ = await client.frame_where(lambda h: h["contacts"] != [] and h["time"] > 2.5)
+            landed, _ = await client.frame_where(lambda h: h["contacts"] != [])
+            header, _ = await client.frame_where(lambda h: h["contacts"] != [] and h["time"] > landed["time"] + 2.5)
             assert 0.05 < header["strain"] < 0.105
             assert header["tools"][0]["force"][2] > 0.05
             await client.say(type="release")

@@ -10,7 +10,9 @@ mod moments;
 mod patch;
 mod quadrature;
 mod refusal;
+mod regular;
 pub mod shape;
+pub mod smooth;
 mod touchable;
 
 pub use closest::{SurfacePoint, SurfaceQuery};
@@ -18,4 +20,5 @@ pub use compliance::{smallest_eigenvalue, touch};
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
 pub use refusal::Refusal;
+pub use regular::{CompliantBody, Moduli, RegularCompliance};
 pub use touchable::TouchPatch;

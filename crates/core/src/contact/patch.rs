@@ -64,7 +64,27 @@ impl Patch {
         self.weights[..self.count].copy_from_slice(other.weights());
     }
 
-    fn push(&mut self, node: u32, weight: f64) {
+    /// Multiplies all weights.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.weights[..self.count].iter_mut().for_each(|weight| *weight *= factor);
+    }
+
+    /// Empties the patch.
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds a node, or to its weight where it is there already; false where there is no place.
+    pub(super) fn add(&mut self, node: u32, weight: f64) -> bool {
+        match self.nodes[..self.count].iter().position(|&known| known == node) {
+            Some(place) => self.weights[place] += weight,
+            None if self.count == MAX_PATCH_NODES => return false,
+            None => self.push(node, weight),
+        }
+        true
+    }
+
+    pub(super) fn push(&mut self, node: u32, weight: f64) {
         (self.nodes[self.count], self.weights[self.count]) = (node, weight);
         self.count += 1;
     }

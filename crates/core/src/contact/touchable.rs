@@ -33,6 +33,35 @@ impl TouchPatch {
         Ok(())
     }
 
+    /// Becomes the part of `patch` that may be touched, its weights raised so that they sum to what those of the whole do.
+    pub fn admit_touchable(&mut self, green: &GreensFunction, patch: &Patch) {
+        let (mut kept, mut all) = (0.0, 0.0);
+        self.patch.count = 0;
+        for (node, weight) in patch.iter() {
+            all += weight;
+            if let Some(column) = green.touchable(node) {
+                self.columns[self.patch.count] = column;
+                self.patch.push(node as u32, weight);
+                kept += weight;
+            }
+        }
+        self.patch.scale(if kept > 0.0 { all / kept } else { 0.0 });
+    }
+
+    /// Becomes these touchable nodes with their weights; a node that comes twice has the sum.
+    pub fn blend(&mut self, green: &GreensFunction, nodes: impl Iterator<Item = (u32, f64)>) {
+        self.patch.clear();
+        for (node, weight) in nodes {
+            let (place, column) = (self.patch.count, green.touchable(node as usize));
+            if let Some(column) = column
+                && self.patch.add(node, weight)
+                && self.patch.count > place
+            {
+                self.columns[place] = column;
+            }
+        }
+    }
+
     /// Nodes and weights.
     pub fn patch(&self) -> &Patch {
         &self.patch

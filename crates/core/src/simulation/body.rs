@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::input::Placement;
-use crate::contact::{PatchGeometry, SurfacePoint, SurfaceQuery};
+use crate::contact::smooth::{FootPoint, SmoothSurface};
+use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
 use crate::mesh::Surface;
@@ -38,6 +39,14 @@ impl BodyDynamics {
     }
 }
 
+/// What the local law needs of a body.
+pub struct LocalSurface {
+    /// The surface under the reference loads, smooth between the nodes.
+    pub smooth: SmoothSurface,
+    /// Elastic constants at the surface nodes.
+    pub moduli: Moduli,
+}
+
 /// A body of a scene. Everything in it is in the body's own frame but its placement.
 pub struct BodyModel {
     /// Where it stands.
@@ -54,6 +63,8 @@ pub struct BodyModel {
     pub(super) dynamics: Option<BodyDynamics>,
     /// Mean length of the edges of the drawn triangles, m.
     pub(super) mean_edge: f64,
+    /// What the local law needs; without it only patches and nodes can touch the body.
+    pub(super) local: Option<LocalSurface>,
 }
 
 impl BodyModel {
@@ -69,7 +80,24 @@ impl BodyModel {
         let query = SurfaceQuery::new(&loaded)?;
         let geometry = PatchGeometry::new(&green.surface);
         let mean_edge = mean_edge(&green.surface);
-        Ok(Self { placement, green, free, query, loaded, geometry, dynamics: None, mean_edge })
+        Ok(Self { placement, green, free, query, loaded, geometry, dynamics: None, mean_edge, local: None })
+    }
+
+    /// The same body, ready for the local law.
+    ///
+    /// # Errors
+    /// Elastic constants that are not given at every surface node, or out of range.
+    pub fn with_moduli(self, moduli: Moduli) -> Result<Self> {
+        let (nodes, given) = (self.green.surface_count(), moduli.youngs.len());
+        if given != nodes || moduli.poissons.len() != nodes {
+            return Err(Error::Invalid(format!("elastic constants at {given} nodes, the surface has {nodes}")));
+        }
+        let valid = |(&e, &nu): (&f64, &f64)| e > 0.0 && e.is_finite() && nu > -1.0 && nu < 0.5;
+        if !moduli.youngs.iter().zip(&moduli.poissons).all(valid) {
+            return Err(Error::Invalid("elastic constants at the surface are out of range".into()));
+        }
+        let smooth = SmoothSurface::new(&self.loaded, |node| self.green.touchable(node as usize).is_some());
+        Ok(Self { local: Some(LocalSurface { smooth, moduli }), ..self })
     }
 
     /// The same body in motion.
@@ -97,6 +125,28 @@ impl BodyModel {
     /// Displacements of the surface dofs under the reference loads, m (3s).
     pub fn free_displacements(&self) -> &[f64] {
         &self.free
+    }
+
+    /// Closest point of the smooth surface that the local law meets, in the body's frame; `None` without that law, or for a
+    /// point that is not finite.
+    pub fn foot(&self, point: DVec3) -> Option<FootPoint> {
+        self.local.as_ref()?.smooth.foot_anywhere(&self.loaded, &self.query, point)
+    }
+
+    /// A foot as a point of the drawn triangle below it.
+    pub(super) fn surface_point(&self, foot: &FootPoint) -> SurfacePoint {
+        let [a, b, c] = self.loaded.corners(foot.triangle);
+        let normal = (b - a).cross(c - a);
+        let scale = 1.0 / normal.length_squared();
+        let of_a = ((c - b).cross(foot.position - b).dot(normal) * scale).clamp(0.0, 1.0);
+        let of_b = ((a - c).cross(foot.position - c).dot(normal) * scale).clamp(0.0, 1.0 - of_a);
+        SurfacePoint {
+            position: foot.position,
+            triangle: foot.triangle,
+            barycentric: [of_a, of_b, 1.0 - of_a - of_b],
+            normal: foot.normal,
+            signed_distance: foot.distance,
+        }
     }
 
     /// Point of the loaded surface, untouched by tools, that is closest to `point`.

@@ -3,6 +3,8 @@
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
+use super::law::LocalContact;
+use super::tool::LawKind;
 use crate::contact::TouchPatch;
 
 /// What a contact does.
@@ -23,11 +25,13 @@ pub struct Contact {
     // Written when it begins.
     /// What it does; [`Mode::Free`] is an empty slot.
     pub mode: Mode,
+    /// How it touches: a tool that holds on does so by a patch.
+    pub law: LawKind,
     /// Index of the tool.
     pub tool: usize,
     /// Index of the body.
     pub body: usize,
-    /// Counts the contacts since the start: tells one from another in the same slot.
+    /// Counts the contacts since the start, and in the lowest [`REVISIONS`] bits how often one has slid to another place.
     pub serial: u64,
     /// Contact point on the untouched surface, m.
     pub point: DVec3,
@@ -51,6 +55,8 @@ pub struct Contact {
     pub(super) bound: f64,
     /// Force on the body, N.
     pub force: DVec3,
+    /// Under the local law, what it remembers.
+    pub local: LocalContact,
 }
 
 /// Slots for contacts. The patches stand apart, so that looking through the slots touches little memory.
@@ -67,7 +73,16 @@ impl Default for Contacts {
     }
 }
 
+/// Bits of a serial that count the places of one contact.
+pub(super) const REVISIONS: u32 = 16;
+
 impl Contacts {
+    /// Serial of a contact that begins.
+    pub(super) fn next_serial(&mut self) -> u64 {
+        self.begun += 1;
+        self.begun << REVISIONS
+    }
+
     /// The contacts and their patches.
     pub fn iter(&self) -> impl Iterator<Item = (&Contact, &TouchPatch)> {
         self.slots.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free)

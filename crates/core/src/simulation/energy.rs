@@ -27,7 +27,7 @@ impl Account {
         self.energy.dissipated += step.dissipated;
     }
 
-    /// Books what springs and the modes left out hold.
+    /// Books what springs, indentations and the modes left out hold.
     pub fn book_contacts(
         &mut self,
         contacts: &Contacts,
@@ -38,7 +38,8 @@ impl Account {
         self.energy.coupling = 0.0;
         for &a in slots {
             let force = contacts.slots[a].force;
-            self.energy.coupling += 0.5 * force.length_squared() / coupling;
+            self.energy.coupling += 0.5 * force.length_squared() / coupling + contacts.slots[a].local.energy;
+            self.energy.dissipated += contacts.slots[a].local.dissipated;
             let beyond: DVec3 = slots.iter().map(|&b| residual[a][b] * contacts.slots[b].force).sum();
             self.energy.strain += 0.5 * force.dot(beyond);
         }

@@ -76,6 +76,8 @@ pub struct Strike {
 pub struct Controls {
     /// Contact radius of each tool's contacts that begin now, m.
     pub contact_radius: [f64; MAX_TOOLS],
+    /// Coulomb's coefficient of friction of each tool.
+    pub friction: [f64; MAX_TOOLS],
     /// Young's modulus of each body over that of its Green's function: it only scales forces.
     pub stiffness_scale: [f64; MAX_BODIES],
     /// Largest strain to which tools may take each body; zero for any.
@@ -92,6 +94,7 @@ impl Default for Controls {
     fn default() -> Self {
         Self {
             contact_radius: [0.0; MAX_TOOLS],
+            friction: [0.0; MAX_TOOLS],
             stiffness_scale: [1.0; MAX_BODIES],
             strain_limit: [0.0; MAX_BODIES],
             reset: false,

@@ -14,24 +14,35 @@ use glam::DVec3;
 
 use super::MAX_CONTACTS;
 use super::admissible::{Contacts, Vectors, closest};
+use super::contacts::Mode;
 use super::model::Model;
 use super::scratch::Scratch;
 use super::solve::{gather, solve_with};
 use super::state::State;
 use super::strain_watch::StrainWatch;
+use super::tool::LawKind;
 use crate::contact::MAX_PATCH_NODES;
 use crate::strain::{MAX_CONTACTS_WATCHED, provisional_displacement};
 
+/// Growth a tick of the share of a force that is let through, and where it begins.
+const GROWTH: f64 = 1.05;
+const LEAST_SHARE: f64 = 1e-3;
 /// Growth a tick of the bound of a contact that has been prepared for.
 const OPENING: f64 = 1.3;
 
-/// Bounds the displacement of the contact that has just begun in `slot`.
+/// Bounds the displacement of the contact that has just begun in `slot`; one under the local law is bounded where its nodes
+/// are known.
 pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
-    let body = &model.bodies[state.contacts.slots[slot].body];
-    if limit <= 0.0 {
+    if limit <= 0.0 || state.contacts.slots[slot].law == LawKind::Local {
         state.contacts.slots[slot].bound = f64::INFINITY;
         return;
     }
+    state.contacts.slots[slot].bound = provisional_bound(model, state, slot, limit);
+}
+
+/// Displacement of a patch under which its own strain surely keeps the limit, m.
+fn provisional_bound(model: &Model, state: &State, slot: usize, limit: f64) -> f64 {
+    let body = &model.bodies[state.contacts.slots[slot].body];
     let patch = state.contacts.patches[slot].patch();
     let (mut weights, mut positions) = ([0.0; MAX_PATCH_NODES], [DVec3::ZERO; MAX_PATCH_NODES]);
     for (i, (node, weight)) in patch.iter().enumerate() {
@@ -39,7 +50,55 @@ pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
         (weights[i], positions[i]) = (if supported { 0.0 } else { weight }, body.green.surface.positions[node]);
     }
     let (weights, positions) = (&weights[..patch.count], &positions[..patch.count]);
-    state.contacts.slots[slot].bound = provisional_displacement(weights, positions, body.mean_edge, limit);
+    provisional_displacement(weights, positions, body.mean_edge, limit)
+}
+
+/// Lets through of the forces under the local law what the limit of strain allows: all of them by the share that is within it,
+/// for they slide, and there is no anchor to hold them to. A contact that is not prepared for yet is bounded by the
+/// displacement of the body under it. Where a contact has slid on by a part of its patch, its strain is asked for anew.
+pub(super) fn let_through(model: &Model, state: &mut State, body: usize, limit: f64) {
+    let State { bodies, contacts, .. } = state;
+    let (watch, scale) = (bodies[body].strain.as_deref(), bodies[body].stiffness_scale);
+    let mut share = 1.0;
+    if let Some(watch) = watch.filter(|_| limit > 0.0) {
+        let mut watched = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
+        for slot in contacts.on(body) {
+            let contact = &contacts.slots[slot];
+            if let Some(place) = watch.place_of(contact) {
+                watched[place] = contact.force / scale;
+            }
+        }
+        share = watch.response.share(&watched, limit);
+    }
+    for slot in 0..MAX_CONTACTS {
+        let contact = &state.contacts.slots[slot];
+        if contact.mode == Mode::Free || contact.body != body || contact.law != LawKind::Local {
+            continue;
+        }
+        let covered = StrainWatch::covers(state.bodies[body].strain.as_deref(), contact);
+        let first = contact.bound == 0.0 && limit > 0.0;
+        let bound = if first { provisional_bound(model, state, slot, limit) } else { contact.bound };
+        let contact = &mut state.contacts.slots[slot];
+        let carried = contact.local.tool.distance(contact.local.relative);
+        let mut own = share;
+        if limit > 0.0 {
+            contact.bound = if covered { bound * OPENING } else { bound };
+            own = own.min(contact.bound / carried.max(f64::MIN_POSITIVE));
+        }
+        // What a new response allows more is let in over some hundredths of a second.
+        let own = own.min(contact.local.share * GROWTH).min(1.0);
+        contact.local.share = own.max(LEAST_SHARE);
+        contact.limited = own < 1.0;
+        if contact.limited {
+            contact.force *= own;
+            contact.local.torque *= own;
+        }
+        let slid = contact.local.watched.distance(contact.point);
+        if slid > model.bodies[body].mean_edge {
+            contact.local.watched = contact.point;
+            contact.serial += 1;
+        }
+    }
 }
 
 /// Brings the displacements of the contacts of a body to what the limit of strain lets pass; zero is no limit.
@@ -101,8 +160,7 @@ impl AtRest<'_> {
     /// For each contact its place in the watch.
     fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.slots.iter().enumerate().filter_map(|(i, &slot)| {
-            let serial = self.state.contacts.slots[slot].serial;
-            let place = self.watch.serials.iter().position(|&known| known == serial);
+            let place = self.watch.place_of(&self.state.contacts.slots[slot]);
             place.map(|place| (i, place))
         })
     }

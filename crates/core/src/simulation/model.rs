@@ -1,8 +1,11 @@
 //! What is fixed while a simulation runs.
 
+use std::sync::Arc;
+
 use super::body::BodyModel;
-use super::tool::ToolModel;
+use super::tool::{LawKind, ToolModel};
 use super::{MAX_BODIES, MAX_TOOLS};
+use crate::contact::{CompliantBody, RegularCompliance};
 use crate::{Error, Result};
 
 /// Bodies and tools.
@@ -11,6 +14,8 @@ pub struct Model {
     pub bodies: Vec<BodyModel>,
     /// The tools; one a device.
     pub tools: Vec<ToolModel>,
+    /// For each tool under the local law and each body what the tool meets beyond the half-space.
+    pub(super) regular: Vec<Vec<Option<Arc<RegularCompliance>>>>,
 }
 
 impl Model {
@@ -31,7 +36,19 @@ impl Model {
                 }
             }
         }
-        Ok(Self { bodies, tools })
+        let mut regular: Vec<Vec<Option<Arc<RegularCompliance>>>> = Vec::new();
+        for (rank, tool) in tools.iter().enumerate() {
+            let twin = |other: &ToolModel| {
+                other.law == tool.law && other.radius == tool.radius && other.max_stiffness == tool.max_stiffness
+            };
+            let known = tools[..rank].iter().position(twin);
+            let of_tool = match known {
+                Some(known) => regular[known].clone(),
+                None => bodies.iter().map(|body| regular_compliance(body, tool)).collect::<Result<_>>()?,
+            };
+            regular.push(of_tool);
+        }
+        Ok(Self { bodies, tools, regular })
     }
 
     /// Refuses a contact radius that some body cannot take.
@@ -41,4 +58,16 @@ impl Model {
     pub fn check_contact_radius(&self, radius: f64) -> Result<()> {
         self.bodies.iter().try_for_each(|body| body.check_contact_radius(radius))
     }
+}
+
+fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {
+    if tool.law != LawKind::Local {
+        return Ok(None);
+    }
+    let local = body.local.as_ref().ok_or_else(|| {
+        Error::Invalid("the local contact law needs the elastic constants of the body at its surface".into())
+    })?;
+    let (green, geometry) = (&*body.green, &body.geometry);
+    let compliant = CompliantBody { green, geometry, smooth: &local.smooth, moduli: &local.moduli };
+    Ok(Some(Arc::new(RegularCompliance::new(compliant, tool.radius, tool.max_stiffness))))
 }

@@ -97,9 +97,7 @@ impl Motion {
         let triangle = body.loaded.triangles[at.triangle as usize];
         let mut sum = DVec3::ZERO;
         for (node, share) in triangle.into_iter().zip(at.barycentric) {
-            let mut corner = [0.0; 3];
-            modes.read(&self.predicted.free_q, 3 * node as usize.., &mut corner);
-            sum += share * DVec3::from(corner);
+            sum += share * self.predicted_displacement(modes, node);
         }
         sum
     }
@@ -124,6 +122,37 @@ impl Motion {
             self.compliance[slot][other] = symmetric;
             self.compliance[other][slot] = symmetric.transpose();
         }
+        self.account.forget(slot);
+    }
+
+    /// Displacement of a surface node at the end of the next step if no force acts, m.
+    pub(super) fn predicted_displacement(&self, modes: &ModalModel, node: u32) -> DVec3 {
+        let mut moved = [0.0; 3];
+        modes.read(&self.predicted.free_q, 3 * node as usize.., &mut moved);
+        moved.into()
+    }
+
+    /// Takes up where the patch of a contact that slides is now.
+    pub(super) fn follow_contact(&mut self, modes: &ModalModel, contacts: &Contacts, slot: usize) {
+        gather(&mut self.projections[slot], modes, contacts.patches[slot].patch());
+        self.free[slot] = self.projections[slot].read(modes, &self.predicted.free_q);
+    }
+
+    /// Compliance of one step between the patches in two slots less that at rest, as far as the modes carry it, m/N.
+    pub(super) fn change_in_a_step(&self, modes: &ModalModel, a: usize, b: usize) -> DMat3 {
+        let (a, b) = (&self.projections[a], &self.projections[b]);
+        a.step_compliance(modes, b) - a.static_compliance(modes, b)
+    }
+
+    /// Takes up what a contact gives beyond the modes, for the account of energy.
+    pub(super) fn keep_residual(&mut self, modes: &ModalModel, slot: usize, regular: &DMat3) {
+        let own = &self.projections[slot];
+        self.residual[slot] = [DMat3::ZERO; MAX_CONTACTS];
+        self.residual[slot][slot] = *regular - own.static_compliance(modes, own);
+    }
+
+    /// A contact begins whose patch will slide.
+    pub(super) fn begin_contact(&mut self, slot: usize) {
         self.account.forget(slot);
     }
 

@@ -1,11 +1,12 @@
 //! The tick, in stages.
 
 use super::contacts::{Contact, Mode};
-use super::input::{Input, Output};
+use super::input::{Controls, Input, Output};
 use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::state::State;
+use super::tool::LawKind;
 use super::{limit, solve, time};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
@@ -20,7 +21,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
             // 2. Contacts begin, follow their tools, and push.
             follow_tools(model, state, scratch, body, input);
             limit::apply(model, state, scratch, body, input.controls.strain_limit[body]);
-            push(model, state, scratch, body);
+            push(model, state, scratch, body, &input.controls);
 
             // 3. Their forces go into the motion.
             if !time::end_step(model, state, body) {
@@ -36,9 +37,9 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
 /// Contacts of a body begin, follow their tools, or end, by geometry and buttons.
 fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
     for (tool, tool_model) in model.tools.iter().enumerate() {
-        let law = law_of(tool_model.law);
         let said = &input.tools[tool];
         let place = state.contacts.of(tool, body);
+        let law = law_of(law_now(tool_model.law, place.map(|slot| state.contacts.slots[slot].law), said.grab));
         state.tools[tool].refused[body] = None;
         if !said.active || input.controls.reset || !said.pose.is_finite() {
             state.tools[tool].entry_depth[body] = 0.0;
@@ -66,9 +67,20 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
     }
 }
 
+/// The law of a tool's contact: a tool that holds on does so by a patch, whatever its law.
+fn law_now(of_tool: LawKind, of_contact: Option<LawKind>, grab: bool) -> LawKind {
+    match of_contact {
+        Some(law) => law,
+        None if grab && of_tool == LawKind::Local => LawKind::Patch,
+        None => of_tool,
+    }
+}
+
 /// Forces of all contacts of a body together; a contact whose law ends it by its force is let go, and the rest solved
 /// again.
-fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
+fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
+    solve::local_forces(model, state, scratch, body, controls);
+    limit::let_through(model, state, body, controls.strain_limit[body]);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);
         let mut ended = false;
@@ -77,7 +89,7 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
             if contact.mode == Mode::Free || contact.body != body {
                 continue;
             }
-            if law_of(model.tools[contact.tool].law).end(contact) {
+            if law_of(contact.law).end(contact) {
                 let contact = *contact;
                 state.contacts.clear(slot);
                 remember(model, state, &contact);
@@ -98,7 +110,7 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
 fn remember(model: &Model, state: &mut State, contact: &Contact) {
     let (tool, body) = (contact.tool, contact.body);
     let moves = model.bodies[body].moves();
-    if !moves && !contact.pressed {
+    if contact.law == LawKind::Local || (!moves && !contact.pressed) {
         return;
     }
     let position = contact.anchor + contact.wanted;
@@ -110,7 +122,9 @@ fn answer(model: &Model, state: &State) -> Output {
     let mut output = Output::default();
     for (contact, _) in state.contacts.iter() {
         let placement = &model.bodies[contact.body].placement;
-        output.wrench_on_device[contact.tool].force -= placement.vector_to_world(contact.force);
+        let wrench = &mut output.wrench_on_device[contact.tool];
+        wrench.force -= placement.vector_to_world(contact.force);
+        wrench.torque += placement.vector_to_world(contact.local.torque);
         output.in_contact[contact.tool] = true;
         output.limited[contact.tool] |= contact.limited;
     }

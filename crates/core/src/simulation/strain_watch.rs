@@ -1,6 +1,6 @@
 //! Strain responses of the contacts of a body, as the limit of strain keeps them.
 
-use super::contacts::Contact;
+use super::contacts::{Contact, REVISIONS};
 use crate::strain::{MAX_CONTACTS_WATCHED, StrainResponse};
 
 /// Strain per newton on some contacts of a body.
@@ -13,8 +13,13 @@ pub struct StrainWatch {
 }
 
 impl StrainWatch {
-    /// Whether a contact has been prepared for.
+    /// Whether a contact has been prepared for, here or where it was before it slid on.
     pub(super) fn covers(watch: Option<&Self>, contact: &Contact) -> bool {
-        watch.is_some_and(|watch| watch.serials.contains(&contact.serial))
+        watch.is_some_and(|watch| watch.place_of(contact).is_some())
+    }
+
+    /// Place of a contact in the response.
+    pub(super) fn place_of(&self, contact: &Contact) -> Option<usize> {
+        self.serials.iter().position(|&known| known != 0 && known >> REVISIONS == contact.serial >> REVISIONS)
     }
 }

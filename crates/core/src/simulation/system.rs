@@ -20,6 +20,29 @@ impl Default for System {
 }
 
 impl System {
+    /// Solves the leading `n` equations in place, whatever the matrix, by elimination with row pivots.
+    pub fn solve_unsymmetric(&mut self, n: usize) {
+        let (a, x) = (&mut self.matrix, &mut self.right);
+        for k in 0..n {
+            let pivot = (k..n).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap_or(k);
+            a.swap(k, pivot);
+            x.swap(k, pivot);
+            for i in k + 1..n {
+                let factor = a[i][k] / a[k][k];
+                for j in k + 1..n {
+                    a[i][j] -= factor * a[k][j];
+                }
+                x[i] -= factor * x[k];
+            }
+        }
+        for k in (0..n).rev() {
+            for j in k + 1..n {
+                x[k] -= a[k][j] * x[j];
+            }
+            x[k] /= a[k][k];
+        }
+    }
+
     /// Solves the leading `n` equations in place. A pivot that is not positive yields infinities or NaN, which the safety
     /// stage turns into a latched fault; nothing here panics.
     pub fn solve(&mut self, n: usize) {

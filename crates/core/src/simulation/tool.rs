@@ -3,6 +3,8 @@
 /// The laws there are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LawKind {
+    /// Contact with a half-space in series with the finite element body: slides, rubs, rolls off.
+    Local,
     /// A smooth patch of a physical radius that sticks to the material it first touched.
     #[default]
     Patch,
@@ -14,6 +16,7 @@ impl LawKind {
     /// `"patch"` or `"node"`.
     pub fn name(self) -> &'static str {
         match self {
+            LawKind::Local => "local",
             LawKind::Patch => "patch",
             LawKind::Node => "node",
         }
@@ -21,7 +24,7 @@ impl LawKind {
 
     /// The law called `name`.
     pub fn parse(name: &str) -> Option<Self> {
-        [LawKind::Patch, LawKind::Node].into_iter().find(|kind| kind.name() == name)
+        [LawKind::Local, LawKind::Patch, LawKind::Node].into_iter().find(|kind| kind.name() == name)
     }
 }
 
@@ -32,6 +35,8 @@ pub struct ToolModel {
     pub radius: f64,
     /// How it touches.
     pub law: LawKind,
+    /// Young's modulus of its pad, Pa; a rigid tool has none.
+    pub pad_youngs_modulus: Option<f64>,
     /// Stiffest contact rendered, N/m: near a support the body alone would be rigid, which no device can render.
     pub max_stiffness: f64,
 }

@@ -68,8 +68,7 @@ pub fn indent_ellipse(approach: f64, curvatures: [f64; 2], effective_modulus: f6
     contact.semi_axes[small] = sphere.radius * (paraboloid.long / paraboloid.radius).sqrt();
     // The smaller curvature is the larger one times the bent ratio.
     contact.energy_by_curvature[small] = by_small * slope;
-    contact.energy_by_curvature[large] =
-        by_large + by_small * (ratio - slope * curvatures[small] / curvatures[large]);
+    contact.energy_by_curvature[large] = by_large + by_small * (ratio - slope * curvatures[small] / curvatures[large]);
     contact
 }
 

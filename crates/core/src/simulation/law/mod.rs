@@ -3,11 +3,14 @@
 //! A law is a file here that implements [`Law`]; `step` calls it and knows nothing else of it. What a law does must not
 //! allocate, and must not hand out energy over a closed path of the tool.
 
+mod local;
 mod node;
 mod patch;
 mod stick;
 
-use glam::{DMat3, DVec3};
+pub use local::{LocalBody, LocalContact, LocalResponse, LocalTool, Others, evaluate};
+
+use glam::{DMat3, DQuat, DVec3};
 
 use super::body::{BodyDynamics, BodyModel};
 use super::contacts::Contact;
@@ -24,6 +27,7 @@ const MOVING_REACH: f64 = 4.0;
 /// What a kind of law says.
 pub fn law_of(kind: LawKind) -> &'static dyn Law {
     match kind {
+        LawKind::Local => &local::Local,
         LawKind::Patch => &stick::Sticking(patch::Patch),
         LawKind::Node => &stick::Sticking(node::Node),
     }
@@ -67,6 +71,8 @@ pub struct Approach<'a> {
     pub tool_index: usize,
     /// Where the tool is, m.
     pub position: DVec3,
+    /// How it is turned.
+    pub orientation: DQuat,
     /// Whether it holds on to what it touches.
     pub grab: bool,
     /// Contact radius of a contact that begins now, m.
@@ -79,7 +85,8 @@ impl<'a> Approach<'a> {
         let said = &input.tools[tool];
         let position = model.bodies[body].placement.point_to_body(said.pose.position);
         let contact_radius = input.controls.contact_radius[tool];
-        Self { grab: said.grab, contact_radius, ..Self::at(model, motion, tool, body, position) }
+        let orientation = DQuat::from_mat3(&model.bodies[body].placement.rotation.transpose()) * said.pose.orientation;
+        Self { grab: said.grab, orientation, contact_radius, ..Self::at(model, motion, tool, body, position) }
     }
 
     /// Of a tool at a place of the body's frame.
@@ -91,6 +98,7 @@ impl<'a> Approach<'a> {
             tool: &model.tools[tool],
             tool_index: tool,
             position,
+            orientation: DQuat::IDENTITY,
             grab: false,
             contact_radius: 0.0,
         }
@@ -104,6 +112,18 @@ impl<'a> Approach<'a> {
                 self.body.closest(self.position - motion.displacement_at(self.body, &dynamics.modes, &closest))
             }
             _ => Some(closest),
+        }
+    }
+
+    /// Displacement of the surface below the tool in the free motion of the body, m.
+    pub fn carried(&self) -> DVec3 {
+        match (self.motion, &self.body.dynamics, self.body.closest(self.position)) {
+            (Some(motion), Some(dynamics), Some(closest))
+                if closest.signed_distance.abs() < MOVING_REACH * self.tool.radius =>
+            {
+                motion.displacement_at(self.body, &dynamics.modes, &closest)
+            }
+            _ => DVec3::ZERO,
         }
     }
 

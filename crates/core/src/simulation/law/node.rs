@@ -5,11 +5,16 @@ use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint};
 use crate::simulation::scratch::Scratch;
+use crate::simulation::tool::LawKind;
 
 /// The node of the touched triangle that is closest.
 pub struct Node;
 
 impl Footprint for Node {
+    fn kind(&self) -> LawKind {
+        LawKind::Node
+    }
+
     fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal> {
         let surface = &approach.body.green.surface;
         let corners = surface.triangles[centre.triangle as usize];

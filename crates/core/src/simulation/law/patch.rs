@@ -4,11 +4,16 @@ use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint, patch_weights};
 use crate::simulation::scratch::Scratch;
+use crate::simulation::tool::LawKind;
 
 /// Consistent weights over a disc of the contact radius.
 pub struct Patch;
 
 impl Footprint for Patch {
+    fn kind(&self) -> LawKind {
+        LawKind::Patch
+    }
+
     fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal> {
         let Scratch { patches, candidate, .. } = scratch;
         let (body, patch_scratch) = (approach.body, &mut patches[approach.body_index]);

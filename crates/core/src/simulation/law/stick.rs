@@ -11,13 +11,16 @@ use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
 use crate::simulation::body::BodyDynamics;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::scratch::Scratch;
-use crate::simulation::tool::ToolModel;
+use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A grab reaches this many tool radii from the surface.
 const GRAB_REACH: f64 = 2.0;
 
 /// Which nodes a contact takes, and with what weights.
 pub trait Footprint: Sync {
+    /// The law that it makes.
+    fn kind(&self) -> LawKind;
+
     /// Weighs the nodes around `centre`, a point of the unloaded surface, into `scratch.candidate`.
     ///
     /// # Errors
@@ -50,6 +53,7 @@ impl<F: Footprint> Law for Sticking<F> {
         let excess = if approach.grab { 0.0 } else { depth - *entry_depth };
         let anchor = approach.position + closest.normal * excess;
         Ok(Some(Contact {
+            law: self.0.kind(),
             mode: if approach.grab { Mode::Grab } else { Mode::Press },
             tool: approach.tool_index,
             body: approach.body_index,

@@ -4,6 +4,7 @@ use crate::simulation::contacts::Contact;
 use crate::simulation::model::Model;
 use crate::simulation::scratch::Scratch;
 use crate::simulation::state::State;
+use crate::simulation::tool::LawKind;
 
 /// Takes up a contact that begins, whose patch is `scratch.candidate`: a slot, its compliance with every other contact of
 /// the body, and of a body in motion where the moving patch is met. Returns the slot; `None`, with the reason left with the
@@ -14,12 +15,20 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
     let State { bodies, contacts, compliance, tools } = &mut *state;
     // There are as many slots as pairs of a tool and a body.
     let slot = contacts.empty()?;
+    if begun.law == LawKind::Local {
+        let serial = contacts.next_serial();
+        contacts.slots[slot] = Contact { serial, ..begun };
+        if let Some(motion) = &mut bodies[body].motion {
+            motion.begin_contact(slot);
+        }
+        return Some(slot);
+    }
     if let Err(refusal) = contacts.patches[slot].admit(green, &scratch.candidate) {
         tools[tool].refused[body] = Some(refusal);
         return None;
     }
-    contacts.begun += 1;
-    contacts.slots[slot] = Contact { serial: contacts.begun, ..begun };
+    let serial = contacts.next_serial();
+    contacts.slots[slot] = Contact { serial, ..begun };
     compliance[slot][slot] = contacts.patches[slot].own_compliance(green);
     for other in contacts.on(body).filter(|&other| other != slot) {
         let block = contacts.patches[slot].compliance_with(green, &contacts.patches[other]);

@@ -7,6 +7,7 @@ use crate::simulation::law::law_of;
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
+use crate::simulation::tool::LawKind;
 
 /// Forces of the contacts of a body, `d` being the displacement of each tool from its anchor, `d_free` its patch's free
 /// motion, `C` the static compliance or that of one step, and `s` what each contact law adds.
@@ -24,7 +25,7 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
             None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
         },
         |slot| {
-            let free = moving.map_or(DVec3::ZERO, |motion| motion.free_displacement(slot));
+            let free = moving.map_or_else(|| dent_of_sliding(model, state, body, slot), |m| m.free_displacement(slot));
             state.contacts.slots[slot].displacement - free
         },
     );
@@ -33,10 +34,20 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
     }
 }
 
-/// Slots of the contacts of a body, in order; returns how many there are.
+/// What contacts under the local law do at one that sticks, m, on a body at rest.
+fn dent_of_sliding(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
+    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
+    let sliding = contacts.on(body).filter(|&other| contacts.slots[other].law == LawKind::Local);
+    let dent = |other: usize| {
+        contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
+    };
+    sliding.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
+}
+
+/// Slots of the contacts of a body that stick, in order; returns how many there are.
 pub fn gather(state: &State, body: usize, slots: &mut [usize; MAX_CONTACTS]) -> usize {
     let mut count = 0;
-    for slot in state.contacts.on(body) {
+    for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law != LawKind::Local) {
         slots[count] = slot;
         count += 1;
     }
@@ -58,7 +69,7 @@ pub fn solve_with(
             let mut block = compliance(a, b);
             if a == b {
                 let tool = &model.tools[contact.tool];
-                let added = law_of(tool.law).respond(tool, model.bodies[contact.body].dynamics.as_ref(), &block);
+                let added = law_of(contact.law).respond(tool, model.bodies[contact.body].dynamics.as_ref(), &block);
                 block += DMat3::from_diagonal(DVec3::splat(added));
             }
             for row in 0..3 {

@@ -2,6 +2,8 @@
 
 mod compliance;
 mod forces;
+mod local;
 
 pub use compliance::add_contact;
 pub use forces::{contact_forces, gather, solve_with};
+pub use local::{LocalScratch, local_forces};

@@ -1,0 +1,157 @@
+//! The closest point of the smooth surface, followed from where it was.
+//!
+//! `p = x + s n(x)` with `f(x) = 0` is solved by Newton's method: along the normal by `f`, along the surface by its
+//! curvature `S`, for a step `dx` turns the normal by `S dx`. The distance `s` has the gradient `n` and the Hessian
+//! `S (I + s S)^-1`, exactly.
+
+use glam::{DMat3, DVec3};
+
+use super::SmoothSurface;
+use super::blend::{blend, outer};
+use crate::contact::{SurfacePoint, SurfaceQuery};
+use crate::mesh::Surface;
+
+/// Newton steps at most; three or four are usual.
+const STEPS: usize = 12;
+/// Beyond a step this small, over the spacing of the nodes, the surface is its own quadric to round-off.
+const SETTLED: f64 = 1e-5;
+/// Triangles crossed within a step at most.
+const CROSSINGS: usize = 16;
+/// The surface is not followed where it would turn back: least `1 + s kappa`.
+const LEAST_STRETCH: f64 = 0.1;
+
+/// A point of the surface closest to a point `p` near it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FootPoint {
+    /// The drawn triangle below or above it.
+    pub triangle: u32,
+    /// Where it is, m.
+    pub position: DVec3,
+    /// Unit outward normal, towards `p` from outside.
+    pub normal: DVec3,
+    /// Of `p`, m; negative inside.
+    pub distance: f64,
+    /// `dn/dp`, symmetric, 1/m.
+    pub turning: DMat3,
+    /// `dx/dp`, symmetric.
+    pub shift: DMat3,
+    /// Whether it lies on a crease.
+    pub on_crease: bool,
+}
+
+/// What ended the search on the smooth side of a triangle.
+enum Search {
+    Found(FootPoint),
+    Left,
+}
+
+impl SmoothSurface {
+    /// The foot of `p`, followed from `start`, a triangle and a point near it. `None` for a point that is not finite.
+    pub fn foot(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3, start: (u32, DVec3)) -> Option<FootPoint> {
+        if let Search::Found(foot) = self.follow(surface, p, start) {
+            return Some(foot);
+        }
+        self.foot_anywhere(surface, query, p)
+    }
+
+    /// The foot of `p` from wherever the drawn surface is closest.
+    pub fn foot_anywhere(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3) -> Option<FootPoint> {
+        let closest = query.closest(surface, p)?;
+        if self.is_within(&closest) {
+            if let Search::Found(foot) = self.follow(surface, p, (closest.triangle, closest.position)) {
+                return Some(foot);
+            }
+        }
+        Some(on_crease(&closest))
+    }
+
+    /// Whether the closest point of the drawn surface is on no crease.
+    fn is_within(&self, closest: &SurfacePoint) -> bool {
+        let creases = &self.creases[closest.triangle as usize];
+        // The edge (k, k + 1) lies opposite to the corner k + 2.
+        !(0..3).any(|k| creases[k] && closest.barycentric[(k + 2) % 3] < 1e-9)
+    }
+
+    fn follow(&self, surface: &Surface, p: DVec3, (mut triangle, mut x): (u32, DVec3)) -> Search {
+        for step in 0..STEPS {
+            let Some(at) = blend(self.own(triangle), x) else { return Search::Left };
+            let size = at.gradient.length();
+            let normal = at.gradient / size;
+            let across = DMat3::IDENTITY - outer(normal, normal);
+            let shape = across * at.hessian * across * (1.0 / size);
+            let distance = (p - x).dot(normal);
+            let stretch = DMat3::IDENTITY + shape * distance;
+            let determinant = stretch.determinant();
+            if !(determinant > LEAST_STRETCH) {
+                return Search::Left;
+            }
+            let inverse = stretch.inverse();
+            let along = p - x - normal * distance;
+            let spacing = self.fans[self.met[self.ranges[triangle as usize][0] as usize] as usize].spacing;
+            let mut dx = inverse * along - normal * (at.value / size);
+            let settled = dx.length_squared() < (SETTLED * spacing).powi(2);
+            if settled || step + 1 == STEPS {
+                let turning = inverse * shape;
+                let turning = (turning + turning.transpose()) * 0.5;
+                let shift = across - turning * distance;
+                let (position, normal) = (x + dx, (normal + shape * dx).normalize());
+                let distance = (p - position).dot(normal);
+                return Search::Found(FootPoint {
+                    triangle,
+                    position,
+                    normal,
+                    distance,
+                    turning,
+                    shift,
+                    on_crease: false,
+                });
+            }
+            if dx.length() > spacing {
+                dx *= spacing / dx.length();
+            }
+            x += dx;
+            match self.triangle_below(surface, triangle, x) {
+                Some(next) => triangle = next,
+                None => return Search::Left,
+            }
+        }
+        Search::Left
+    }
+
+    /// The triangle over which `x` lies, walked to from another; `None` beyond a crease.
+    fn triangle_below(&self, surface: &Surface, from: u32, x: DVec3) -> Option<u32> {
+        let mut triangle = from;
+        for _ in 0..CROSSINGS {
+            let [a, b, c] = surface.corners(triangle);
+            let normal = (b - a).cross(c - a);
+            let opposite = [(b - a).cross(x - a), (c - b).cross(x - b), (a - c).cross(x - c)].map(|n| n.dot(normal));
+            // The edge (k, k + 1) that x lies farthest beyond, with a margin so that no two triangles hand it to and fro.
+            let beyond = -1e-9 * normal.length_squared();
+            let k = (0..3).min_by(|&i, &j| opposite[i].total_cmp(&opposite[j])).unwrap_or(0);
+            if opposite[k] >= beyond {
+                return Some(triangle);
+            }
+            if self.creases[triangle as usize][k] {
+                return None;
+            }
+            triangle = surface.neighbours[triangle as usize][k];
+        }
+        Some(triangle)
+    }
+}
+
+/// The closest point of the drawn triangles, as on a point or an edge: the normal turns with `p` about it.
+fn on_crease(closest: &SurfacePoint) -> FootPoint {
+    let (normal, distance) = (closest.normal, closest.signed_distance);
+    let across = DMat3::IDENTITY - outer(normal, normal);
+    let turning = if distance.abs() > 1e-9 { across * (1.0 / distance) } else { DMat3::ZERO };
+    FootPoint {
+        triangle: closest.triangle,
+        position: closest.position,
+        normal,
+        distance,
+        turning,
+        shift: DMat3::ZERO,
+        on_crease: true,
+    }
+}

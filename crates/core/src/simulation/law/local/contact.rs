@@ -1,0 +1,47 @@
+//! What a local contact remembers from tick to tick.
+
+use glam::{DQuat, DVec3};
+
+use super::friction::Friction;
+use crate::contact::smooth::FootPoint;
+
+/// State of a contact under the local law; vectors are in the body's frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LocalContact {
+    /// Where the tool is, less what the device has not yet been let into, m, and how it is turned.
+    pub tool: DVec3,
+    /// How the tool is turned.
+    pub orientation: DQuat,
+    /// Where it is over the surface at rest, `p' = p - u`: what moves with the body below it does not count, m.
+    pub relative: DVec3,
+    /// How far it went there in the last tick, m.
+    pub(in crate::simulation) advance: DVec3,
+    /// How it was turned a tick ago.
+    pub(in crate::simulation) turned: DQuat,
+    /// Approach at which it began, m: a tool that appears inside starts from no force.
+    pub entry: f64,
+    /// The closest point of the surface at rest.
+    pub foot: FootPoint,
+    /// Friction at the end of the last tick.
+    pub(in crate::simulation) friction: Friction,
+    /// Torque on the tool about its tip, N m.
+    pub torque: DVec3,
+    /// Contact radius, m.
+    pub radius: f64,
+    /// Approach of the tool and the surface at rest, m.
+    pub depth: f64,
+    /// Felt stiffness along the normal, N/m.
+    pub stiffness: f64,
+    /// Whether it slips.
+    pub slipping: bool,
+    /// Force on the body before the limit of strain, N.
+    pub(in crate::simulation) force: DVec3,
+    /// Energy of the indentation and of the springs, J.
+    pub(in crate::simulation) energy: f64,
+    /// What friction took out in the last tick, J.
+    pub(in crate::simulation) dissipated: f64,
+    /// Share of its force that the limit of strain lets through.
+    pub(in crate::simulation) share: f64,
+    /// Place at which its strain was last asked for, m.
+    pub(in crate::simulation) watched: DVec3,
+}

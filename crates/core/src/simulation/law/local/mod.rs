@@ -1,0 +1,96 @@
+//! Contact below the size of elements: a local law in series with finite elements.
+//!
+//! The body carries the surface below the tool along by `u = C_reg(x) f` (`contact::regular`). What is left between the
+//! tool, at `p' = p - u`, and the smooth surface at rest is contact with a half-space: Sneddon's sphere, and friction. With the
+//! energy `Phi(p')` of the one and `f^T C_reg f / 2` of the other, all of it is the stationary value over `u` of
+//!
+//! ```text
+//! E(p) = min_u  u^T C_reg(x)^-1 u / 2 + Phi(p - u)        x = x(p - u)
+//! ```
+//!
+//! so that `dE/dp = C_reg^-1 u = f`, and with `d(C^-1) = -C^-1 dC C^-1`
+//!
+//! ```text
+//! f = dPhi/dp' - (1/2) f^T (dC_reg/dp') f
+//! ```
+//!
+//! The last term inclines the force as the surface under load is inclined. Whatever forces friction adds to `dPhi/dp'`, the
+//! work of the tool less that of friction is the change of one energy: `f . dp = d(f^T C f / 2) + f_local . dp'`.
+
+mod contact;
+mod friction;
+mod response;
+
+pub use contact::LocalContact;
+pub use response::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
+
+use glam::{DMat3, DVec3};
+
+use super::{Approach, Law};
+use crate::contact::Refusal;
+use crate::simulation::body::BodyDynamics;
+use crate::simulation::contacts::{Contact, Mode};
+use crate::simulation::scratch::Scratch;
+use crate::simulation::tool::{LawKind, ToolModel};
+
+/// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
+const JUMP: f64 = 2.0;
+
+/// The law.
+pub struct Local;
+
+impl Law for Local {
+    fn begin(
+        &self,
+        approach: &Approach<'_>,
+        entry_depth: &mut f64,
+        _scratch: &mut Scratch,
+    ) -> Result<Option<Contact>, Refusal> {
+        let (body, met) = (approach.body, approach.position - approach.carried());
+        let Some(local) = &body.local else { return Ok(None) };
+        let Some(foot) = local.smooth.foot_anywhere(&body.loaded, &body.query, met) else { return Ok(None) };
+        let depth = approach.tool.radius - foot.distance;
+        *entry_depth = entry_depth.min(depth.max(0.0));
+        if depth <= *entry_depth {
+            return Ok(None);
+        }
+        let local = LocalContact {
+            tool: approach.position,
+            orientation: approach.orientation,
+            relative: met,
+            turned: approach.orientation,
+            entry: *entry_depth,
+            foot,
+            share: 1.0,
+            watched: foot.position,
+            ..LocalContact::default()
+        };
+        Ok(Some(Contact {
+            mode: Mode::Press,
+            law: LawKind::Local,
+            tool: approach.tool_index,
+            body: approach.body_index,
+            point: foot.position,
+            normal: foot.normal,
+            anchor: approach.position,
+            local,
+            ..Contact::default()
+        }))
+    }
+
+    fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
+        let local = &mut contact.local;
+        let jumped = approach.position.distance(local.tool) > JUMP * approach.tool.radius;
+        (local.tool, local.orientation) = (approach.position, approach.orientation);
+        // Withdrawn, it may come in again as deep as it has been left.
+        !approach.grab && !jumped
+    }
+
+    fn respond(&self, _tool: &ToolModel, dynamics: Option<&BodyDynamics>, _own: &DMat3) -> f64 {
+        dynamics.map_or(0.0, |dynamics| 1.0 / dynamics.coupling)
+    }
+
+    fn end(&self, contact: &Contact) -> bool {
+        contact.force == DVec3::ZERO
+    }
+}

@@ -1,0 +1,170 @@
+//! Force and its derivative for a place of the tool over the surface at rest.
+
+use glam::{DMat3, DVec3};
+
+use super::LocalContact;
+use super::friction::{Answer, Friction};
+use crate::contact::local::{SphereContact, effective_modulus, indent_sphere};
+use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
+use crate::contact::{Moduli, SurfaceQuery};
+use crate::mesh::Surface;
+
+/// Least `(1/R + kappa_1) (1/R + kappa_2)` over `1/R^2`: a tool that fits a hollow closely touches it as a flatter one.
+const CLOSEST_FIT: f64 = 0.1;
+/// The force is inclined by the body's change of compliance by no more than this, over the pressing force.
+const STEEPEST: f64 = 0.5;
+
+/// What a tool meets of a body.
+#[derive(Clone, Copy)]
+pub struct LocalBody<'a> {
+    pub surface: &'a Surface,
+    pub query: &'a SurfaceQuery,
+    pub smooth: &'a SmoothSurface,
+    pub moduli: &'a Moduli,
+    /// `C_reg` at the fans, m/N.
+    pub regular: &'a [DMat3],
+    /// Young's modulus over the Green's function's.
+    pub scale: f64,
+}
+
+/// The tool, and what it rubs with.
+#[derive(Clone, Copy)]
+pub struct LocalTool {
+    /// Radius of the sphere, m.
+    pub radius: f64,
+    /// Young's modulus of its pad, Pa; a rigid one has none.
+    pub pad: Option<f64>,
+    /// Coulomb's coefficient.
+    pub coefficient: f64,
+}
+
+/// What other contacts of the body do at a contact.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Others {
+    /// Derivative of `f^T sum_b C_ab f_b` by the place of the tool, N.
+    pub slope: DVec3,
+    /// Of a body in motion the derivative of the surface's displacement `u_k` by the place, columns by `k`: it takes the place
+    /// of the compliance's, for `f . du(x)/dp'` at rest is `f^T (dC/dp') f / 2`.
+    pub moving: Option<DMat3>,
+}
+
+/// The answer at one place.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LocalResponse {
+    pub foot: FootPoint,
+    /// Force on the body, N, and its derivative by the place, N/m.
+    pub force: DVec3,
+    pub jacobian: DMat3,
+    /// `C_reg` there, m/N.
+    pub compliance: DMat3,
+    /// Direction of the force without friction, turned towards the tool.
+    pub normal: DVec3,
+    pub sphere: SphereContact,
+    pub friction: Answer,
+    /// Torque on the tool about its tip, N m.
+    pub torque: DVec3,
+}
+
+/// Energy of the local contact at a place and its gradient without friction.
+struct Indentation {
+    sphere: SphereContact,
+    /// `dPhi/dp'`, N.
+    gradient: DVec3,
+    /// `k_t / k_n`.
+    tangential: f64,
+}
+
+/// Answers to the tool at `place`; `force` is what is known of the force so far. `None` where nothing may be touched.
+pub fn evaluate(
+    body: LocalBody<'_>,
+    tool: LocalTool,
+    contact: &LocalContact,
+    place: DVec3,
+    force: DVec3,
+    others: Others,
+    weights: &mut FanWeights,
+) -> Option<LocalResponse> {
+    let start = (contact.foot.triangle, contact.foot.position);
+    let foot = body.smooth.foot(body.surface, body.query, place, start)?;
+    body.smooth.weigh(&foot, weights);
+    if weights.touchable < 0.5 {
+        return None;
+    }
+    let depth = tool.radius - contact.entry - foot.distance;
+    let Indentation { sphere, gradient, tangential } = indent(body, tool, &foot, depth, weights);
+    let mut compliance = DMat3::ZERO;
+    for (fan, weight) in weights.iter() {
+        compliance += body.regular[fan] * (weight / body.scale);
+    }
+    let mut response =
+        LocalResponse { foot, force, compliance, normal: foot.normal, sphere, ..LocalResponse::default() };
+    if sphere.force == 0.0 {
+        response.force = DVec3::ZERO;
+        return Some(response);
+    }
+    let lever = -foot.normal * tool.radius;
+    let rotation = rotation_between(contact);
+    let displacement = place - contact.relative + rotation.cross(lever);
+    // The inclination of the force follows from the force of the step before: they agree where the steps end.
+    let mut slope = others.slope;
+    match others.moving {
+        Some(moving) => slope += moving * force,
+        None => {
+            for (fan, _, gradient) in weights.with_gradients() {
+                slope += gradient * (0.5 / body.scale * force.dot(body.regular[fan] * force));
+            }
+        }
+    }
+    let push = slope.clamp_length_max(STEEPEST * sphere.force) - gradient;
+    let pressing = push.length();
+    response.normal = push / pressing;
+    let stiffness = tangential * sphere.stiffness;
+    let bound = tool.coefficient * pressing;
+    response.friction = contact.friction.answer(displacement, bound, tool.coefficient, stiffness, response.normal);
+    response.force = response.friction.force - push;
+    let (n, turning) = (foot.normal, foot.turning);
+    let along = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+    response.jacobian = along(n, n) * sphere.stiffness - turning * sphere.force + response.friction.by_displacement
+        - along(response.friction.by_pressing, n) * sphere.stiffness;
+    response.torque = -lever.cross(response.friction.force);
+    Some(response)
+}
+
+fn indent(body: LocalBody<'_>, tool: LocalTool, foot: &FootPoint, depth: f64, weights: &FanWeights) -> Indentation {
+    let fans = body.smooth.fans();
+    let (mean, mean_slope) = weights.field(|fan| fans[fan].mean);
+    let (gauss, gauss_slope) = weights.field(|fan| fans[fan].gauss);
+    let (modulus, modulus_slope) = weights.field(|fan| body.scale * body.moduli.plane_strain(fans[fan].node));
+    let (poisson, _) = weights.field(|fan| body.moduli.poissons[fans[fan].node as usize]);
+    let curved = 1.0 / tool.radius;
+    let product = curved * curved + 2.0 * mean * curved + gauss;
+    let product_slope = mean_slope * (2.0 * curved) + gauss_slope;
+    // A maximum with continuous derivatives.
+    let least = CLOSEST_FIT * curved * curved;
+    let root = (product * product + least * least).sqrt();
+    let (bounded, share) = (0.5 * (product + root), 0.5 * (1.0 + product / root));
+    let radius = 1.0 / bounded.sqrt();
+    let radius_slope = product_slope * (-0.5 * radius * radius * radius * share);
+    let effective = effective_modulus(modulus, 0.0, tool.pad);
+    let effective_slope = modulus_slope * (effective / modulus).powi(2);
+    let sphere = indent_sphere(depth, radius, effective);
+    let gradient = radius_slope * sphere.energy_by_radius + effective_slope * (sphere.energy / effective)
+        - foot.normal * sphere.force;
+    Indentation { sphere, gradient, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
+}
+
+/// Rotation vector of the tool since the last tick, rad.
+fn rotation_between(contact: &LocalContact) -> DVec3 {
+    let turned = contact.orientation * contact.turned.conjugate();
+    let turned = if turned.w < 0.0 { -turned } else { turned };
+    let sine = DVec3::new(turned.x, turned.y, turned.z);
+    let size = sine.length();
+    if size > 1e-12 { sine * (2.0 * size.atan2(turned.w) / size) } else { sine * 2.0 }
+}
+
+/// Springs without any force.
+impl LocalResponse {
+    pub fn springs(&self) -> Friction {
+        if self.force == DVec3::ZERO { Friction::default() } else { self.friction.friction }
+    }
+}

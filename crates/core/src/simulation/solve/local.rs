@@ -1,0 +1,320 @@
+//! Contacts under the local law: where each tool is over the surface at rest, by Newton's method on all of them together.
+//!
+//! ```text
+//! p'_a + sum_b C_ab f_b(p'_b) = p_a - u_free,a
+//! ```
+//!
+//! Sneddon's force grows ever steeper with the approach: from a place that is too deep the method approaches the answer from
+//! that side, and one step brings any other place there.
+
+use glam::{DMat3, DVec3};
+
+use crate::contact::patch_weights;
+use crate::contact::smooth::FanWeights;
+use crate::simulation::MAX_CONTACTS;
+use crate::simulation::contacts::Contact;
+use crate::simulation::input::Controls;
+use crate::simulation::law::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
+use crate::simulation::model::Model;
+use crate::simulation::scratch::Scratch;
+use crate::simulation::state::State;
+use crate::simulation::system::System;
+use crate::simulation::tool::LawKind;
+
+/// Most steps; three or four are usual.
+pub const MOST_STEPS: usize = 16;
+/// A step of this length, over the tool's radius, is none.
+const SETTLED: f64 = 1e-8;
+/// A force that changes by less than this part from step to step stays.
+const SAME: f64 = 1e-8;
+/// Steps in which the compliance between contacts follows them.
+const FOLLOWED: usize = 3;
+
+/// Memory of the method.
+pub struct LocalScratch {
+    weights: Vec<FanWeights>,
+    responses: Vec<LocalResponse>,
+    /// Compliance between contacts, and what the others do at each.
+    between: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
+    /// Compliance of one step less that at rest, on a body in motion, with the coupling on the diagonal.
+    change: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
+    others: [Others; MAX_CONTACTS],
+    /// What every contact counts from.
+    from: [DVec3; MAX_CONTACTS],
+    places: [DVec3; MAX_CONTACTS],
+    steps: [DVec3; MAX_CONTACTS],
+    /// Largest change of a force in the latest step, over that force.
+    changed: f64,
+}
+
+impl LocalScratch {
+    /// Takes the step.
+    fn go(&mut self) {
+        self.places.iter_mut().zip(&self.steps).for_each(|(place, step)| *place += *step);
+    }
+}
+
+impl Default for LocalScratch {
+    fn default() -> Self {
+        Self {
+            weights: vec![FanWeights::default(); MAX_CONTACTS],
+            responses: vec![LocalResponse::default(); MAX_CONTACTS],
+            between: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
+            change: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
+            others: [Others::default(); MAX_CONTACTS],
+            from: [DVec3::ZERO; MAX_CONTACTS],
+            places: [DVec3::ZERO; MAX_CONTACTS],
+            steps: [DVec3::ZERO; MAX_CONTACTS],
+            changed: 0.0,
+        }
+    }
+}
+
+/// What a tool meets of a body; `None` where the local law is not prepared.
+pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize) -> Option<LocalBody<'a>> {
+    let fixed = &model.bodies[body];
+    let local = fixed.local.as_ref()?;
+    let regular = model.regular[tool][body].as_deref()?;
+    Some(LocalBody {
+        surface: &fixed.loaded,
+        query: &fixed.query,
+        smooth: &local.smooth,
+        moduli: &local.moduli,
+        regular: &regular.blocks,
+        scale: state.bodies[body].stiffness_scale,
+    })
+}
+
+fn local_tool(model: &Model, controls: &Controls, tool: usize) -> LocalTool {
+    let fixed = &model.tools[tool];
+    LocalTool { radius: fixed.radius, pad: fixed.pad_youngs_modulus, coefficient: controls.friction[tool] }
+}
+
+/// Forces of the contacts of a body under the local law.
+pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
+    let mut slots = [0; MAX_CONTACTS];
+    let mut count = 0;
+    for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
+        slots[count] = slot;
+        count += 1;
+    }
+    if count == 0 {
+        return;
+    }
+    let slots = &slots[..count];
+    scratch.local.others[..count].fill(Others::default());
+    follow_motion(model, state, scratch, slots, body);
+    let Scratch { local, system, .. } = scratch;
+    for (a, &slot) in slots.iter().enumerate() {
+        let contact = &state.contacts.slots[slot];
+        // Whatever moves goes on as it did.
+        local.places[a] = contact.local.relative + contact.local.advance;
+        local.from[a] = contact.local.tool - free_displacement(model, state, body, slot);
+        local.responses[a].force = contact.local.force;
+        local.others[a].slope = DVec3::ZERO;
+    }
+    for step in 0..MOST_STEPS {
+        if !meet(model, state, local, slots, body, controls, step) {
+            return;
+        }
+        let longest = advance(local, system, slots.len());
+        let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
+        if longest < SETTLED * radius && step > 0 && local.changed < SAME {
+            break;
+        }
+        if step + 1 < MOST_STEPS {
+            local.go();
+        }
+    }
+    take_up(model, state, local, slots, body);
+}
+
+/// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, and what
+/// contacts that stick did to it a tick ago, m.
+fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
+    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
+    if let Some(motion) = &state.bodies[body].motion {
+        return motion.free_displacement(slot);
+    }
+    let sticking = contacts.on(body).filter(|&other| contacts.slots[other].law != LawKind::Local);
+    let dent = |other: usize| {
+        contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
+    };
+    sticking.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
+}
+
+/// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
+/// to: by smaller patches the compliance of a single step could outweigh what is left of the half-space.
+fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots: &[usize], body: usize) {
+    let fixed = &model.bodies[body];
+    let State { bodies, contacts, .. } = state;
+    let (Some(motion), Some(dynamics), Some(own)) = (&mut bodies[body].motion, &fixed.dynamics, &fixed.local) else {
+        return;
+    };
+    for (a, &slot) in slots.iter().enumerate() {
+        let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
+        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut scratch.local.weights[a]);
+        own.smooth.weigh(foot, weights);
+        let (wide, _) = weights.field(|fan| regular.widths[fan]);
+        let centre = fixed.material_point(&fixed.surface_point(foot));
+        let (surface, patches) = (&fixed.green.surface, &mut scratch.patches[body]);
+        // As many nodes as at the fans around fit.
+        if patch_weights(surface, &fixed.geometry, &centre, wide, patches, &mut scratch.candidate).is_ok() {
+            contacts.patches[slot].admit_touchable(&fixed.green, &scratch.candidate);
+        }
+        motion.follow_contact(&dynamics.modes, contacts, slot);
+        let mut moving = DMat3::ZERO;
+        for (fan, _, gradient) in weights.with_gradients() {
+            let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
+            moving += DMat3::from_cols(gradient * moved.x, gradient * moved.y, gradient * moved.z);
+        }
+        scratch.local.others[a].moving = Some(moving);
+    }
+    for (a, &slot) in slots.iter().enumerate() {
+        for (b, &other) in slots.iter().enumerate() {
+            let mut change = motion.change_in_a_step(&dynamics.modes, slot, other);
+            if a == b {
+                change += DMat3::IDENTITY * (1.0 / dynamics.coupling);
+            }
+            scratch.local.change[a][b] = change;
+        }
+    }
+}
+
+/// Answers of all contacts at their places. A contact that has come where nothing may be touched is let go: false.
+fn meet(
+    model: &Model,
+    state: &mut State,
+    local: &mut LocalScratch,
+    slots: &[usize],
+    body: usize,
+    controls: &Controls,
+    step: usize,
+) -> bool {
+    local.changed = 0.0;
+    for (a, &slot) in slots.iter().enumerate() {
+        let tool = state.contacts.slots[slot].tool;
+        let answer = local_body(model, state, tool, body).and_then(|met| {
+            let (contact, known) = (&state.contacts.slots[slot].local, local.responses[a].force);
+            let tool = local_tool(model, controls, tool);
+            evaluate(met, tool, contact, local.places[a], known, local.others[a], &mut local.weights[a])
+        });
+        match answer {
+            Some(answer) => {
+                let change = (answer.force - local.responses[a].force).length();
+                local.changed = local.changed.max(change / answer.force.length().max(f64::MIN_POSITIVE));
+                local.responses[a] = answer;
+            }
+            None => {
+                state.contacts.clear(slot);
+                return false;
+            }
+        }
+        local.between[a][a] = local.responses[a].compliance;
+        if state.bodies[body].motion.is_some() {
+            local.between[a][a] += local.change[a][a];
+        }
+    }
+    if slots.len() > 1 && step < FOLLOWED {
+        couple(model, state, local, slots, body);
+    }
+    true
+}
+
+/// Compliance between the contacts, and how it changes with the place of each.
+fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[usize], body: usize) {
+    let green = &model.bodies[body].green;
+    let scale = state.bodies[body].stiffness_scale;
+    for (a, &slot) in slots.iter().enumerate() {
+        if state.bodies[body].motion.is_none() {
+            cover(model, state, &local.weights[a], slot, body);
+        }
+        local.others[a].slope = DVec3::ZERO;
+    }
+    let Some(fans) = model.bodies[body].local.as_ref().map(|own| own.smooth.fans()) else { return };
+    for (a, _) in slots.iter().enumerate() {
+        for (b, &other) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
+            let (mut block, mut slope) = (DMat3::ZERO, DVec3::ZERO);
+            let (own, force) = (local.responses[a].force, local.responses[b].force);
+            for (fan, weight, gradient) in local.weights[a].with_gradients() {
+                let of_node = state.contacts.patches[other].compliance_at(green, fans[fan].node as usize);
+                block += of_node * (weight / scale);
+                slope += gradient * (own.dot(of_node * force) / scale);
+            }
+            local.between[a][b] = block;
+            if state.bodies[body].motion.is_some() {
+                local.between[a][b] += local.change[a][b];
+            }
+            local.others[a].slope += slope;
+        }
+    }
+}
+
+/// The nodes below a contact, as blended.
+fn cover(model: &Model, state: &mut State, weights: &FanWeights, slot: usize, body: usize) {
+    let fixed = &model.bodies[body];
+    let Some(local) = &fixed.local else { return };
+    let fans = local.smooth.fans();
+    state.contacts.patches[slot].blend(&fixed.green, weights.iter().map(|(fan, weight)| (fans[fan].node, weight)));
+}
+
+/// One step of Newton's method; the longest of all.
+fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
+    for a in 0..count {
+        let mut residual = local.places[a] - local.from[a];
+        for b in 0..count {
+            let between = local.between[a][b];
+            residual += between * local.responses[b].force;
+            let mut block = between * local.responses[b].jacobian;
+            if a == b {
+                block += DMat3::IDENTITY;
+            }
+            for row in 0..3 {
+                for column in 0..3 {
+                    system.matrix[3 * a + row][3 * b + column] = block.col(column)[row];
+                }
+            }
+        }
+        system.right[3 * a..3 * a + 3].copy_from_slice(&(-residual).to_array());
+    }
+    system.solve_unsymmetric(3 * count);
+    let mut longest = 0.0f64;
+    for a in 0..count {
+        let step = DVec3::from_slice(&system.right[3 * a..3 * a + 3]);
+        let step = if step.is_finite() { step } else { DVec3::ZERO };
+        local.steps[a] = step;
+        longest = longest.max(step.length());
+    }
+    longest
+}
+
+/// Writes the answers down.
+fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
+    for (a, &slot) in slots.iter().enumerate() {
+        let response = &local.responses[a];
+        match &mut state.bodies[body].motion {
+            Some(motion) => {
+                let Some(dynamics) = &model.bodies[body].dynamics else { continue };
+                motion.keep_residual(&dynamics.modes, slot, &response.compliance);
+            }
+            None => cover(model, state, &local.weights[a], slot, body),
+        }
+        let contact: &mut Contact = &mut state.contacts.slots[slot];
+        (contact.force, contact.local.force) = (response.force, response.force);
+        (contact.point, contact.normal) = (response.foot.position, response.normal);
+        (contact.displacement, contact.wanted) =
+            (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
+        let own = &mut contact.local;
+        own.advance = local.places[a] - own.relative;
+        own.relative = local.places[a];
+        own.turned = own.orientation;
+        own.foot = response.foot;
+        own.friction = response.springs();
+        (own.torque, own.radius, own.slipping) = (response.torque, response.sphere.radius, response.friction.slipping);
+        let along = response.normal.dot(response.compliance * response.normal);
+        own.stiffness = response.sphere.stiffness / (1.0 + along * response.sphere.stiffness);
+        own.energy = response.sphere.energy + response.springs().energy();
+        own.dissipated = response.friction.dissipated;
+        own.depth = model.tools[contact.tool].radius - response.foot.normal.dot(own.tool - response.foot.position);
+    }
+}
