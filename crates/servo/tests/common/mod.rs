@@ -20,7 +20,13 @@ pub use bodies::cube;
 
 pub const PERIOD: f64 = 1e-3;
 pub const PERIOD_NS: u64 = 1_000_000;
-pub const TOOL: ToolModel = ToolModel { radius: 0.005, law: LawKind::Patch, max_stiffness: 5000.0 };
+pub const TOOL: ToolModel = ToolModel {
+    shape: ToolShape::Sphere { radius: 0.005 },
+    radius: 0.005,
+    law: LawKind::Patch,
+    pad_youngs_modulus: None,
+    max_stiffness: 5000.0,
+};
 
 /// Two tools and two cubes 0.1 m wide, one at the origin, the other turned by a right angle, with its corner at
 /// (0.25, 0, 0): it may be touched in its half of larger x.

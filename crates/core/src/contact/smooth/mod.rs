@@ -135,14 +135,14 @@ struct Walk<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::f64::consts::PI;
 
     use super::*;
     use crate::contact::SurfaceQuery;
 
     /// A ball of radius one, of `n` rows of triangles.
-    fn ball(n: u32) -> Surface {
+    pub(crate) fn ball(n: u32) -> Surface {
         let mut positions = vec![DVec3::Z];
         for i in 1..n {
             let polar = PI * f64::from(i) / f64::from(n);
@@ -231,7 +231,13 @@ mod tests {
         let surface = cube();
         let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
         assert_eq!(smooth.fans().len(), 24);
-        for t in 0..12 { eprintln!("{t} {:?} own {:?}", surface.normals[t], smooth.own(t as u32).map(|f| (f.node, f.normal, f.mean, f.reach)).collect::<Vec<_>>()); }
+        for t in 0..12 {
+            eprintln!(
+                "{t} {:?} own {:?}",
+                surface.normals[t],
+                smooth.own(t as u32).map(|f| (f.node, f.normal, f.mean, f.reach)).collect::<Vec<_>>()
+            );
+        }
         let foot = |p| smooth.foot_anywhere(&surface, &query, p).expect("a foot");
         let over = foot(DVec3::new(0.3, 0.6, 1.2));
         assert!((over.distance - 0.2).abs() < 1e-12 && over.normal.distance(DVec3::Z) < 1e-12, "{over:?}");
