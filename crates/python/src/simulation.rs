@@ -138,12 +138,7 @@ impl SimulationCore {
 
     /// Closest points of the smooth surface of a body (n, 7): position (m), outward normal, signed distance (m), in the
     /// body's frame; NaN where there is none.
-    fn feet<'py>(
-        &self,
-        py: Python<'py>,
-        body: usize,
-        points: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn feet<'py>(&self, py: Python<'py>, body: usize, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = points.as_slice()?.to_vec();
         let model = self.model.clone();
         let feet = py.detach(|| {

@@ -86,7 +86,7 @@ pub(super) fn line_entry(semi_axes: DVec3, origin: DVec3, direction: DVec3) -> O
     // Closest approach to the centre, whose length has no cancellation for an origin far away.
     let closest = from - along * (b / a);
     let discriminant = 1.0 - closest.length_squared();
-    if !(discriminant > 0.0) {
+    if discriminant <= 0.0 {
         return None;
     }
     let distance = -b / a - (discriminant / a).sqrt();

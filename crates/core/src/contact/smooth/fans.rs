@@ -69,8 +69,9 @@ impl Fans {
 }
 
 fn creases(surface: &Surface) -> Vec<[bool; 3]> {
-    let turns =
-        |t: usize, other: u32| other == u32::MAX || surface.normals[t].dot(surface.normals[other as usize]) < CREASE;
+    let turns = |t: usize, other: u32| {
+        other == u32::MAX || surface.normals[t].dot(surface.normals[other as usize]) < CREASE
+    };
     surface.neighbours.iter().enumerate().map(|(t, across)| across.map(|other| turns(t, other))).collect()
 }
 
@@ -202,8 +203,11 @@ fn fit(rank: u32, fan: &mut Fan, before: &[Fan], neighbours: &[Vec<u32>]) {
     let normal = ((fan.normal - a * x - b * y) * flatter).normalize();
     // The second fundamental form in the tangents of the graph, brought to an orthonormal frame of the new plane.
     let (tx, ty) = (x + a * fan.normal, y + b * fan.normal);
-    let inverse =
-        glam::DMat2::from_cols(DVec2::new(tx.dot(tx), tx.dot(ty)), DVec2::new(tx.dot(ty), ty.dot(ty))).inverse();
+    let inverse = glam::DMat2::from_cols(
+        DVec2::new(tx.dot(tx), tx.dot(ty)),
+        DVec2::new(tx.dot(ty), ty.dot(ty)),
+    )
+    .inverse();
     let form = glam::DMat2::from_cols(DVec2::new(c, d), DVec2::new(d, e)) * (-flatter / longest);
     let raised = inverse * form * inverse;
     let bound = (SHARPEST / longest / raised_size(&raised)).min(1.0);

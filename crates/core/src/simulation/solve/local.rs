@@ -302,8 +302,7 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         let contact: &mut Contact = &mut state.contacts.slots[slot];
         (contact.force, contact.local.force) = (response.force, response.force);
         (contact.point, contact.normal) = (response.foot.position, response.normal);
-        (contact.displacement, contact.wanted) =
-            (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
+        (contact.displacement, contact.wanted) = (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
         let own = &mut contact.local;
         own.advance = local.places[a] - own.relative;
         own.relative = local.places[a];

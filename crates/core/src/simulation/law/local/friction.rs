@@ -70,7 +70,8 @@ impl Friction {
         let mut answer = Answer::default();
         answer.friction.stiffness = stiffness;
         answer.friction.normal = normal;
-        let along = DMat3::IDENTITY - DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+        let along = DMat3::IDENTITY
+            - DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
         let kept = if self.stiffness > stiffness { stiffness / self.stiffness } else { 1.0 };
         let spring = stiffness / SPRINGS as f64;
         let stretch = along * displacement * spring;
@@ -85,8 +86,11 @@ impl Friction {
             } else {
                 let direction = tried / size;
                 *after = direction * most;
-                let across =
-                    DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
+                let across = DMat3::from_cols(
+                    direction * direction.x,
+                    direction * direction.y,
+                    direction * direction.z,
+                );
                 answer.by_displacement += (along - across) * (spring * most / size);
                 answer.by_pressing += direction * (BOUNDS[i] * coefficient);
                 giving += 1;
