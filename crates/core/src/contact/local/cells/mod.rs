@@ -79,7 +79,7 @@ pub struct CellProblem<'a> {
 }
 
 /// What the next solution starts from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureState {
     resolution: Resolution,
     /// Forces over `pi E* sqrt(hx hy)`, m.
