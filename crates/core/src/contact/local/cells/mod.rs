@@ -2,8 +2,11 @@
 //!
 //! The stored energy is `U = max over f >= 0 of - f.gap - f.G f/2`, where `gap` is how far the tool lies above the body at
 //! the middle of each cell (negative where it overlaps) and `G` the influence of the cells' forces on each other. The
-//! wrench is the exact gradient of this energy by the tool's pose, to the precision of the solution: at the maximum the forces may be held
-//! constant, and the gap, the cells' places and their influence are differentiated.
+//! wrench is the gradient of this energy by the tool's pose, to the precision of the solution: at the maximum the forces
+//! may be held constant, and the gap, the cells' places and their influence are differentiated.
+//!
+//! The gap is measured along the normal, as in Sneddon's and Hertz's solutions. Of a sphere 16 x 16 cells give force and
+//! energy to 0.3 %, 8 x 8 to 1 %, 4 x 4 to 3 %.
 
 mod grid;
 mod influence;
@@ -124,7 +127,8 @@ pub struct CellContact {
     pub normal_force: f64,
     /// Where their resultant acts on the surface, m.
     pub centre_of_pressure: DVec3,
-    /// Normal stiffness `dF/dd` of the cells under pressure, N/m.
+    /// Normal stiffness `dF/dd` of the cells under pressure, N/m; cells at the rim count as whole, so it is up to 5 % too large
+    /// (10 % with 8 x 8 cells).
     pub stiffness: f64,
     /// Stored energy, J.
     pub energy: f64,
@@ -132,7 +136,8 @@ pub struct CellContact {
     pub area: f64,
     /// How far the tool's support reaches below the tangent plane, m.
     pub depth: f64,
-    /// Derivative of the energy with respect to each curvature of the surface, J m.
+    /// Derivative of the energy with respect to each curvature of the surface, J m. With it and the wrench, the energy's change
+    /// with the whole frame is known: a motion of tool and frame together changes nothing.
     pub energy_by_curvature: [f64; 3],
     /// How the solution ended.
     pub convergence: Convergence,
