@@ -69,7 +69,7 @@ pub(super) fn curvature_at(semi_axes: DVec3, normal: DVec3) -> PrincipalCurvatur
 }
 
 /// Eigenvalues of a symmetric matrix, larger first, and the unit eigenvector of the larger.
-fn symmetric_eigen(m: DMat2) -> ([f64; 2], DVec2) {
+pub(crate) fn symmetric_eigen(m: DMat2) -> ([f64; 2], DVec2) {
     let (half_trace, half_difference, off) =
         (0.5 * (m.x_axis.x + m.y_axis.y), 0.5 * (m.x_axis.x - m.y_axis.y), m.x_axis.y);
     let spread = half_difference.hypot(off);

@@ -13,9 +13,10 @@ mod influence;
 mod pressure;
 mod wrench;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::super::shape::ToolShape;
+use super::place::{OsculatingSurface, ToolPose};
 use grid::{PosedTool, Rectangle};
 pub use influence::MAX_CELLS;
 use influence::{Grid, Influence};
@@ -43,27 +44,6 @@ impl Resolution {
             Resolution::Coarse => MAX_CELLS / 4,
         }
     }
-}
-
-/// A body's surface around a point, of second order.
-#[derive(Clone, Copy, Debug)]
-pub struct OsculatingSurface {
-    /// The point, m.
-    pub origin: DVec3,
-    /// Two tangents and the outward normal as columns, right-handed and orthonormal.
-    pub axes: DMat3,
-    /// Curvatures `[k_xx, k_xy, k_yy]` along the tangents, 1/m, positive where the surface falls away from its tangent
-    /// plane: its height is `-(k_xx x^2 + 2 k_xy x y + k_yy y^2)/2`.
-    pub curvature: [f64; 3],
-}
-
-/// Where a tool is.
-#[derive(Clone, Copy, Debug)]
-pub struct ToolPose {
-    /// Its origin, m.
-    pub position: DVec3,
-    /// World from tool.
-    pub rotation: DQuat,
 }
 
 /// A tool at a place.
@@ -166,7 +146,7 @@ impl CellProblem<'_> {
         if !(cells.sides[0] > 0.0 && cells.sides[1] > 0.0) {
             return CellContact::default();
         }
-        scratch.influence.set_aspect(cells.sides[1] / cells.sides[0]);
+        scratch.influence.set_aspect(cells.count, cells.sides[1] / cells.sides[0]);
         scratch.measure_gaps(&tool, &cells, &self.surface, depth);
         let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.gap, depth, &mut state.q);
         let contact = scratch.integrate(&tool, &cells, &self.surface, &state.q);
@@ -199,20 +179,6 @@ impl Cells {
         let along = left.coordinate + (i as f64 + 0.5) * self.sides[0];
         let across = below.coordinate + (j as f64 + 0.5) * self.sides[1];
         along * self.rectangle.axes[0] + across * self.rectangle.axes[1]
-    }
-}
-
-impl OsculatingSurface {
-    /// Height over the tangent plane, in the frame of the surface.
-    fn height(&self, at: DVec3) -> f64 {
-        let [xx, xy, yy] = self.curvature;
-        -0.5 * (xx * at.x * at.x + 2.0 * xy * at.x * at.y + yy * at.y * at.y)
-    }
-
-    /// Slope of the height.
-    fn slope(&self, at: DVec3) -> DVec3 {
-        let [xx, xy, yy] = self.curvature;
-        -DVec3::new(xx * at.x + xy * at.y, xy * at.x + yy * at.y, 0.0)
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use glam::EulerRot;
+use glam::{DQuat, EulerRot};
 
 use super::*;
-use crate::contact::local::{indent_ellipse, indent_sphere};
+use crate::contact::local::{OsculatingSurface, ToolPose, indent_ellipse, indent_sphere};
 use crate::contact::shape::{SurfaceShape, tests::sphere_mesh};
 
 const MODULUS: f64 = 12.5e3;
@@ -313,7 +313,7 @@ fn nothing_touches_from_outside() {
 fn influence_is_loves() {
     for aspect in [1.0, 0.3, 7.0] {
         let mut influence = Influence::new();
-        influence.set_aspect(aspect);
+        influence.set_aspect(MAX_CELLS, aspect);
         // Cells of sides 1 and `aspect`, split into points of equal force; q = f/(pi E* sqrt(aspect)).
         let splits = 200;
         for (i, j) in [(1usize, 0usize), (0, 1), (2, 3), (15, 9)] {
@@ -347,7 +347,7 @@ fn influence_changes_with_aspect_as_said() {
     for aspect in [0.4, 1.0, 3.0] {
         let at = |aspect: f64| {
             let (mut influence, mut out) = (Influence::new(), q);
-            influence.set_aspect(aspect);
+            influence.set_aspect(MAX_CELLS, aspect);
             influence.product(MAX_CELLS, &q, &mut out);
             (influence, out)
         };
@@ -367,7 +367,7 @@ fn influence_changes_with_aspect_as_said() {
 fn the_local_inverse_is_positive_definite() {
     for aspect in [1e-3, 0.02, 0.3, 1.0, 2.0, 17.0, 300.0, 1e4] {
         let mut influence = Influence::new();
-        influence.set_aspect(aspect);
+        influence.set_aspect(MAX_CELLS, aspect);
         let (mut r, mut out) = ([[0.0; MAX_CELLS]; MAX_CELLS], [[0.0; MAX_CELLS]; MAX_CELLS]);
         r[8][8] = 1.0;
         influence.precondition(MAX_CELLS, &r, &mut out);
