@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
-use palpate_core::dynamics::{Energy, ModalModel, exact_step};
 use palpate_core::contact::Moduli;
+use palpate_core::dynamics::{Energy, ModalModel, exact_step};
 use palpate_core::simulation::{
     BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel,
 };

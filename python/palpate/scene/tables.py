@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from palpate import models
-from palpate.fields import HONEST_STRAIN
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
@@ -18,6 +17,8 @@ from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, 
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
+# Strain of the finite element field at which a tool is held.
+STRAIN_LIMIT = 0.3
 # Rubber on dry glass comes to about 2; beyond this a coefficient is a slip of the pen.
 MOST_FRICTION = 10.0
 
@@ -101,7 +102,8 @@ class ToolTable(Table):
     ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
     ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
-    goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law.
+    goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
+    names a ``contact_radius`` and no law is a patch, for only patches have one.
     """
 
     shape: Literal["sphere"] = "sphere"
@@ -110,6 +112,13 @@ class ToolTable(Table):
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
     pad_youngs_modulus: Pressure | None = None
     contact_radius: Radius = 5e-3
+
+    @model_validator(mode="before")
+    @classmethod
+    def _patch_by_radius(cls, given: Any) -> Any:
+        """Take a tool with a contact radius for a patch."""
+        names_radius = isinstance(given, dict) and "contact_radius" in given and "contact" not in given
+        return {**given, "contact": "patch"} if names_radius else given
 
 
 class DeviceTable(Table):
@@ -125,12 +134,13 @@ class DeviceTable(Table):
 class ViewTable(Table):
     """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
 
-    Linear elasticity balloons beyond about 10 % strain; ``strain_limit = 0`` takes the limit away.
+    Linear elasticity is honest up to about 10 % strain, where the page warns; a finger's press on an organ goes beyond.
+    ``strain_limit = 0`` takes the limit away.
     """
 
     position: tuple[float, float, float] | None = None
     target: tuple[float, float, float] | None = None
-    strain_limit: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = HONEST_STRAIN
+    strain_limit: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = STRAIN_LIMIT
 
 
 class SceneTables(Table):

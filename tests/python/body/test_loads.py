@@ -123,7 +123,7 @@ def test_simulation_presses_the_sagged_body(loaded, loaded_green):
     """The tool meets the surface where the loads have put it, and feels its displacement from there."""
     scene = palpate.Scene.of_store(loaded_green.path)
     limits = {"max_force": 100.0, "max_slew": 1e9, "ramp": 0.0}
-    tool = {"radius": 0.006, "contact_radius": 0.012}
+    tool = {"radius": 0.006, "contact": "patch", "contact_radius": 0.012}
     scene = scene.model_copy(update={"device": scene.device.model_copy(update=limits)})
     view = scene.view.model_copy(update={"strain_limit": 0.0})
     scene = scene.model_copy(update={"tools": [scene.tools[0].model_copy(update=tool)], "view": view})

@@ -136,8 +136,8 @@ def test_scripted_press_leaves_a_log_and_a_plot(tmp_path):
 
 
 def test_scripted_press_is_limited_or_flagged(tmp_path):
-    scene = '[body]\nmodel = "kidney"\npaper = true\n'
-    (tmp_path / "limited.toml").write_text(scene)
+    scene = '[body]\nmodel = "kidney"\npaper = true\n[tool]\ncontact = "patch"\n'
+    (tmp_path / "limited.toml").write_text(scene + "[view]\nstrain_limit = 0.1\n")
     (tmp_path / "free.toml").write_text(scene + "[view]\nstrain_limit = 0\n")
     limited = run("run", "limited.toml", "--headless", "1", cwd=tmp_path).stdout
     assert "largest strain 10.0 %, where the tool was limited" in limited and "honest" not in limited

@@ -79,7 +79,11 @@ impl RegularCompliance {
     pub fn new(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
         let count = body.smooth.fans().len();
         let block = |(scratch, patch): &mut (PatchScratch, Patch), fan: usize| {
-            if body.smooth.touchable[fan] { at_fan(body, fan, radius, max_stiffness, scratch, patch) } else { (DMat3::ZERO, 0.0) }
+            if body.smooth.touchable[fan] {
+                at_fan(body, fan, radius, max_stiffness, scratch, patch)
+            } else {
+                (DMat3::ZERO, 0.0)
+            }
         };
         let memory = || (PatchScratch::new(&body.green.surface), Patch::default());
         #[cfg(feature = "offline")]
@@ -144,7 +148,8 @@ mod tests {
     fn the_constant_is_its_integral() {
         let simpson = |f: &dyn Fn(f64) -> f64, from: f64, to: f64, n: usize| {
             let h = (to - from) / n as f64;
-            let term = |i: usize| f(from + h * i as f64) * if i == 0 || i == n { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
+            let term =
+                |i: usize| f(from + h * i as f64) * if i == 0 || i == n { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
             (0..=n).map(term).sum::<f64>() * h / 3.0
         };
         let bessel = |t: f64| {

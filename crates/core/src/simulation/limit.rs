@@ -14,9 +14,9 @@ use glam::DVec3;
 
 use super::MAX_CONTACTS;
 use super::admissible::{Contacts, Vectors, closest};
+use super::contacts::Mode;
 use super::model::Model;
 use super::scratch::Scratch;
-use super::contacts::Mode;
 use super::solve::{gather, solve_with};
 use super::state::State;
 use super::strain_watch::StrainWatch;

@@ -55,7 +55,8 @@ impl Fans {
     pub fn new(surface: &Surface) -> Self {
         let creases = creases(surface);
         let (of_corners, count) = corners(surface, &creases);
-        let mut fans = vec![Fan::default(); count];
+        // A matrix is the identity by default.
+        let mut fans = vec![Fan { curvature: DMat3::ZERO, ..Fan::default() }; count];
         outline(surface, &of_corners, &mut fans);
         let neighbours = neighbours(&of_corners, count);
         for _ in 0..FITS {
@@ -69,9 +70,8 @@ impl Fans {
 }
 
 fn creases(surface: &Surface) -> Vec<[bool; 3]> {
-    let turns = |t: usize, other: u32| {
-        other == u32::MAX || surface.normals[t].dot(surface.normals[other as usize]) < CREASE
-    };
+    let turns =
+        |t: usize, other: u32| other == u32::MAX || surface.normals[t].dot(surface.normals[other as usize]) < CREASE;
     surface.neighbours.iter().enumerate().map(|(t, across)| across.map(|other| turns(t, other))).collect()
 }
 
@@ -203,11 +203,8 @@ fn fit(rank: u32, fan: &mut Fan, before: &[Fan], neighbours: &[Vec<u32>]) {
     let normal = ((fan.normal - a * x - b * y) * flatter).normalize();
     // The second fundamental form in the tangents of the graph, brought to an orthonormal frame of the new plane.
     let (tx, ty) = (x + a * fan.normal, y + b * fan.normal);
-    let inverse = glam::DMat2::from_cols(
-        DVec2::new(tx.dot(tx), tx.dot(ty)),
-        DVec2::new(tx.dot(ty), ty.dot(ty)),
-    )
-    .inverse();
+    let inverse =
+        glam::DMat2::from_cols(DVec2::new(tx.dot(tx), tx.dot(ty)), DVec2::new(tx.dot(ty), ty.dot(ty))).inverse();
     let form = glam::DMat2::from_cols(DVec2::new(c, d), DVec2::new(d, e)) * (-flatter / longest);
     let raised = inverse * form * inverse;
     let bound = (SHARPEST / longest / raised_size(&raised)).min(1.0);

@@ -133,3 +133,112 @@ struct Walk<'a> {
     kept: Vec<u32>,
     queue: Vec<u32>,
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::contact::SurfaceQuery;
+
+    /// A ball of radius one, of `n` rows of triangles.
+    fn ball(n: u32) -> Surface {
+        let mut positions = vec![DVec3::Z];
+        for i in 1..n {
+            let polar = PI * f64::from(i) / f64::from(n);
+            // Turned from row to row, so that no edge runs along a meridian.
+            positions.extend((0..2 * n).map(|j| {
+                let turn = PI * (f64::from(j) + 0.5 * f64::from(i)) / f64::from(n);
+                DVec3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos())
+            }));
+        }
+        positions.push(-DVec3::Z);
+        let (last, row) = (positions.len() as u32 - 1, 2 * n);
+        let at = |i: u32, j: u32| 1 + (i - 1) * row + j % row;
+        let mut faces = Vec::new();
+        for j in 0..row {
+            faces.push([0, at(1, j), at(1, j + 1)]);
+            faces.push([last, at(n - 1, j + 1), at(n - 1, j)]);
+            for i in 1..n - 1 {
+                faces.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+                faces.push([at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]);
+            }
+        }
+        Surface::new(positions, faces.into()).expect("a closed surface")
+    }
+
+    fn cube() -> Surface {
+        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
+        let faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2]];
+        let faces = [&faces[..], &[[2, 4, 6], [1, 3, 5], [3, 7, 5]]].concat();
+        Surface::new((0..8).map(corner).collect(), faces.into()).expect("a cube")
+    }
+
+    fn points(radius: f64) -> impl Iterator<Item = DVec3> {
+        (0..400).map(move |k| {
+            let (z, turn) = (0.9 * (0.37 * f64::from(k)).sin(), 2.399 * f64::from(k));
+            let across = (1.0 - z * z).sqrt();
+            radius * DVec3::new(across * turn.cos(), across * turn.sin(), z)
+        })
+    }
+
+    /// Facets of this ball lie up to 1.2 % of the radius below it.
+    #[test]
+    fn the_distance_of_a_ball_is_that_of_the_ball_and_its_derivatives_are_exact() {
+        let surface = ball(16);
+        let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
+        let mut worst = 0.0f64;
+        for p in points(1.2) {
+            let foot = |p| smooth.foot_anywhere(&surface, &query, p).expect("a foot");
+            let at = foot(p);
+            assert!(!at.on_crease);
+            worst = worst.max((at.distance - 0.2).abs());
+            assert!((at.position + at.normal * at.distance - p).length() < 1e-9);
+            let h = 1e-5;
+            for axis in DVec3::AXES {
+                let (ahead, behind) = (foot(p + h * axis), foot(p - h * axis));
+                assert!(((ahead.distance - behind.distance) / (2.0 * h) - at.normal.dot(axis)).abs() < 1e-6);
+                assert!(((ahead.normal - behind.normal) / (2.0 * h) - at.turning * axis).length() < 1e-3);
+                assert!(((ahead.position - behind.position) / (2.0 * h) - at.shift * axis).length() < 1e-3);
+            }
+        }
+        assert!(worst < 3e-4, "{worst}");
+        let fan = &smooth.fans()[40];
+        assert!((fan.mean - 1.0).abs() < 0.05 && (fan.gauss - 1.0).abs() < 0.1, "{} {}", fan.mean, fan.gauss);
+    }
+
+    #[test]
+    fn weights_sum_to_one_and_their_gradients_are_exact() {
+        let surface = ball(16);
+        let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
+        let mut weights = FanWeights::default();
+        let mut height = |p| {
+            smooth.weigh(&smooth.foot_anywhere(&surface, &query, p).expect("a foot"), &mut weights);
+            assert!((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-12);
+            weights.field(|fan| smooth.fans()[fan].position.z)
+        };
+        for p in points(1.1) {
+            let (_, slope) = height(p);
+            for axis in DVec3::AXES {
+                let difference = (height(p + 1e-5 * axis).0 - height(p - 1e-5 * axis).0) / 2e-5;
+                assert!((difference - slope.dot(axis)).abs() < 1e-5, "{difference} {}", slope.dot(axis));
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_has_three_fans_a_corner_and_is_flat_between_its_creases() {
+        let surface = cube();
+        let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
+        assert_eq!(smooth.fans().len(), 24);
+        let foot = |p| smooth.foot_anywhere(&surface, &query, p).expect("a foot");
+        let over = foot(DVec3::new(0.3, 0.6, 1.2));
+        assert!((over.distance - 0.2).abs() < 1e-12 && over.normal.distance(DVec3::Z) < 1e-12, "{over:?}");
+        let beside = foot(DVec3::new(1.1, 0.5, 1.1));
+        assert!(beside.on_crease && (beside.distance - 0.02f64.sqrt()).abs() < 1e-12);
+        // Followed from the face, the foot stops at the crease.
+        let followed = smooth.foot(&surface, &query, DVec3::new(1.1, 0.5, 1.1), (over.triangle, over.position));
+        assert!(followed.expect("a foot").position.distance(beside.position) < 1e-12);
+        assert!(smooth.foot_anywhere(&surface, &query, DVec3::splat(f64::NAN)).is_none());
+    }
+}

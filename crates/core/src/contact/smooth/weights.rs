@@ -5,9 +5,9 @@
 
 use glam::DVec3;
 
+use super::SmoothSurface;
 use super::blend::weight;
 use super::foot::FootPoint;
-use super::SmoothSurface;
 
 /// Most fans around a foot.
 pub const MAX_FANS: usize = 160;

@@ -30,7 +30,7 @@ use super::{Approach, Law};
 use crate::contact::Refusal;
 use crate::simulation::body::BodyDynamics;
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::scratch::Scratch;
+use crate::simulation::covering::Covering;
 use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
@@ -44,7 +44,7 @@ impl Law for Local {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        _scratch: &mut Scratch,
+        _covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };

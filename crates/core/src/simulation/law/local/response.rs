@@ -96,10 +96,11 @@ pub fn evaluate(
     for (fan, weight) in weights.iter() {
         compliance += body.regular[fan] * (weight / body.scale);
     }
+    // A matrix is the identity by default.
+    let jacobian = DMat3::ZERO;
     let mut response =
-        LocalResponse { foot, force, compliance, normal: foot.normal, sphere, ..LocalResponse::default() };
+        LocalResponse { foot, compliance, normal: foot.normal, sphere, jacobian, ..LocalResponse::default() };
     if sphere.force == 0.0 {
-        response.force = DVec3::ZERO;
         return Some(response);
     }
     let lever = -foot.normal * tool.radius;
