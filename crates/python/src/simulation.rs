@@ -251,22 +251,6 @@ impl SimulationCore {
         self.servo().as_mut().map(|servo| contact_records(&model, &servo.latest().state))
     }
 
-    /// The contact of a tool with a body at the latest tick, and the body's displacements (3s) per unit displacement of
-    /// the tool from its anchor along x, y and z of the body's frame, m/m; None for a tool that does not touch it.
-    #[allow(clippy::type_complexity)] // a record and three arrays; naming them would need a class nobody else uses
-    fn contact_response<'py>(
-        &mut self,
-        py: Python<'py>,
-        tool: usize,
-        body: usize,
-    ) -> Option<(ContactRecord, Vec<Bound<'py, PyArray1<f64>>>)> {
-        let model = self.model.clone();
-        let state = self.servo().as_mut()?.latest().state.clone();
-        let fields = py.detach(|| state.response(&model, tool, body))?;
-        let record = contact_records(&model, &state).into_iter().find(|record| (record.0, record.1) == (tool, body))?;
-        Some((record, fields.map(|field| field.into_pyarray(py)).into()))
-    }
-
     /// Rows (18 a tick) of the log since the last call: time, position and force of the first tool, computing time, wake-up
     /// delay, displacement of the watched node, and time and energies of the watched body.
     fn drain_log<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {

@@ -4,9 +4,20 @@ from palpate.body.body import Body
 from palpate.body.free_end import free_end
 from palpate.body.loads import Loads
 from palpate.body.material import Material
-from palpate.body.predicate import parse
 from palpate.body.moduli import moduli_of_store, surface_moduli
+from palpate.body.predicate import parse
 from palpate.body.problem import description, problem_arrays
 from palpate.body.supports import Fixed
 
-__all__ = ["Body", "Fixed", "Loads", "Material", "description", "free_end", "moduli_of_store", "parse", "problem_arrays", "surface_moduli"]
+__all__ = [
+    "Body",
+    "Fixed",
+    "Loads",
+    "Material",
+    "description",
+    "free_end",
+    "moduli_of_store",
+    "parse",
+    "problem_arrays",
+    "surface_moduli",
+]

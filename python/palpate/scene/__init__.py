@@ -4,7 +4,7 @@ from palpate.scene.build import BuiltBody, BuiltScene
 from palpate.scene.dynamics import BodyMotion, DynamicsTable, StrikeTable
 from palpate.scene.model_scenes import MODES, TOOLS, YOUNGS_MODULUS, model_scene
 from palpate.scene.scene import Scene
-from palpate.scene.tables import MOST_FRICTION
+from palpate.scene.tables import MOST_FRICTION, DeviceTable, ToolTable
 
 __all__ = [
     "MODES",
@@ -14,8 +14,10 @@ __all__ = [
     "BodyMotion",
     "BuiltBody",
     "BuiltScene",
+    "DeviceTable",
     "DynamicsTable",
     "Scene",
     "StrikeTable",
+    "ToolTable",
     "model_scene",
 ]

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
-from palpate.body import Body, moduli_of_store, surface_moduli
+from palpate.body import Body
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
-from palpate.scene import MOST_FRICTION, BodyMotion, BuiltBody, BuiltScene, Scene
+from palpate.scene import MOST_FRICTION, BodyMotion, BuiltScene, Scene
+from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.frame import BodyFrame, Contact, Frame
 from palpate.simulation.recording import LOG_DTYPE, Recording
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
@@ -58,18 +59,8 @@ class Simulation:
         self._targets: list[tuple[Any, Any]] = [((0.0, 0.0, 0.0), UPRIGHT)] * len(tools)
         self._grab = [False] * len(tools)
         self._core = _native.SimulationCore(
-            [_body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
-            [
-                (
-                    tool.radius,
-                    tool.contact_radius,
-                    tool.contact,
-                    device.max_stiffness,
-                    tool.friction,
-                    tool.pad_youngs_modulus,
-                )
-                for tool in tools
-            ],
+            [body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
+            [tool_arguments(tool, device) for tool in tools],
             (device.max_force, device.max_slew, device.ramp),
             self.scene.view.strain_limit,
             device.rate,
@@ -165,8 +156,8 @@ class Simulation:
         Returns
         -------
         tuple
-            Points (n, 3), m, outward unit normals (n, 3), both in the scene, and signed distances (n,), m, negative inside;
-            NaN where a point is not finite, or no tool of the scene has the local law.
+            Points (n, 3), m, outward unit normals (n, 3), both in the scene, and signed distances (n,), m, negative
+            inside; NaN where a point is not finite, or no tool of the scene has the local law.
 
         """
         placed = self.bodies[self._body(body)]
@@ -361,19 +352,6 @@ class Simulation:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
         return [self._contact(record) for record in self._core.contacts() or []]
 
-    def contact_response(self, tool: int = 0, body: int = 0) -> tuple[Contact, np.ndarray] | None:
-        """Contact of a tool, and the surface's displacements (3, s, 3) per unit displacement of the tool along an axis.
-
-        The tool's displacement counts from the anchor, along the axes of the body's own frame; the surface is at
-        `u_free` plus these fields times its components, with the stiffness of contacts limited as in the force loop;
-        None for a tool that does not touch the body.
-        """
-        answer = self._core.contact_response(self._tool(tool), self._body(body))
-        if answer is None:
-            return None
-        record, fields = answer
-        return self._contact(record), np.reshape(fields, (3, -1, 3))
-
     @property
     def strain_measure(self) -> StrainMeasure:
         """Measure of the largest strain of the first body."""
@@ -514,18 +492,3 @@ class Simulation:
         if not 0 <= body < len(self.bodies):
             raise SceneError(f"there is no body {body}: the scene has {len(self.bodies)}")
         return body
-
-
-def _body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
-    """Arrays of one body in the order of the native module."""
-    motion = body.motion
-    moving = None
-    if motion is not None:
-        shapes = motion.basis.shapes[body.green.surface_nodes].reshape(-1, len(motion.basis))
-        moving = (motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling)
-    moduli = None
-    if local:
-        green = body.green
-        known = body.body is not None
-        moduli = surface_moduli(body.body) if known else moduli_of_store(green.description, len(green.surface_nodes))
-    return body.green._core, body.position, body.orientation, moving, moduli

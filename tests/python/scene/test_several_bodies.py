@@ -102,7 +102,7 @@ def test_a_single_table_is_a_list_of_one(folder):
 
 def test_tables_of_a_body_come_before_those_of_the_scene(folder):
     scene = read(folder, SEVERAL)
-    assert scene.name == "left-b" and [tool.contact for tool in scene.tools] == ["patch", "node"]
+    assert scene.name == "left-b" and [tool.contact for tool in scene.tools] == ["local", "node"]
     left, right = scene.build().bodies
     assert (left.name, right.name) == ("left", "b")
     # The first takes what the scene says, the second what is its own.

@@ -41,13 +41,14 @@ def press(request, tmp_path):
 
 def settle(simulation: palpate.Simulation, seconds: float = 10.0) -> palpate.Frame:
     """Frame once the simulated hand has arrived and the limit has been found."""
-    end, before = time.monotonic() + seconds, None
+    end, before, same = time.monotonic() + seconds, None, 0
     while time.monotonic() < end:
         time.sleep(0.05)
         frame = simulation.frame()
         assert frame.statistics["fault"] is None
         now = np.concatenate([frame.positions.ravel(), frame.forces.ravel()])
-        if before is not None and np.abs(now - before).max() < 1e-8:
+        same = same + 1 if before is not None and np.abs(now - before).max() < 1e-8 else 0
+        if same == 4:
             return frame
         before = now
     raise AssertionError(f"did not settle: {frame} {frame.contacts}")
@@ -118,29 +119,6 @@ def test_a_pull_sideways_is_limited_too(press):
     assert frame.positions[0] == pytest.approx(target, abs=1e-7)
     wanted = frame.positions[0] - contact.anchor
     assert 0 < contact.displacement @ wanted < 0.9 * wanted @ wanted
-
-
-def test_the_response_is_that_of_a_touch(press):
-    press.move(TOP + [0, 0, RADIUS - 0.001])
-    frame = settle(press)
-    contact, response = press.contact_response()
-    displacement = frame.positions[0] - contact.anchor
-    assert contact.displacement == pytest.approx(displacement, abs=1e-12)
-    expected = press.green.free_displacements + np.tensordot(displacement, response, axes=1)
-    # The hand still creeps by less than 1e-8 m between the frame and the response.
-    assert np.abs(frame.displacements - expected).max() <= 1e-8 + 1e-9 * np.abs(expected).max()
-    press.remove()
-    time.sleep(0.05)
-    assert press.contact_response() is None and press.contacts() == []
-
-
-def test_the_response_of_a_limited_contact_is_that_of_its_own_displacement(press):
-    press.move(TOP + [0, 0, RADIUS - 0.02])
-    frame = settle(press)
-    contact, response = press.contact_response()
-    assert contact.limited
-    expected = press.green.free_displacements + np.tensordot(contact.displacement, response, axes=1)
-    assert np.abs(frame.displacements - expected).max() <= 1e-6 * np.abs(expected).max()
 
 
 def test_other_settings_are_noticed(press):

@@ -9,6 +9,7 @@
 mod admissible;
 mod body;
 mod contacts;
+mod covering;
 mod energy;
 mod input;
 mod law;

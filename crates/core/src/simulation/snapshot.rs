@@ -1,15 +1,13 @@
 //! What the frame side needs to draw a tick; its memory is sized once.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
+use super::MAX_TOOLS;
 use super::body::BodyModel;
 use super::contacts::Contacts;
 use super::model::Model;
-use super::solve::solve_with;
 use super::state::{State, ToolState};
 use super::strike::gather;
-use super::system::System;
-use super::{MAX_CONTACTS, MAX_TOOLS};
 use crate::dynamics::{Energy, Lanes, Projection};
 
 /// What a tick left of one body.
@@ -122,38 +120,5 @@ impl Snapshot {
             projection.take_static(modes, self.contacts.slots[slot].force, &mut moving);
         }
         moving
-    }
-
-    /// Displacements of all surface dofs (3s) of the touched body per unit displacement of `tool` from its anchor along each
-    /// axis of the body's frame, m/m, for the contacts as they are and a body come to rest. The answer is linear in the
-    /// displacements of all tools; `None` for a tool that does not touch `body`.
-    pub fn response(&self, model: &Model, tool: usize, body: usize) -> Option<[Vec<f64>; 3]> {
-        let slot = self.contacts.of(tool, body)?;
-        let (green, scale) = (&model.bodies[body].green, self.bodies[body].stiffness_scale);
-        let slots: Vec<usize> = self.contacts.on(body).collect();
-        let mut state = State::new(model);
-        state.contacts = self.contacts.clone();
-        let block = |a: usize, b: usize| -> DMat3 {
-            let (a, b) = (&self.contacts.patches[a], &self.contacts.patches[b]);
-            a.compliance_with(green, b) * (1.0 / scale)
-        };
-        let mut blocks = vec![[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS];
-        for &a in &slots {
-            for &b in &slots {
-                blocks[a][b] =
-                    if a == b { self.contacts.patches[a].own_compliance(green) * (1.0 / scale) } else { block(a, b) };
-            }
-        }
-        let mut system = Box::<System>::default();
-        Some(DVec3::AXES.map(|displacement| {
-            let of = |other: usize| if other == slot { displacement } else { DVec3::ZERO };
-            solve_with(model, &state, &mut system, &slots, |a, b| blocks[a][b], of);
-            let mut field = vec![0.0; model.bodies[body].free.len()];
-            for (i, &other) in slots.iter().enumerate() {
-                let force = DVec3::from_slice(&system.right[3 * i..3 * i + 3]) / scale;
-                self.contacts.patches[other].add_response(green, force, &mut field);
-            }
-            field
-        }))
     }
 }

@@ -54,9 +54,9 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                     state.contacts.clear(slot);
                 }
             }
-            None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], scratch) {
+            None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], &mut scratch.covering) {
                 Ok(Some(begun)) => {
-                    if let Some(slot) = solve::add_contact(model, state, begun, scratch) {
+                    if let Some(slot) = solve::add_contact(model, state, begun, &scratch.covering) {
                         limit::begin(model, state, slot, input.controls.strain_limit[body]);
                     }
                 }
@@ -79,7 +79,8 @@ fn law_now(of_tool: LawKind, of_contact: Option<LawKind>, grab: bool) -> LawKind
 /// Forces of all contacts of a body together; a contact whose law ends it by its force is let go, and the rest solved
 /// again.
 fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
-    solve::local_forces(model, state, scratch, body, controls);
+    let Scratch { covering, local, system } = scratch;
+    solve::local_forces(model, state, solve::Memory { covering, local, system }, body, controls);
     limit::let_through(model, state, body, controls.strain_limit[body]);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);

@@ -1,6 +1,7 @@
 //! Time of a body in motion: strikes begin, steps come due, begin and end. A body at rest answers at once.
 
 use super::body::TIME_STEPS;
+use super::covering::Covering;
 use super::input::{Controls, Input};
 use super::model::Model;
 use super::scratch::Scratch;
@@ -16,7 +17,7 @@ pub(super) fn begin_strike(model: &Model, state: &mut State, scratch: &mut Scrat
     }
     let Some(closest) = fixed.closest(fixed.placement.point_to_body(strike.point)) else { return };
     let centre = fixed.material_point(&closest);
-    let Scratch { patches, candidate, .. } = scratch;
+    let Covering { patches, candidate } = &mut scratch.covering;
     let surface = &fixed.green.surface;
     let weighed = patch_weights(surface, &fixed.geometry, &centre, strike.radius, &mut patches[body], candidate);
     if weighed.is_ok() {

@@ -5,9 +5,13 @@
 
 pub mod cells;
 mod ellipse;
+mod ellipsoid;
 mod modulus;
+mod place;
 mod sphere;
 
 pub use ellipse::{EllipseContact, indent_ellipse};
+pub use ellipsoid::{EllipsoidContact, EllipsoidProblem};
 pub use modulus::effective_modulus;
+pub use place::{OsculatingSurface, ToolPose};
 pub use sphere::{SphereContact, indent_sphere};

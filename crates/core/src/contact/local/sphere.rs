@@ -45,8 +45,7 @@ pub struct SphereContact {
 ///
 /// Nothing touches unless the approach is positive. Relative precision is 1e-13 at any depth.
 pub fn indent_sphere(approach: f64, radius: f64, effective_modulus: f64) -> SphereContact {
-    // A depth that is not a number touches nothing, too.
-    if !(approach > 0.0) {
+    if approach.is_nan() || approach <= 0.0 {
         return SphereContact::default();
     }
     let depth = approach / radius;

@@ -38,7 +38,7 @@ fn cylinder_entry(radius: f64, origin: DVec3, direction: DVec3) -> Option<LineEn
     }
     let middle = -from.dot(along) / a;
     let discriminant = radius * radius - (from + middle * along).length_squared();
-    if !(discriminant > 0.0) {
+    if discriminant <= 0.0 {
         return None;
     }
     let distance = middle - (discriminant / a).sqrt();

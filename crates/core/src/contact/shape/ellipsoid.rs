@@ -69,7 +69,7 @@ pub(super) fn curvature_at(semi_axes: DVec3, normal: DVec3) -> PrincipalCurvatur
 }
 
 /// Eigenvalues of a symmetric matrix, larger first, and the unit eigenvector of the larger.
-fn symmetric_eigen(m: DMat2) -> ([f64; 2], DVec2) {
+pub(crate) fn symmetric_eigen(m: DMat2) -> ([f64; 2], DVec2) {
     let (half_trace, half_difference, off) =
         (0.5 * (m.x_axis.x + m.y_axis.y), 0.5 * (m.x_axis.x - m.y_axis.y), m.x_axis.y);
     let spread = half_difference.hypot(off);
@@ -86,7 +86,7 @@ pub(super) fn line_entry(semi_axes: DVec3, origin: DVec3, direction: DVec3) -> O
     // Closest approach to the centre, whose length has no cancellation for an origin far away.
     let closest = from - along * (b / a);
     let discriminant = 1.0 - closest.length_squared();
-    if !(discriminant > 0.0) {
+    if discriminant <= 0.0 {
         return None;
     }
     let distance = -b / a - (discriminant / a).sqrt();

@@ -4,7 +4,7 @@
 //! a capsule, the middle of a punch's face. Capsule and punch lie along +z, their front towards -z.
 
 mod capsule;
-mod ellipsoid;
+pub(crate) mod ellipsoid;
 mod punch;
 mod surface;
 

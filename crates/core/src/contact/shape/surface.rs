@@ -319,7 +319,7 @@ fn long_axis(vertices: &[DVec3], triangles: &[[u32; 3]]) -> DVec3 {
     }
     for _ in 0..8 {
         let largest = moments.x_axis.length().max(moments.y_axis.length()).max(moments.z_axis.length());
-        moments = moments * (1.0 / largest);
+        moments *= 1.0 / largest;
         moments = moments * moments;
     }
     let columns = [moments.x_axis, moments.y_axis, moments.z_axis];

@@ -55,7 +55,8 @@ impl Fans {
     pub fn new(surface: &Surface) -> Self {
         let creases = creases(surface);
         let (of_corners, count) = corners(surface, &creases);
-        let mut fans = vec![Fan::default(); count];
+        // A matrix is the identity by default.
+        let mut fans = vec![Fan { curvature: DMat3::ZERO, ..Fan::default() }; count];
         outline(surface, &of_corners, &mut fans);
         let neighbours = neighbours(&of_corners, count);
         for _ in 0..FITS {

@@ -231,13 +231,6 @@ pub(crate) mod tests {
         let surface = cube();
         let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
         assert_eq!(smooth.fans().len(), 24);
-        for t in 0..12 {
-            eprintln!(
-                "{t} {:?} own {:?}",
-                surface.normals[t],
-                smooth.own(t as u32).map(|f| (f.node, f.normal, f.mean, f.reach)).collect::<Vec<_>>()
-            );
-        }
         let foot = |p| smooth.foot_anywhere(&surface, &query, p).expect("a foot");
         let over = foot(DVec3::new(0.3, 0.6, 1.2));
         assert!((over.distance - 0.2).abs() < 1e-12 && over.normal.distance(DVec3::Z) < 1e-12, "{over:?}");

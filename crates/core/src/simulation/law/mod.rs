@@ -14,10 +14,10 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::body::{BodyDynamics, BodyModel};
 use super::contacts::Contact;
+use super::covering::Covering;
 use super::input::Input;
 use super::model::Model;
 use super::motion::Motion;
-use super::scratch::Scratch;
 use super::tool::{LawKind, ToolModel};
 use crate::contact::shape::ToolShape;
 use crate::contact::{Refusal, SurfacePoint};
@@ -36,7 +36,7 @@ pub fn law_of(kind: LawKind) -> &'static dyn Law {
 
 /// What a contact law says, in the order of a tick.
 pub trait Law: Sync {
-    /// For a tool without a contact: begins one where it reaches the body, with its patch in `scratch`. `entry_depth` is what
+    /// For a tool without a contact: begins one where it reaches the body, with its patch in `covering`. `entry_depth` is what
     /// the tool remembers of this body.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ pub trait Law: Sync {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        scratch: &mut Scratch,
+        covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal>;
 
     /// Follows the tool; false ends the contact.

@@ -4,7 +4,7 @@
 use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint};
-use crate::simulation::scratch::Scratch;
+use crate::simulation::covering::Covering;
 use crate::simulation::tool::LawKind;
 
 /// The node of the touched triangle that is closest.
@@ -15,13 +15,13 @@ impl Footprint for Node {
         LawKind::Node
     }
 
-    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal> {
+    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, covering: &mut Covering) -> Result<(), Refusal> {
         let surface = &approach.body.green.surface;
         let corners = surface.triangles[centre.triangle as usize];
         let squared_distance = |node: u32| surface.positions[node as usize].distance_squared(centre.position);
         let [a, b, c] = corners;
         let closer = |x: u32, y: u32| if squared_distance(y) < squared_distance(x) { y } else { x };
-        scratch.candidate.set_node(closer(closer(a, b), c));
+        covering.candidate.set_node(closer(closer(a, b), c));
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use super::Approach;
 use super::stick::Footprint;
 use crate::contact::{Refusal, SurfacePoint, patch_weights};
-use crate::simulation::scratch::Scratch;
+use crate::simulation::covering::Covering;
 use crate::simulation::tool::LawKind;
 
 /// Consistent weights over a disc of the contact radius.
@@ -14,8 +14,8 @@ impl Footprint for Patch {
         LawKind::Patch
     }
 
-    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal> {
-        let Scratch { patches, candidate, .. } = scratch;
+    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, covering: &mut Covering) -> Result<(), Refusal> {
+        let Covering { patches, candidate } = covering;
         let (body, patch_scratch) = (approach.body, &mut patches[approach.body_index]);
         patch_weights(&body.green.surface, &body.geometry, centre, approach.contact_radius, patch_scratch, candidate)
     }

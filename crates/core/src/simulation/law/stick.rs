@@ -10,7 +10,7 @@ use super::{Approach, Law};
 use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
 use crate::simulation::body::BodyDynamics;
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::scratch::Scratch;
+use crate::simulation::covering::Covering;
 use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A grab reaches this many tool radii from the surface.
@@ -21,11 +21,11 @@ pub trait Footprint: Sync {
     /// The law that it makes.
     fn kind(&self) -> LawKind;
 
-    /// Weighs the nodes around `centre`, a point of the unloaded surface, into `scratch.candidate`.
+    /// Weighs the nodes around `centre`, a point of the unloaded surface, into `covering.candidate`.
     ///
     /// # Errors
     /// More nodes than a tick can weigh.
-    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, scratch: &mut Scratch) -> Result<(), Refusal>;
+    fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, covering: &mut Covering) -> Result<(), Refusal>;
 }
 
 /// The sticking law on a footprint.
@@ -36,7 +36,7 @@ impl<F: Footprint> Law for Sticking<F> {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        scratch: &mut Scratch,
+        covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let Some(closest) = approach.closest() else { return Ok(None) };
         let depth = approach.reach(closest.normal) - closest.signed_distance;
@@ -48,7 +48,7 @@ impl<F: Footprint> Law for Sticking<F> {
         if !reaches {
             return Ok(None);
         }
-        self.0.cover(approach, &approach.body.material_point(&closest), scratch)?;
+        self.0.cover(approach, &approach.body.material_point(&closest), covering)?;
         let excess = if approach.grab { 0.0 } else { depth - *entry_depth };
         let anchor = approach.position + closest.normal * excess;
         Ok(Some(Contact {

@@ -2,15 +2,15 @@
 
 use crate::contact::local::cells::PressureState;
 use crate::simulation::contacts::Contact;
+use crate::simulation::covering::Covering;
 use crate::simulation::model::Model;
-use crate::simulation::scratch::Scratch;
 use crate::simulation::state::State;
 use crate::simulation::tool::LawKind;
 
-/// Takes up a contact that begins, whose patch is `scratch.candidate`: a slot, its compliance with every other contact of
+/// Takes up a contact that begins, whose patch is `covering.candidate`: a slot, its compliance with every other contact of
 /// the body, and of a body in motion where the moving patch is met. Returns the slot; `None`, with the reason left with the
 /// tool, where a node may not be touched.
-pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &Scratch) -> Option<usize> {
+pub fn add_contact(model: &Model, state: &mut State, begun: Contact, covering: &Covering) -> Option<usize> {
     let (tool, body) = (begun.tool, begun.body);
     let green = &model.bodies[body].green;
     let State { bodies, contacts, compliance, tools, pressures } = &mut *state;
@@ -27,7 +27,7 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, scratch: &S
         }
         return Some(slot);
     }
-    if let Err(refusal) = contacts.patches[slot].admit(green, &scratch.candidate) {
+    if let Err(refusal) = contacts.patches[slot].admit(green, &covering.candidate) {
         tools[tool].refused[body] = Some(refusal);
         return None;
     }

@@ -15,12 +15,12 @@ use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FanWeights, FootPoint};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
+use crate::simulation::covering::Covering;
 use crate::simulation::input::Controls;
 use crate::simulation::law::{
     Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
 };
 use crate::simulation::model::Model;
-use crate::simulation::scratch::Scratch;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -33,6 +33,8 @@ pub const MOST_CELL_STEPS: usize = 3;
 const SETTLED: f64 = 1e-8;
 /// A force that changes by less than this part from step to step stays.
 const SAME: f64 = 1e-8;
+/// A foot that goes farther in a tick, over the tool's radius, has jumped.
+const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
@@ -122,8 +124,15 @@ fn resolution(model: &Model, state: &State) -> Resolution {
     }
 }
 
+/// Memory of a tick, as far as contacts under the local law need it.
+pub struct Memory<'a> {
+    pub covering: &'a mut Covering,
+    pub local: &'a mut LocalScratch,
+    pub system: &'a mut System,
+}
+
 /// Forces of the contacts of a body under the local law.
-pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
+pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: usize, controls: &Controls) {
     let mut slots = [0; MAX_CONTACTS];
     let mut count = 0;
     for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
@@ -134,9 +143,9 @@ pub fn local_forces(model: &Model, state: &mut State, scratch: &mut Scratch, bod
         return;
     }
     let slots = &slots[..count];
-    scratch.local.others[..count].fill(Others::default());
-    follow_motion(model, state, scratch, slots, body);
-    let Scratch { local, system, .. } = scratch;
+    let Memory { covering, local, system } = memory;
+    local.others[..count].fill(Others::default());
+    follow_motion(model, state, covering, local, slots, body);
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
         // Whatever moves goes on as it did.
@@ -179,7 +188,14 @@ fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> 
 
 /// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
 /// to: by smaller patches the compliance of a single step could outweigh what is left of the half-space.
-fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots: &[usize], body: usize) {
+fn follow_motion(
+    model: &Model,
+    state: &mut State,
+    covering: &mut Covering,
+    local: &mut LocalScratch,
+    slots: &[usize],
+    body: usize,
+) {
     let fixed = &model.bodies[body];
     let State { bodies, contacts, .. } = state;
     let (Some(motion), Some(dynamics), Some(own)) = (&mut bodies[body].motion, &fixed.dynamics, &fixed.local) else {
@@ -187,14 +203,14 @@ fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots:
     };
     for (a, &slot) in slots.iter().enumerate() {
         let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
-        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut scratch.local.weights[a]);
+        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
         own.smooth.weigh(foot, weights);
         let (wide, _) = weights.field(|fan| regular.widths[fan]);
         let centre = fixed.material_point(&fixed.surface_point(foot));
-        let (surface, patches) = (&fixed.green.surface, &mut scratch.patches[body]);
+        let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
         // As many nodes as at the fans around fit.
-        if patch_weights(surface, &fixed.geometry, &centre, wide, patches, &mut scratch.candidate).is_ok() {
-            contacts.patches[slot].admit_touchable(&fixed.green, &scratch.candidate);
+        if patch_weights(surface, &fixed.geometry, &centre, wide, patches, &mut covering.candidate).is_ok() {
+            contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
         let mut moving = DMat3::ZERO;
@@ -202,7 +218,7 @@ fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots:
             let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
             moving += DMat3::from_cols(gradient * moved.x, gradient * moved.y, gradient * moved.z);
         }
-        scratch.local.others[a].moving = Some(moving);
+        local.others[a].moving = Some(moving);
     }
     for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate() {
@@ -210,7 +226,7 @@ fn follow_motion(model: &Model, state: &mut State, scratch: &mut Scratch, slots:
             if a == b {
                 change += DMat3::IDENTITY * (1.0 / dynamics.coupling);
             }
-            scratch.local.change[a][b] = change;
+            local.change[a][b] = change;
         }
     }
 }
@@ -326,10 +342,24 @@ fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
     longest
 }
 
+/// Whether a foot has come elsewhere than where the tool has gone: off a ridge, or through a body. The force there has
+/// nothing to do with the one before, and might have more energy: such a contact ends, and the next starts from none.
+fn has_jumped(contact: &Contact, response: &LocalResponse, place: DVec3, radius: f64) -> bool {
+    let gone = place.distance(contact.local.relative);
+    response.foot.position.distance(contact.local.foot.position) > 4.0 * gone + FOOT_JUMP * radius
+}
+
 /// Writes the answers down.
 fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
     for (a, &slot) in slots.iter().enumerate() {
         let response = &local.responses[a];
+        let contact = &state.contacts.slots[slot];
+        let (tool, radius) = (contact.tool, model.tools[contact.tool].radius);
+        if has_jumped(contact, response, local.places[a], radius) {
+            state.tools[tool].entry_depth[body] = f64::INFINITY;
+            state.contacts.clear(slot);
+            continue;
+        }
         match &mut state.bodies[body].motion {
             Some(motion) => {
                 let Some(dynamics) = &model.bodies[body].dynamics else { continue };

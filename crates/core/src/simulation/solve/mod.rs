@@ -6,4 +6,4 @@ mod local;
 
 pub use compliance::add_contact;
 pub use forces::{contact_forces, gather, solve_with};
-pub use local::{LocalScratch, local_forces};
+pub use local::{LocalScratch, Memory, local_forces};

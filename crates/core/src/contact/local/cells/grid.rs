@@ -2,9 +2,10 @@
 //!
 //! The rectangle moves with the tool, turns with its long axis and grows with its depth, so that cells are as fine as the
 //! contact allows, and a tool that slides over a plane meets the same cells everywhere. Its motion is part of the
-//! energy's gradient. Its sides are found by duality: for a convex body with the support function `h`, the largest coordinate along
-//! `e` of its points below the plane is `min h(e - mu n)` over `mu >= 0`, least where the support lies in the plane. A
-//! minimum changes with the pose as if `mu` were constant.
+//! energy's gradient. Its sides are found by duality: for a convex body with the support function `h`, the largest
+//! coordinate along `e` of its points below the plane is `min h(e - mu n)` over `mu >= 0`, least where the support lies in
+//! the plane. A minimum changes with the pose as if `mu` were constant. In a hollow the contact may be wider: up to half
+//! the tool's curvature all of it is still within.
 
 use glam::{DMat3, DVec3};
 

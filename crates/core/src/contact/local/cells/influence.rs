@@ -30,6 +30,7 @@ pub type Kernel = [[f64; OFFSETS]; MAX_CELLS];
 pub struct Influence {
     arch: Arch,
     aspect: f64,
+    cells: usize,
     kernel: Kernel,
     kernel_by_aspect: Kernel,
     stencil: [[f64; 2]; 2],
@@ -39,23 +40,29 @@ impl Influence {
     /// Of square cells.
     pub fn new() -> Self {
         let zero = [[0.0; OFFSETS]; MAX_CELLS];
-        let mut influence =
-            Self { arch: Arch::new(), aspect: f64::NAN, kernel: zero, kernel_by_aspect: zero, stencil: [[0.0; 2]; 2] };
-        influence.set_aspect(1.0);
+        let mut influence = Self {
+            arch: Arch::new(),
+            aspect: f64::NAN,
+            cells: 0,
+            kernel: zero,
+            kernel_by_aspect: zero,
+            stencil: [[0.0; 2]; 2],
+        };
+        influence.set_aspect(MAX_CELLS, 1.0);
         influence
     }
 
-    /// Prepares cells of an aspect `hy/hx`; costs nothing where it has not changed.
-    pub fn set_aspect(&mut self, aspect: f64) {
-        if aspect == self.aspect {
+    /// Prepares a grid of `cells` by `cells` of an aspect `hy/hx`; costs nothing where neither has changed.
+    pub fn set_aspect(&mut self, cells: usize, aspect: f64) {
+        if (cells, aspect) == (self.cells, self.aspect) {
             return;
         }
-        self.aspect = aspect;
+        (self.cells, self.aspect) = (cells, aspect);
         // Values and derivatives by y of F at the corners (i + 1/2, aspect (j + 1/2)).
         let (mut value, mut by_y) = ([[0.0; MAX_CELLS]; MAX_CELLS], [[0.0; MAX_CELLS]; MAX_CELLS]);
-        for j in 0..MAX_CELLS {
+        for j in 0..self.cells {
             let y = aspect * (j as f64 + 0.5);
-            for i in 0..MAX_CELLS {
+            for i in 0..self.cells {
                 let x = i as f64 + 0.5;
                 let r = x.hypot(y);
                 by_y[j][i] = ((x + r) / y).ln();
@@ -69,8 +76,8 @@ impl Influence {
     /// Kernels from values and derivatives at the corners.
     fn fill(&mut self, value: &Grid, by_y: &Grid) {
         let (aspect, root) = (self.aspect, self.aspect.sqrt());
-        for j in 0..MAX_CELLS {
-            for i in 0..MAX_CELLS {
+        for j in 0..self.cells {
+            for i in 0..self.cells {
                 // F is odd in x and in y, its derivative by y even in y.
                 let (left, below) = (i.checked_sub(1), j.checked_sub(1));
                 let at = |f: &Grid, i: Option<usize>, j: Option<usize>, odd: f64| {

@@ -2,17 +2,21 @@
 //!
 //! The stored energy is `U = max over f >= 0 of - f.gap - f.G f/2`, where `gap` is how far the tool lies above the body at
 //! the middle of each cell (negative where it overlaps) and `G` the influence of the cells' forces on each other. The
-//! wrench is the exact gradient of this energy by the tool's pose, to the precision of the solution: at the maximum the forces may be held
-//! constant, and the gap, the cells' places and their influence are differentiated.
+//! wrench is the gradient of this energy by the tool's pose, to the precision of the solution: at the maximum the forces
+//! may be held constant, and the gap, the cells' places and their influence are differentiated.
+//!
+//! The gap is measured along the normal, as in Sneddon's and Hertz's solutions. Of a sphere 16 x 16 cells give force and
+//! energy to 0.3 %, 8 x 8 to 1 %, 4 x 4 to 3 %.
 
 mod grid;
 mod influence;
 mod pressure;
 mod wrench;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::super::shape::ToolShape;
+use super::place::{OsculatingSurface, ToolPose};
 use grid::{PosedTool, Rectangle};
 pub use influence::MAX_CELLS;
 use influence::{Grid, Influence};
@@ -42,27 +46,6 @@ impl Resolution {
     }
 }
 
-/// A body's surface around a point, of second order.
-#[derive(Clone, Copy, Debug)]
-pub struct OsculatingSurface {
-    /// The point, m.
-    pub origin: DVec3,
-    /// Two tangents and the outward normal as columns, right-handed and orthonormal.
-    pub axes: DMat3,
-    /// Curvatures `[k_xx, k_xy, k_yy]` along the tangents, 1/m, positive where the surface falls away from its tangent
-    /// plane: its height is `-(k_xx x^2 + 2 k_xy x y + k_yy y^2)/2`.
-    pub curvature: [f64; 3],
-}
-
-/// Where a tool is.
-#[derive(Clone, Copy, Debug)]
-pub struct ToolPose {
-    /// Its origin, m.
-    pub position: DVec3,
-    /// World from tool.
-    pub rotation: DQuat,
-}
-
 /// A tool at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct CellProblem<'a> {
@@ -79,7 +62,7 @@ pub struct CellProblem<'a> {
 }
 
 /// What the next solution starts from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureState {
     resolution: Resolution,
     /// Forces over `pi E* sqrt(hx hy)`, m.
@@ -124,7 +107,8 @@ pub struct CellContact {
     pub normal_force: f64,
     /// Where their resultant acts on the surface, m.
     pub centre_of_pressure: DVec3,
-    /// Normal stiffness `dF/dd` of the cells under pressure, N/m.
+    /// Normal stiffness `dF/dd` of the cells under pressure, N/m; cells at the rim count as whole, so it is up to 5 % too large
+    /// (10 % with 8 x 8 cells).
     pub stiffness: f64,
     /// Stored energy, J.
     pub energy: f64,
@@ -132,7 +116,8 @@ pub struct CellContact {
     pub area: f64,
     /// How far the tool's support reaches below the tangent plane, m.
     pub depth: f64,
-    /// Derivative of the energy with respect to each curvature of the surface, J m.
+    /// Derivative of the energy with respect to each curvature of the surface, J m. With it and the wrench, the energy's change
+    /// with the whole frame is known: a motion of tool and frame together changes nothing.
     pub energy_by_curvature: [f64; 3],
     /// How the solution ended.
     pub convergence: Convergence,
@@ -161,7 +146,7 @@ impl CellProblem<'_> {
         if !(cells.sides[0] > 0.0 && cells.sides[1] > 0.0) {
             return CellContact::default();
         }
-        scratch.influence.set_aspect(cells.sides[1] / cells.sides[0]);
+        scratch.influence.set_aspect(cells.count, cells.sides[1] / cells.sides[0]);
         scratch.measure_gaps(&tool, &cells, &self.surface, depth);
         let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.gap, depth, &mut state.q);
         let contact = scratch.integrate(&tool, &cells, &self.surface, &state.q);
@@ -194,20 +179,6 @@ impl Cells {
         let along = left.coordinate + (i as f64 + 0.5) * self.sides[0];
         let across = below.coordinate + (j as f64 + 0.5) * self.sides[1];
         along * self.rectangle.axes[0] + across * self.rectangle.axes[1]
-    }
-}
-
-impl OsculatingSurface {
-    /// Height over the tangent plane, in the frame of the surface.
-    fn height(&self, at: DVec3) -> f64 {
-        let [xx, xy, yy] = self.curvature;
-        -0.5 * (xx * at.x * at.x + 2.0 * xy * at.x * at.y + yy * at.y * at.y)
-    }
-
-    /// Slope of the height.
-    fn slope(&self, at: DVec3) -> DVec3 {
-        let [xx, xy, yy] = self.curvature;
-        -DVec3::new(xx * at.x + xy * at.y, xy * at.x + yy * at.y, 0.0)
     }
 }
 

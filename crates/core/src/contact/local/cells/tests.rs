@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use glam::EulerRot;
+use glam::{DQuat, EulerRot};
 
 use super::*;
-use crate::contact::local::{indent_ellipse, indent_sphere};
+use crate::contact::local::{OsculatingSurface, ToolPose, indent_ellipse, indent_sphere};
 use crate::contact::shape::{SurfaceShape, tests::sphere_mesh};
 
 const MODULUS: f64 = 12.5e3;
@@ -264,7 +264,7 @@ fn every_solution_ends_and_does_not_depend_on_its_start() {
                 let depth = 1e-3 + 1.2e-3 * (2.1 * u).sin();
                 let mut problem = CellProblem { resolution, ..pressed(&shape, turn, depth) };
                 problem.surface.curvature = [30.0 * u.sin(), 10.0 * u.cos(), -20.0 * u.sin()];
-                let before = state.clone();
+                let mut before = state;
                 let warm = problem.solve(&mut state, &mut scratch);
                 assert!(warm.convergence.products <= MAX_PRODUCTS);
                 assert!(
@@ -277,7 +277,7 @@ fn every_solution_ends_and_does_not_depend_on_its_start() {
                 assert!(warm.force.distance(cold.force) <= 1e-5 * cold.force.length(), "{shape:?} {resolution:?} {k}");
                 assert!((warm.energy - cold.energy).abs() <= 1e-9 * cold.energy);
                 // The same start gives the same bits.
-                assert_eq!(problem.solve(&mut before.clone(), &mut CellScratch::default()), warm);
+                assert_eq!(problem.solve(&mut before, &mut CellScratch::default()), warm);
             }
         }
     }
@@ -313,7 +313,7 @@ fn nothing_touches_from_outside() {
 fn influence_is_loves() {
     for aspect in [1.0, 0.3, 7.0] {
         let mut influence = Influence::new();
-        influence.set_aspect(aspect);
+        influence.set_aspect(MAX_CELLS, aspect);
         // Cells of sides 1 and `aspect`, split into points of equal force; q = f/(pi E* sqrt(aspect)).
         let splits = 200;
         for (i, j) in [(1usize, 0usize), (0, 1), (2, 3), (15, 9)] {
@@ -347,7 +347,7 @@ fn influence_changes_with_aspect_as_said() {
     for aspect in [0.4, 1.0, 3.0] {
         let at = |aspect: f64| {
             let (mut influence, mut out) = (Influence::new(), q);
-            influence.set_aspect(aspect);
+            influence.set_aspect(MAX_CELLS, aspect);
             influence.product(MAX_CELLS, &q, &mut out);
             (influence, out)
         };
@@ -367,7 +367,7 @@ fn influence_changes_with_aspect_as_said() {
 fn the_local_inverse_is_positive_definite() {
     for aspect in [1e-3, 0.02, 0.3, 1.0, 2.0, 17.0, 300.0, 1e4] {
         let mut influence = Influence::new();
-        influence.set_aspect(aspect);
+        influence.set_aspect(MAX_CELLS, aspect);
         let (mut r, mut out) = ([[0.0; MAX_CELLS]; MAX_CELLS], [[0.0; MAX_CELLS]; MAX_CELLS]);
         r[8][8] = 1.0;
         influence.precondition(MAX_CELLS, &r, &mut out);
@@ -378,5 +378,50 @@ fn the_local_inverse_is_positive_definite() {
                 assert!(symbol > 1e-3 * out[8][8], "{aspect} {x} {y} {symbol}");
             }
         }
+    }
+}
+
+/// A rigid square punch of side `s` (King, Elastic analysis of some punch problems for a layered medium, 1987):
+/// `k = 1.012 (2/sqrt pi) E* s`.
+#[test]
+fn a_cube_from_a_file_is_a_square_punch() {
+    let (side, depth) = (0.01, 2e-4);
+    let corner = |k: u32| DVec3::new(f64::from(k & 1) - 0.5, f64::from(k >> 1 & 1) - 0.5, f64::from(k >> 2)) * side;
+    let vertices: Vec<DVec3> = (0..8).map(corner).collect();
+    let squares = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<[u32; 3]> = squares.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let shape = ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles).unwrap()));
+    let mut problem = pressed(&shape, DVec3::ZERO, 0.0);
+    problem.pose.position = DVec3::NEG_Z * depth;
+    let contact = cold(&problem);
+    // The grid of distances rounds its edges.
+    let expected = 1.012 * 2.0 / PI.sqrt() * MODULUS * side * depth;
+    assert!(near(contact.force.z, expected, 0.04), "{} {expected}", contact.force.z);
+    assert!(contact.centre_of_pressure.length() < 1e-8 && contact.torque.length() < 2e-3 * side * contact.force.z);
+}
+
+/// The grid is laid out for a plane, and wide enough for a hollow of half the tool's curvature.
+#[test]
+fn a_sphere_in_a_hollow_is_a_flatter_sphere() {
+    let shape = ToolShape::sphere(0.008).unwrap();
+    for curvature in [-30.0, -60.0] {
+        for depth in [1e-4, 5e-4] {
+            let mut problem = pressed(&shape, DVec3::ZERO, depth);
+            problem.surface.curvature = [curvature, 0.0, curvature];
+            let expected = indent_sphere(depth, 1.0 / (125.0 + curvature), MODULUS).force;
+            assert!(near(cold(&problem).force.z, expected, 0.02), "{curvature} {depth}");
+        }
+    }
+}
+
+/// Upright, where the direction of its grid turns fastest, a capsule is a sphere all the same.
+#[test]
+fn a_capsule_on_its_end_is_a_sphere() {
+    let shape = ToolShape::capsule(0.004, 0.010).unwrap();
+    for tilt in [0.0, 5e-4, 2e-3, 0.05, 0.5] {
+        let contact = cold(&pressed(&shape, DVec3::new(tilt, 0.3 * tilt, 0.4), 1e-3));
+        let sphere = indent_sphere(1e-3, 0.004, MODULUS);
+        assert!(near(contact.force.z, sphere.force, 0.004), "{tilt}");
+        assert!(contact.torque.length() < 1e-6 * 0.004 * sphere.force, "{tilt}: {}", contact.torque);
     }
 }

@@ -5,7 +5,8 @@ use glam::DVec3;
 use super::grid::PosedTool;
 use super::influence::Grid;
 use super::pressure::dot;
-use super::{CellContact, CellScratch, Cells, OsculatingSurface};
+use super::{CellContact, CellScratch, Cells};
+use crate::contact::local::OsculatingSurface;
 
 /// Normals flatter than this do not press: the wall of a tool is no contact along the normal.
 const LEAST_NORMAL: f64 = 1e-3;

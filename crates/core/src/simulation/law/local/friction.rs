@@ -67,7 +67,8 @@ impl Friction {
     /// The springs after the tool has gone on by `displacement` along the surface (m; its part along the normal does not
     /// count), under a pressing force whose bound `mu F` is `bound`, N, with the stiffness `k` and the normal as they are now.
     pub fn answer(&self, displacement: DVec3, bound: f64, coefficient: f64, stiffness: f64, normal: DVec3) -> Answer {
-        let mut answer = Answer::default();
+        // A matrix is the identity by default.
+        let mut answer = Answer { by_displacement: DMat3::ZERO, ..Answer::default() };
         answer.friction.stiffness = stiffness;
         answer.friction.normal = normal;
         let along = DMat3::IDENTITY - DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);

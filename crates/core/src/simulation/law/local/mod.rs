@@ -18,7 +18,6 @@
 //! work of the tool less that of friction is the change of one energy: `f . dp = d(f^T C f / 2) + f_local . dp'`.
 
 mod contact;
-mod ellipsoid;
 mod friction;
 mod reference;
 mod response;
@@ -38,7 +37,7 @@ use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;
 use crate::simulation::body::{BodyDynamics, LocalSurface};
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::scratch::Scratch;
+use crate::simulation::covering::Covering;
 use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
@@ -70,7 +69,7 @@ impl Law for Local {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        _scratch: &mut Scratch,
+        _covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };

@@ -124,10 +124,11 @@ pub fn evaluate(
         compliance += body.regular[fan] * (weight / body.scale);
     }
     let (normal, point) = (foot.normal, foot.position);
+    // A matrix is the identity by default.
+    let jacobian = DMat3::ZERO;
     let mut response =
-        LocalResponse { foot, force, compliance, normal, point, indentation, ..LocalResponse::default() };
+        LocalResponse { foot, compliance, normal, point, indentation, jacobian, ..LocalResponse::default() };
     if indentation.force == 0.0 {
-        response.force = DVec3::ZERO;
         return Some(response);
     }
     let lever = indentation.lever;

@@ -13,11 +13,10 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::LocalContact;
-use super::ellipsoid::press_ellipsoid;
 use super::reference::Reference;
 use super::response::{Indentation, LocalBody, LocalTool};
-use crate::contact::local::cells::{CellProblem, CellScratch, OsculatingSurface, PressureState, Resolution, ToolPose};
-use crate::contact::local::effective_modulus;
+use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
+use crate::contact::local::{EllipsoidProblem, OsculatingSurface, ToolPose, effective_modulus};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FanWeights, FootPoint};
 
@@ -103,17 +102,21 @@ fn press(
     effective_modulus: f64,
     cells: Cells<'_>,
 ) -> Pressed {
+    let (pose, surface) = (ToolPose { position, rotation: orientation }, *surface);
     if let ToolShape::Ellipsoid { semi_axes } = *shape {
-        let rotation = DMat3::from_quat(orientation);
-        return press_ellipsoid(semi_axes, (position, rotation), surface, effective_modulus);
+        let contact = EllipsoidProblem { semi_axes, pose, surface, effective_modulus }.solve();
+        return Pressed {
+            force: contact.force,
+            torque: contact.torque,
+            centre: contact.centre_of_pressure,
+            normal_force: contact.indentation.force,
+            radius: contact.indentation.radius,
+            stiffness: contact.indentation.stiffness,
+            energy: contact.indentation.energy,
+            energy_by_curvature: contact.energy_by_curvature,
+        };
     }
-    let problem = CellProblem {
-        shape,
-        pose: ToolPose { position, rotation: orientation },
-        surface: *surface,
-        effective_modulus,
-        resolution: cells.resolution,
-    };
+    let problem = CellProblem { shape, pose, surface, effective_modulus, resolution: cells.resolution };
     let contact = problem.solve(cells.state, cells.scratch);
     Pressed {
         force: contact.force,

@@ -1,0 +1,31 @@
+"""Bodies and tools of a scene as the native module takes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from palpate.body import moduli_of_store, surface_moduli
+from palpate.scene import BuiltBody, DeviceTable, ToolTable
+
+
+def tool_arguments(tool: ToolTable, device: DeviceTable) -> tuple[Any, ...]:
+    """Numbers of one tool in the order of the native module."""
+    radii = tool.radius, tool.contact_radius
+    return *radii, tool.contact, device.max_stiffness, tool.friction, tool.pad_youngs_modulus
+
+
+def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
+    """Arrays of one body in the order of the native module."""
+    motion = body.motion
+    moving = None
+    if motion is not None:
+        shapes = motion.basis.shapes[body.green.surface_nodes].reshape(-1, len(motion.basis))
+        moving = (motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling)
+    moduli = None
+    if local:
+        green = body.green
+        known = body.body is not None
+        moduli = surface_moduli(body.body) if known else moduli_of_store(green.description, len(green.surface_nodes))
+    return body.green._core, body.position, body.orientation, moving, moduli
