@@ -6,6 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::{ModalModel, Newmark, Rayleigh};
 use palpate_core::fem::Supports;
 use palpate_core::green::{GreensFunction, Precision, Problem, precompute};
