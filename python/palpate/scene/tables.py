@@ -100,8 +100,8 @@ class BodyTable(Table):
 class ToolTable(Table):
     """A tool: what it looks like, how it touches, and what it rubs with.
 
-    ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length`` of
-    the cylinder between its hemispheres), ``"punch"`` (``radius``, ``rounding`` of its rim), or the path of a closed
+    ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length``
+    of the cylinder between its hemispheres), ``"punch"`` (``radius``, ``rounding`` of its rim), or the path of a closed
     surface file relative to the scene file, in ``unit``. Capsule and punch lie along z of the tool, their front towards
     -z; its origin is the middle of the front hemisphere or of the face.
 

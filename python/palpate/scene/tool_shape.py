@@ -54,7 +54,7 @@ def check_keys(tool: ToolTable) -> None:
 
 
 def shape_arguments(tool: ToolTable, folder: Path) -> ShapeArguments:
-    """What the force loop takes; a surface file is read.
+    """Read the surface file, if there is one, and put the shape as the force loop takes it.
 
     Raises
     ------
