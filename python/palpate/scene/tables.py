@@ -14,7 +14,7 @@ from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time
-from palpate.scene.tool_shape import check_keys
+from palpate.scene.tool_shape import ShapeTable
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
@@ -97,13 +97,8 @@ class BodyTable(Table):
         return self.element == "quadratic" or (self.element is None and self.fills_a_surface)
 
 
-class ToolTable(Table):
+class ToolTable(ShapeTable):
     """A tool: what it looks like, how it touches, and what it rubs with.
-
-    ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length``
-    of the cylinder between its hemispheres), ``"punch"`` (``radius``, ``rounding`` of its rim), or the path of a closed
-    surface file relative to the scene file, in ``unit``. Capsule and punch lie along z of the tool, their front towards
-    -z; its origin is the middle of the front hemisphere or of the face.
 
     ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
@@ -112,12 +107,6 @@ class ToolTable(Table):
     names a ``contact_radius`` and no law is a patch, for only patches have one.
     """
 
-    shape: str = "sphere"
-    radius: Length = 5e-3
-    semi_axes: tuple[Length, Length, Length] | None = None
-    length: Length | None = None
-    rounding: Length | None = None
-    unit: str = "m"
     contact: Literal["local", "patch", "node"] = "local"
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
     pad_youngs_modulus: Pressure | None = None
@@ -131,15 +120,10 @@ class ToolTable(Table):
         return {**given, "contact": "patch"} if names_radius else given
 
     @model_validator(mode="after")
-    def _keys_of_the_shape(self) -> ToolTable:
-        check_keys(self)
+    def _spheres_alone_stick(self) -> ToolTable:
+        if self.shape != "sphere" and self.contact != "local":
+            raise ValueError(f"contact = '{self.contact}' is for spheres: a tool of shape '{self.shape}' takes 'local'")
         return self
-
-    @property
-    def reach(self) -> float:
-        """From the tool's origin to its front along -z, m; of a surface file 0, for its origin may lie anywhere."""
-        fronts = {"sphere": self.radius, "capsule": self.radius, "ellipsoid": (self.semi_axes or (0.0,))[-1]}
-        return fronts.get(self.shape, 0.0)
 
 
 class DeviceTable(Table):

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from pydantic import model_validator
 
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, closed_surface
+from palpate.scene.table import Length, Table
 from palpate.units import length_scale
 
-if TYPE_CHECKING:
-    from palpate.scene.tables import ToolTable
-
-# Keys of each shape beside those of every tool, and those of them that it cannot do without.
-KEYS = {
+# Keys of each shape, and those of them that it cannot do without.
+KEYS: dict[str, tuple[set[str], set[str]]] = {
     "sphere": ({"radius"}, set()),
     "ellipsoid": ({"semi_axes"}, {"semi_axes"}),
     "capsule": ({"radius", "length"}, {"length"}),
@@ -28,48 +26,62 @@ ROUNDING = 0.1
 ShapeArguments = tuple[str, tuple[float, float, float], list[list[float]], list[list[int]]]
 
 
-def check_keys(tool: ToolTable) -> None:
-    """Refuse keys that the shape does not take, and a law that knows spheres only.
+class ShapeTable(Table):
+    """Keys of a tool's shape.
 
-    Raises
-    ------
-    ValueError
-        What is wrong, and which keys the shape takes.
-
+    ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length``
+    of the cylinder between its hemispheres), ``"punch"`` (``radius``, ``rounding`` of its rim), or the path of a closed
+    surface file relative to the scene file, in ``unit``. Capsule and punch lie along z of the tool, their front towards
+    -z; its origin is the middle of the front hemisphere or of the face.
     """
-    name = tool.shape
-    if name not in KEYS and Path(name).suffix.lower() not in SURFACE_ENDINGS:
-        known = ", ".join(f"'{key}'" for key in KEYS)
-        raise ValueError(f"unknown shape '{name}'; known are {known} and surface files ({', '.join(SURFACE_ENDINGS)})")
-    taken, needed = KEYS.get(name, KEYS_OF_FILES)
-    of_shapes = set().union(*(keys for keys, _ in KEYS.values()), KEYS_OF_FILES[0])
-    for key in sorted(tool.model_fields_set & of_shapes - taken):
-        raise ValueError(f"a tool of shape '{name}' takes no '{key}'; it takes {', '.join(sorted(taken))}")
-    for key in sorted(needed - tool.model_fields_set):
-        raise ValueError(f"a tool of shape '{name}' needs the key '{key}'")
-    if tool.rounding is not None and tool.rounding > tool.radius:
-        raise ValueError(f"rounding is {tool.rounding:g} m, more than the radius of {tool.radius:g} m")
-    if name != "sphere" and tool.contact != "local":
-        raise ValueError(f"contact = '{tool.contact}' is for spheres: a tool of shape '{name}' takes 'local'")
 
+    shape: str = "sphere"
+    radius: Length = 5e-3
+    semi_axes: tuple[Length, Length, Length] | None = None
+    length: Length | None = None
+    rounding: Length | None = None
+    unit: str = "m"
 
-def shape_arguments(tool: ToolTable, folder: Path) -> ShapeArguments:
-    """Read the surface file, if there is one, and put the shape as the force loop takes it.
+    @model_validator(mode="after")
+    def _keys_of_the_shape(self) -> ShapeTable:
+        """Refuse keys that the shape does not take."""
+        name = self.shape
+        if name not in KEYS and Path(name).suffix.lower() not in SURFACE_ENDINGS:
+            known = ", ".join(f"'{key}'" for key in KEYS)
+            files = ", ".join(SURFACE_ENDINGS)
+            raise ValueError(f"unknown shape '{name}'; known are {known} and surface files ({files})")
+        taken, needed = KEYS.get(name, KEYS_OF_FILES)
+        for key in sorted(self.model_fields_set & set(ShapeTable.model_fields) - taken - {"shape"}):
+            raise ValueError(f"a tool of shape '{name}' takes no '{key}'; it takes {', '.join(sorted(taken))}")
+        for key in sorted(needed - self.model_fields_set):
+            raise ValueError(f"a tool of shape '{name}' needs the key '{key}'")
+        if self.rounding is not None and self.rounding > self.radius:
+            raise ValueError(f"rounding is {self.rounding:g} m, more than the radius of {self.radius:g} m")
+        return self
 
-    Raises
-    ------
-    MeshError
-        A file that is missing, cannot be read or holds no closed surface.
+    @property
+    def reach(self) -> float:
+        """From the tool's origin to its front along -z, m; of a surface file 0, for its origin may lie anywhere."""
+        fronts = {"sphere": self.radius, "capsule": self.radius, "ellipsoid": (self.semi_axes or (0.0,))[-1]}
+        return fronts.get(self.shape, 0.0)
 
-    """
-    if tool.shape == "sphere":
-        return "sphere", (tool.radius, 0.0, 0.0), [], []
-    if tool.shape == "ellipsoid" and tool.semi_axes is not None:
-        return "ellipsoid", tool.semi_axes, [], []
-    if tool.shape == "capsule":
-        return "capsule", (tool.radius, tool.length or 0.0, 0.0), [], []
-    if tool.shape == "punch":
-        return "punch", (tool.radius, tool.rounding or ROUNDING * tool.radius, 0.0), [], []
-    surface = closed_surface(folder / tool.shape)
-    vertices = np.asarray(surface.vertices, dtype=float) * length_scale(tool.unit)
-    return "surface", (0.0, 0.0, 0.0), vertices.tolist(), np.asarray(surface.faces).tolist()
+    def shape_arguments(self, folder: Path) -> ShapeArguments:
+        """Put the shape as the force loop takes it; a surface file, relative to ``folder``, is read.
+
+        Raises
+        ------
+        MeshError
+            A file that is missing, cannot be read or holds no closed surface.
+
+        """
+        if self.shape == "sphere":
+            return "sphere", (self.radius, 0.0, 0.0), [], []
+        if self.shape == "ellipsoid" and self.semi_axes is not None:
+            return "ellipsoid", self.semi_axes, [], []
+        if self.shape == "capsule":
+            return "capsule", (self.radius, self.length or 0.0, 0.0), [], []
+        if self.shape == "punch":
+            return "punch", (self.radius, self.rounding or ROUNDING * self.radius, 0.0), [], []
+        surface = closed_surface(folder / self.shape)
+        vertices = np.asarray(surface.vertices, dtype=float) * length_scale(self.unit)
+        return "surface", (0.0, 0.0, 0.0), vertices.tolist(), np.asarray(surface.faces).tolist()

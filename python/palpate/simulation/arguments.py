@@ -11,7 +11,6 @@ from palpate.errors import Error, SceneError
 from palpate.scene import BuiltBody
 from palpate.scene.mistakes import located
 from palpate.scene.tables import SceneTables
-from palpate.scene.tool_shape import shape_arguments
 
 
 def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
@@ -25,7 +24,7 @@ def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
     """
     tool, device = scene.tools[rank], scene.device
     try:
-        shape = shape_arguments(tool, scene.folder)
+        shape = tool.shape_arguments(scene.folder)
     except Error as error:
         path, text = scene.source
         raise SceneError(f"{located(path, text, ['tool', rank, 'shape'])}: tool.shape: {error}") from None

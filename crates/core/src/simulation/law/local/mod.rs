@@ -19,13 +19,15 @@
 
 mod contact;
 mod friction;
+mod met;
 mod reference;
 mod response;
 mod wrench;
 
 pub use contact::LocalContact;
+pub use met::{LocalBody, LocalTool};
 pub use reference::depth_below;
-pub use response::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
+pub use response::{LocalResponse, Others, evaluate};
 pub use wrench::{Cells, takes_cells};
 
 use glam::{DMat3, DVec3};

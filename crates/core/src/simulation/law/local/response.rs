@@ -4,44 +4,17 @@ use glam::{DMat3, DVec3};
 
 use super::LocalContact;
 use super::friction::{Answer, Friction};
+use super::met::{Indentation, LocalBody, LocalTool};
 use super::reference::Reference;
 use super::wrench::{Cells, indent_shape};
 use crate::contact::local::{effective_modulus, indent_sphere};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
-use crate::contact::{Moduli, SurfaceQuery};
-use crate::mesh::Surface;
+use crate::contact::smooth::{FanWeights, FootPoint};
 
 /// Least `(1/R + kappa_1) (1/R + kappa_2)` over `1/R^2`: a tool that fits a hollow closely touches it as a flatter one.
 const CLOSEST_FIT: f64 = 0.1;
 /// The force is inclined by the body's change of compliance by no more than this, over the pressing force.
 const STEEPEST: f64 = 0.5;
-
-/// What a tool meets of a body.
-#[derive(Clone, Copy)]
-pub struct LocalBody<'a> {
-    pub surface: &'a Surface,
-    pub query: &'a SurfaceQuery,
-    pub smooth: &'a SmoothSurface,
-    pub moduli: &'a Moduli,
-    /// `C_reg` at the fans, m/N.
-    pub regular: &'a [DMat3],
-    /// Young's modulus over the Green's function's.
-    pub scale: f64,
-}
-
-/// The tool, and what it rubs with.
-#[derive(Clone, Copy)]
-pub struct LocalTool<'a> {
-    /// What it looks like.
-    pub shape: &'a ToolShape,
-    /// Size of the part that touches, m: of a sphere its radius.
-    pub radius: f64,
-    /// Young's modulus of its pad, Pa; a rigid one has none.
-    pub pad: Option<f64>,
-    /// Coulomb's coefficient.
-    pub coefficient: f64,
-}
 
 /// What other contacts of the body do at a contact.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,27 +43,6 @@ pub struct LocalResponse {
     pub friction: Answer,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
-}
-
-/// Energy of the local contact at a place and its gradient without friction.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Indentation {
-    /// Normal force, N.
-    pub force: f64,
-    /// Contact radius, or that of the circle of the same stiffness, m.
-    pub radius: f64,
-    /// Normal stiffness, N/m.
-    pub stiffness: f64,
-    /// J.
-    pub energy: f64,
-    /// `dPhi/dp'`, N.
-    pub gradient: DVec3,
-    /// Torque on the tool about its tip, N m.
-    pub torque: DVec3,
-    /// From the tip to where friction acts, m.
-    pub lever: DVec3,
-    /// `k_t / k_n`.
-    pub tangential: f64,
 }
 
 /// Where a tool meets the surface.

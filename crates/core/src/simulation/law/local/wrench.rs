@@ -12,9 +12,9 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::LocalContact;
+use super::contact::LocalContact;
+use super::met::{Indentation, LocalBody, LocalTool};
 use super::reference::Reference;
-use super::response::{Indentation, LocalBody, LocalTool};
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
 use crate::contact::local::{EllipsoidProblem, OsculatingSurface, ToolPose, effective_modulus};
 use crate::contact::shape::ToolShape;
