@@ -7,11 +7,13 @@ import pytest
 import trimesh
 from conftest import box_mesh
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq, nnls
 from scipy.special import ellipe, ellipk
 
 import palpate
 from palpate.scene import BuiltScene
+from palpate.simulation.arguments import tool_arguments
 
 SIZE = np.array([0.12, 0.12, 0.08])
 TOP = np.array([0.061, 0.059, 0.08])
@@ -50,7 +52,7 @@ def in_series(block, law, depth: float, size: float) -> float:
     width = max(3 * SPACING, 1.6 * size)
     touch = block[1].touch(TOP, (None, None, -1e-3), width)
     regular = 1e-3 / np.linalg.norm(touch.force) - MASK / (MODULUS * width)
-    return brentq(lambda force: force - law(depth - regular * force), 0.0, law(depth))
+    return brentq(lambda force: force - law(depth - regular * force), 0.0, 2 * law(depth))
 
 
 def hertz_ellipse(depth: float, radii: tuple[float, float]) -> float:
@@ -126,6 +128,43 @@ def test_the_torque_of_a_lying_capsule_is_its_lever(block):
     assert np.abs(torque[[0, 2]]).max() < 0.02 * abs(torque[1])
 
 
+def lying_capsule(depth: float, radius: float, length: float, cells=(40, 12)) -> float:
+    """Force of a capsule on its side on a half-space: uniform pressures on rectangles (Love, 1929), N."""
+    half = 0.5 * length + np.sqrt(max(2 * radius * depth, 0)), np.sqrt(max(2 * radius * depth, 0))
+    sides = [2 * h / n for h, n in zip(half, cells, strict=True)]
+    x, y = (
+        g.ravel() for g in np.meshgrid(*(s * (np.arange(n) - (n - 1) / 2) for s, n in zip(sides, cells, strict=True)))
+    )
+    off_axis = np.maximum(np.abs(x) - 0.5 * length, 0) ** 2 + y**2
+    gap = radius - np.sqrt(np.maximum(radius**2 - off_axis, 0)) - depth
+
+    def corner(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b))
+
+    dx, dy = x[:, None] - x, y[:, None] - y
+    a, b = 0.5 * sides[0], 0.5 * sides[1]
+    influence = corner(dx + a, dy + b) - corner(dx + a, dy - b) - corner(dx - a, dy + b) + corner(dx - a, dy - b)
+    root = np.linalg.cholesky(influence / (np.pi * MODULUS))
+    pressures, _ = nnls(root.T, -np.linalg.solve(root, gap), maxiter=10_000)
+    return pressures.sum() * sides[0] * sides[1]
+
+
+def test_a_lying_capsule_is_the_half_spaces_in_series_with_the_block(block):
+    radius, length, depth = 0.004, 0.02, 5e-4
+    simulation = simulation_of(block, shape="capsule", radius=radius, length=length)
+    # Its middle over the middle of the block.
+    down = np.linspace(-2e-4, depth, 60)[:, None]
+    path = TOP + np.array([-0.5 * length, 0.0, radius]) - down * [0, 0, 1]
+    force = simulation.play(path, np.tile(LYING, (60, 1))).forces[-1, 2]
+    size = radius + 0.5 * length
+
+    depths = np.linspace(0.0, 2 * depth, 9)
+    forces = [0.0, *(lying_capsule(d, radius, length) for d in depths[1:])]
+    law = CubicSpline(depths, forces)
+    expected = in_series(block, lambda d: float(law(max(d, 0.0))), depth, size)
+    assert force == pytest.approx(expected, rel=0.05)
+
+
 SHAPES = {
     "ellipsoid": {"shape": "ellipsoid", "semi_axes": (0.008, 0.006, 0.005)},
     "capsule": {"shape": "capsule", "radius": 0.004, "length": 0.01},
@@ -172,9 +211,6 @@ def test_closed_paths_with_rotation_give_out_no_energy(block, name):
 
 
 def test_mistakes_in_shapes_are_told_with_their_line(tmp_path):
-    surface = trimesh.creation.box((1.0, 1.0, 1.0))
-    surface.faces = surface.faces[:-1]
-    surface.export(tmp_path / "open.stl")
     mistakes = {
         'shape = "ellipsoid"': "needs the key 'semi_axes'",
         'shape = "punch"\nlength = "1cm"': "takes no 'length'",
@@ -188,3 +224,15 @@ def test_mistakes_in_shapes_are_told_with_their_line(tmp_path):
         with pytest.raises(palpate.SceneError, match=r"scene\.toml:[34]: .*tool") as caught:
             palpate.Scene.read(path)
         assert told in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("file", "told"), [("open.stl", "not closed"), ("missing.stl", "no such file")])
+def test_mistakes_in_surface_files_are_told_with_their_line(tmp_path, file, told):
+    surface = trimesh.creation.box((1.0, 1.0, 1.0))
+    surface.faces = surface.faces[:-1]
+    surface.export(tmp_path / "open.stl")
+    path = tmp_path / "scene.toml"
+    path.write_text(f'[body]\nmodel = "beam"\n[tool]\nshape = "{file}"\n')
+    with pytest.raises(palpate.SceneError, match=r"scene\.toml:4: tool\.shape") as caught:
+        tool_arguments(palpate.Scene.read(path), 0)
+    assert told in str(caught.value) and "\n" not in str(caught.value)
