@@ -114,7 +114,8 @@ impl Core {
         let outer = DMat3::from_cols(along * towards.x, along * towards.y, along * towards.z);
         let by_normal = outer * (1.0 / height.powi(3)) - self.excess * (1.0 / height);
         let l = DMat3::IDENTITY - by_normal * foot.turning;
-        if !(l.determinant() > LEAST_DETERMINANT) {
+        let determinant = l.determinant();
+        if determinant.is_nan() || determinant <= LEAST_DETERMINANT {
             return None;
         }
         Some(Reference { offset: self.centre - along / height, by_normal, inverse: l.inverse(), normal })
