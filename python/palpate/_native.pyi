@@ -133,7 +133,7 @@ class SimulationCore:
     def __init__(
         self,
         bodies: list[tuple],
-        tools: list[tuple[float, float, str, float, float, float | None]],
+        tools: list[tuple[tuple, float, str, float, float, float | None]],
         limits: tuple[float, float, float],
         strain_limit: float,
         rate: float,

@@ -3,9 +3,10 @@
 use glam::{DMat3, DQuat, DVec3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
+use palpate_core::contact::shape::{SurfaceShape, ToolShape};
 use palpate_core::dynamics::{Energy, ModalModel, exact_step};
 use palpate_core::simulation::{
-    BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel,
+    BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel, contact_size,
 };
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
@@ -21,8 +22,10 @@ pub type ModuliArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'p
 /// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, and its elastic constants.
 pub type BodyArguments<'py> =
     (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>, Option<ModuliArguments<'py>>);
-/// Radius (m), contact radius (m), contact law, largest stiffness (N/m), friction, Young's modulus of the pad (Pa).
-pub type ToolArguments = (f64, f64, String, f64, f64, Option<f64>);
+/// What a tool looks like: a kind and its lengths in m, three at most; of a surface vertices and triangles.
+pub type ShapeArguments = (String, [f64; 3], Vec<[f64; 3]>, Vec<[u32; 3]>);
+/// Shape, contact radius (m), contact law, largest stiffness (N/m), friction, Young's modulus of the pad (Pa).
+pub type ToolArguments = (ShapeArguments, f64, String, f64, f64, Option<f64>);
 
 /// Tool, body, mode, (point, normal, force, torque, anchor, displacement) in the world, whether it is limited and slips,
 /// contact radius (m), depth (m) and stiffness (N/m) under the local law, nodes and weights of a contact.
@@ -76,9 +79,24 @@ impl BodyParts {
 
 /// A tool, the contact radius (m) and the friction that it starts with.
 pub fn tool(arguments: ToolArguments) -> Result<(ToolModel, f64, f64)> {
-    let (radius, contact_radius, law, max_stiffness, friction, pad_youngs_modulus) = arguments;
+    let (shape, contact_radius, law, max_stiffness, friction, pad_youngs_modulus) = arguments;
+    let shape = tool_shape(shape)?;
     let law = LawKind::parse(&law).ok_or_else(|| Error::Invalid(format!("there is no contact law '{law}'")))?;
-    Ok((ToolModel { radius, law, pad_youngs_modulus, max_stiffness }, contact_radius, friction))
+    let radius = contact_size(&shape);
+    Ok((ToolModel { shape, radius, law, pad_youngs_modulus, max_stiffness }, contact_radius, friction))
+}
+
+fn tool_shape((kind, [a, b, c], vertices, triangles): ShapeArguments) -> Result<ToolShape> {
+    match kind.as_str() {
+        "sphere" => ToolShape::sphere(a),
+        "ellipsoid" => ToolShape::ellipsoid(DVec3::new(a, b, c)),
+        "capsule" => ToolShape::capsule(a, 0.5 * b),
+        "punch" => ToolShape::punch(a, b),
+        _ => {
+            let vertices: Vec<DVec3> = vertices.into_iter().map(DVec3::from).collect();
+            Ok(ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles)?)))
+        }
+    }
 }
 
 /// From w x y z, made of length one to the last bit.

@@ -39,7 +39,7 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     middle = nodes[:, :2].mean(axis=0)
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
     depth = DEPTH * size
-    rest = top + [0, 0, built.scene.tools[0].radius]
+    rest = top + [0, 0, built.scene.tools[0].reach]
     logs, limited = [], False
     with Simulation(built) as simulation:
         hardest = simulation.frame()

@@ -129,6 +129,20 @@ def _fill(
     return mesh
 
 
+def closed_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
+    """Read a closed surface, in its own unit.
+
+    Raises
+    ------
+    MeshError
+        A file that is missing or cannot be read, or a surface that is open, crossed or empty.
+
+    """
+    name, shape = _load(path)
+    _check_surface(name, shape)
+    return shape
+
+
 def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trimesh.Trimesh]:
     import trimesh
 

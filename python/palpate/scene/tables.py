@@ -14,6 +14,7 @@ from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time
+from palpate.scene.tool_shape import ShapeTable
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
@@ -96,8 +97,8 @@ class BodyTable(Table):
         return self.element == "quadratic" or (self.element is None and self.fills_a_surface)
 
 
-class ToolTable(Table):
-    """A spherical tool: its radius, how it touches, and what it rubs with.
+class ToolTable(ShapeTable):
+    """A tool: what it looks like, how it touches, and what it rubs with.
 
     ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
@@ -106,8 +107,6 @@ class ToolTable(Table):
     names a ``contact_radius`` and no law is a patch, for only patches have one.
     """
 
-    shape: Literal["sphere"] = "sphere"
-    radius: Length = 5e-3
     contact: Literal["local", "patch", "node"] = "local"
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
     pad_youngs_modulus: Pressure | None = None
@@ -119,6 +118,12 @@ class ToolTable(Table):
         """Take a tool with a contact radius for a patch."""
         names_radius = isinstance(given, dict) and "contact_radius" in given and "contact" not in given
         return {**given, "contact": "patch"} if names_radius else given
+
+    @model_validator(mode="after")
+    def _spheres_alone_stick(self) -> ToolTable:
+        if self.shape != "sphere" and self.contact != "local":
+            raise ValueError(f"contact = '{self.contact}' is for spheres: a tool of shape '{self.shape}' takes 'local'")
+        return self
 
 
 class DeviceTable(Table):

@@ -7,13 +7,28 @@ from typing import Any
 import numpy as np
 
 from palpate.body import moduli_of_store, surface_moduli
-from palpate.scene import BuiltBody, DeviceTable, ToolTable
+from palpate.errors import Error, SceneError
+from palpate.scene import BuiltBody
+from palpate.scene.mistakes import located
+from palpate.scene.tables import SceneTables
 
 
-def tool_arguments(tool: ToolTable, device: DeviceTable) -> tuple[Any, ...]:
-    """Numbers of one tool in the order of the native module."""
-    radii = tool.radius, tool.contact_radius
-    return *radii, tool.contact, device.max_stiffness, tool.friction, tool.pad_youngs_modulus
+def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
+    """Shape and numbers of one tool in the order of the native module.
+
+    Raises
+    ------
+    SceneError
+        A surface file that is missing, cannot be read or holds no closed surface, with its line.
+
+    """
+    tool, device = scene.tools[rank], scene.device
+    try:
+        shape = tool.shape_arguments(scene.folder)
+    except Error as error:
+        path, text = scene.source
+        raise SceneError(f"{located(path, text, ['tool', rank, 'shape'])}: tool.shape: {error}") from None
+    return shape, tool.contact_radius, tool.contact, device.max_stiffness, tool.friction, tool.pad_youngs_modulus
 
 
 def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:

@@ -60,7 +60,7 @@ class Simulation:
         self._grab = [False] * len(tools)
         self._core = _native.SimulationCore(
             [body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
-            [tool_arguments(tool, device) for tool in tools],
+            [tool_arguments(self.scene, rank) for rank in range(len(tools))],
             (device.max_force, device.max_slew, device.ramp),
             self.scene.view.strain_limit,
             device.rate,

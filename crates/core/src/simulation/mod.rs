@@ -37,7 +37,7 @@ pub use snapshot::Snapshot;
 pub use state::{BodyState, State, ToolState};
 pub use step::step;
 pub use strain_watch::StrainWatch;
-pub use tool::{LawKind, ToolModel};
+pub use tool::{LawKind, ToolModel, contact_size};
 
 /// Most tools a simulation may have.
 pub const MAX_TOOLS: usize = 4;

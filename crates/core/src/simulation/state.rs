@@ -4,11 +4,13 @@ use glam::{DMat3, DVec3};
 
 use super::body::BodyModel;
 use super::contacts::Contacts;
+use super::law::takes_cells;
 use super::model::Model;
 use super::motion::Motion;
 use super::strain_watch::StrainWatch;
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 use crate::contact::Refusal;
+use crate::contact::local::cells::PressureState;
 
 /// What a tool remembers of each body it does not touch.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,6 +42,8 @@ pub struct State {
     pub tools: [ToolState; MAX_TOOLS],
     /// The contacts.
     pub contacts: Contacts,
+    /// Under tools without a closed form, the pressures of each contact; empty if there is no such tool.
+    pub(super) pressures: Vec<PressureState>,
     /// Static compliance between the contacts in two slots, at the Green's function's own Young's modulus, m/N.
     pub(super) compliance: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
 }
@@ -56,6 +60,10 @@ impl State {
             bodies: model.bodies.iter().map(body).collect(),
             tools: Default::default(),
             contacts: Contacts::default(),
+            pressures: match model.tools.iter().any(|tool| takes_cells(&tool.shape)) {
+                true => vec![PressureState::default(); MAX_CONTACTS],
+                false => Vec::new(),
+            },
             compliance: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
         }
     }

@@ -1,5 +1,7 @@
 //! The tip of a device, and how it touches.
 
+use crate::contact::shape::ToolShape;
+
 /// The laws there are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LawKind {
@@ -29,9 +31,12 @@ impl LawKind {
 }
 
 /// The tip of one device.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct ToolModel {
-    /// Radius of the sphere, m.
+    /// What it looks like. Laws other than the local one touch where the closest point of its origin is.
+    pub shape: ToolShape,
+    /// Size of the part that touches, m: the radius of a sphere, else as [`contact_size`] has it. The regular compliance, what
+    /// counts as a jump and where the tool is near a body are measured by it.
     pub radius: f64,
     /// How it touches.
     pub law: LawKind,
@@ -39,4 +44,13 @@ pub struct ToolModel {
     pub pad_youngs_modulus: Option<f64>,
     /// Stiffest contact rendered, N/m: near a support the body alone would be rigid, which no device can render.
     pub max_stiffness: f64,
+}
+
+/// Half the greatest width of what a shape can touch a plane with, m: contacts reach no farther from their middle.
+pub fn contact_size(shape: &ToolShape) -> f64 {
+    match *shape {
+        // Its long side, as far as it may lie on a body, is no part of its face.
+        ToolShape::Punch { radius, .. } => radius,
+        _ => shape.bounding_radius(),
+    }
 }

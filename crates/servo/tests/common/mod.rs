@@ -6,6 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::{ModalModel, Newmark, Rayleigh};
 use palpate_core::fem::Supports;
 use palpate_core::green::{GreensFunction, Precision, Problem, precompute};
@@ -20,8 +21,13 @@ pub use bodies::cube;
 
 pub const PERIOD: f64 = 1e-3;
 pub const PERIOD_NS: u64 = 1_000_000;
-pub const TOOL: ToolModel =
-    ToolModel { radius: 0.005, law: LawKind::Patch, pad_youngs_modulus: None, max_stiffness: 5000.0 };
+pub const TOOL: ToolModel = ToolModel {
+    shape: ToolShape::Sphere { radius: 0.005 },
+    radius: 0.005,
+    law: LawKind::Patch,
+    pad_youngs_modulus: None,
+    max_stiffness: 5000.0,
+};
 
 /// Two tools and two cubes 0.1 m wide, one at the origin, the other turned by a right angle, with its corner at
 /// (0.25, 0, 0): it may be touched in its half of larger x.

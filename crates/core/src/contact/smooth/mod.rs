@@ -135,14 +135,14 @@ struct Walk<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::f64::consts::PI;
 
     use super::*;
     use crate::contact::SurfaceQuery;
 
     /// A ball of radius one, of `n` rows of triangles.
-    fn ball(n: u32) -> Surface {
+    pub(crate) fn ball(n: u32) -> Surface {
         let mut positions = vec![DVec3::Z];
         for i in 1..n {
             let polar = PI * f64::from(i) / f64::from(n);

@@ -8,7 +8,7 @@ mod node;
 mod patch;
 mod stick;
 
-pub use local::{LocalBody, LocalContact, LocalResponse, LocalTool, Others, evaluate};
+pub use local::{Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells};
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -19,6 +19,7 @@ use super::input::Input;
 use super::model::Model;
 use super::motion::Motion;
 use super::tool::{LawKind, ToolModel};
+use crate::contact::shape::ToolShape;
 use crate::contact::{Refusal, SurfacePoint};
 
 /// A tool farther than this many radii from the surface at rest meets it there: displacements are smaller than that.
@@ -134,6 +135,17 @@ impl<'a> Approach<'a> {
 
     /// How deep the tool is in the untouched surface, m; zero outside.
     pub fn depth(&self) -> f64 {
-        self.closest().map_or(0.0, |closest| self.tool.radius - closest.signed_distance).max(0.0)
+        self.closest().map_or(0.0, |closest| self.reach(closest.normal) - closest.signed_distance).max(0.0)
+    }
+
+    /// How far the tool reaches from its origin towards a surface of the given normal, m.
+    pub fn reach(&self, normal: DVec3) -> f64 {
+        match self.tool.shape {
+            ToolShape::Sphere { radius } => radius,
+            ref shape => {
+                let own = self.orientation.conjugate() * normal;
+                -shape.support(-own).dot(own)
+            }
+        }
     }
 }

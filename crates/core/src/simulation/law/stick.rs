@@ -46,11 +46,10 @@ impl<F: Footprint> Law for Sticking<F> {
         covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let Some(closest) = approach.closest() else { return Ok(None) };
-        let radius = approach.tool.radius;
-        let depth = radius - closest.signed_distance;
+        let depth = approach.reach(closest.normal) - closest.signed_distance;
         *entry_depth = entry_depth.min(depth.max(0.0));
         let reaches = match approach.grab {
-            true => closest.signed_distance.abs() < GRAB_REACH * radius,
+            true => closest.signed_distance.abs() < GRAB_REACH * approach.tool.radius,
             false => depth > *entry_depth,
         };
         if !reaches {

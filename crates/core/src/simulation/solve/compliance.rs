@@ -1,5 +1,6 @@
 //! Rows and columns of the compliance between contacts: worked out once, when a contact begins.
 
+use crate::contact::local::cells::PressureState;
 use crate::simulation::contacts::Contact;
 use crate::simulation::covering::Covering;
 use crate::simulation::model::Model;
@@ -12,12 +13,15 @@ use crate::simulation::tool::LawKind;
 pub fn add_contact(model: &Model, state: &mut State, begun: Contact, covering: &Covering) -> Option<usize> {
     let (tool, body) = (begun.tool, begun.body);
     let green = &model.bodies[body].green;
-    let State { bodies, contacts, compliance, tools } = &mut *state;
+    let State { bodies, contacts, compliance, tools, pressures } = &mut *state;
     // There are as many slots as pairs of a tool and a body.
     let slot = contacts.empty()?;
     if begun.law == LawKind::Local {
         let serial = contacts.next_serial();
         contacts.slots[slot] = Contact { serial, ..begun };
+        if let Some(pressures) = pressures.get_mut(slot) {
+            *pressures = PressureState::default();
+        }
         if let Some(motion) = &mut bodies[body].motion {
             motion.begin_contact(slot);
         }

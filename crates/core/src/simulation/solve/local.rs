@@ -9,13 +9,17 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
 use crate::contact::patch_weights;
+use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FanWeights, FootPoint};
 use crate::simulation::MAX_CONTACTS;
-use crate::simulation::contacts::Contact;
+use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
 use crate::simulation::input::Controls;
-use crate::simulation::law::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
+use crate::simulation::law::{
+    Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
+};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
@@ -23,6 +27,8 @@ use crate::simulation::tool::LawKind;
 
 /// Most steps; three or four are usual.
 pub const MOST_STEPS: usize = 16;
+/// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
+pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
 const SETTLED: f64 = 1e-8;
 /// A force that changes by less than this part from step to step stays.
@@ -53,6 +59,9 @@ pub struct LocalScratch {
     steps: [DVec3; MAX_CONTACTS],
     /// Largest change of a force in the latest step, over that force.
     changed: f64,
+    cells: Box<CellScratch>,
+    /// For contacts without cells.
+    unused: PressureState,
 }
 
 impl LocalScratch {
@@ -74,6 +83,8 @@ impl Default for LocalScratch {
             places: [DVec3::ZERO; MAX_CONTACTS],
             steps: [DVec3::ZERO; MAX_CONTACTS],
             changed: 0.0,
+            cells: Box::default(),
+            unused: PressureState::default(),
         }
     }
 }
@@ -93,9 +104,30 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
     })
 }
 
-fn local_tool(model: &Model, controls: &Controls, tool: usize) -> LocalTool {
+fn local_tool<'a>(model: &'a Model, controls: &Controls, tool: usize) -> LocalTool<'a> {
     let fixed = &model.tools[tool];
-    LocalTool { radius: fixed.radius, pad: fixed.pad_youngs_modulus, coefficient: controls.friction[tool] }
+    LocalTool {
+        shape: &fixed.shape,
+        radius: fixed.radius,
+        pad: fixed.pad_youngs_modulus,
+        coefficient: controls.friction[tool],
+    }
+}
+
+/// Whether the contact in a slot takes pressure cells.
+fn takes_pressures(model: &Model, state: &State, slot: usize) -> bool {
+    takes_cells(&model.tools[state.contacts.slots[slot].tool].shape)
+}
+
+/// How fine cells may be: the more contacts take them, the coarser, so that a tick stays within its time.
+fn resolution(model: &Model, state: &State) -> Resolution {
+    let slots = &state.contacts.slots;
+    let local = |slot: usize| slots[slot].mode != Mode::Free && slots[slot].law == LawKind::Local;
+    match (0..MAX_CONTACTS).filter(|&slot| local(slot) && takes_pressures(model, state, slot)).count() {
+        0 | 1 => Resolution::Fine,
+        2..=4 => Resolution::Medium,
+        _ => Resolution::Coarse,
+    }
 }
 
 /// Memory of a tick, as far as contacts under the local law need it.
@@ -128,12 +160,16 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
         local.responses[a].force = contact.local.force;
         local.others[a].slope = DVec3::ZERO;
     }
-    let mut deepest = [0.0; MAX_CONTACTS];
+    let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
-        let contact = &state.contacts.slots[slot];
-        deepest[a] = (1.0 - MOST_DEPTH) * model.tools[contact.tool].radius - contact.local.entry;
+        let (contact, tool) = (&state.contacts.slots[slot], &model.tools[state.contacts.slots[slot].tool]);
+        if let ToolShape::Sphere { radius } = tool.shape {
+            deepest[a] = (1.0 - MOST_DEPTH) * radius - contact.local.entry;
+        }
     }
-    for step in 0..MOST_STEPS {
+    let cells = slots.iter().any(|&slot| takes_pressures(model, state, slot));
+    let most = if cells { MOST_CELL_STEPS } else { MOST_STEPS };
+    for step in 0..most {
         if !meet(model, state, local, slots, body, controls, step) {
             return;
         }
@@ -142,7 +178,7 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
         if longest < SETTLED * radius && step > 0 && local.changed < SAME {
             break;
         }
-        if step + 1 < MOST_STEPS {
+        if step + 1 < most {
             local.go();
         }
     }
@@ -220,12 +256,16 @@ fn meet(
     step: usize,
 ) -> bool {
     local.changed = 0.0;
+    let resolution = resolution(model, state);
     for (a, &slot) in slots.iter().enumerate() {
         let tool = state.contacts.slots[slot].tool;
         let answer = local_body(model, state, tool, body).and_then(|met| {
-            let (contact, known) = (&state.contacts.slots[slot].local, local.responses[a].force);
+            let LocalScratch { places, responses, others, weights, cells, unused, .. } = &mut *local;
+            let contact = &state.contacts.slots[slot].local;
+            let pressures = state.pressures.get_mut(slot).unwrap_or(unused);
+            let cells = Cells { state: pressures, scratch: cells, resolution };
             let tool = local_tool(model, controls, tool);
-            evaluate(met, tool, contact, local.places[a], known, local.others[a], &mut local.weights[a])
+            evaluate(met, tool, contact, (places[a], responses[a].force), others[a], &mut weights[a], cells)
         });
         match answer {
             Some(answer) => {
@@ -351,7 +391,7 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         }
         let contact: &mut Contact = &mut state.contacts.slots[slot];
         (contact.force, contact.local.force) = (response.force, response.force);
-        (contact.point, contact.normal) = (response.foot.position, response.normal);
+        (contact.point, contact.normal) = (response.point, response.normal);
         (contact.displacement, contact.wanted) =
             (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
         let own = &mut contact.local;
@@ -360,11 +400,20 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         own.turned = own.orientation;
         own.foot = response.foot;
         own.friction = response.springs();
-        (own.torque, own.radius, own.slipping) = (response.torque, response.sphere.radius, response.friction.slipping);
+        let indentation = &response.indentation;
+        (own.torque, own.radius, own.slipping) = (response.torque, indentation.radius, response.friction.slipping);
         let along = response.normal.dot(response.compliance * response.normal);
-        own.stiffness = response.sphere.stiffness / (1.0 + along * response.sphere.stiffness);
-        own.energy = response.sphere.energy + response.springs().energy();
+        own.stiffness = indentation.stiffness / (1.0 + along * indentation.stiffness);
+        own.energy = indentation.energy + response.springs().energy();
         own.dissipated = response.friction.dissipated;
-        own.depth = model.tools[contact.tool].radius - response.foot.normal.dot(own.tool - response.foot.position);
+        own.depth = depth(&model.tools[contact.tool].shape, own, &response.foot);
+    }
+}
+
+/// How far a tool reaches below the surface at rest, m.
+fn depth(shape: &ToolShape, contact: &LocalContact, foot: &FootPoint) -> f64 {
+    match *shape {
+        ToolShape::Sphere { radius } => radius - foot.normal.dot(contact.tool - foot.position),
+        _ => depth_below(shape, (contact.tool, DMat3::from_quat(contact.orientation)), foot),
     }
 }

@@ -19,16 +19,25 @@
 
 mod contact;
 mod friction;
+mod met;
+mod reference;
 mod response;
+mod wrench;
 
 pub use contact::LocalContact;
-pub use response::{LocalBody, LocalResponse, LocalTool, Others, evaluate};
+pub use met::{LocalBody, LocalTool};
+pub use reference::depth_below;
+pub use response::{LocalResponse, Others, evaluate};
+pub use wrench::{Cells, takes_cells};
 
 use glam::{DMat3, DVec3};
 
+use self::reference::Reference;
 use super::{Approach, Law};
 use crate::contact::Refusal;
-use crate::simulation::body::BodyDynamics;
+use crate::contact::shape::ToolShape;
+use crate::contact::smooth::FootPoint;
+use crate::simulation::body::{BodyDynamics, LocalSurface};
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
 use crate::simulation::tool::{LawKind, ToolModel};
@@ -39,6 +48,24 @@ const JUMP: f64 = 2.0;
 /// The law.
 pub struct Local;
 
+/// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m.
+fn first_foot(approach: &Approach<'_>, local: &LocalSurface, place: DVec3) -> Option<(FootPoint, f64)> {
+    let (body, tool) = (approach.body, approach.tool);
+    let foot_of = |point| local.smooth.foot_anywhere(&body.loaded, &body.query, point);
+    if let ToolShape::Sphere { radius } = tool.shape {
+        let foot = foot_of(place)?;
+        return Some((foot, radius - foot.distance));
+    }
+    let rotation = DMat3::from_quat(approach.orientation);
+    let from = foot_of(place + rotation * tool.shape.centre())?;
+    if from.distance > tool.shape.bounding_radius() {
+        return Some((from, 0.0));
+    }
+    let met = (&local.smooth, &body.loaded, &body.query);
+    let (foot, _) = Reference::find(met, &tool.shape, (place, rotation), &from)?;
+    Some((foot, depth_below(&tool.shape, (place, rotation), &foot)))
+}
+
 impl Law for Local {
     fn begin(
         &self,
@@ -48,8 +75,7 @@ impl Law for Local {
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };
-        let Some(foot) = local.smooth.foot_anywhere(&body.loaded, &body.query, met) else { return Ok(None) };
-        let depth = approach.tool.radius - foot.distance;
+        let Some((foot, depth)) = first_foot(approach, local, met) else { return Ok(None) };
         *entry_depth = entry_depth.min(depth.max(0.0));
         if depth <= *entry_depth {
             return Ok(None);

@@ -4,39 +4,17 @@ use glam::{DMat3, DVec3};
 
 use super::LocalContact;
 use super::friction::{Answer, Friction};
-use crate::contact::local::{SphereContact, effective_modulus, indent_sphere};
-use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
-use crate::contact::{Moduli, SurfaceQuery};
-use crate::mesh::Surface;
+use super::met::{Indentation, LocalBody, LocalTool};
+use super::reference::Reference;
+use super::wrench::{Cells, indent_shape};
+use crate::contact::local::{effective_modulus, indent_sphere};
+use crate::contact::shape::ToolShape;
+use crate::contact::smooth::{FanWeights, FootPoint};
 
 /// Least `(1/R + kappa_1) (1/R + kappa_2)` over `1/R^2`: a tool that fits a hollow closely touches it as a flatter one.
 const CLOSEST_FIT: f64 = 0.1;
 /// The force is inclined by the body's change of compliance by no more than this, over the pressing force.
 const STEEPEST: f64 = 0.5;
-
-/// What a tool meets of a body.
-#[derive(Clone, Copy)]
-pub struct LocalBody<'a> {
-    pub surface: &'a Surface,
-    pub query: &'a SurfaceQuery,
-    pub smooth: &'a SmoothSurface,
-    pub moduli: &'a Moduli,
-    /// `C_reg` at the fans, m/N.
-    pub regular: &'a [DMat3],
-    /// Young's modulus over the Green's function's.
-    pub scale: f64,
-}
-
-/// The tool, and what it rubs with.
-#[derive(Clone, Copy)]
-pub struct LocalTool {
-    /// Radius of the sphere, m.
-    pub radius: f64,
-    /// Young's modulus of its pad, Pa; a rigid one has none.
-    pub pad: Option<f64>,
-    /// Coulomb's coefficient.
-    pub coefficient: f64,
-}
 
 /// What other contacts of the body do at a contact.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,54 +37,92 @@ pub struct LocalResponse {
     pub compliance: DMat3,
     /// Direction of the force without friction, turned towards the tool.
     pub normal: DVec3,
-    pub sphere: SphereContact,
+    /// Where the body is touched, at rest, m.
+    pub point: DVec3,
+    pub indentation: Indentation,
     pub friction: Answer,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
 }
 
-/// Energy of the local contact at a place and its gradient without friction.
-struct Indentation {
-    sphere: SphereContact,
-    /// `dPhi/dp'`, N.
-    gradient: DVec3,
-    /// `k_t / k_n`.
-    tangential: f64,
+/// Where a tool meets the surface.
+struct Met {
+    foot: FootPoint,
+    /// How its foot follows it; that of a sphere's centre follows the tip.
+    reference: Option<Reference>,
 }
 
 /// Answers to the tool at `place`; `force` is what is known of the force so far. `None` where nothing may be touched.
 pub fn evaluate(
     body: LocalBody<'_>,
-    tool: LocalTool,
+    tool: LocalTool<'_>,
     contact: &LocalContact,
-    place: DVec3,
-    force: DVec3,
+    (place, force): (DVec3, DVec3),
     others: Others,
     weights: &mut FanWeights,
+    cells: Cells<'_>,
 ) -> Option<LocalResponse> {
-    let start = (contact.foot.triangle, contact.foot.position);
-    let foot = body.smooth.foot(body.surface, body.query, place, start)?;
+    let Met { foot, reference } = meet(body, tool, contact, place)?;
     body.smooth.weigh(&foot, weights);
     if weights.touchable < 0.5 {
         return None;
     }
-    let depth = tool.radius - contact.entry - foot.distance;
-    let Indentation { sphere, gradient, tangential } = indent(body, tool, &foot, depth, weights);
+    let indentation = match &reference {
+        None => indent(body, tool, &foot, tool.radius - contact.entry - foot.distance, weights),
+        Some(reference) => indent_shape(body, tool, contact, place, (&foot, reference), weights, cells),
+    };
     let mut compliance = DMat3::ZERO;
     for (fan, weight) in weights.iter() {
         compliance += body.regular[fan] * (weight / body.scale);
     }
+    let (normal, point) = (foot.normal, foot.position);
     // A matrix is the identity by default.
     let jacobian = DMat3::ZERO;
     let mut response =
-        LocalResponse { foot, compliance, normal: foot.normal, sphere, jacobian, ..LocalResponse::default() };
-    if sphere.force == 0.0 {
+        LocalResponse { foot, compliance, normal, point, indentation, jacobian, ..LocalResponse::default() };
+    if indentation.force == 0.0 {
         return Some(response);
     }
-    let lever = -foot.normal * tool.radius;
+    let lever = indentation.lever;
     let rotation = rotation_between(contact);
     let displacement = place - contact.relative + rotation.cross(lever);
-    // The inclination of the force follows from the force of the step before: they agree where the steps end.
+    let slope = slope(body, force, others, weights).clamp_length_max(STEEPEST * indentation.force);
+    let (slope, twist) = reference.map_or((slope, DVec3::ZERO), |reference| reference.by_pose(slope));
+    let push = slope - indentation.gradient;
+    let pressing = push.length();
+    response.normal = push / pressing;
+    let stiffness = indentation.tangential * indentation.stiffness;
+    let bound = tool.coefficient * pressing;
+    response.friction = contact.friction.answer(displacement, bound, tool.coefficient, stiffness, response.normal);
+    response.force = response.friction.force - push;
+    let turning = reference.map_or(foot.turning, |reference| reference.turning(&foot));
+    let n = foot.normal;
+    let along = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+    response.jacobian = along(n, n) * indentation.stiffness - turning * indentation.force
+        + response.friction.by_displacement
+        - along(response.friction.by_pressing, n) * indentation.stiffness;
+    response.torque = -lever.cross(response.friction.force);
+    if reference.is_some() {
+        response.torque += indentation.torque + twist;
+        response.point = place + lever;
+    }
+    Some(response)
+}
+
+fn meet(body: LocalBody<'_>, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3) -> Option<Met> {
+    if let ToolShape::Sphere { .. } = tool.shape {
+        let start = (contact.foot.triangle, contact.foot.position);
+        return Some(Met { foot: body.smooth.foot(body.surface, body.query, place, start)?, reference: None });
+    }
+    let pose = (place, DMat3::from_quat(contact.orientation));
+    let met = (body.smooth, body.surface, body.query);
+    let (foot, reference) = Reference::find(met, tool.shape, pose, &contact.foot)?;
+    Some(Met { foot, reference: Some(reference) })
+}
+
+/// What the change of the body's compliance, and the other contacts, add to the force on the tool, by the place of the foot's
+/// point. It follows from the force of the step before: they agree where the steps end.
+fn slope(body: LocalBody<'_>, force: DVec3, others: Others, weights: &FanWeights) -> DVec3 {
     let mut slope = others.slope;
     match others.moving {
         Some(moving) => slope += moving * force,
@@ -116,22 +132,11 @@ pub fn evaluate(
             }
         }
     }
-    let push = slope.clamp_length_max(STEEPEST * sphere.force) - gradient;
-    let pressing = push.length();
-    response.normal = push / pressing;
-    let stiffness = tangential * sphere.stiffness;
-    let bound = tool.coefficient * pressing;
-    response.friction = contact.friction.answer(displacement, bound, tool.coefficient, stiffness, response.normal);
-    response.force = response.friction.force - push;
-    let (n, turning) = (foot.normal, foot.turning);
-    let along = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-    response.jacobian = along(n, n) * sphere.stiffness - turning * sphere.force + response.friction.by_displacement
-        - along(response.friction.by_pressing, n) * sphere.stiffness;
-    response.torque = -lever.cross(response.friction.force);
-    Some(response)
+    slope
 }
 
-fn indent(body: LocalBody<'_>, tool: LocalTool, foot: &FootPoint, depth: f64, weights: &FanWeights) -> Indentation {
+/// Of a sphere.
+fn indent(body: LocalBody<'_>, tool: LocalTool<'_>, foot: &FootPoint, depth: f64, weights: &FanWeights) -> Indentation {
     let fans = body.smooth.fans();
     let (mean, mean_slope) = weights.field(|fan| fans[fan].mean);
     let (gauss, gauss_slope) = weights.field(|fan| fans[fan].gauss);
@@ -151,7 +156,16 @@ fn indent(body: LocalBody<'_>, tool: LocalTool, foot: &FootPoint, depth: f64, we
     let sphere = indent_sphere(depth, radius, effective);
     let gradient = radius_slope * sphere.energy_by_radius + effective_slope * (sphere.energy / effective)
         - foot.normal * sphere.force;
-    Indentation { sphere, gradient, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
+    Indentation {
+        force: sphere.force,
+        radius: sphere.radius,
+        stiffness: sphere.stiffness,
+        energy: sphere.energy,
+        gradient,
+        torque: DVec3::ZERO,
+        lever: -foot.normal * tool.radius,
+        tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson),
+    }
 }
 
 /// Rotation vector of the tool since the last tick, rad.

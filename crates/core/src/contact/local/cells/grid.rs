@@ -1,0 +1,113 @@
+//! Where the cells lie: a rectangle on the tangent plane that just holds the part of the tool below that plane.
+//!
+//! The rectangle moves with the tool, turns with its long axis and grows with its depth, so that cells are as fine as the
+//! contact allows, and a tool that slides over a plane meets the same cells everywhere. Its motion is part of the
+//! energy's gradient. Its sides are found by duality: for a convex body with the support function `h`, the largest
+//! coordinate along `e` of its points below the plane is `min h(e - mu n)` over `mu >= 0`, least where the support lies in
+//! the plane. A minimum changes with the pose as if `mu` were constant. In a hollow the contact may be wider: up to half
+//! the tool's curvature all of it is still within.
+
+use glam::{DMat3, DVec3};
+
+use super::super::super::shape::ToolShape;
+
+/// Most steps towards the direction of a side's support.
+const MAX_SUPPORT_STEPS: usize = 50;
+/// How far an arc of the tool may rise over its chord to be straight, over the tool's size: the arc is then 3e-7 long.
+const STRAIGHT: f64 = 1e-14;
+/// Tools whose long axis stands more upright than this sine keep the grid along the first tangent.
+const LEAST_SINE: f64 = 1e-3;
+
+/// A side of the rectangle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Side {
+    /// Its coordinate along its axis, m.
+    pub coordinate: f64,
+    /// `e - mu n` or, on the lower side, `e + mu n`: the coordinate's derivative by a motion of the support.
+    pub gradient: DVec3,
+    /// The tool's point that gives it, m.
+    pub support: DVec3,
+}
+
+/// The rectangle, in the frame of the surface.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rectangle {
+    /// Its axes.
+    pub axes: [DVec3; 2],
+    /// Lower and upper side along each axis.
+    pub sides: [[Side; 2]; 2],
+    /// Change of its angle about the normal with a rotation of the tool.
+    pub angle_by_rotation: DVec3,
+}
+
+/// A tool in the frame of the surface, whose third axis is the normal.
+pub struct PosedTool<'a> {
+    /// Its shape.
+    pub shape: &'a ToolShape,
+    /// Axes of the tool as columns.
+    pub rotation: DMat3,
+    /// Its origin, m.
+    pub tip: DVec3,
+}
+
+impl PosedTool<'_> {
+    /// Farthest point in a direction.
+    pub fn support(&self, direction: DVec3) -> DVec3 {
+        self.tip + self.rotation * self.shape.support(self.rotation.transpose() * direction)
+    }
+
+    /// The rectangle around what lies below the plane; there must be something.
+    pub fn rectangle(&self) -> Rectangle {
+        let long = self.rotation * self.shape.long_axis();
+        let flat = long.with_z(0.0);
+        let squared_sine = flat.length_squared();
+        let (first, angle_by_rotation) = match squared_sine > LEAST_SINE * LEAST_SINE {
+            true => (flat / squared_sine.sqrt(), long.cross(DVec3::Z.cross(flat)) / squared_sine),
+            false => (DVec3::X, DVec3::ZERO),
+        };
+        let axes = [first, DVec3::Z.cross(first)];
+        let sides = axes.map(|axis| {
+            let (lower, upper) = (self.side(-axis), self.side(axis));
+            [Side { coordinate: -lower.coordinate, gradient: -lower.gradient, support: lower.support }, upper]
+        });
+        Rectangle { axes, sides, angle_by_rotation }
+    }
+
+    /// The upper side along a direction in the plane.
+    fn side(&self, direction: DVec3) -> Side {
+        let mut above = self.support(direction);
+        if above.z <= 0.0 {
+            return Side { coordinate: above.dot(direction), gradient: direction, support: above };
+        }
+        // Supports sink as their direction turns downwards. The next direction is across the chord of the last two, which ends
+        // on a polyhedron, and in between by their heights, which ends elsewhere.
+        let (mut level, mut steep) = (direction, DVec3::NEG_Z);
+        let mut below = self.support(steep);
+        let mut chord = above - below;
+        let straight = STRAIGHT * self.shape.bounding_radius();
+        for step in 0..MAX_SUPPORT_STEPS {
+            let across = direction - DVec3::Z * (chord.dot(direction) / chord.z);
+            let by_height = level * -below.z + steep * above.z;
+            let next = if step % 2 == 0 { across } else { by_height }.normalize();
+            let support = self.support(next);
+            if support.z.abs() <= straight {
+                let gradient = next / next.dot(direction);
+                return Side { coordinate: direction.dot(support), gradient, support };
+            }
+            // Nothing lies beyond the chord.
+            if step % 2 == 0 && (support - above).dot(next) <= straight {
+                break;
+            }
+            if support.z > 0.0 {
+                (level, above) = (next, support);
+            } else {
+                (steep, below) = (next, support);
+            }
+            chord = above - below;
+        }
+        // The chord's slope is `mu`, and it meets the plane between its ends.
+        let support = below - chord * (below.z / chord.z);
+        let gradient = direction - DVec3::Z * (chord.dot(direction) / chord.z);
+        Side { coordinate: direction.dot(support), gradient, support }
+    }
+}

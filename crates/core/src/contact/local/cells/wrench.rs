@@ -1,0 +1,144 @@
+//! Gaps under the cells, and the energy's gradient by the tool's pose.
+
+use glam::DVec3;
+
+use super::grid::PosedTool;
+use super::influence::Grid;
+use super::pressure::dot;
+use super::{CellContact, CellScratch, Cells};
+use crate::contact::local::OsculatingSurface;
+
+/// Normals flatter than this do not press: the wall of a tool is no contact along the normal.
+const LEAST_NORMAL: f64 = 1e-3;
+
+/// Derivatives of the energy by the places of the cells, J/m.
+#[derive(Default)]
+struct ByPlace {
+    /// By a shift of all along each axis.
+    shift: [f64; 2],
+    /// By the cells' sides.
+    side: [f64; 2],
+    /// By a turn of all about the origin, J.
+    turn: f64,
+}
+
+impl CellScratch {
+    /// How far the tool lies above the surface in the middle of each cell, where it overlaps; zero elsewhere.
+    pub(super) fn measure_gaps(&mut self, tool: &PosedTool, cells: &Cells, surface: &OsculatingSurface, depth: f64) {
+        let to_tool = tool.rotation.transpose();
+        let upwards = to_tool * DVec3::Z;
+        let axes = cells.rectangle.axes;
+        for j in 0..cells.count {
+            for i in 0..cells.count {
+                let at = cells.middle(i, j);
+                self.gap[j][i] = 0.0;
+                // From the plane through the tool's lowest point.
+                let origin = to_tool * (at.with_z(-depth) - tool.tip);
+                let height = depth + surface.height(at);
+                let Some(entry) = tool.shape.line_entry(origin, upwards, height) else { continue };
+                let normal = tool.rotation * entry.normal;
+                let gap = entry.distance - height;
+                if gap < 0.0 && normal.z < -LEAST_NORMAL {
+                    self.gap[j][i] = gap;
+                    self.slopes[0][j][i] = -normal.dot(axes[0]) / normal.z;
+                    self.slopes[1][j][i] = -normal.dot(axes[1]) / normal.z;
+                }
+            }
+        }
+    }
+
+    /// Energy, wrench and what else follows from the solution, whose residual must still be at hand.
+    pub(super) fn integrate(
+        &mut self,
+        tool: &PosedTool,
+        cells: &Cells,
+        surface: &OsculatingSurface,
+        q: &Grid,
+    ) -> CellContact {
+        let mut contact = CellContact::default();
+        let mut by_place = ByPlace::default();
+        let (mut work, mut moment) = (0.0, DVec3::ZERO);
+        for j in 0..cells.count {
+            for i in 0..cells.count {
+                if q[j][i] <= 0.0 {
+                    continue;
+                }
+                let (force, gap) = (cells.force_scale * q[j][i], self.gap[j][i]);
+                let slopes = [self.slopes[0][j][i], self.slopes[1][j][i]];
+                let at = cells.middle(i, j);
+                by_place.add(cells, surface, (at, slopes), force, (i, j));
+                // A lift of the tool widens the gap by as much, a shift by the tool's slope times it.
+                let [along, across] = cells.rectangle.axes;
+                let push = force * (DVec3::Z - slopes[0] * along - slopes[1] * across);
+                let height = surface.height(at);
+                contact.force += push;
+                contact.torque += (at.with_z(height + gap) - tool.tip).cross(push);
+                contact.normal_force += force;
+                contact.energy_by_curvature[0] -= 0.5 * force * at.x * at.x;
+                contact.energy_by_curvature[1] -= force * at.x * at.y;
+                contact.energy_by_curvature[2] -= 0.5 * force * at.y * at.y;
+                contact.area += cells.sides[0] * cells.sides[1];
+                work -= force * gap;
+                moment += force * at.with_z(height);
+            }
+        }
+        let elastic = cells.force_scale * self.solver.energy(&self.gap, q);
+        contact.energy = work - 0.5 * elastic;
+        self.add_influence(cells, q, elastic, &mut by_place);
+        by_place.move_with_tool(tool, cells, &mut contact);
+        if contact.normal_force > 0.0 {
+            contact.centre_of_pressure = surface.origin + surface.axes * (moment / contact.normal_force);
+        }
+        contact.force = surface.axes * contact.force;
+        contact.torque = surface.axes * contact.torque;
+        contact
+    }
+
+    /// The influence `T/(pi E* sqrt(hx hy))` changes with the cells' sides, by the root and by the aspect `hy/hx`.
+    fn add_influence(&mut self, cells: &Cells, q: &Grid, elastic: f64, by_place: &mut ByPlace) {
+        self.influence.product_by_aspect(cells.count, q, &mut self.image);
+        let by_aspect = dot(q, &self.image) * 0.5 * cells.force_scale * cells.sides[1] / cells.sides[0];
+        by_place.side[0] += (0.25 * elastic + by_aspect) / cells.sides[0];
+        by_place.side[1] += (0.25 * elastic - by_aspect) / cells.sides[1];
+    }
+}
+
+impl ByPlace {
+    /// Adds a cell whose place `at` sees the tool's `slopes`.
+    fn add(
+        &mut self,
+        cells: &Cells,
+        surface: &OsculatingSurface,
+        (at, slopes): (DVec3, [f64; 2]),
+        force: f64,
+        (i, j): (usize, usize),
+    ) {
+        let [along, across] = cells.rectangle.axes;
+        let slope = surface.slope(at);
+        let gap_slopes = [slopes[0] - slope.dot(along), slopes[1] - slope.dot(across)];
+        let from_middle = [i, j].map(|k| k as f64 + 0.5 - 0.5 * cells.count as f64);
+        for k in 0..2 {
+            self.shift[k] -= force * gap_slopes[k];
+            self.side[k] -= force * gap_slopes[k] * from_middle[k];
+        }
+        self.turn -= force * (gap_slopes[1] * at.dot(along) - gap_slopes[0] * at.dot(across));
+    }
+
+    /// The rectangle moves with the tool: its sides with the supports below, its angle with the long axis.
+    fn move_with_tool(&self, tool: &PosedTool, cells: &Cells, contact: &mut CellContact) {
+        let [along, across] = cells.rectangle.axes;
+        // Derivatives of both axes by the angle.
+        let turned = [across, -along];
+        let mut by_angle = self.turn;
+        for k in 0..2 {
+            let by_side = self.side[k] / cells.count as f64;
+            for (side, share) in cells.rectangle.sides[k].iter().zip([-by_side, by_side]) {
+                let share = 0.5 * self.shift[k] + share;
+                contact.force -= share * side.gradient;
+                contact.torque -= share * (side.support - tool.tip).cross(side.gradient);
+                by_angle += share * side.support.dot(turned[k]);
+            }
+        }
+        contact.torque -= by_angle * cells.rectangle.angle_by_rotation;
+    }
+}

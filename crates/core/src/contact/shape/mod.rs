@@ -1,0 +1,223 @@
+//! Shapes of rigid tools, in the tool's own frame; m.
+//!
+//! The origin is the point that a device moves: the centre of a sphere, of an ellipsoid and of the hemisphere in front of
+//! a capsule, the middle of a punch's face. Capsule and punch lie along +z, their front towards -z.
+
+mod capsule;
+pub(crate) mod ellipsoid;
+mod punch;
+mod surface;
+
+use glam::DVec3;
+
+pub use surface::SurfaceShape;
+
+use crate::{Error, Result};
+
+/// What tools look like.
+#[derive(Clone, Debug)]
+pub enum ToolShape {
+    /// A sphere around the origin.
+    Sphere {
+        /// Radius, m.
+        radius: f64,
+    },
+    /// An ellipsoid around the origin.
+    Ellipsoid {
+        /// Half its lengths along x, y and z, m.
+        semi_axes: DVec3,
+    },
+    /// A cylinder along +z with a hemisphere around the origin and one at its other end.
+    Capsule {
+        /// Radius, m.
+        radius: f64,
+        /// Half the distance between the centres of the hemispheres, m.
+        half_length: f64,
+    },
+    /// A cylinder along +z, four radii long, whose flat face lies in the plane z = 0.
+    Punch {
+        /// Radius of the cylinder, m.
+        radius: f64,
+        /// Radius by which the edges of its faces are rounded, m; at most that of the cylinder.
+        rounding: f64,
+    },
+    /// Any closed surface.
+    Surface(Box<SurfaceShape>),
+}
+
+/// How the surface bends where it reaches farthest in a direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrincipalCurvatures {
+    /// Curvatures, 1/m; zero where flat.
+    pub curvatures: [f64; 2],
+    /// Unit directions of the two, perpendicular to each other and to the direction asked for.
+    pub directions: [DVec3; 2],
+}
+
+/// Where a straight line enters a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineEntry {
+    /// Distance along the line, in units of its direction.
+    pub distance: f64,
+    /// Unit outward normal of the shape.
+    pub normal: DVec3,
+}
+
+impl ToolShape {
+    /// A sphere.
+    ///
+    /// # Errors
+    /// A radius that is not positive.
+    pub fn sphere(radius: f64) -> Result<Self> {
+        positive("radius of a sphere", radius)?;
+        Ok(Self::Sphere { radius })
+    }
+
+    /// An ellipsoid.
+    ///
+    /// # Errors
+    /// A semi-axis that is not positive.
+    pub fn ellipsoid(semi_axes: DVec3) -> Result<Self> {
+        for semi_axis in semi_axes.to_array() {
+            positive("semi-axis of an ellipsoid", semi_axis)?;
+        }
+        Ok(Self::Ellipsoid { semi_axes })
+    }
+
+    /// A capsule.
+    ///
+    /// # Errors
+    /// A radius or half length that is not positive.
+    pub fn capsule(radius: f64, half_length: f64) -> Result<Self> {
+        positive("radius of a capsule", radius)?;
+        positive("half length of a capsule", half_length)?;
+        Ok(Self::Capsule { radius, half_length })
+    }
+
+    /// A flat punch with a rounded rim.
+    ///
+    /// # Errors
+    /// A radius or rounding that is not positive, a rounding larger than the radius.
+    pub fn punch(radius: f64, rounding: f64) -> Result<Self> {
+        positive("radius of a punch", radius)?;
+        positive("rounding of a punch", rounding)?;
+        if rounding > radius {
+            return Err(Error::Invalid(format!(
+                "rounding of a punch is {rounding} m, more than its radius of {radius} m"
+            )));
+        }
+        Ok(Self::Punch { radius, rounding })
+    }
+
+    /// Signed distance of a point, m, negative inside, and its gradient, a unit vector away from the shape.
+    ///
+    /// Where several points of the shape are closest, the gradient is that of one of them.
+    pub fn signed_distance(&self, point: DVec3) -> (f64, DVec3) {
+        match *self {
+            Self::Sphere { radius } => distance_to_ball(point, radius),
+            Self::Ellipsoid { semi_axes } => ellipsoid::signed_distance(semi_axes, point),
+            Self::Capsule { radius, half_length } => {
+                let axis_point = DVec3::Z * point.z.clamp(0.0, 2.0 * half_length);
+                distance_to_ball(point - axis_point, radius)
+            }
+            Self::Punch { radius, rounding } => punch::signed_distance(radius, rounding, point),
+            Self::Surface(ref surface) => surface.signed_distance(point),
+        }
+    }
+
+    /// The point that reaches farthest in a direction of any length; of a surface from a file, one that reaches as far or, by
+    /// up to 2 % of its size, farther.
+    pub fn support(&self, direction: DVec3) -> DVec3 {
+        match *self {
+            Self::Sphere { radius } => radius * direction.normalize_or_zero(),
+            Self::Ellipsoid { semi_axes } => ellipsoid::support(semi_axes, direction),
+            Self::Capsule { radius, half_length } => capsule::support(radius, half_length, direction),
+            Self::Punch { radius, rounding } => punch::support(radius, rounding, direction),
+            Self::Surface(ref surface) => surface.support(direction),
+        }
+    }
+
+    /// Curvatures at the support in a direction; `None` for a surface from a file, which has them at no single point.
+    pub fn curvature_at(&self, direction: DVec3) -> Option<PrincipalCurvatures> {
+        let normal = direction.try_normalize()?;
+        Some(match *self {
+            Self::Sphere { radius } => umbilic(normal, 1.0 / radius),
+            Self::Ellipsoid { semi_axes } => ellipsoid::curvature_at(semi_axes, normal),
+            Self::Capsule { radius, .. } => capsule::curvature_at(radius, normal),
+            Self::Punch { radius, rounding } => punch::curvature_at(radius, rounding, normal),
+            Self::Surface(_) => return None,
+        })
+    }
+
+    /// Where the line `origin + s direction` (a unit vector), from an origin outside, first enters the shape. Entries beyond
+    /// `reach` may be left out.
+    pub fn line_entry(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<LineEntry> {
+        match *self {
+            Self::Sphere { radius } => ellipsoid::line_entry(DVec3::splat(radius), origin, direction),
+            Self::Ellipsoid { semi_axes } => ellipsoid::line_entry(semi_axes, origin, direction),
+            Self::Capsule { radius, half_length } => capsule::line_entry(radius, half_length, origin, direction),
+            Self::Punch { radius, rounding } => punch::line_entry(radius, rounding, origin, direction),
+            Self::Surface(ref surface) => surface.line_entry(origin, direction, reach),
+        }
+    }
+
+    /// Centre of a ball around the shape.
+    pub fn centre(&self) -> DVec3 {
+        match *self {
+            Self::Sphere { .. } | Self::Ellipsoid { .. } => DVec3::ZERO,
+            Self::Capsule { half_length, .. } => DVec3::Z * half_length,
+            Self::Punch { radius, .. } => DVec3::Z * (0.5 * punch::LENGTH * radius),
+            Self::Surface(ref surface) => surface.centre(),
+        }
+    }
+
+    /// Radius of the ball around [`ToolShape::centre`], m.
+    pub fn bounding_radius(&self) -> f64 {
+        match *self {
+            Self::Sphere { radius } => radius,
+            Self::Ellipsoid { semi_axes } => semi_axes.max_element(),
+            Self::Capsule { radius, half_length } => radius + half_length,
+            Self::Punch { radius, .. } => radius * (0.5 * punch::LENGTH).hypot(1.0),
+            Self::Surface(ref surface) => surface.bounding_radius(),
+        }
+    }
+
+    /// The direction along which the shape is longest, a unit vector: contacts are mostly longest along it too.
+    pub fn long_axis(&self) -> DVec3 {
+        match *self {
+            Self::Sphere { .. } | Self::Capsule { .. } => DVec3::Z,
+            // Its face is round, so the axis that lies in the face serves as well as any.
+            Self::Punch { .. } => DVec3::X,
+            Self::Ellipsoid { semi_axes } => DVec3::AXES[semi_axes.max_position()],
+            Self::Surface(ref surface) => surface.long_axis(),
+        }
+    }
+
+    /// Whether its points between any two lie inside, as closed forms assume.
+    pub fn is_convex(&self) -> bool {
+        !matches!(self, Self::Surface(_))
+    }
+}
+
+/// Refuses numbers that no length can be.
+fn positive(what: &str, value: f64) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(Error::Invalid(format!("{what} is {value} m: it must be positive")))
+}
+
+/// Signed distance to a ball around the origin, and its gradient.
+fn distance_to_ball(point: DVec3, radius: f64) -> (f64, DVec3) {
+    let length = point.length();
+    (length - radius, if length > 0.0 { point / length } else { DVec3::NEG_Z })
+}
+
+/// Equal curvatures in all directions.
+fn umbilic(normal: DVec3, curvature: f64) -> PrincipalCurvatures {
+    let (first, second) = normal.any_orthonormal_pair();
+    PrincipalCurvatures { curvatures: [curvature; 2], directions: [first, second] }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;
