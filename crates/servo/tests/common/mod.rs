@@ -6,6 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::{ModalModel, Newmark, Rayleigh};
 use palpate_core::fem::Supports;
@@ -48,6 +49,17 @@ pub fn single(moving: bool) -> Arc<Model> {
     let body = BodyModel::new(green(&cube(4)), Placement::default()).expect("a valid body");
     let body = if moving { set_in_motion(body) } else { body };
     Arc::new(Model::new(vec![body], vec![TOOL]).expect("a valid scene"))
+}
+
+/// A cube at the origin under tools of the local law, one a shape.
+pub fn sliding(moving: bool, shapes: [ToolShape; 2]) -> Arc<Model> {
+    let body = BodyModel::new(green(&cube(6)), Placement::default()).expect("a valid body");
+    let nodes = body.green().surface_count();
+    let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes] };
+    let body = body.with_moduli(moduli).expect("constants that match");
+    let body = if moving { set_in_motion(body) } else { body };
+    let tools = shapes.map(|shape| ToolModel { shape, radius: 0.01, law: LawKind::Local, ..TOOL });
+    Arc::new(Model::new(vec![body], tools.into()).expect("a valid scene"))
 }
 
 pub fn settings() -> Settings {
