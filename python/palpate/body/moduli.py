@@ -29,14 +29,17 @@ def moduli_of_store(description: Mapping[str, Any], count: int) -> tuple[np.ndar
     Raises
     ------
     BodyError
-        A body of several materials: the store does not say where each of them is.
+        An older store of a body of several materials: it does not say where each of them is.
 
     """
-    materials = list(description.get("materials", {}).values())
-    if len(materials) != 1:
-        raise BodyError(
-            "a store of several materials does not say which is at the surface: give the scene the mesh instead, or a "
-            "tool with contact = 'patch'"
-        )
-    young, poisson, _ = materials[0]
-    return np.full(count, float(young)), np.full(count, float(poisson))
+    known = description.get("surface_moduli")
+    if known is None:
+        materials = list(description.get("materials", {}).values())
+        if len(materials) != 1:
+            raise BodyError(
+                "this store of several materials does not say which is at the surface: compute it again, or give the "
+                "tool contact = 'patch'"
+            )
+        known = [[value] for value in materials[0][:2]]
+    young, poisson = (np.broadcast_to(np.asarray(values, dtype=float), count).copy() for values in known)
+    return young, poisson

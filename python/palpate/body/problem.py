@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.body.body import Body
+from palpate.body.moduli import surface_moduli
 from palpate.errors import BodyError
 
 
@@ -34,6 +35,8 @@ def description(body: Body) -> dict[str, Any]:
     """Give counts, materials and loads of a body: kept in its files, and compared where keys differ."""
     materials = body.material if isinstance(body.material, Mapping) else {"all": body.material}
     total = body.load_vector().sum(axis=0)
+    young, poisson = surface_moduli(body)
+    even = np.ptp(young) == 0 and np.ptp(poisson) == 0
     return {
         "nodes": len(body.mesh.nodes),
         "tets": len(body.mesh.tets),
@@ -41,5 +44,7 @@ def description(body: Body) -> dict[str, Any]:
         "surface_nodes": len(body.mesh.surface_nodes),
         "fixed_nodes": len(body.fixed_nodes),
         "materials": {str(k): [m.youngs_modulus, m.poissons_ratio, m.density] for k, m in materials.items()},
+        # What tools meet: once where the surface is of one material, else at every surface node.
+        "surface_moduli": [m[:1].tolist() if even else m.tolist() for m in (young, poisson)],
         "load_N": total.tolist(),
     }
