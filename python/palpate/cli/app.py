@@ -261,7 +261,8 @@ def _mesh_line(mesh: TetMesh) -> str:
 
 def _print_origin(description: dict[str, object], key: str) -> None:
     """Say what a precomputed file was made from."""
-    for name, value in description.items():
+    # Constants at every surface node are for programs.
+    for name, value in ((name, value) for name, value in description.items() if name != "surface_moduli"):
         print(f"  {name.replace('_', ' ')}: {value}")
     print(f"  key: {key}")
 

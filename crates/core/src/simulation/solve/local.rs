@@ -300,19 +300,23 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
         local.others[a].slope = DVec3::ZERO;
     }
     let Some(fans) = model.bodies[body].local.as_ref().map(|own| own.smooth.fans()) else { return };
-    for (a, _) in slots.iter().enumerate() {
+    for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
+            let patches = &state.contacts.patches;
+            if state.bodies[body].motion.is_some() {
+                // The slope is that of the moving surface, whoever moves it.
+                let at_rest = patches[slot].compliance_with(green, &patches[other]);
+                local.between[a][b] = at_rest + local.change[a][b];
+                continue;
+            }
             let (mut block, mut slope) = (DMat3::ZERO, DVec3::ZERO);
             let (own, force) = (local.responses[a].force, local.responses[b].force);
             for (fan, weight, gradient) in local.weights[a].with_gradients() {
-                let of_node = state.contacts.patches[other].compliance_at(green, fans[fan].node as usize);
+                let of_node = patches[other].compliance_at(green, fans[fan].node as usize);
                 block += of_node * (weight / scale);
                 slope += gradient * (own.dot(of_node * force) / scale);
             }
             local.between[a][b] = block;
-            if state.bodies[body].motion.is_some() {
-                local.between[a][b] += local.change[a][b];
-            }
             local.others[a].slope += slope;
         }
     }
