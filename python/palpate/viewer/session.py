@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -405,9 +405,8 @@ def _thin(rows: np.ndarray, peaks: int | None = None) -> np.ndarray:
 
 
 def shapes_of(tool: ToolTable) -> tuple[str, ...]:
-    """Shapes that a tool may take in the page: its own, and those that the page draws."""
-    known = get_args(type(tool).model_fields["shape"].annotation)
-    return tuple(name for name in known if name in DRAWN_SHAPES or name == tool.shape)
+    """Shapes that a tool may take in the page; one that the page does not draw stays what it is."""
+    return DRAWN_SHAPES if tool.shape in DRAWN_SHAPES else (tool.shape,)
 
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:

@@ -162,6 +162,8 @@ def test_no_second_tool_is_offered_where_there_is_one(chromium, cache):
         press(page)
         page.keyboard.press("n")
         time.sleep(0.2)
-        assert state(page)["pinned"] == [] and state(page)["contacts"] == 1
+        assert state(page)["pinned"] == []
+        # The beam swings: it may leave the finger for a moment.
+        until(page, lambda s: s["contacts"] == 1)
         page.mouse.up()
     assert started.stop() == 0

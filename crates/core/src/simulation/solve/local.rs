@@ -33,9 +33,9 @@ pub const MOST_CELL_STEPS: usize = 3;
 const SETTLED: f64 = 1e-8;
 /// A force that changes by less than this part from step to step stays.
 const SAME: f64 = 1e-8;
-/// A tool is taken no deeper into the surface at rest than this, over its radius: its centre would leave the outside, where
-/// the closest point is one. A half-space under a sphere is strained by 60 % there.
-const MOST_DEPTH: f64 = 1.2;
+/// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
+/// longer one. A half-space under a sphere is strained far beyond what is linear there.
+const MOST_DEPTH: f64 = 1.6;
 /// Radius of the patch by which a body in motion is met, over the tool's, at least: in a step a body may be as good as rigid,
 /// and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of the patch.
 const WIDER: f64 = 1.6;
