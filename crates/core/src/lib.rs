@@ -24,5 +24,6 @@ pub mod simulation;
 #[cfg(feature = "offline")]
 pub mod solver;
 pub mod strain;
+mod tensor;
 
 pub use error::{Error, Result};

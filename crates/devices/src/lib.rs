@@ -2,11 +2,9 @@
 
 mod device;
 pub mod known;
-mod rotation;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
-pub use rotation::rotation_vector;
 
 // All that a driver knows of the core; `scripts/check_architecture.py` checks it.
 pub use palpate_core::simulation::{Pose, Twist, Wrench};

@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_core::Result;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Mode, Model, Pose, Snapshot, StrainWatch, Strike};
-use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench, rotation_vector};
+use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
 
 use crate::clock::now_ns;
 use crate::force_loop::ForceLoop;
@@ -218,8 +218,5 @@ impl Device for Scripted {
 
 /// Mean velocity from one pose to the next.
 fn twist(before: &Pose, now: &Pose, period: f64) -> Twist {
-    Twist {
-        linear: (now.position - before.position) / period,
-        angular: rotation_vector(before.orientation, now.orientation) / period,
-    }
+    Twist { linear: (now.position - before.position) / period, angular: now.rotation_from(before) / period }
 }

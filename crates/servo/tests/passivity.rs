@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::sync::{Arc, Mutex};
 
 use glam::{DMat3, DQuat, DVec3};
-use palpate_devices::{Device, DeviceLimits, Pose, Reading, Wrench, known, rotation_vector};
+use palpate_devices::{Device, DeviceLimits, Pose, Reading, Wrench, known};
 use palpate_servo::{ForceLoop, PortEnergy, SafetyLimits, SafetyStage};
 
 use common::{PERIOD, PERIOD_NS, Scripted, TOOL, settings, single};
@@ -57,7 +57,7 @@ fn follow(stage: &mut SafetyStage, path: &[Pose], every: usize, law: impl Fn(usi
         assert_eq!(stage.fault(), None);
         if let Some((before, computed_before, out_before)) = last {
             let moved = pose.position - before.position;
-            let turned = rotation_vector(before.orientation, pose.orientation);
+            let turned = pose.rotation_from(&before);
             let work =
                 |a: Wrench, b: Wrench| 0.5 * ((a.force + b.force).dot(moved) + (a.torque + b.torque).dot(turned));
             outcome.given += work(out_before, out);
@@ -136,7 +136,7 @@ impl Springs {
         if !self.attached.contains(&tick) {
             return Wrench::default();
         }
-        let angle = rotation_vector(DQuat::IDENTITY, pose.orientation);
+        let angle = pose.rotation_from(&Pose::default());
         Wrench { force: -(self.stiffness * pose.position), torque: -self.torsion * angle }
     }
 }

@@ -57,7 +57,7 @@ impl SurfaceQuery {
 }
 
 /// Barycentric coordinates of `p` in the plane of a triangle, by areas.
-fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
+pub fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
     let n = (b - a).cross(c - a);
     let scale = 1.0 / n.length_squared();
     let wa = (c - b).cross(p - b).dot(n) * scale;

@@ -15,6 +15,7 @@ pub mod shape;
 pub mod smooth;
 mod touchable;
 
+pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{smallest_eigenvalue, touch};
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};

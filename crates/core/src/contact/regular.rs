@@ -23,6 +23,7 @@ use super::smooth::SmoothSurface;
 use super::{PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, smallest_eigenvalue};
 use crate::contact::Patch;
 use crate::green::GreensFunction;
+use crate::tensor::outer;
 
 /// `k`.
 const HALF_SPACE: f64 = 0.766_544;
@@ -131,7 +132,7 @@ fn at_fan(
     let poisson = body.moduli.poissons[fan.node as usize];
     let normal = HALF_SPACE / (modulus * wide);
     let tangential = normal * (1.0 - 0.5 * poisson) / (1.0 - poisson);
-    let along = DMat3::from_cols(fan.normal * fan.normal.x, fan.normal * fan.normal.y, fan.normal * fan.normal.z);
+    let along = outer(fan.normal, fan.normal);
     let half_space = DMat3::IDENTITY * tangential + along * (normal - tangential);
     let rendered = (1.0 / max_stiffness - smallest_eigenvalue(&whole)).max(0.0);
     let regular = whole - half_space + DMat3::IDENTITY * rendered;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::Isotropic;
 use crate::element::{Tet4, Tet10, Tetrahedron, determinant, gradients};
 use crate::mesh::{TetMesh, Tets, node_elements, positions};
+use crate::tensor::outer;
 
 /// A symmetric matrix with both triangles stored, compressed by columns, rows ascending.
 #[derive(Clone, Debug)]
@@ -123,10 +124,6 @@ fn lumped_mass_of<E: Tetrahedron<N>, const N: usize>(
         rows: (0..dimension as u32).collect(),
         values: of_node.iter().flat_map(|&m| [m; 3]).collect(),
     }
-}
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 /// Sums the columns of blocks `column_of(element, local node)` over the elements around each node.

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::input::Placement;
 use crate::contact::smooth::{FootPoint, SmoothSurface};
-use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery};
+use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery, barycentric};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
 use crate::mesh::Surface;
@@ -135,11 +135,9 @@ impl BodyModel {
 
     /// A foot as a point of the drawn triangle below it.
     pub(super) fn surface_point(&self, foot: &FootPoint) -> SurfacePoint {
-        let [a, b, c] = self.loaded.corners(foot.triangle);
-        let normal = (b - a).cross(c - a);
-        let scale = 1.0 / normal.length_squared();
-        let of_a = ((c - b).cross(foot.position - b).dot(normal) * scale).clamp(0.0, 1.0);
-        let of_b = ((a - c).cross(foot.position - c).dot(normal) * scale).clamp(0.0, 1.0 - of_a);
+        let [of_a, of_b, _] = barycentric(self.loaded.corners(foot.triangle), foot.position);
+        let of_a = of_a.clamp(0.0, 1.0);
+        let of_b = of_b.clamp(0.0, 1.0 - of_a);
         SurfacePoint {
             position: foot.position,
             triangle: foot.triangle,

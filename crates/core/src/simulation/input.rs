@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::rotation::rotation_vector;
 use super::{MAX_BODIES, MAX_TOOLS};
 
 /// Place and direction of a rigid tool.
@@ -17,6 +18,11 @@ impl Pose {
     /// At a place, not turned.
     pub fn at(position: DVec3) -> Self {
         Self { position, orientation: DQuat::IDENTITY }
+    }
+
+    /// Shortest rotation in the world from the orientation of another pose to this one's, rad along its axis.
+    pub fn rotation_from(&self, other: &Pose) -> DVec3 {
+        rotation_vector(other.orientation, self.orientation)
     }
 
     /// Whether every number is finite.

@@ -16,6 +16,7 @@ mod law;
 mod limit;
 mod model;
 mod motion;
+mod rotation;
 mod scratch;
 mod slip;
 mod snapshot;

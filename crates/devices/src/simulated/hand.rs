@@ -13,7 +13,6 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::rotation::rotation_vector;
 use crate::{Pose, Twist};
 
 /// Time constant with which the tip follows its target, s: a step is followed to 98 % in about six of them.
@@ -39,8 +38,7 @@ impl Hand {
     /// Follows a target for a period, s.
     pub fn follow(&mut self, target: Pose, period: f64) {
         let (offset, linear) = decay(self.pose.position - target.position, self.twist.linear, period);
-        let (angle, angular) =
-            decay(rotation_vector(target.orientation, self.pose.orientation), self.twist.angular, period);
+        let (angle, angular) = decay(self.pose.rotation_from(&target), self.twist.angular, period);
         self.pose.position = target.position + offset;
         self.pose.orientation = (DQuat::from_scaled_axis(angle) * target.orientation).normalize();
         self.twist = Twist { linear, angular };

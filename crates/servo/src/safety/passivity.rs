@@ -51,7 +51,7 @@
 //! `K`. The device's own damping must take that (Colgate and Schenkel 1997): `DeviceLimits::largest_stiffness`.
 
 use glam::DVec3;
-use palpate_devices::{Pose, Reading, Wrench, rotation_vector};
+use palpate_devices::{Pose, Reading, Wrench};
 
 use super::SafetyLimits;
 
@@ -98,7 +98,7 @@ struct Motion {
 
 impl Motion {
     fn between(before: &Pose, now: &Pose) -> Self {
-        let angular = rotation_vector(before.orientation, now.orientation);
+        let angular = now.rotation_from(before);
         Self { linear: now.position - before.position, angular }
     }
 

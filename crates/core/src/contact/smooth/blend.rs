@@ -4,6 +4,7 @@
 use glam::{DMat3, DVec3};
 
 use super::fans::Fan;
+use crate::tensor::outer;
 
 /// Squared distance within which a node does not draw the surface towards itself, over its squared reach.
 const SHARP: f64 = 0.25;
@@ -73,9 +74,4 @@ pub fn blend<'a>(fans: impl Iterator<Item = &'a Fan>, x: DVec3) -> Option<Blend>
     let cross = outer(gradient, wx);
     let hessian = (nxx - wxx * value - cross - cross.transpose()) * (1.0 / w);
     Some(Blend { value, gradient, hessian })
-}
-
-/// `a b^T`.
-pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }

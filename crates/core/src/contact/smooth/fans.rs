@@ -8,6 +8,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::mesh::Surface;
+use crate::tensor::outer;
 
 /// Cosine of the turn beyond which an edge is a crease: 50 degrees.
 const CREASE: f64 = 0.642_787_609_686_539_4;
@@ -209,10 +210,9 @@ fn fit(rank: u32, fan: &mut Fan, before: &[Fan], neighbours: &[Vec<u32>]) {
     let raised = inverse * form * inverse;
     let bound = (SHARPEST / longest / raised_size(&raised)).min(1.0);
     let raised = raised * bound;
-    let dual = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
-    fan.curvature = dual(tx, tx) * raised.x_axis.x
-        + (dual(tx, ty) + dual(ty, tx)) * raised.x_axis.y
-        + dual(ty, ty) * raised.y_axis.y;
+    fan.curvature = outer(tx, tx) * raised.x_axis.x
+        + (outer(tx, ty) + outer(ty, tx)) * raised.x_axis.y
+        + outer(ty, ty) * raised.y_axis.y;
     let mixed = inverse * form * bound;
     (fan.mean, fan.gauss) = (0.5 * (mixed.x_axis.x + mixed.y_axis.y), mixed.determinant());
     fan.normal = normal;

@@ -7,9 +7,10 @@
 use glam::{DMat3, DVec3};
 
 use super::SmoothSurface;
-use super::blend::{blend, outer};
+use super::blend::blend;
 use crate::contact::{SurfacePoint, SurfaceQuery};
 use crate::mesh::Surface;
+use crate::tensor::across;
 
 /// Newton steps at most; three or four are usual.
 const STEPS: usize = 12;
@@ -66,7 +67,7 @@ impl SmoothSurface {
             let at = blend(self.own(triangle), x)?;
             let size = at.gradient.length();
             let normal = at.gradient / size;
-            let across = DMat3::IDENTITY - outer(normal, normal);
+            let across = across(normal);
             let shape = across * at.hessian * across * (1.0 / size);
             let distance = (p - x).dot(normal);
             let stretch = DMat3::IDENTITY + shape * distance;
@@ -121,7 +122,7 @@ impl SmoothSurface {
 /// The closest point of the drawn triangles, as on a point or an edge: the normal turns with `p` about it.
 fn on_crease(closest: &SurfacePoint) -> FootPoint {
     let (normal, distance) = (closest.normal, closest.signed_distance);
-    let across = DMat3::IDENTITY - outer(normal, normal);
+    let across = across(normal);
     let turning = if distance.abs() > 1e-9 { across * (1.0 / distance) } else { DMat3::ZERO };
     FootPoint {
         triangle: closest.triangle,

@@ -26,7 +26,8 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
             None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
         },
         |slot| {
-            let free = moving.map_or_else(|| dent_of_sliding(model, state, body, slot), |m| m.free_displacement(slot));
+            let sliding = || dent_of(model, state, slot, |law| law == LawKind::Local);
+            let free = moving.map_or_else(sliding, |motion| motion.free_displacement(slot));
             state.contacts.slots[slot].displacement - free
         },
     );
@@ -51,14 +52,15 @@ fn with_law(model: &Model, contact: &Contact, own: DMat3) -> DMat3 {
     own + DMat3::from_diagonal(DVec3::splat(law_of(contact.law).respond(tool, dynamics, &own)))
 }
 
-/// What contacts under the local law do at one that sticks, m, on a body at rest.
-fn dent_of_sliding(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
-    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
-    let sliding = contacts.on(body).filter(|&other| contacts.slots[other].law == LawKind::Local);
+/// What the contacts of some laws did a tick ago at the contact in a slot, m, on a body at rest.
+pub fn dent_of(model: &Model, state: &State, slot: usize, laws: impl Fn(LawKind) -> bool) -> DVec3 {
+    let (contacts, body) = (&state.contacts, state.contacts.slots[slot].body);
+    let green = &model.bodies[body].green;
+    let others = contacts.on(body).filter(|&other| laws(contacts.slots[other].law));
     let dent = |other: usize| {
         contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
     };
-    sliding.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
+    others.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
 }
 
 /// Slots of the contacts of a body that stick, in order; returns how many there are.

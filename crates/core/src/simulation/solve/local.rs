@@ -21,9 +21,11 @@ use crate::simulation::law::{
     Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
 };
 use crate::simulation::model::Model;
+use crate::simulation::solve::forces::dent_of;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
+use crate::tensor::outer;
 
 /// Most steps; three or four are usual.
 pub const MOST_STEPS: usize = 16;
@@ -152,18 +154,14 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
     let Memory { covering, local, system } = memory;
     local.others[..count].fill(Others::default());
     follow_motion(model, state, covering, local, slots, body);
+    let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
         // Whatever moves goes on as it did.
         local.places[a] = contact.local.relative + contact.local.advance;
         local.from[a] = contact.local.tool - free_displacement(model, state, body, slot);
         local.responses[a].force = contact.local.force;
-        local.others[a].slope = DVec3::ZERO;
-    }
-    let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
-    for (a, &slot) in slots.iter().enumerate() {
-        let (contact, tool) = (&state.contacts.slots[slot], &model.tools[state.contacts.slots[slot].tool]);
-        if let ToolShape::Sphere { radius } = tool.shape {
+        if let ToolShape::Sphere { radius } = model.tools[contact.tool].shape {
             deepest[a] = (1.0 - MOST_DEPTH) * radius - contact.local.entry;
         }
     }
@@ -188,15 +186,10 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
 /// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, and what
 /// contacts that stick did to it a tick ago, m.
 fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
-    let (contacts, green) = (&state.contacts, &model.bodies[body].green);
-    if let Some(motion) = &state.bodies[body].motion {
-        return motion.free_displacement(slot);
+    match &state.bodies[body].motion {
+        Some(motion) => motion.free_displacement(slot),
+        None => dent_of(model, state, slot, |law| law != LawKind::Local),
     }
-    let sticking = contacts.on(body).filter(|&other| contacts.slots[other].law != LawKind::Local);
-    let dent = |other: usize| {
-        contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
-    };
-    sticking.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
 }
 
 /// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
@@ -230,7 +223,7 @@ fn follow_motion(
         let mut moving = DMat3::ZERO;
         for (fan, _, gradient) in weights.with_gradients() {
             let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
-            moving += DMat3::from_cols(gradient * moved.x, gradient * moved.y, gradient * moved.z);
+            moving += outer(gradient, moved);
         }
         local.others[a].moving = Some(moving);
     }

@@ -16,6 +16,8 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::tensor::{across, outer};
+
 /// Springs with sliders.
 pub const SPRINGS: usize = 8;
 
@@ -37,8 +39,6 @@ pub struct Friction {
     springs: [DVec3; SPRINGS],
     /// `k`, N/m.
     stiffness: f64,
-    /// Direction across which they lie.
-    normal: DVec3,
 }
 
 /// What friction answers to a displacement.
@@ -70,8 +70,7 @@ impl Friction {
         // A matrix is the identity by default.
         let mut answer = Answer { by_displacement: DMat3::ZERO, ..Answer::default() };
         answer.friction.stiffness = stiffness;
-        answer.friction.normal = normal;
-        let along = DMat3::IDENTITY - DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+        let along = across(normal);
         let kept = if self.stiffness > stiffness { stiffness / self.stiffness } else { 1.0 };
         let spring = stiffness / SPRINGS as f64;
         let stretch = along * displacement * spring;
@@ -86,9 +85,7 @@ impl Friction {
             } else {
                 let direction = tried / size;
                 *after = direction * most;
-                let across =
-                    DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
-                answer.by_displacement += (along - across) * (spring * most / size);
+                answer.by_displacement += (along - outer(direction, direction)) * (spring * most / size);
                 answer.by_pressing += direction * (BOUNDS[i] * coefficient);
                 giving += 1;
             }

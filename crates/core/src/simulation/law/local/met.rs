@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::local::effective_modulus;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::SmoothSurface;
+use crate::contact::smooth::{FanWeights, SmoothSurface};
 use crate::contact::{Moduli, SurfaceQuery};
 use crate::mesh::Surface;
 
@@ -31,6 +32,27 @@ pub struct LocalTool<'a> {
     pub pad: Option<f64>,
     /// Coulomb's coefficient.
     pub coefficient: f64,
+}
+
+/// The half-space below a tool.
+pub struct HalfSpace {
+    /// `E*`, Pa, and its gradient by the place of the foot's point.
+    pub modulus: f64,
+    pub slope: DVec3,
+    /// `k_t / k_n`.
+    pub tangential: f64,
+}
+
+impl HalfSpace {
+    /// Of the body's constants at the foot and the tool's pad.
+    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, weights: &FanWeights) -> Self {
+        let fans = body.smooth.fans();
+        let (own, own_slope) = weights.field(|fan| body.scale * body.moduli.plane_strain(fans[fan].node));
+        let (poisson, _) = weights.field(|fan| body.moduli.poissons[fans[fan].node as usize]);
+        let modulus = effective_modulus(own, 0.0, tool.pad);
+        let slope = own_slope * (modulus / own).powi(2);
+        Self { modulus, slope, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
+    }
 }
 
 /// Energy of the local contact at a place and its gradient without friction.

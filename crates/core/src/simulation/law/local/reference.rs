@@ -20,6 +20,7 @@ use crate::contact::SurfaceQuery;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FootPoint, SmoothSurface};
 use crate::mesh::Surface;
+use crate::tensor::outer;
 
 /// Newton's steps at most; two are usual.
 const STEPS: usize = 6;
@@ -111,8 +112,7 @@ impl Core {
         let normal = foot.normal;
         let (towards, along) = (self.squares * normal, self.excess * normal);
         let height = normal.dot(towards).sqrt();
-        let outer = DMat3::from_cols(along * towards.x, along * towards.y, along * towards.z);
-        let by_normal = outer * (1.0 / height.powi(3)) - self.excess * (1.0 / height);
+        let by_normal = outer(along, towards) * (1.0 / height.powi(3)) - self.excess * (1.0 / height);
         let l = DMat3::IDENTITY - by_normal * foot.turning;
         let determinant = l.determinant();
         if determinant.is_nan() || determinant <= LEAST_DETERMINANT {

@@ -4,12 +4,14 @@ use glam::{DMat3, DVec3};
 
 use super::LocalContact;
 use super::friction::{Answer, Friction};
-use super::met::{Indentation, LocalBody, LocalTool};
+use super::met::{HalfSpace, Indentation, LocalBody, LocalTool};
 use super::reference::Reference;
 use super::wrench::{Cells, indent_shape};
-use crate::contact::local::{effective_modulus, indent_sphere};
+use crate::contact::local::indent_sphere;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FanWeights, FootPoint};
+use crate::simulation::rotation::rotation_vector;
+use crate::tensor::outer;
 
 /// Least `(1/R + kappa_1) (1/R + kappa_2)` over `1/R^2`: a tool that fits a hollow closely touches it as a flatter one.
 const CLOSEST_FIT: f64 = 0.1;
@@ -84,7 +86,7 @@ pub fn evaluate(
         return Some(response);
     }
     let lever = indentation.lever;
-    let rotation = rotation_between(contact);
+    let rotation = rotation_vector(contact.turned, contact.orientation);
     let displacement = place - contact.relative + rotation.cross(lever);
     let slope = slope(body, force, others, weights).clamp_length_max(STEEPEST * indentation.force);
     let (slope, twist) = reference.map_or((slope, DVec3::ZERO), |reference| reference.by_pose(slope));
@@ -97,10 +99,9 @@ pub fn evaluate(
     response.force = response.friction.force - push;
     let turning = reference.map_or(foot.turning, |reference| reference.turning(&foot));
     let n = foot.normal;
-    let along = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-    response.jacobian = along(n, n) * indentation.stiffness - turning * indentation.force
+    response.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force
         + response.friction.by_displacement
-        - along(response.friction.by_pressing, n) * indentation.stiffness;
+        - outer(response.friction.by_pressing, n) * indentation.stiffness;
     response.torque = -lever.cross(response.friction.force);
     if reference.is_some() {
         response.torque += indentation.torque + twist;
@@ -140,8 +141,7 @@ fn indent(body: LocalBody<'_>, tool: LocalTool<'_>, foot: &FootPoint, depth: f64
     let fans = body.smooth.fans();
     let (mean, mean_slope) = weights.field(|fan| fans[fan].mean);
     let (gauss, gauss_slope) = weights.field(|fan| fans[fan].gauss);
-    let (modulus, modulus_slope) = weights.field(|fan| body.scale * body.moduli.plane_strain(fans[fan].node));
-    let (poisson, _) = weights.field(|fan| body.moduli.poissons[fans[fan].node as usize]);
+    let half_space = HalfSpace::new(body, tool, weights);
     let curved = 1.0 / tool.radius;
     let product = curved * curved + 2.0 * mean * curved + gauss;
     let product_slope = mean_slope * (2.0 * curved) + gauss_slope;
@@ -151,10 +151,8 @@ fn indent(body: LocalBody<'_>, tool: LocalTool<'_>, foot: &FootPoint, depth: f64
     let (bounded, share) = (0.5 * (product + root), 0.5 * (1.0 + product / root));
     let radius = 1.0 / bounded.sqrt();
     let radius_slope = product_slope * (-0.5 * radius * radius * radius * share);
-    let effective = effective_modulus(modulus, 0.0, tool.pad);
-    let effective_slope = modulus_slope * (effective / modulus).powi(2);
-    let sphere = indent_sphere(depth, radius, effective);
-    let gradient = radius_slope * sphere.energy_by_radius + effective_slope * (sphere.energy / effective)
+    let sphere = indent_sphere(depth, radius, half_space.modulus);
+    let gradient = radius_slope * sphere.energy_by_radius + half_space.slope * (sphere.energy / half_space.modulus)
         - foot.normal * sphere.force;
     Indentation {
         force: sphere.force,
@@ -164,21 +162,12 @@ fn indent(body: LocalBody<'_>, tool: LocalTool<'_>, foot: &FootPoint, depth: f64
         gradient,
         torque: DVec3::ZERO,
         lever: -foot.normal * tool.radius,
-        tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson),
+        tangential: half_space.tangential,
     }
 }
 
-/// Rotation vector of the tool since the last tick, rad.
-fn rotation_between(contact: &LocalContact) -> DVec3 {
-    let turned = contact.orientation * contact.turned.conjugate();
-    let turned = if turned.w < 0.0 { -turned } else { turned };
-    let sine = DVec3::new(turned.x, turned.y, turned.z);
-    let size = sine.length();
-    if size > 1e-12 { sine * (2.0 * size.atan2(turned.w) / size) } else { sine * 2.0 }
-}
-
-/// Springs without any force.
 impl LocalResponse {
+    /// Its springs; without a force none is stretched.
     pub fn springs(&self) -> Friction {
         if self.force == DVec3::ZERO { Friction::default() } else { self.friction.friction }
     }

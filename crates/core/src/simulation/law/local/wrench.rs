@@ -13,10 +13,10 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::contact::LocalContact;
-use super::met::{Indentation, LocalBody, LocalTool};
+use super::met::{HalfSpace, Indentation, LocalBody, LocalTool};
 use super::reference::Reference;
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
-use crate::contact::local::{EllipsoidProblem, OsculatingSurface, ToolPose, effective_modulus};
+use crate::contact::local::{EllipsoidProblem, OsculatingSurface, ToolPose};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FanWeights, FootPoint};
 
@@ -60,14 +60,11 @@ pub fn indent_shape(
     cells: Cells<'_>,
 ) -> Indentation {
     let fans = body.smooth.fans();
-    let (modulus, modulus_slope) = weights.field(|fan| body.scale * body.moduli.plane_strain(fans[fan].node));
-    let (poisson, _) = weights.field(|fan| body.moduli.poissons[fans[fan].node as usize]);
-    let effective = effective_modulus(modulus, 0.0, tool.pad);
-    let effective_slope = modulus_slope * (effective / modulus).powi(2);
+    let half_space = HalfSpace::new(body, tool, weights);
     let (surface, curvature) = osculating_surface(body, foot, weights);
     // What it began with counts as if the tool were not so deep.
     let position = place + foot.normal * contact.entry;
-    let pressed = press(tool.shape, (position, contact.orientation), &surface, effective, cells);
+    let pressed = press(tool.shape, (position, contact.orientation), &surface, half_space.modulus, cells);
     let moment = pressed.torque + (position - surface.origin).cross(pressed.force);
     let [along, across, normal] = [surface.axes.x_axis, surface.axes.y_axis, surface.axes.z_axis];
     let [xx, xy, yy] = pressed.energy_by_curvature;
@@ -81,7 +78,7 @@ pub fn indent_shape(
         let bent = own * along;
         by_reference += gradient * (xx * along.dot(bent) + xy * across.dot(bent) + yy * across.dot(own * across));
     }
-    by_reference += effective_slope * (pressed.energy / effective);
+    by_reference += half_space.slope * (pressed.energy / half_space.modulus);
     let (by_place, by_rotation) = reference.by_pose(by_reference);
     Indentation {
         force: pressed.normal_force,
@@ -91,7 +88,7 @@ pub fn indent_shape(
         gradient: by_place - pressed.force,
         torque: pressed.torque - by_rotation,
         lever: pressed.centre - place,
-        tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson),
+        tangential: half_space.tangential,
     }
 }
 
@@ -146,6 +143,7 @@ fn osculating_surface(body: LocalBody<'_>, foot: &FootPoint, weights: &FanWeight
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::local::effective_modulus;
     use crate::contact::smooth::SmoothSurface;
     use crate::contact::smooth::tests::ball;
     use crate::contact::{Moduli, SurfaceQuery};
