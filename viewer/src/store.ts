@@ -24,6 +24,12 @@ export interface Pressing {
   depth: number;
 }
 
+/** How a tool is held on the surface that it touches, degrees: how far it leans from upright, and where to. */
+export interface Posture {
+  tilt: number;
+  turn: number;
+}
+
 export interface State {
   connection: ConnectionState;
   role: Role;
@@ -53,6 +59,8 @@ export interface State {
   strike: boolean;
   impulse: number;
   pressing: Readonly<Pressing> | null;
+  /** Of each tool. */
+  postures: readonly Readonly<Posture>[];
   /** Tools that stay where they were left. */
   pinned: readonly number[];
   /** Whether the next press stays where it is let go. */
@@ -80,6 +88,7 @@ export function initialState(): State {
     strike: false,
     impulse: 0,
     pressing: null,
+    postures: [],
     pinned: [],
     pinNext: false,
   };

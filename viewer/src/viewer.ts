@@ -21,6 +21,7 @@ import { Plots } from "./ui/plots";
 import { Readout } from "./ui/readout";
 import { SettingsPanel } from "./ui/settings_panel";
 import { Statistics } from "./ui/statistics";
+import { ToolPanel } from "./ui/tool_panel";
 
 /** The scene's own strike waits until the body has been seen at rest. */
 const FIRST_STRIKE_MS = 800;
@@ -59,6 +60,7 @@ export class Viewer {
     new Legend(store);
     new Panel(store, control, viewport);
     new SettingsPanel(store, control);
+    new ToolPanel(store, control);
     new MotionPanel(store, control);
     followNotices(store, control);
     installTestHooks({ store, stage: this.stage, pointer, statistics, history: this.plots.history });

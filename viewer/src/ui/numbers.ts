@@ -46,3 +46,9 @@ export function percent(part: number): string {
 export function millimetres(metres: number): string {
   return `${(1000 * metres).toFixed(1)} mm`;
 }
+
+/** An angle in degrees, with its sign. */
+export function degrees(angle: number): string {
+  const whole = Math.round(angle);
+  return `${whole < 0 ? MINUS : ""}${Math.abs(whole)}°`;
+}
