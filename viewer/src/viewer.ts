@@ -83,11 +83,13 @@ export class Viewer {
   private takeScene(data: SceneData): void {
     // Frames of the scene before are not drawn any more, but the server still counts on an answer.
     this.frames.take();
+    const again = data.header.name === this.store.get().scene?.name;
     this.control.takeScene(data.header);
     this.stage.setScene(data);
     document.title = `${data.header.title} · Palpate`;
     window.clearTimeout(this.firstStrike);
-    if (!data.header.motion?.strike) return;
+    // Another tool on the same body is no reason to strike it.
+    if (again || !data.header.motion?.strike) return;
     this.firstStrike = window.setTimeout(() => this.control.repeatStrike(), FIRST_STRIKE_MS);
   }
 

@@ -53,7 +53,7 @@ class Session:
     def __init__(self, built: BuiltScene, own_tools: Sequence[ToolTable] | None = None):
         self.built = built
         scene = built.scene
-        self._own_tools = scene.tools if own_tools is None else own_tools
+        self.own_tools = scene.tools if own_tools is None else own_tools
         self.simulation = Simulation(built)
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
@@ -130,8 +130,8 @@ class Session:
             raise ViewerError(f"unknown message '{message['type'][:40]}'")
         return handler(message)
 
-    def reshaped(self, message: Mapping[str, Any]) -> Session | None:
-        """Session, not started, on the same bodies, a tool of which has the shape of a message; None if it has it.
+    def reshaped(self, message: Mapping[str, Any]) -> BuiltScene | None:
+        """Scene with the same bodies, a tool of which has the shape of a message; None if it has that now.
 
         Raises
         ------
@@ -140,18 +140,16 @@ class Session:
 
         """
         tool, name = index(message, "tool", len(self._active)), word(message, "name")
-        scene, own = self.built.scene, self._own_tools[tool]
+        scene, own = self.built.scene, self.own_tools[tool]
         offered = [choice["name"] for choice in shape_choices(own)]
         if name not in offered:
             raise ViewerError(f"shape: this tool is no '{name}'; it may be {' or '.join(offered)}")
         if name == kind_of(scene.tools[tool]):
             return None
         tools = [*scene.tools[:tool], with_shape(own, name, scene.folder), *scene.tools[tool + 1 :]]
-        other = Session(replace(self.built, scene=scene.model_copy(update={"tools": tools})), self._own_tools)
-        other._take_over(self)
-        return other
+        return replace(self.built, scene=scene.model_copy(update={"tools": tools}))
 
-    def _take_over(self, other: Session) -> None:
+    def take_over(self, other: Session) -> None:
         """Set what the sliders of another session on the same bodies have set."""
         for rank in range(len(self._active)):
             self.simulation.set_radius(other.simulation.contact_radius_of(rank), rank)
@@ -161,6 +159,8 @@ class Session:
             if modulus is not None:
                 self.simulation.set_youngs_modulus(modulus, rank)
         self._set_strain_limit(other._strain_limit, {})
+        if self._moving is not None and other._moving is not None:
+            self._moving.set_time_scale(other._moving.time_scale)
 
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
@@ -185,7 +185,7 @@ class Session:
     def _tool_entry(self, tool: int) -> dict[str, Any]:
         """Entry of the scene message, but for what its shape looks like."""
         return {
-            "shapes": shape_choices(self._own_tools[tool]),
+            "shapes": shape_choices(self.own_tools[tool]),
             "contact": self.built.scene.tools[tool].contact,
             "friction": self.simulation.friction_of(tool),
             "contact_radius": self.simulation.contact_radius_of(tool),

@@ -22,10 +22,8 @@ export class ToolPanel {
     this.turn.oninput = () => control.hold({ turn: this.turn.valueAsNumber });
     this.friction.oninput = () => control.setFriction(this.friction.valueAsNumber);
     this.radius.oninput = () => control.setContactRadius(this.radius.valueAsNumber);
-    store.subscribe(["scene", "settings", "pinned", "pressing"], (state) => {
-      this.showShape(state);
-      this.showContact(state);
-    });
+    store.subscribe(["scene", "settings", "pinned", "pressing"], (state) => this.showContact(state));
+    store.subscribe(["scene", "settings", "pinned", "pressing", "status"], (state) => this.showShape(state));
     store.subscribe(["scene", "postures", "pinned", "pressing"], (state) => this.showPosture(state));
     store.subscribe(["role"], ({ role }) => {
       const { shape, tilt, turn, friction, radius } = this;
@@ -42,7 +40,8 @@ export class ToolPanel {
     if (listed.join() !== header.shapes.map(({ name }) => name).join()) {
       this.shape.replaceChildren(...header.shapes.map(({ name, title }) => new Option(title, name)));
     }
-    this.shape.value = state.settings?.shape[tool] ?? header.shape;
+    // One that was cancelled is not the one that the tool has.
+    if (!state.status?.text) this.shape.value = state.settings?.shape[tool] ?? header.shape;
   }
 
   /** A sphere is the same from all sides. */
