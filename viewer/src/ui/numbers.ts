@@ -9,8 +9,9 @@ export function signed(value: number): string {
   return (value < 0 ? MINUS : "+") + text;
 }
 
-/** Three digits where the number has them: 0.42, 3.14, 12.5. */
+/** Two or three digits: 0.063, 0.42, 3.14, 12.5; what rounds to nothing is 0.00. */
 export function threeDigits(value: number): string {
+  if (value >= 0.0005 && value < 0.0995) return value.toFixed(3);
   return value.toFixed(value >= 9.995 ? 1 : 2);
 }
 
