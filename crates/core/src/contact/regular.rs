@@ -23,7 +23,7 @@ use super::smooth::SmoothSurface;
 use super::{PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, smallest_eigenvalue};
 use crate::contact::Patch;
 use crate::green::GreensFunction;
-use crate::tensor::outer;
+use crate::tensor::{outer, symmetric};
 
 /// `k`.
 const HALF_SPACE: f64 = 0.766_544;
@@ -53,12 +53,27 @@ impl Moduli {
     }
 }
 
-/// What a tool of one radius meets of a body: one entry a fan of its smooth surface.
+/// What a tool meets at a fan: mean and Gaussian curvature (1/m, 1/m^2), `E/(1 - nu^2)` (Pa) and `nu`, `C_reg` by
+/// `xx, xy, xz, yy, yz, zz` (m/N; zero where nothing can be touched), and `b` (m); filled up to a whole number of vectors.
+pub type FanFields = [f64; FIELDS];
+const FIELDS: usize = 12;
+/// Field of the mean curvature.
+pub const MEAN: usize = 0;
+/// Field of the Gaussian curvature.
+pub const GAUSS: usize = 1;
+/// Field of `E/(1 - nu^2)`.
+pub const PLANE_STRAIN: usize = 2;
+/// Field of Poisson's ratio.
+pub const POISSON: usize = 3;
+/// Fields of `C_reg`.
+pub const COMPLIANCE: std::ops::Range<usize> = 4..10;
+/// Field of `b`.
+pub const WIDTH: usize = 10;
+
+/// What a tool of one radius meets of a body.
 pub struct RegularCompliance {
-    /// `C_reg`, symmetric, m/N; zero where nothing can be touched.
-    pub blocks: Vec<DMat3>,
-    /// `b`, m.
-    pub widths: Vec<f64>,
+    /// One entry a fan of the smooth surface.
+    pub fields: Vec<FanFields>,
 }
 
 /// A body as its regular compliance needs it.
@@ -97,9 +112,18 @@ impl RegularCompliance {
             let mut memory = memory();
             (0..count).map(|fan| block(&mut memory, fan)).collect()
         };
-        let (blocks, widths) = found.into_iter().unzip();
-        Self { blocks, widths }
+        let fields = found.into_iter().zip(body.smooth.fans()).map(|((c, width), fan)| {
+            let (modulus, poisson) = (body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
+            let [x, y, z] = [c.x_axis, c.y_axis, c.z_axis];
+            [fan.mean, fan.gauss, modulus, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, 0.0]
+        });
+        Self { fields: fields.collect() }
     }
+}
+
+/// `C_reg` from blended fields.
+pub fn compliance_of(fields: &FanFields) -> DMat3 {
+    symmetric(std::array::from_fn(|k| fields[COMPLIANCE.start + k]))
 }
 
 fn at_fan(
