@@ -45,13 +45,21 @@ def choose(page: Page, test_id: str, name: str) -> None:
     page.get_by_test_id("status").wait_for(state="hidden", timeout=60_000)
 
 
+def take(page: Page, path: Path, contacts: int) -> None:
+    """Take a picture of what touches; a page so slow that the program has let its tools go shows nothing."""
+    page.screenshot(path=path)
+    found = state(page)["contacts"]
+    if found != contacts:
+        raise SystemExit(f"{path.name}: {found} tools touch in place of {contacts}: the machine is too busy")
+
+
 def viewer(chromium: Browser, out: Path) -> None:
     """Press a finger on the liver, and show the stress around it."""
     with page_of(chromium, "liver") as page:
         choose(page, "field-select", "von_mises")
         press(page, 2, place=(510, 250))
         time.sleep(STANDS)
-        page.screenshot(path=out / "viewer.png")
+        take(page, out / "viewer.png", 1)
 
 
 def two_fingers(chromium: Browser, out: Path) -> None:
@@ -64,7 +72,7 @@ def two_fingers(chromium: Browser, out: Path) -> None:
         drag(page, (700, 330), (740, 360))
         settled_force(page)
         time.sleep(STANDS)
-        page.screenshot(path=out / "two-fingers.png")
+        take(page, out / "two-fingers.png", 2)
 
 
 def motion(chromium: Browser, out: Path) -> None:
@@ -74,7 +82,7 @@ def motion(chromium: Browser, out: Path) -> None:
         time.sleep(2 * STANDS)
         page.get_by_test_id("repeat").click()
         time.sleep(STANDS)
-        page.screenshot(path=out / "motion.png")
+        take(page, out / "motion.png", 0)
 
 
 def tools(chromium: Browser, out: Path) -> None:
@@ -88,7 +96,7 @@ def tools(chromium: Browser, out: Path) -> None:
         page.keyboard.up("Alt")
         settled_force(page)
         time.sleep(STANDS)
-        page.screenshot(path=out / "tools.png")
+        take(page, out / "tools.png", 1)
 
 
 def nodule(chromium: Browser, out: Path) -> None:
@@ -99,11 +107,11 @@ def nodule(chromium: Browser, out: Path) -> None:
         press(page, place=beside)
         settled_depth(page)
         time.sleep(STANDS)
-        page.screenshot(path=out / "nodule-beside.png")
+        take(page, out / "nodule-beside.png", 1)
         print(f"beside the nodule {state(page)['forceMagnitude']:.3f} N", end=", ")
         drag(page, beside, over, 24, 0.1)
         settled_force(page)
-        page.screenshot(path=out / "nodule-over.png")
+        take(page, out / "nodule-over.png", 1)
         print(f"over it {state(page)['forceMagnitude']:.3f} N")
 
 

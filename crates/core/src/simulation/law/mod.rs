@@ -8,7 +8,9 @@ mod node;
 mod patch;
 mod stick;
 
-pub use local::{Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells};
+pub use local::{
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
+};
 
 use glam::{DMat3, DQuat, DVec3};
 
