@@ -208,9 +208,10 @@ impl ForceLoop {
     /// Wrenches of the devices, made safe.
     fn write_devices(&mut self, output: &Output, period: f64) {
         let common = self.fault;
+        let share = SafetyStage::scene_share(&mut self.stages);
         for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
             common.into_iter().for_each(|reason| stage.latch(reason));
-            let wrench = stage.apply(output.wrench_on_device[tool], period);
+            let wrench = stage.apply(output.wrench_on_device[tool], share, period);
             self.status.wrenches[tool] = wrench;
             self.status.ports[tool] = stage.energy();
             if let Err(fault) = device.write(wrench) {
