@@ -8,6 +8,22 @@ use super::reading::ReadingCheck;
 use super::vector::{LimitedVector, clamped};
 use super::{FaultReason, SafetyLimits};
 
+/// What a tick computed for one device.
+#[derive(Clone, Copy, Debug)]
+pub struct Computed {
+    /// By the contact laws, before the limit of strain: the reference of the energy balance.
+    pub law: Wrench,
+    /// What that limit leaves of it.
+    pub limited: Wrench,
+}
+
+impl From<Wrench> for Computed {
+    /// Where strain is not limited.
+    fn from(wrench: Wrench) -> Self {
+        Self { law: wrench, limited: wrench }
+    }
+}
+
 /// The stage's memory.
 #[derive(Clone, Debug)]
 pub struct SafetyStage {
@@ -82,10 +98,12 @@ impl SafetyStage {
 
     /// The wrench to put out for `computed`, `period` seconds after the last call; the share is that of
     /// [`SafetyStage::scene_share`], one for a stage by itself.
-    pub fn apply(&mut self, computed: Wrench, scene_share: f64, period: f64) -> Wrench {
+    pub fn apply(&mut self, computed: impl Into<Computed>, scene_share: f64, period: f64) -> Wrench {
+        let Computed { law, limited } = computed.into();
         self.age += period;
         // The magnitude of a finite vector may overflow.
-        if !(computed.force.length().is_finite() && computed.torque.length().is_finite()) {
+        if ![law, limited].iter().all(|wrench| wrench.force.length().is_finite() && wrench.torque.length().is_finite())
+        {
             self.latch(FaultReason::WrenchNotFinite);
         }
         if self.fault.is_some() {
@@ -97,10 +115,10 @@ impl SafetyStage {
         let limits = &self.limits;
         let share = if self.age < limits.ramp { self.age / limits.ramp } else { 1.0 };
         let asked = Wrench {
-            force: clamped(computed.force, share, limits.max_force),
-            torque: clamped(computed.torque, share, limits.max_torque),
+            force: clamped(limited.force, share, limits.max_force),
+            torque: clamped(limited.torque, share, limits.max_torque),
         };
-        let damping = self.port.damping(&computed, &asked, limits, scene_share, period);
+        let damping = self.port.damping(&law, &asked, limits, scene_share, period);
         // A difference of nothing changes no bit, and does not pass the clamp again.
         let damped = |asked: DVec3, damping: DVec3, most: f64| match damping == DVec3::ZERO {
             true => asked,
@@ -112,7 +130,7 @@ impl SafetyStage {
                 .torque
                 .pass(damped(asked.torque, damping.torque, limits.max_torque), limits.max_torque_slew * period),
         };
-        self.port.book(computed, out, self.keeps_energy);
+        self.port.book(law, out, self.keeps_energy);
         out
     }
 }
