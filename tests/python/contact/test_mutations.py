@@ -6,8 +6,8 @@ three ways: by the Green's function of the block held at a side, whose complianc
 exchanged; by turning around the part of the force along the surface, which comes from the change of `C_reg`; and by
 exchanging components of the force.
 
-A uniform factor on all forces is another conservative law: closed paths do not see it, the direct solution does. They see
-one that holds for a part of the surface.
+A uniform factor on all forces is another conservative law: closed paths do not see it, the direct solution does. They
+see one that holds for a part of the surface.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Contacts that slide beyond the limit of strain: it is held, the force is continuous, and the hand gets nothing back."""
+"""Contacts that slide beyond the limit of strain: it is held, the force is continuous, no energy is given out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def block():
 
 
 def drag(body: palpate.Body) -> tuple[np.ndarray, slice]:
-    """Places of a press far beyond the limit, a drag to and fro over elements of 10 mm, and a lift; which are the drag."""
+    """Places of a press far beyond the limit, a drag to and fro over elements of 10 mm, and a lift; where the drag is."""
     low, high = body.mesh.bounds
     middle = (low + high) / 2
     top = np.array([middle[0] - 0.01, middle[1] + 1e-3, high[2] + RADIUS])

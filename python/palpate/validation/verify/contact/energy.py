@@ -97,8 +97,8 @@ class EnergyBench:
     def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
         """Return forces and torques (paths, ticks, tools, 3).
 
-        A body in motion starts each path at rest, and a device with limits each at the start of its ramp, which lasts for
-        more than half of a path.
+        A body in motion starts each path at rest, and a device with limits each at the start of its ramp, which lasts
+        for more than half of a path.
         """
         simulation = self.simulation(condition)
         if not (condition.moving or condition.limited):
