@@ -24,7 +24,7 @@ def block():
 
 
 def drag(body: palpate.Body) -> tuple[np.ndarray, slice]:
-    """Places of a press far beyond the limit, a drag to and fro over elements of 10 mm, and a lift; where the drag is."""
+    """Places of a press far beyond the limit, a drag to and fro over 10 mm elements, a lift; and which are the drag."""
     low, high = body.mesh.bounds
     middle = (low + high) / 2
     top = np.array([middle[0] - 0.01, middle[1] + 1e-3, high[2] + RADIUS])
