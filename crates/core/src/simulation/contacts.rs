@@ -131,8 +131,13 @@ impl Contacts {
     pub(super) fn copy_from(&mut self, other: &Contacts) {
         self.begun = other.begun;
         for slot in 0..MAX_CONTACTS {
+            let empty = |contact: &Contact| contact.mode == Mode::Free;
+            // Empty slots are all alike.
+            if empty(&self.slots[slot]) && empty(&other.slots[slot]) {
+                continue;
+            }
             self.slots[slot] = other.slots[slot];
-            if other.slots[slot].mode != Mode::Free {
+            if !empty(&other.slots[slot]) {
                 self.patches[slot].copy_from(&other.patches[slot]);
             }
         }

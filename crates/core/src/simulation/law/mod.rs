@@ -9,7 +9,9 @@ mod patch;
 mod stick;
 
 pub(super) use local::ASKED;
-pub use local::{Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells};
+pub use local::{
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
+};
 pub use stick::series_compliance;
 
 use glam::{DQuat, DVec3};
