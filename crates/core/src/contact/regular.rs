@@ -36,8 +36,6 @@ use crate::tensor::{outer, symmetric};
 const HALF_SPACE: f64 = 0.766_544;
 /// `b` over the mean spacing of nodes around: at 2 the ripple of a sliding contact is 1 %, at 3 it is 0.03 %.
 const SPACINGS: f64 = 3.0;
-/// `b` over the tool's radius: a contact is smaller than its tool.
-const RADII: f64 = 1.0;
 /// Contact radius that `C_reg` is extrapolated to, over the tool's radius.
 const CONTACT: f64 = 0.5;
 /// A Hertzian contact of radius `a` has the second moment of `phi` for `b^2 = 8/5 a^2`.
@@ -205,7 +203,8 @@ fn at_fan(
     patch: &mut Patch,
 ) -> AtFan {
     let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), scratch, patch };
-    let (whole, width) = probe.whole((SPACINGS * body.smooth.spacing_around(fan)).max(RADII * radius));
+    let least = (SAME_MOMENT * reference_area(radius)).sqrt();
+    let (whole, width) = probe.whole((SPACINGS * body.smooth.spacing_around(fan)).max(least));
     let (mut regular, mut widening) = (whole - half_space(body.moduli, fan, width), 0.0);
     let unit = 1.0 / (body.moduli.plane_strain(fan.node) * radius);
     if !body.moduli.homogeneous {

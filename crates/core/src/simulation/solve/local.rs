@@ -196,8 +196,8 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
     take_up(model, state, local, slots, body);
 }
 
-/// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, and what
-/// contacts that stick did to it a tick ago, m.
+/// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, or on one at
+/// rest what contacts that stick do to it, m.
 fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
     match &state.bodies[body].motion {
         Some(motion) => motion.free_displacement(slot),
@@ -232,9 +232,10 @@ fn follow_motion(
             contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
+        motion.leave_out_static(&dynamics.modes, slot, contacts.slots[slot].force);
         let mut moving = DMat3::ZERO;
         for (fan, _, gradient) in weights.with_gradients() {
-            let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
+            let moved = motion.remaining_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
             moving += outer(gradient, moved);
         }
         local.others[a].moving = Some(moving);

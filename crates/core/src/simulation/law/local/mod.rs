@@ -24,6 +24,7 @@ mod reference;
 mod response;
 mod wrench;
 
+pub(in crate::simulation) use contact::ASKED;
 pub use contact::LocalContact;
 pub use met::{LocalBody, LocalTool};
 pub use reference::depth_below;
@@ -37,10 +38,10 @@ use super::{Approach, Law};
 use crate::contact::Refusal;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FootPoint, Neighbourhood};
-use crate::simulation::body::{BodyDynamics, LocalSurface};
+use crate::simulation::body::LocalSurface;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
-use crate::simulation::tool::{LawKind, ToolModel};
+use crate::simulation::tool::LawKind;
 
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
 const JUMP: f64 = 2.0;
@@ -100,7 +101,7 @@ impl Law for Local {
             entry: *entry_depth,
             foot,
             share: 1.0,
-            watched: foot.position,
+            asked: [foot.position; ASKED],
             ..LocalContact::default()
         };
         Ok(Some(Contact {
@@ -122,10 +123,6 @@ impl Law for Local {
         (local.tool, local.orientation) = (approach.position, approach.orientation);
         // Withdrawn, it may come in again as deep as it has been left.
         !approach.grab && !jumped
-    }
-
-    fn respond(&self, _tool: &ToolModel, dynamics: Option<&BodyDynamics>, _own: &DMat3) -> f64 {
-        dynamics.map_or(0.0, |dynamics| 1.0 / dynamics.coupling)
     }
 
     fn end(&self, contact: &Contact) -> bool {
