@@ -72,9 +72,12 @@ def mesh(
 
     Example: palpate mesh scan.ply scan.vtu --unit mm --repair
     """
+    from palpate.errors import MeshError
+    from palpate.input_file import require_writable
     from palpate.mesh import tetrahedralize
     from palpate.units import length
 
+    require_writable(out, MeshError)
     made = tetrahedralize(surface, None if max_size is None else length(max_size), unit, repair=repair)
     made = made.to_quadratic() if quadratic else made
     made.write(out)
@@ -106,7 +109,10 @@ def precompute(
     import palpate
     from palpate import units
     from palpate.body import parse
+    from palpate.input_file import require_writable
 
+    if out is not None:
+        require_writable(out, palpate.StoreError)
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
     body = _body(_read_any(mesh, unit, element), material, fix, loads)

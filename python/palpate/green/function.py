@@ -12,14 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from palpate import _native
+from palpate import _native, units
 from palpate.body import Body, description, problem_arrays
 from palpate.errors import BodyError, StoreError
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
-from palpate.vectors import three_components, three_numbers
+from palpate.input_file import require_file
+from palpate.vectors import Reader, three_components, three_numbers
 
-Components = Sequence[float | None]
+# Numbers in SI, or text with a unit.
+Components = Sequence[float | str | None]
 
 
 class GreensFunction:
@@ -136,8 +138,7 @@ class GreensFunction:
 
         """
         path = Path(path)
-        if not path.exists():
-            raise StoreError(f"{path}: no such file")
+        require_file(path, StoreError)
         green = cls(_native.GreenCore.load(path), body)
         if body is not None:
             touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
@@ -174,7 +175,8 @@ class GreensFunction:
             a force and a displacement on the same component; released supports that leave the body free to move.
 
         """
-        forced, placed = self._by_column(forces, "forces"), self._by_column(displacements, "displacements")
+        forced = self._by_column(forces, "forces", units.force)
+        placed = self._by_column(displacements, "displacements", units.length)
         freed = {column for node in release for column in self._released_columns(node)}
         known: dict[int, float] = {}
         switched: dict[int, float] = {}
@@ -193,24 +195,33 @@ class GreensFunction:
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
         return Answer(u, f, self._reactions(f, reactions), self)
 
-    def touch(self, point: Sequence[float], displacement: Components, radius: float = 0.0) -> Touch:
+    def touch(self, point: Sequence[float | str], displacement: Components, radius: float | str = 0.0) -> Touch:
         """Press a patch of the surface.
 
         Parameters
         ----------
         point
-            Contact point, m, on the unloaded body; the closest point of the surface is taken.
+            Contact point, m, on the unloaded body; the closest point of the surface is taken. Lengths may also be text
+            with a unit, such as ``"4cm"``.
         displacement
             Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
         radius
             Contact radius, m; 0 is a point contact.
 
+        Raises
+        ------
+        BodyError
+            A number that is not finite, a negative radius, or one that covers more nodes than a tick can weigh.
+        UnitError
+            Text that is no length.
+
         """
-        if not (np.isfinite(radius) and radius >= 0):
-            raise BodyError(f"the contact radius must not be negative, got {radius}")
-        target = three_numbers(point, "the touch point", BodyError)
-        wanted = three_components(displacement, "displacement", BodyError)
-        force, u = self._core.touch(target, wanted, float(radius))
+        reach = units.length(radius)
+        if not (np.isfinite(reach) and reach >= 0):
+            raise BodyError(f"the contact radius must not be negative, got {reach:g} m")
+        target = three_numbers(point, "the touch point", BodyError, units.length)
+        wanted = three_components(displacement, "displacement", BodyError, units.length)
+        force, u = self._core.touch(target, wanted, reach)
         return Touch(np.array(force), u.reshape(-1, 3), self)
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
@@ -225,12 +236,14 @@ class GreensFunction:
         reactions[rows, self.fixed_dofs % 3] = fixed_dof_forces
         return reactions
 
-    def _by_column(self, values: Mapping[int, Components] | None, argument: str) -> dict[int, float]:
+    def _by_column(self, values: Mapping[int, Components] | None, argument: str, read: Reader) -> dict[int, float]:
         """Given components by column of the operator."""
         columns = {}
+        if not isinstance(values, Mapping | None):
+            raise BodyError(f"{argument} must map nodes to three components, such as {{7: (None, None, -1e-3)}}")
         for node, components in (values or {}).items():
             first = self._column(node, argument)
-            for axis, value in enumerate(three_components(components, f"{argument}: node {node}", BodyError)):
+            for axis, value in enumerate(three_components(components, f"{argument}: node {node}", BodyError, read)):
                 if value is not None:
                     columns[first + axis] = value
         return columns

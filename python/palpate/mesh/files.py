@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.atomic import written_beside
 from palpate.errors import MeshError
+from palpate.input_file import require_file, require_writable
 from palpate.mesh.elements import boundary_faces
 from palpate.units import length_scale
 
@@ -71,10 +72,7 @@ class Volume:
 def read_volume(path: Path, unit: str) -> Volume:
     """Read nodes, tetrahedra and regions of a file whose unit of length is ``unit``; nodes are in m."""
     scale = length_scale(unit)
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise MeshError(f"{path}: the file is empty")
+    require_file(path, MeshError)
     if path.suffix == ".vol":
         volume = _read_netgen(path)
     else:
@@ -87,6 +85,13 @@ def _read_meshio(path: Path) -> meshio.Mesh:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    with path.open("rb") as file:
+        head = file.read(4)
+    if path.suffix == ".msh" and head == b"$NOD":
+        raise MeshError(
+            f"{path} has Gmsh's first format, which is not read: convert it with "
+            f"'gmsh {path.name} -save -format msh41 -o new.msh'"
+        )
     # meshio prints its complaints and may end the program; both become one error of ours.
     noise = io.StringIO()
     try:
@@ -156,6 +161,7 @@ def write_volume(mesh: Volume, path: Path, unit: str) -> None:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    require_writable(path, MeshError)
     if mesh.is_quadratic and path.suffix in LINEAR_ONLY:
         known = ", ".join(ending for ending in WRITERS if ending not in LINEAR_ONLY)
         raise MeshError(f"{path}: 10-node tetrahedra cannot be written to {path.suffix} files; use {known}")

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from palpate.errors import MeshError, MeshWarning
+from palpate.input_file import require_file
+from palpate.mesh.stl import load_stl
 from palpate.mesh.tetmesh import TetMesh
-from palpate.units import length_scale
+from palpate.units import length, length_scale
 from palpate.vectors import three_numbers
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip instal
 
 def tetrahedralize(
     surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | None = None,
+    max_element_size: float | str | None = None,
     unit: str = "m",
     refine: Sequence[Ball] = (),
     *,
@@ -56,7 +58,7 @@ def tetrahedralize(
     surface
         STL, OBJ, PLY, OFF or GLB file, or a trimesh surface.
     max_element_size
-        Longest edge wanted, m; None: a fifteenth of the longest side.
+        Longest edge wanted, m or text such as ``"4mm"``; None: a fifteenth of the longest side.
     unit
         Unit of length of the surface.
     refine
@@ -80,7 +82,7 @@ def tetrahedralize(
 def tetrahedralize_with(
     element: Element,
     surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | None = None,
+    max_element_size: float | str | None = None,
     unit: str = "m",
     refine: Sequence[Ball] = (),
 ) -> TetMesh:
@@ -91,7 +93,7 @@ def tetrahedralize_with(
 
 def _fill(
     surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | None,
+    max_element_size: float | str | None,
     element: Element,
     unit: str,
     refine: Sequence[Ball],
@@ -107,7 +109,7 @@ def _fill(
     else:
         _check_surface(name, shape)
     extent = float(np.ptp(shape.vertices, axis=0).max())
-    size = extent / PARTS[element] if max_element_size is None else float(max_element_size)
+    size = extent / PARTS[element] if max_element_size is None else length(max_element_size)
     if not (np.isfinite(size) and size > 0):
         raise MeshError(f"max_element_size must be positive, got {max_element_size}")
     for center, radius, ball_size in refine:
@@ -149,16 +151,13 @@ def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trime
     if isinstance(surface, trimesh.Trimesh):
         return "surface", surface
     path = Path(surface)
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise MeshError(f"{path}: the file is empty")
+    require_file(path, MeshError)
     if path.suffix.lower() not in SURFACE_ENDINGS:
         raise MeshError(f"{path}: unknown surface format '{path.suffix}'; known are {', '.join(SURFACE_ENDINGS)}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            loaded = trimesh.load_mesh(path, process=False)
+            loaded = load_stl(path) if path.suffix.lower() == ".stl" else trimesh.load_mesh(path, process=False)
             shape = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     except Exception as error:
         reason = " ".join(str(error).split())[:150]

@@ -167,6 +167,8 @@ class _Builder:
         fixed = supports.fixed
         if fixed is None and self._table.model is not None:
             return models.fixed(self._table.model, mesh)
+        if fixed is None:
+            raise SceneError(f"supports.fixed is missing: '{self._table.title}' needs nodes that are held")
         if isinstance(fixed, str):
             mask = parse(fixed)(mesh.nodes)
             if not np.any(mask):

@@ -13,7 +13,7 @@ from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
-from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time
+from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
 
 # As many as the force loop takes.
@@ -24,6 +24,12 @@ STRAIN_LIMIT = 0.3
 MOST_FRICTION = 10.0
 
 Quaternion = tuple[Number, Number, Number, Number]
+
+
+_NODES = one_of(
+    "a predicate, such as 'z < min + 5mm', or a list of node numbers",
+    lambda v: v is None or isinstance(v, str) or (isinstance(v, (list, tuple)) and all(map(is_whole, v))),
+)
 
 
 class RefineTable(Table):
@@ -37,7 +43,7 @@ class RefineTable(Table):
 class SupportsTable(Table):
     """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
 
-    fixed: str | list[int] | None = None
+    fixed: Annotated[str | list[int] | None, _NODES] = None
 
 
 class BodyTable(Table):
