@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Finite elements you can feel.", no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
 )
-cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
-app.add_typer(cache_app, name="cache")
 
 
 class Element(str, Enum):
@@ -210,28 +208,6 @@ def models_command() -> None:
     from palpate.cli.catalogue import print_models
 
     print_models()
-
-
-@cache_app.command("list")
-def cache_list() -> None:
-    """List the precomputed files in the cache."""
-    from palpate.cache import cache_directory
-
-    files = sorted(cache_directory().glob("*.palpate"))
-    for file in files:
-        print(f"{file.stat().st_size / 1e6:9.1f} MB  {file}")
-    print(f"{len(files)} files, {sum(f.stat().st_size for f in files) / 1e6:.1f} MB in {cache_directory()}")
-
-
-@cache_app.command("clear")
-def cache_clear() -> None:
-    """Delete the precomputed files in the cache."""
-    from palpate.cache import cache_directory
-
-    files = sorted(cache_directory().glob("*.palpate*"))
-    for file in files:
-        file.unlink()
-    print(f"deleted {len(files)} files")
 
 
 def _read_any(path: Path, unit: str, element: Element | None) -> TetMesh:

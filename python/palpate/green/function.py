@@ -18,6 +18,7 @@ from palpate.errors import BodyError, StoreError
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
 from palpate.input_file import require_file
+from palpate.leftovers import remove_leftovers
 from palpate.vectors import Reader, three_components, three_numbers
 
 # Numbers in SI, or text with a unit.
@@ -118,6 +119,7 @@ class GreensFunction:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
+        remove_leftovers(Path(path))
         self._core.save(Path(path))
 
     @classmethod

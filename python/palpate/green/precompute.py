@@ -18,6 +18,7 @@ from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.function import GreensFunction
 from palpate.green.memory import allowed_memory
 from palpate.input_file import require_writable
+from palpate.leftovers import remove_leftovers
 from palpate.progress import progress_reporter
 from palpate.units import brief_repr
 
@@ -71,6 +72,7 @@ def precompute(
     else:
         target = Path(path)
         require_writable(target, StoreError)
+    remove_leftovers(target)
     if target.exists():
         with contextlib.suppress(StoreError):
             return GreensFunction(_native.GreenCore.load(target, key), body)

@@ -43,8 +43,8 @@ def test_surface_to_force(ball, tmp_path):
 
 def test_cache_is_listed_and_cleared(ball, tmp_path):
     run("precompute", "ball.stl", "--unit", "mm", "--fix", "z < -2cm", cwd=tmp_path)
-    assert "1 files" in run("cache", "list", cwd=tmp_path).stdout
-    assert "deleted 1" in run("cache", "clear", cwd=tmp_path).stdout
+    assert "1 file, " in run("cache", "list", cwd=tmp_path).stdout
+    assert "deleted 1 file, " in run("cache", "clear", cwd=tmp_path).stdout
     assert "0 files" in run("cache", "list", cwd=tmp_path).stdout
 
 
