@@ -132,7 +132,7 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     record = scripted_press(built, seconds)
     log, statistics = record.log, record.last.statistics
-    write_log(log, out / f"{name}.csv")
+    write_log(log, record.depth, record.strain, out / f"{name}.csv")
     plot_log(log, out / f"{name}.png", f"{name}: scripted press at 1 kHz")
     compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
     print(f"{len(log)} ticks, largest force {(log['force'] ** 2).sum(axis=1).max() ** 0.5:.3f} N")
@@ -143,3 +143,6 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
     if not all(statistics["realtime"]):
         print("palpate: note: the system granted no real-time priority or locked memory", file=sys.stderr)
+    if record.interrupted:
+        print("palpate: interrupted", file=sys.stderr)
+        raise typer.Exit(130)
