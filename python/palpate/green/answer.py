@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from palpate.equality import ComparedByValue
-from palpate.fields import Strained, StrainSource
+from palpate.fields import Result, ResultSource
 from palpate.vectors import brief
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Answer(ComparedByValue, Strained):
+class Answer(ComparedByValue, Result):
     """Solution of a changed boundary value problem. Compared by value, number by number; not hashable.
 
     Attributes
@@ -29,7 +29,10 @@ class Answer(ComparedByValue, Strained):
     displacements: np.ndarray
     forces: np.ndarray
     reactions: np.ndarray
-    _source: StrainSource = field(repr=False, compare=False)
+    _source: ResultSource = field(repr=False, compare=False)
+
+    def _at_surface_nodes(self) -> dict[str, np.ndarray]:
+        return {"force": self.forces}
 
     def __repr__(self) -> str:
         moved, force = (np.linalg.norm(field, axis=1).max() for field in (self.displacements, self.forces))
@@ -37,7 +40,7 @@ class Answer(ComparedByValue, Strained):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Touch(ComparedByValue, Strained):
+class Touch(ComparedByValue, Result):
     """Answer to a patch contact. Compared by value, number by number; not hashable.
 
     Attributes
@@ -51,7 +54,7 @@ class Touch(ComparedByValue, Strained):
 
     force: np.ndarray
     displacements: np.ndarray
-    _source: StrainSource = field(repr=False, compare=False)
+    _source: ResultSource = field(repr=False, compare=False)
 
     def __repr__(self) -> str:
         moved = np.linalg.norm(self.displacements, axis=1).max()

@@ -108,6 +108,21 @@ class GreensFunction:
         return ElementStrain(StressRecovery(self.body))
 
     @cached_property
+    def stress_everywhere(self) -> StressRecovery:
+        """Recovery of stress and strain at all nodes of the body, inner ones too.
+
+        Raises
+        ------
+        BodyError
+            A bare store: it does not know the elements.
+
+        """
+        measure = self.strain_measure
+        if self.body is None or not isinstance(measure, ElementStrain):
+            raise BodyError("a bare store knows only the surface: stress needs the elements of the body")
+        return StressRecovery(self.body, np.arange(len(self.body.mesh.nodes)), measure.recovery.interior)
+
+    @cached_property
     def native_strain_measure(self) -> _native.StrainMeasure:
         """The same measure for the force loop, which limits strain."""
         measure = self.strain_measure
@@ -223,8 +238,31 @@ class GreensFunction:
             raise BodyError(f"the contact radius must not be negative, got {reach:g} m")
         target = three_numbers(point, "the touch point", BodyError, units.length)
         wanted = three_components(displacement, "displacement", BodyError, units.length)
-        force, u = self._core.touch(target, wanted, reach)
+        try:
+            force, u = self._core.touch(target, wanted, reach)
+        except BodyError:
+            if self.accepts_contact_radius(reach):
+                raise
+            largest = 1e3 * self.largest_contact_radius(reach)
+            raise BodyError(
+                f"a contact radius of {1e3 * reach:.4g} mm covers more nodes than a touch can weigh: give a radius of "
+                f"at most {largest:.3g} mm (--radius), or make the mesh coarser"
+            ) from None
         return Touch(np.array(force), u.reshape(-1, 3), self)
+
+    def accepts_contact_radius(self, radius: float) -> bool:
+        """Whether contacts of a radius, m, can be weighed everywhere on the surface."""
+        return self._core.accepts_contact_radius(float(radius))
+
+    def largest_contact_radius(self, limit: float) -> float:
+        """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
+        low, high = 0.0, limit
+        if self.accepts_contact_radius(high):
+            return high
+        while high - low > 0.01 * limit:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.accepts_contact_radius(middle) else (low, middle)
+        return low
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
         """`K u` at the fixed nodes; a free component carries the loads on it."""

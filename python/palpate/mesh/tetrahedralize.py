@@ -85,9 +85,10 @@ def tetrahedralize_with(
     max_element_size: float | str | None = None,
     unit: str = "m",
     refine: Sequence[Ball] = (),
+    repair: bool = False,
 ) -> TetMesh:
     """Fill a closed surface as :func:`tetrahedralize` does, with either element; None: a size that suits it."""
-    mesh = _fill(surface, max_element_size, element, unit, refine)
+    mesh = _fill(surface, max_element_size, element, unit, refine, repair)
     return mesh.to_quadratic() if element == "quadratic" else mesh
 
 
@@ -129,6 +130,18 @@ def _fill(
             f"it probably intersects itself; {REPAIR_HINT}"
         )
     return mesh
+
+
+def read_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
+    """Read a surface as it is, in its own unit.
+
+    Raises
+    ------
+    MeshError
+        A file that is missing or cannot be read.
+
+    """
+    return _load(path)[1]
 
 
 def closed_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:

@@ -110,13 +110,13 @@ class ToolTable(ShapeTable):
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
     ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
     goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
-    names a ``contact_radius`` and no law is a patch, for only patches have one.
+    names a ``contact_radius`` and no law is a patch, for only patches have one; one that is not given follows the body.
     """
 
     contact: Literal["local", "patch", "node"] = "local"
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
     pad_youngs_modulus: Pressure | None = None
-    contact_radius: Radius = 5e-3
+    contact_radius: Radius | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -180,7 +180,7 @@ class SceneTables(Table):
             f"model {body.model}" if body.model else str(body.mesh or body.store) for body in self.bodies
         )
         moves = any(body.dynamics or self.dynamics for body in self.bodies)
-        radii = ", ".join(f"{1e3 * tool.radius:.4g} mm" for tool in self.tools)
+        radii = ", ".join("by the body" if t.radius is None else f"{1e3 * t.radius:.4g} mm" for t in self.tools)
         tools = f"tool of radius {radii}" if len(self.tools) == 1 else f"tools of radius {radii}"
         return f"{type(self).__name__}({bodies}{', in motion' if moves else ''}, {tools})"
 

@@ -211,13 +211,7 @@ class Simulation:
 
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
-        low, high = 0.0, limit
-        if self._core.accepts_contact_radius(high):
-            return high
-        while high - low > 0.01 * limit:
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self._core.accepts_contact_radius(middle) else (low, middle)
-        return low
+        return min(body.green.largest_contact_radius(limit) for body in self.bodies)
 
     def youngs_modulus_of(self, body: int = 0) -> float | None:
         """Young's modulus of a body now, Pa; None for one of several materials, with loads, or in motion."""
@@ -337,8 +331,8 @@ class Simulation:
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         bodies = tuple(
-            BodyFrame(displacements.reshape(-1, 3), None if energy is None else Energy(*energy), body.green)
-            for body, (displacements, energy) in zip(self.bodies, raw["bodies"], strict=True)
+            BodyFrame(moved.reshape(-1, 3), None if energy is None else Energy(*energy), body.green, body, scale)
+            for body, (moved, energy), scale in zip(self.bodies, raw["bodies"], self._scales, strict=True)
         )
         tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "limited")]
         contacts = [self._contact(record) for record in raw["contacts"]]
