@@ -39,8 +39,8 @@ class Result(Strained):
 
     Of a body whose elements are known, files and meshes hold its tetrahedra with ``displacement`` (m), ``strain`` and
     ``stress`` (Pa) by the components xx, yy, zz, xy, yz, xz, ``largest_strain`` (principal, in magnitude) and
-    ``von_mises`` (Pa) at all nodes; the inside is in equilibrium with the surface. A bare store knows the surface alone: its faces with ``displacement`` and
-    ``largest_strain``.
+    ``von_mises`` (Pa) at all nodes; the inside is in equilibrium with the surface. A bare store knows the surface
+    alone: its faces with ``displacement`` and ``largest_strain``.
     """
 
     _source: ResultSource
