@@ -145,12 +145,13 @@ class TetMesh:
         Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood; 10-node
         tetrahedra in all but TetGen's and Medit's. Node order is the file's. Regions come from cell data ``region``,
         ``gmsh:physical`` or ``medit:ref``, else from the only integer cell array; their names from Gmsh's physical
-        names.
+        names. Hexahedra, wedges and pyramids are split into 4-node tetrahedra, and a :class:`palpate.MeshWarning` says
+        so; those with mid-side nodes by their corners.
 
         Raises
         ------
         MeshError
-            A file that is missing, not readable, or holds no tetrahedra.
+            A file that is missing, not readable, holds no solid cells, or cells of another kind.
 
         """
         volume = read_volume(Path(path), unit)
