@@ -91,7 +91,8 @@ class TetMesh:
             return self
         edges, of_element = unique_edges(self.tets)
         nodes = np.vstack([self.nodes, self.nodes[edges].mean(axis=1)])
-        return TetMesh(nodes, np.hstack([self.tets, len(self.nodes) + of_element]), self.regions)
+        tets = np.hstack([self.tets, len(self.nodes) + of_element])
+        return TetMesh(nodes, tets, self.regions, self.region_names)
 
     @cached_property
     def surface_faces(self) -> np.ndarray:
