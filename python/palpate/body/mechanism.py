@@ -15,9 +15,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
-from scipy.sparse.csgraph import connected_components
 
 from palpate.mesh import TetMesh
+from palpate.mesh.elements import face_parts
 
 # Eigenvalue of the system of a part held by three nodes, one of them off the line of the others by 1e-5 of its size.
 SINGULAR = 1e-10
@@ -70,17 +70,6 @@ class Mechanism:
 
 def _place(point: np.ndarray) -> str:
     return f"({', '.join(f'{x:.4g}' for x in point)}) m"
-
-
-def face_parts(tets: np.ndarray) -> np.ndarray:
-    """Label of the part of elements connected by faces that each element belongs to, (m,)."""
-    corners = np.sort(tets[:, :4].astype(np.int64), axis=1)
-    faces = corners[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
-    order = np.lexsort(faces.T)
-    same = np.flatnonzero((faces[order[1:]] == faces[order[:-1]]).all(axis=1))
-    a, b = order[same] // 4, order[same + 1] // 4
-    graph = scipy.sparse.coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(tets), len(tets)))
-    return connected_components(graph, directed=False)[1]
 
 
 def find_mechanism(mesh: TetMesh, fixed: np.ndarray) -> Mechanism | None:

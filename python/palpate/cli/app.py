@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,7 +29,10 @@ class Element(str, Enum):
     QUADRATIC = "quadratic"
 
 
-Unit = Annotated[str, typer.Option(help="Unit of length of the file: m, cm, mm, um, in.")]
+Unit = Annotated[
+    str | None,
+    typer.Option(help="Unit of length of the file: m, cm, mm, um, in; default: m, asked for if that is unlikely."),
+]
 
 
 def main() -> None:
@@ -61,7 +65,7 @@ def _complain(message: str) -> int:
 def mesh(
     surface: Annotated[Path, typer.Argument(help="Closed surface: STL, OBJ, PLY, OFF or GLB.")],
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
-    unit: Unit = "m",
+    unit: Unit = None,
     max_size: Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")] = None,
     repair: Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")] = False,
     quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
@@ -72,11 +76,11 @@ def mesh(
 
     Example: palpate mesh scan.ply scan.vtu --unit mm --repair
     """
-    from palpate.mesh import tetrahedralize
+    from palpate.mesh.tetrahedralize import tetrahedralize_with
     from palpate.units import length
 
-    made = tetrahedralize(surface, None if max_size is None else length(max_size), unit, repair=repair)
-    made = made.to_quadratic() if quadratic else made
+    size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
+    made = _in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, repair=repair))
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
 
@@ -90,7 +94,7 @@ def precompute(
     density: Annotated[str, typer.Option(help="Density, for its weight, such as 1000kg/m3.")] = "1000kg/m3",
     gravity: Annotated[str | None, typer.Option(help="Let it sag under gravity, m/s^2, such as 0,0,-9.81.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
-    unit: Unit = "m",
+    unit: Unit = None,
     precision: Annotated[str, typer.Option(help="Stored number format: f16, f32 or f64.")] = "f32",
     touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
     element: Annotated[
@@ -109,7 +113,7 @@ def precompute(
 
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    body = _body(_read_any(mesh, unit, element), material, fix, loads)
+    body = _body(_in_unit(unit, lambda unit: _read_any(mesh, unit, element)), material, fix, loads)
     region = None
     if touch is not None:
         surface = body.mesh.surface_nodes
@@ -135,12 +139,15 @@ def touch(
     import numpy as np
 
     import palpate
+    from palpate.mesh import size_text
     from palpate.units import length
 
     green = palpate.GreensFunction.load(store)
     where = [length(v) for v in point.split(",")]
     how = [None if v.strip() == "-" else length(v) for v in press.split(",")]
     answer = green.touch(where, how, length(radius))
+    if answer.distance > 1e-6 * green.extents.max():
+        print(f"landed at {np.array2string(answer.point, precision=5)} m, {size_text([answer.distance])} off the point")
     size = np.linalg.norm(answer.displacements, axis=1)
     print(f"force on the body: {np.array2string(answer.force, precision=5)} N, {np.linalg.norm(answer.force):.5g} N")
     print(f"largest displacement: {1e3 * size.max():.4g} mm at node {green.surface_nodes[size.argmax()]}")
@@ -149,7 +156,7 @@ def touch(
 @app.command()
 def info(
     file: Annotated[Path, typer.Argument(help="A store, a file of modes, a scene file, or a volume mesh.")],
-    unit: Unit = "m",
+    unit: Unit = None,
 ) -> None:
     """Say what a file holds.
 
@@ -174,7 +181,8 @@ def info(
             _print_entry(name, value)
         print("  lengths in m, pressures in Pa, forces in N, times in s")
         return
-    made = palpate.TetMesh.read(file, unit)
+    # A size that needs asking about is what this command tells.
+    made = palpate.TetMesh.read(file, unit or "m")
     print(f"{file}: {_mesh_line(made)}")
     low, high = 1e3 * made.bounds
     print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * made.volume:.4g} cm3")
@@ -228,7 +236,20 @@ def cache_clear() -> None:
     print(f"deleted {len(files)} files")
 
 
-def _read_any(path: Path, unit: str, element: Element | None) -> TetMesh:
+def _in_unit(unit: str | None, read: Callable[[str | None], TetMesh]) -> TetMesh:
+    """Read a file in its unit of length, asking for it on a terminal where it is not clear."""
+    from palpate.errors import UnclearUnitError
+
+    try:
+        return read(unit)
+    except UnclearUnitError as error:
+        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise
+        question = f"{error}\nUnit of length"
+        return read(typer.prompt(question, default=next(iter(error.fitting), "m"), err=True))
+
+
+def _read_any(path: Path, unit: str | None, element: Element | None) -> TetMesh:
     from palpate.errors import MeshError
     from palpate.mesh import TetMesh
     from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, tetrahedralize_with
@@ -253,9 +274,12 @@ def _body(mesh: TetMesh, material: Material, fix: str, loads: Loads | None) -> B
 
 
 def _mesh_line(mesh: TetMesh) -> str:
+    from palpate.mesh import size_text
+
     return (
-        f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {'10-node ' if mesh.is_quadratic else ''}tetrahedra, "
-        f"{len(mesh.surface_nodes)} surface nodes, {len(mesh.surface_triangles)} triangles"
+        f"{size_text(mesh.bounds[1] - mesh.bounds[0])}, {len(mesh.nodes)} nodes, {len(mesh.tets)} "
+        f"{'10-node ' if mesh.is_quadratic else ''}tetrahedra, {len(mesh.surface_nodes)} surface nodes, "
+        f"{len(mesh.surface_triangles)} triangles"
     )
 
 
@@ -268,8 +292,11 @@ def _print_origin(description: dict[str, object], key: str) -> None:
 
 
 def _green_line(green) -> str:
+    from palpate.mesh import size_text
+
     size = green.path.stat().st_size / 1e6
     return (
-        f"Green's function, {len(green.touchable_nodes)} of {len(green.surface_nodes)} surface nodes touchable, "
-        f"{len(green.fixed_nodes)} nodes fixed, {green.precision}, {size:.1f} MB"
+        f"Green's function of a body of {size_text(green.extents)}, {len(green.touchable_nodes)} of "
+        f"{len(green.surface_nodes)} surface nodes touchable, {len(green.fixed_nodes)} nodes fixed, {green.precision}, "
+        f"{size:.1f} MB"
     )

@@ -17,14 +17,32 @@ POINTER_RATE = 120.0
 DEPTH = 0.03
 
 
+# A tool that is limited at less than this part of the limit of strain has just begun to touch.
+AT_LIMIT = 0.9
+
+
 @dataclass(frozen=True)
 class PressRecord:
-    """Log of the 1 kHz loop, the frame that was pressed hardest, the last one, and whether the tool was limited."""
+    """What a press left.
+
+    Attributes
+    ----------
+    log
+        Of the 1 kHz loop.
+    hardest, last
+        The frame with the largest force on the body, and the last one.
+    limited
+        Whether the limit of strain held the tool.
+    force
+        Largest on the body in any frame, N; the device's own is within its limits.
+
+    """
 
     log: np.ndarray
     hardest: Frame
     last: Frame
     limited: bool
+    force: float
 
 
 def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
@@ -40,7 +58,8 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
     depth = DEPTH * size
     rest = top + [0, 0, built.scene.tools[0].reach]
-    logs, limited = [], False
+    logs: list[np.ndarray] = []
+    limited: list[Frame] = []
     with Simulation(built) as simulation:
         hardest = simulation.frame()
         start = time.monotonic()
@@ -52,8 +71,17 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
             logs.append(simulation.drain_log())
             # The press is along a line: the largest force has the largest strain.
             frame = simulation.frame()
-            limited |= bool(frame.limited[0])
-            hardest = max(hardest, frame, key=lambda frame: np.linalg.norm(frame.forces[0]))
+            hardest = max(hardest, frame, key=_force_on_body)
+            if frame.limited[0]:
+                limited = [max(*limited, frame, key=_force_on_body)] if limited else [frame]
         last = simulation.frame()
         logs.append(simulation.drain_log())
-    return PressRecord(np.concatenate(logs), hardest, last, limited)
+    most = AT_LIMIT * built.scene.view.strain_limit
+    held = any(frame.largest_strain >= most for frame in limited)
+    return PressRecord(np.concatenate(logs), hardest, last, held, _force_on_body(hardest))
+
+
+def _force_on_body(frame: Frame) -> float:
+    """Force of the contacts of the first tool, N, before the safety stage limits what its device puts out."""
+    forces = [contact.force for contact in frame.contacts if contact.tool == 0]
+    return float(np.linalg.norm(np.sum(forces, axis=0))) if forces else 0.0

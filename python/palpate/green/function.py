@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -14,12 +15,16 @@ import numpy as np
 
 from palpate import _native
 from palpate.body import Body, description, problem_arrays
-from palpate.errors import BodyError, StoreError
+from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
-from palpate.vectors import three_components, three_numbers
+from palpate.mesh import size_text
+from palpate.vectors import brief, three_components, three_numbers
 
 Components = Sequence[float | None]
+
+# A touch that lands farther from its point than this part of the body's longest side was probably meant elsewhere.
+FAR = 0.05
 
 
 class GreensFunction:
@@ -96,6 +101,16 @@ class GreensFunction:
     def free_displacements(self) -> np.ndarray:
         """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
         return self._core.free_displacements.reshape(-1, 3)
+
+    @property
+    def extents(self) -> np.ndarray:
+        """Sides of the body's bounding box (3,), m."""
+        return np.ptp(self.surface_positions, axis=0)
+
+    @cached_property
+    def _surface_search(self) -> _native.SurfaceSearch:
+        triangles = np.searchsorted(self.surface_nodes, self.surface_triangles)
+        return _native.SurfaceSearch(self.surface_positions, triangles.astype(np.uint32))
 
     @cached_property
     def strain_measure(self) -> StrainMeasure:
@@ -199,7 +214,8 @@ class GreensFunction:
         Parameters
         ----------
         point
-            Contact point, m, on the unloaded body; the closest point of the surface is taken.
+            Contact point, m, on the unloaded body; the closest point of the surface is taken, and a
+            :class:`palpate.TouchWarning` tells if it is far off.
         displacement
             Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
         radius
@@ -211,7 +227,16 @@ class GreensFunction:
         target = three_numbers(point, "the touch point", BodyError)
         wanted = three_components(displacement, "displacement", BodyError)
         force, u = self._core.touch(target, wanted, float(radius))
-        return Touch(np.array(force), u.reshape(-1, 3), self)
+        landed = self._surface_search.closest(np.array([target]))
+        distance = float(np.linalg.norm(landed - target))
+        if distance > FAR * self.extents.max():
+            warnings.warn(
+                f"the touch landed at {brief(landed)} m, {size_text([distance])} from the point given: the body is "
+                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on",
+                TouchWarning,
+                stacklevel=2,
+            )
+        return Touch(np.array(force), u.reshape(-1, 3), landed, distance, self)
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
         """`K u` at the fixed nodes; a free component carries the loads on it."""

@@ -17,6 +17,7 @@ from palpate.atomic import written_beside
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.cells import CURVED, Block, shape_of, split
 from palpate.mesh.elements import boundary_faces
+from palpate.mesh.size import scale_of
 from palpate.units import length_scale
 
 if TYPE_CHECKING:
@@ -71,9 +72,8 @@ class Volume:
         return self.tets.shape[1] == 10
 
 
-def read_volume(path: Path, unit: str) -> Volume:
+def read_volume(path: Path, unit: str | None) -> Volume:
     """Read nodes, tetrahedra and regions of a file whose unit of length is ``unit``; nodes are in m."""
-    scale = length_scale(unit)
     if not path.is_file():
         raise MeshError(f"{path}: no such file")
     if path.stat().st_size == 0:
@@ -82,7 +82,9 @@ def read_volume(path: Path, unit: str) -> Volume:
         volume = _read_netgen(path)
     else:
         volume = _tetrahedra(path, _read_meshio(path))
-    return replace(volume, nodes=volume.nodes * scale)
+    used = np.unique(volume.tets)
+    used = used[(used >= 0) & (used < len(volume.nodes))]
+    return replace(volume, nodes=volume.nodes * scale_of(str(path), volume.nodes[used], unit))
 
 
 def _read_meshio(path: Path) -> meshio.Mesh:

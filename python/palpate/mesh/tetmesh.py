@@ -140,8 +140,8 @@ class TetMesh:
         return 180.0 - np.degrees(np.arccos(np.clip(cosines[:, i, j], -1, 1))).max(axis=1)
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], unit: str = "m") -> TetMesh:
-        """Read a volume mesh; ``unit`` is the file's unit of length.
+    def read(cls, path: str | os.PathLike[str], unit: str | None = None) -> TetMesh:
+        """Read a volume mesh; ``unit`` is the file's unit of length, metres if None.
 
         Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood; 10-node
         tetrahedra in all but TetGen's and Medit's. Node order is the file's. Regions come from cell data ``region``,
@@ -153,6 +153,9 @@ class TetMesh:
         ------
         MeshError
             A file that is missing, not readable, holds no solid cells, or cells of another kind.
+        UnclearUnitError
+            No unit is given, and in metres the body is below a millimetre or above three metres long; with a unit given
+            that is a warning.
 
         """
         volume = read_volume(Path(path), unit)

@@ -14,22 +14,25 @@ import numpy as np
 
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import failure_of, run_limited
+from palpate.mesh.elements import face_parts
 from palpate.mesh.filling import PARTS, REPAIR_HINT, Ball, Element, Filling
+from palpate.mesh.size import scale_of
 from palpate.mesh.tetmesh import TetMesh
-from palpate.units import length_scale
 from palpate.vectors import three_numbers
 
 if TYPE_CHECKING:
     import trimesh
 
 SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-TIME_LIMIT = 300.0  # s, of one run of a mesher
+# A part of a repaired body that is smaller than this share of the largest is none.
+CRUMB = 0.01
+TIME_LIMIT = 300.0  # s
 
 
 def tetrahedralize(
     surface: str | os.PathLike[str] | trimesh.Trimesh,
     max_element_size: float | None = None,
-    unit: str = "m",
+    unit: str | None = None,
     refine: Sequence[Ball] = (),
     *,
     repair: bool = False,
@@ -49,7 +52,7 @@ def tetrahedralize(
         the body so thin that more than a hundredth of the volume would be lost, down to a sixtieth. What is lost all
         the same, or by the size given, a :class:`palpate.MeshWarning` tells.
     unit
-        Unit of length of the surface.
+        Unit of length of the surface; None: metres.
     refine
         Finer balls: ``((x, y, z), radius, size)`` in m.
     repair
@@ -63,6 +66,9 @@ def tetrahedralize(
     MeshError
         A surface that cannot be filled, with what is wrong with it, a mesher that crashed, hung or returned nothing, or
         a mesh that loses more than a tenth of the volume.
+    UnclearUnitError
+        No unit is given, and in metres the body is below a millimetre or above three metres long; with a unit given
+        that is a warning.
 
     """
     return _fill(surface, max_element_size, "linear", unit, refine, repair, time_limit)
@@ -72,7 +78,7 @@ def tetrahedralize_with(
     element: Element,
     surface: str | os.PathLike[str] | trimesh.Trimesh,
     max_element_size: float | None = None,
-    unit: str = "m",
+    unit: str | None = None,
     refine: Sequence[Ball] = (),
     repair: bool = False,
 ) -> TetMesh:
@@ -88,7 +94,7 @@ def _fill(
     surface: str | os.PathLike[str] | trimesh.Trimesh,
     max_element_size: float | None,
     element: Element,
-    unit: str,
+    unit: str | None,
     refine: Sequence[Ball],
     repair: bool = False,
     time_limit: float = TIME_LIMIT,
@@ -96,7 +102,7 @@ def _fill(
     """Tetrahedra by NETGEN, or by fTetWild."""
     name, shape = _load(surface)
     shape = shape.copy()
-    shape.apply_scale(length_scale(unit))
+    shape.apply_scale(scale_of(name, shape.vertices, unit))
     if repair:
         _check_finite(name, shape)
     else:
@@ -186,6 +192,23 @@ def _check_finite(name: str, shape: trimesh.Trimesh) -> None:
         raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")
 
 
+def _without_crumbs(name: str, mesh: TetMesh) -> TetMesh:
+    """Drop what fTetWild leaves hanging on edges and vertices, or beside the body: parts without a face to the rest."""
+    labels = face_parts(mesh.tets)
+    volumes = np.bincount(labels, mesh.volumes)
+    kept = (volumes >= CRUMB * volumes.max())[labels]
+    if kept.all():
+        return mesh
+    warnings.warn(
+        f"{name}: {(~kept).sum()} tetrahedra that share no face with the rest, {mesh.volumes[~kept].sum():.2g} m3 of "
+        f"{mesh.volume:.3g} m3, were dropped",
+        MeshWarning,
+        stacklevel=3,
+    )
+    used = np.unique(mesh.tets[kept])
+    return TetMesh(mesh.nodes[used], np.searchsorted(used, mesh.tets[kept]), mesh.regions[kept])
+
+
 def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, time_limit: float) -> TetMesh:
     """Mesh by fTetWild, in a unit box as NETGEN's."""
     origin = shape.vertices.min(axis=0)
@@ -200,7 +223,7 @@ def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, tim
         if failure is not None or not made.exists():
             raise MeshError(f"{name}: fTetWild {failure or 'returned no tetrahedra'}")
         with np.load(made) as result:
-            mesh = TetMesh(result["nodes"] * extent + origin, result["tets"])
+            mesh = _without_crumbs(name, TetMesh(result["nodes"] * extent + origin, result["tets"]))
     warnings.warn(
         f"{name}: the surface was rebuilt, within about {1e-3 * extent * 3**0.5:.2g} m of the given one",
         MeshWarning,
