@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from palpate.cli.bodies import ElementChoice, MaxSize, Repair, Unit, body_of, is_surface, read_any
+from palpate.cli.bodies import ElementChoice, MaxSize, Repair, Unit, body_of, in_unit, is_surface, read_any
 from palpate.cli.completion import precisions, units
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _complain(message: str) -> int:
 def mesh(
     surface: Annotated[Path, typer.Argument(help="Closed surface: STL, OBJ, PLY, OFF or GLB.")],
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
-    unit: Unit = "m",
+    unit: Unit = None,
     max_size: MaxSize = None,
     repair: Repair = False,
     quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
@@ -80,12 +80,12 @@ def mesh(
     """
     from palpate.errors import MeshError
     from palpate.input_file import require_writable
-    from palpate.mesh import tetrahedralize
+    from palpate.mesh.tetrahedralize import tetrahedralize_with
     from palpate.units import length
 
     require_writable(out, MeshError)
-    made = tetrahedralize(surface, None if max_size is None else length(max_size), unit, repair=repair)
-    made = made.to_quadratic() if quadratic else made
+    size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
+    made = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, repair=repair))
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
 
@@ -99,7 +99,7 @@ def precompute(
     density: Annotated[str, typer.Option(help="Density, for its weight, such as 1000kg/m3.")] = "1000kg/m3",
     gravity: Annotated[str | None, typer.Option(help="Let it sag under gravity, m/s^2, such as 0,0,-9.81.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
-    unit: Unit = "m",
+    unit: Unit = None,
     precision: Annotated[
         str, typer.Option(help="Stored number format: f16, f32 or f64.", autocompletion=precisions)
     ] = "f32",
@@ -122,7 +122,8 @@ def precompute(
         require_writable(out, palpate.StoreError)
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    body = body_of(read_any(mesh, unit, element, max_size, repair), material, fix, loads)
+    made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
+    body = body_of(made, material, fix, loads)
     region = None
     if touch is not None:
         surface = body.mesh.surface_nodes
@@ -150,6 +151,7 @@ def touch(
     import numpy as np
 
     import palpate
+    from palpate.mesh import size_text
     from palpate.scene.default_radius import default_contact_radius
     from palpate.units import length
 
@@ -158,6 +160,8 @@ def touch(
     how = [None if v.strip() == "-" else length(v) for v in press.split(",")]
     reach = default_contact_radius(green) if radius is None else length(radius)
     answer = green.touch(where, how, reach)
+    if answer.distance > 1e-6 * green.extents.max():
+        print(f"landed at {np.array2string(answer.point, precision=5)} m, {size_text([answer.distance])} off the point")
     size = np.linalg.norm(answer.displacements, axis=1)
     print(f"force on the body: {np.array2string(answer.force, precision=5)} N, {np.linalg.norm(answer.force):.5g} N")
     print(f"largest displacement: {1e3 * size.max():.4g} mm at node {green.surface_nodes[size.argmax()]}")
@@ -170,7 +174,7 @@ def info(
     file: Annotated[Path, typer.Argument(help="A store, a file of modes, a scene file, a volume mesh, or a surface.")],
     unit: Annotated[
         str | None,
-        typer.Option(help="Unit of length; of a mesh m, of a surface what fits its size.", autocompletion=units),
+        typer.Option(help="Unit of length; default: m, of a surface what fits its size.", autocompletion=units),
     ] = None,
 ) -> None:
     """Say what a file holds.
@@ -203,6 +207,7 @@ def info(
 
         print_surface(file, unit)
         return
+    # A size that needs asking about is what this command tells.
     made = palpate.TetMesh.read(file, unit or "m")
     print(f"{file}: {_mesh_line(made)}")
     low, high = 1e3 * made.bounds
@@ -236,9 +241,12 @@ def models_command() -> None:
 
 
 def _mesh_line(mesh: TetMesh) -> str:
+    from palpate.mesh import size_text
+
     return (
-        f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {'10-node ' if mesh.is_quadratic else ''}tetrahedra, "
-        f"{len(mesh.surface_nodes)} surface nodes, {len(mesh.surface_triangles)} triangles"
+        f"{size_text(mesh.bounds[1] - mesh.bounds[0])}, {len(mesh.nodes)} nodes, {len(mesh.tets)} "
+        f"{'10-node ' if mesh.is_quadratic else ''}tetrahedra, {len(mesh.surface_nodes)} surface nodes, "
+        f"{len(mesh.surface_triangles)} triangles"
     )
 
 
@@ -251,8 +259,11 @@ def _print_origin(description: dict[str, object], key: str) -> None:
 
 
 def _green_line(green) -> str:
+    from palpate.mesh import size_text
+
     size = green.path.stat().st_size / 1e6
     return (
-        f"Green's function, {len(green.touchable_nodes)} of {len(green.surface_nodes)} surface nodes touchable, "
-        f"{len(green.fixed_nodes)} nodes fixed, {green.precision}, {size:.1f} MB"
+        f"Green's function of a body of {size_text(green.extents)}, {len(green.touchable_nodes)} of "
+        f"{len(green.surface_nodes)} surface nodes touchable, {len(green.fixed_nodes)} nodes fixed, {green.precision}, "
+        f"{size:.1f} MB"
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,12 +24,13 @@ class Element(str, Enum):
     QUADRATIC = "quadratic"
 
 
-# No organ or part is longer, m: a larger number is one of a smaller unit.
-LONGEST_SIDE = 3.0
-UNITS_BY_SIZE = ("m", "mm", "um")
-
-UNIT_HELP = "Unit of length of the file: m, cm, mm, um, in."
-Unit = Annotated[str, typer.Option(help=UNIT_HELP, autocompletion=units)]
+Unit = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of length of the file: m, cm, mm, um, in; default: m, asked for if that is unlikely.",
+        autocompletion=units,
+    ),
+]
 MaxSize = Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")]
 Repair = Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")]
 ElementChoice = Annotated[
@@ -44,7 +47,7 @@ def is_surface(path: Path) -> bool:
 
 
 def read_any(
-    path: Path, unit: str, element: Element | None, max_size: str | None = None, repair: bool = False
+    path: Path, unit: str | None, element: Element | None, max_size: str | None = None, repair: bool = False
 ) -> TetMesh:
     """Read a volume mesh, or fill a surface.
 
@@ -90,14 +93,33 @@ def body_of(mesh: TetMesh, material: Material, fix: str, loads: Loads | None = N
     return palpate.Body(mesh, material=material, fixed=mask, loads=loads)
 
 
-def likely_unit(file: Path) -> str:
-    """Tell the unit of a file that does not say it: the largest in which the body is no longer than three metres."""
+def likely_unit(path: Path) -> str:
+    """Tell the unit of a file that does not say it: metres, or the most common one of a size that hands can feel."""
     import numpy as np
 
-    from palpate.mesh import TetMesh
+    from palpate.errors import UnclearUnitError
+    from palpate.mesh.files import read_volume
+    from palpate.mesh.size import scale_of
     from palpate.mesh.tetrahedralize import read_surface
-    from palpate.units import length_scale
 
-    bounds = np.asarray(read_surface(file).bounds if is_surface(file) else TetMesh.read(file, "m").bounds)
-    longest = float(np.ptp(bounds, axis=0).max())
-    return next((unit for unit in UNITS_BY_SIZE if longest * length_scale(unit) <= LONGEST_SIDE), "m")
+    try:
+        if is_surface(path):
+            scale_of(str(path), np.asarray(read_surface(path).vertices), None)
+        else:
+            read_volume(path, None)
+    except UnclearUnitError as error:
+        return next(iter(error.fitting), "m")
+    return "m"
+
+
+def in_unit(unit: str | None, read: Callable[[str | None], TetMesh]) -> TetMesh:
+    """Read a file in its unit of length, asking for it on a terminal where it is not clear."""
+    from palpate.errors import UnclearUnitError
+
+    try:
+        return read(unit)
+    except UnclearUnitError as error:
+        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise
+        question = f"{error}\nUnit of length"
+        return read(typer.prompt(question, default=next(iter(error.fitting), "m"), err=True))

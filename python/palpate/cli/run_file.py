@@ -13,7 +13,6 @@ from palpate.cli.bodies import Element, body_of, likely_unit, read_any
 from palpate.errors import SceneError
 
 if TYPE_CHECKING:
-    from palpate.mesh import TetMesh
     from palpate.scene import BuiltScene, Scene
 
 # A bare body is held in this part of its height, from below.
@@ -51,6 +50,7 @@ class RunOptions:
 FLAGS = {
     "radius": "--radius",
     "fix": "--fix",
+    "fixed": "--fix",
     "youngs_modulus": "-E",
     "poissons_ratio": "--nu",
     "density": "--density",
@@ -88,28 +88,36 @@ def built_from(file: Path, options: RunOptions) -> BuiltScene:
 
 def _with_options(scene: Scene, options: RunOptions) -> Scene:
     """Scene in which what was typed stands instead of what was written, in the tables of its bodies too."""
-    from palpate.scene.regions import MaterialTable
-    from palpate.scene.tables import SupportsTable
-
     names = ("youngs_modulus", "poissons_ratio", "density")
     given = {name: value for name, value in asdict(options).items() if name in names and value is not None}
     update: dict[str, Any] = {}
-    tables: dict[str, tuple[type, Mapping[str, Any]]] = {}
+    tables: dict[str, Mapping[str, Any]] = {}
     if given:
-        tables["material"] = (MaterialTable, given)
+        tables["material"] = given
     if options.fix is not None:
-        tables["supports"] = (SupportsTable, {"fixed": options.fix})
+        tables["supports"] = {"fixed": options.fix}
     bodies = list(scene.bodies)
-    for name, (table, values) in tables.items():
-        update[name] = table(**{**getattr(scene, name).model_dump(exclude_unset=True), **values})
+    for name, values in tables.items():
+        update[name] = _changed(getattr(scene, name), values)
         for rank, body in enumerate(bodies):
             own = getattr(body, name)
             if own is not None:
-                changed = table(**{**own.model_dump(exclude_unset=True), **values})
-                bodies[rank] = body.model_copy(update={name: changed})
+                bodies[rank] = body.model_copy(update={name: _changed(own, values)})
     if options.radius is not None:
         update["tools"] = [tool.model_copy(update=_radii(tool, options.radius)) for tool in scene.tools]
     return scene.model_copy(update={**update, "bodies": bodies})
+
+
+def _changed(table: Any, values: Mapping[str, Any]) -> Any:
+    """Table of the same kind with other values, as strictly checked as in a file."""
+    from pydantic import ValidationError
+
+    try:
+        return type(table)(**{**table.model_dump(exclude_unset=True), **values})
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+        raise SceneError(f"{FLAGS[str(first['loc'][0])]}: {said}") from None
 
 
 def _radii(tool: Any, radius: str) -> dict[str, float]:
@@ -128,6 +136,7 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
     import palpate
     from palpate import units
+    from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
 
     told = []
@@ -135,7 +144,9 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     if unit is None:
         unit = likely_unit(file)
         told.append(f"unit {unit} (--unit)")
-    mesh = read_any(file, unit, options.element, options.max_size, options.repair)
+    # A body that is of no likely size in any unit is asked about, not taken for one in metres.
+    known = None if options.unit is None and unit == "m" else unit
+    mesh = read_any(file, known, options.element, options.max_size, options.repair)
     low, high = mesh.bounds
     fix = options.fix
     if fix is None:
@@ -157,9 +168,5 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     built = BuiltScene.of(_with_options(scene, RunOptions(radius=options.radius)), body, green)
     if options.radius is None:
         told.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
-    print(f"{file}: {_size(mesh)}" + (f"; by default {', '.join(told)}" if told else ""))
+    print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(told)}" if told else ""))
     return built
-
-
-def _size(mesh: TetMesh) -> str:
-    return " x ".join(f"{1e3 * side:.3g}" for side in mesh.bounds[1] - mesh.bounds[0]) + " mm"

@@ -135,6 +135,15 @@ def _view(
     open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of), browser=browser)
 
 
+def _force_line(record: PressRecord, max_force: float) -> str:
+    """Tell the largest force on the device, and that of the body where the device's limit held it."""
+    force = (record.log["force"] ** 2).sum(axis=1).max() ** 0.5
+    line = f"{len(record.log)} ticks, largest force {force:.3f} N"
+    if force >= max_force * (1 - 1e-9) and record.force > max_force:
+        line += f", where it was limited ([device] max_force = {max_force:g}): the body's was {record.force:.3f} N"
+    return line
+
+
 def _strain_line(record: PressRecord, strain_limit: float) -> str:
     """Tell the largest strain, and what there is to say about it."""
     line = f"largest strain {100 * record.hardest.largest_strain:.1f} %"
@@ -155,7 +164,7 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     write_log(log, record.depth, record.strain, out / f"{name}.csv")
     plot_log(log, out / f"{name}.png", f"{name}: scripted press at 1 kHz")
     compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
-    print(f"{len(log)} ticks, largest force {(log['force'] ** 2).sum(axis=1).max() ** 0.5:.3f} N")
+    print(_force_line(record, built.scene.device.max_force))
     print(_strain_line(record, built.scene.view.strain_limit))
     print("us            p50      p99    p99.9      max")
     for title, row in (("computing", compute), ("wake-up", wakeup)):

@@ -18,6 +18,8 @@ POINTER_RATE = 120.0
 DEPTH = 0.03
 # Frames of a run of which the strain is computed, afterwards: it takes milliseconds of each.
 STRAIN_SAMPLES = 100
+# A tool that is limited at less than this part of the limit of strain has just begun to touch.
+AT_LIMIT = 0.9
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,11 @@ class PressRecord:
         At each row: approach of tool and surface, m, and largest strain; between frames, of which there are 120 and
         some tens a second, they are interpolated.
     hardest, last
-        The frame that was pressed hardest, and the last one.
+        The frame with the largest force on the body, and the last one.
     limited
-        Whether the tool was.
+        Whether the limit of strain held the tool.
+    force
+        Largest on the body in any frame, N; the device's own is within its limits.
     interrupted
         Whether Ctrl-C ended it early.
 
@@ -46,6 +50,7 @@ class PressRecord:
     hardest: Frame
     last: Frame
     limited: bool
+    force: float
     interrupted: bool
 
 
@@ -53,7 +58,8 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     """Press for so many seconds, within the scene's limit of strain, or until Ctrl-C."""
     rest, depth = _target(built)
     logs, depths, sampled = [], [], []
-    limited = interrupted = False
+    limited: list[Frame] = []
+    interrupted = False
     with Simulation(built) as simulation:
         hardest = simulation.frame()
         start = time.monotonic()
@@ -69,8 +75,9 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
                 depths.append((frame.time, _depth(frame)))
                 if STRAIN_SAMPLES * elapsed >= len(sampled) * seconds:
                     sampled.append(frame)
-                limited |= bool(frame.limited[0])
-                hardest = max(hardest, frame, key=lambda frame: np.linalg.norm(frame.forces[0]))
+                hardest = max(hardest, frame, key=_force_on_body)
+                if frame.limited[0]:
+                    limited = [max(*limited, frame, key=_force_on_body)] if limited else [frame]
         except KeyboardInterrupt:
             interrupted = True
         last = simulation.frame()
@@ -79,7 +86,9 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     sampled = sorted([*sampled, hardest, last], key=lambda frame: frame.time)
     strains = [(frame.time, frame.largest_strain) for frame in sampled]
     columns = (_at_ticks(log["time"], depths), _at_ticks(log["time"], strains))
-    return PressRecord(log, *columns, hardest, last, limited, interrupted)
+    most = AT_LIMIT * built.scene.view.strain_limit
+    held = any(frame.largest_strain >= most for frame in limited)
+    return PressRecord(log, *columns, hardest, last, held, _force_on_body(hardest), interrupted)
 
 
 def _target(built: BuiltScene) -> tuple[np.ndarray, float]:
@@ -94,6 +103,12 @@ def _target(built: BuiltScene) -> tuple[np.ndarray, float]:
     middle = nodes[:, :2].mean(axis=0)
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
     return top + [0, 0, built.scene.tools[0].reach], DEPTH * size
+
+
+def _force_on_body(frame: Frame) -> float:
+    """Force of the contacts of the first tool, N, before the safety stage limits what its device puts out."""
+    forces = [contact.force for contact in frame.contacts if contact.tool == 0]
+    return float(np.linalg.norm(np.sum(forces, axis=0))) if forces else 0.0
 
 
 def _depth(frame: Frame) -> float:

@@ -49,13 +49,20 @@ class Touch(ComparedByValue, Result):
         On the body (3,), N.
     displacements
         (s, 3) m; rows follow the surface nodes.
+    point
+        Where it landed (3,), m: the point of the unloaded surface closest to the one asked for.
+    distance
+        From the one to the other, m.
 
     """
 
     force: np.ndarray
     displacements: np.ndarray
+    point: np.ndarray
+    distance: float
     _source: ResultSource = field(repr=False, compare=False)
 
     def __repr__(self) -> str:
         moved = np.linalg.norm(self.displacements, axis=1).max()
-        return f"Touch(force {brief(self.force)} N, largest displacement {1e3 * moved:.4g} mm)"
+        force = f"force {brief(self.force)} N at {brief(self.point)} m"
+        return f"Touch({force}, largest displacement {1e3 * moved:.4g} mm)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -14,15 +15,19 @@ import numpy as np
 
 from palpate import _native, units
 from palpate.body import Body, description, problem_arrays
-from palpate.errors import BodyError, StoreError
+from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
 from palpate.input_file import require_file
 from palpate.leftovers import remove_leftovers
-from palpate.vectors import Reader, three_components, three_numbers
+from palpate.mesh import size_text
+from palpate.vectors import Reader, brief, three_components, three_numbers
 
 # Numbers in SI, or text with a unit.
 Components = Sequence[float | str | None]
+
+# A touch that lands farther from its point than this part of the body's longest side was probably meant elsewhere.
+FAR = 0.05
 
 
 class GreensFunction:
@@ -99,6 +104,16 @@ class GreensFunction:
     def free_displacements(self) -> np.ndarray:
         """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
         return self._core.free_displacements.reshape(-1, 3)
+
+    @property
+    def extents(self) -> np.ndarray:
+        """Sides of the body's bounding box (3,), m."""
+        return np.ptp(self.surface_positions, axis=0)
+
+    @cached_property
+    def _surface_search(self) -> _native.SurfaceSearch:
+        triangles = np.searchsorted(self.surface_nodes, self.surface_triangles)
+        return _native.SurfaceSearch(self.surface_positions, triangles.astype(np.uint32))
 
     @cached_property
     def strain_measure(self) -> StrainMeasure:
@@ -218,8 +233,9 @@ class GreensFunction:
         Parameters
         ----------
         point
-            Contact point, m, on the unloaded body; the closest point of the surface is taken. Lengths may also be text
-            with a unit, such as ``"4cm"``.
+            Contact point, m, on the unloaded body; the closest point of the surface is taken, and a
+            :class:`palpate.TouchWarning` tells if it is far off. Lengths may also be text with a unit, such as
+            ``"4cm"``.
         displacement
             Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
         radius
@@ -243,12 +259,24 @@ class GreensFunction:
         except BodyError:
             if self.accepts_contact_radius(reach):
                 raise
-            largest = 1e3 * self.largest_contact_radius(reach)
-            raise BodyError(
-                f"a contact radius of {1e3 * reach:.4g} mm covers more nodes than a touch can weigh: give a radius of "
-                f"at most {largest:.3g} mm (--radius), or make the mesh coarser"
-            ) from None
-        return Touch(np.array(force), u.reshape(-1, 3), self)
+            raise self._too_wide(reach) from None
+        landed = self._surface_search.closest(np.array([target]))
+        distance = float(np.linalg.norm(landed - target))
+        if distance > FAR * self.extents.max():
+            warnings.warn(
+                f"the touch landed at {brief(landed)} m, {size_text([distance])} from the point given: the body is "
+                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on",
+                TouchWarning,
+                stacklevel=2,
+            )
+        return Touch(np.array(force), u.reshape(-1, 3), landed, distance, self)
+
+    def _too_wide(self, radius: float) -> BodyError:
+        largest = 1e3 * self.largest_contact_radius(radius)
+        return BodyError(
+            f"a contact radius of {1e3 * radius:.4g} mm covers more nodes than a touch can weigh: give a radius of "
+            f"at most {largest:.3g} mm (--radius), or make the mesh coarser"
+        )
 
     def accepts_contact_radius(self, radius: float) -> bool:
         """Whether contacts of a radius, m, can be weighed everywhere on the surface."""

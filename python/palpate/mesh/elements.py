@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse
+from scipy.sparse.csgraph import connected_components
 
 from palpate.errors import MeshError
 
@@ -79,3 +81,14 @@ def boundary_faces(tets: np.ndarray) -> np.ndarray:
         face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
         raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
     return faces[np.sort(first[counts == 1])]
+
+
+def face_parts(tets: np.ndarray) -> np.ndarray:
+    """Label of the part of elements connected by faces that each element belongs to, (m,)."""
+    corners = np.sort(tets[:, :4].astype(np.int64), axis=1)
+    faces = corners[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
+    order = np.lexsort(faces.T)
+    same = np.flatnonzero((faces[order[1:]] == faces[order[:-1]]).all(axis=1))
+    a, b = order[same] // 4, order[same + 1] // 4
+    graph = scipy.sparse.coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(tets), len(tets)))
+    return connected_components(graph, directed=False)[1]

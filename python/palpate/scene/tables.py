@@ -64,7 +64,7 @@ class BodyTable(Table):
     model: str | None = None
     store: str | None = None
     paper: bool = False
-    unit: str = "m"
+    unit: str | None = None
     max_element_size: Length | None = None
     element: Element | None = None
     refine: list[RefineTable] = Field(default_factory=list)

@@ -79,6 +79,26 @@ def test_options_that_a_file_does_not_take_are_refused_by_name(block_green):
         built_from(BLOCK.parent / "block.toml", RunOptions(unit="mm"))
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"youngs_modulus": "10kilo"}, "-E: unknown unit 'kilo'"),
+        ({"youngs_modulus": "-1kPa"}, "-E: must be greater than 0"),
+        ({"poissons_ratio": 0.7}, "--nu: must be less than 0.5"),
+        ({"radius": "0mm"}, "--radius must be positive"),
+        ({"radius": "wide"}, "'wide' is not a length"),
+        ({"fix": "z <"}, "cannot read the predicate 'z <'"),
+    ],
+)
+def test_wrong_options_are_refused_by_name_for_scenes_and_bare_files(options, message, tmp_path):
+    (tmp_path / "a.toml").write_text('[body]\nmodel = "beam"\npaper = true\n')
+    with pytest.raises(palpate.Error, match=message):
+        built_from(tmp_path / "a.toml", RunOptions(**options))
+    box_mesh().write(tmp_path / "box.vtu")
+    with pytest.raises(palpate.Error):
+        built_from(tmp_path / "box.vtu", RunOptions(**options))
+
+
 def test_radii_that_are_not_given_follow_the_body(block_green):
     assert default_radius(block_green) == pytest.approx(0.08 / 16)
     built = built_from(block_green.path, RunOptions())
