@@ -93,8 +93,8 @@ def body_of(mesh: TetMesh, material: Material, fix: str, loads: Loads | None = N
     return palpate.Body(mesh, material=material, fixed=mask, loads=loads)
 
 
-def likely_unit(path: Path) -> str:
-    """Tell the unit of a file that does not say it: metres, or the most common one of a size that hands can feel."""
+def likely_units(path: Path) -> list[str]:
+    """Tell the units that a file may be in: metres, or those of a size that hands can feel, the most common first."""
     import numpy as np
 
     from palpate.errors import UnclearUnitError
@@ -108,8 +108,8 @@ def likely_unit(path: Path) -> str:
         else:
             read_volume(path, None)
     except UnclearUnitError as error:
-        return next(iter(error.fitting), "m")
-    return "m"
+        return list(error.fitting) or ["m"]
+    return ["m"]
 
 
 def in_unit(unit: str | None, read: Callable[[str | None], TetMesh]) -> TetMesh:

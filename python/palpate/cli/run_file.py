@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.cli.bodies import Element, body_of, likely_unit, read_any
+from palpate.cli.bodies import Element, body_of, likely_units, read_any
 from palpate.errors import SceneError
 
 if TYPE_CHECKING:
@@ -142,8 +142,8 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     told = []
     unit = options.unit
     if unit is None:
-        unit = likely_unit(file)
-        told.append(f"unit {unit} (--unit)")
+        unit, *others = likely_units(file)
+        told.append(f"unit {unit} (--unit{'; it may also be ' if others else ''}{' or '.join(others)})")
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
     mesh = read_any(file, known, options.element, options.max_size, options.repair)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.cli.bodies import likely_unit
+from palpate.cli.bodies import likely_units
 
 
 def print_surface(path: Path, unit: str | None) -> None:
@@ -14,13 +14,15 @@ def print_surface(path: Path, unit: str | None) -> None:
     from palpate.mesh.tetrahedralize import read_surface
     from palpate.units import length_scale
 
-    unit = likely_unit(path) if unit is None else unit
+    unit, *others = likely_units(path) if unit is None else [unit]
     shape, scale = read_surface(path), length_scale(unit)
     shape.merge_vertices(merge_tex=True, merge_norm=True)
     print(f"{path}: surface of {len(shape.vertices)} vertices, {len(shape.faces)} triangles")
     low, high = 1e3 * scale * shape.bounds
     size = " x ".join(f"{side:.4g}" for side in high - low)
-    print(f"  {size} mm if its unit is {unit} (--unit), from {low.round(2).tolist()} to {high.round(2).tolist()} mm")
+    may_be = f"; it may also be {' or '.join(others)}" if others else ""
+    place = f"from {low.round(2).tolist()} to {high.round(2).tolist()} mm"
+    print(f"  {size} mm if its unit is {unit} (--unit{may_be}), {place}")
     _, uses = np.unique(shape.edges_sorted, axis=0, return_counts=True)
     rims, crowded = int((uses == 1).sum()), int((uses > 2).sum())
     faults = [
