@@ -37,7 +37,7 @@ FINEST, ATTEMPTS, LOST = 4.0, 5, 0.05
 
 # The mesh may cut corners of a curved surface, but not lose a part of it.
 VOLUME_TOLERANCE = 0.1
-REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install palpate[repair]' and --repair"
+REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install pytetwild pyvista' and --repair"
 
 
 @dataclass(frozen=True, eq=False)

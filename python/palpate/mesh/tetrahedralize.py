@@ -230,7 +230,7 @@ def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, tim
         command = [sys.executable, "-m", "palpate.mesh.tetwild_child", str(given), str(made)]
         status = run_limited(command, time_limit)
         if status == 3:
-            raise MeshError("repairing needs pytetwild: pip install 'palpate[repair]'")
+            raise MeshError("repairing needs pytetwild: pip install pytetwild pyvista")
         failure = failure_of(status, time_limit)
         if failure is not None or not made.exists():
             raise MeshError(f"{name}: fTetWild {failure or 'returned no tetrahedra'}")
