@@ -11,6 +11,7 @@ mod patch;
 mod quadrature;
 mod refusal;
 mod regular;
+mod regular_store;
 pub mod shape;
 pub mod smooth;
 mod touchable;

@@ -38,9 +38,6 @@ const SAME: f64 = 1e-8;
 /// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
 /// longer one. A half-space under a sphere is strained far beyond what is linear there.
 const MOST_DEPTH: f64 = 1.6;
-/// Radius of the patch by which a body in motion is met, over the tool's, at least: in a step a body may be as good as rigid,
-/// and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of the patch.
-const WIDER: f64 = 1.6;
 /// A foot that goes farther in a tick, over the tool's radius, has jumped.
 const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
@@ -192,8 +189,8 @@ fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> 
     }
 }
 
-/// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
-/// to: by smaller patches the compliance of a single step could outweigh what is left of the half-space.
+/// On a body in motion each contact is met where it was a step ago, over a patch so wide that what the local law has less
+/// than the patch is monotonic even where the body is rigid within a step ([`RegularCompliance::widths`]).
 fn follow_motion(
     model: &Model,
     state: &mut State,
@@ -211,8 +208,7 @@ fn follow_motion(
         let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
         let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
         own.smooth.weigh(foot, weights);
-        let radius = model.tools[contacts.slots[slot].tool].radius;
-        let wide = weights.field(|fan| regular.widths[fan]).0.max(WIDER * radius);
+        let wide = weights.field(|fan| regular.widths[fan]).0;
         let centre = fixed.material_point(&fixed.surface_point(foot));
         let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
         // As many nodes as at the fans around fit.

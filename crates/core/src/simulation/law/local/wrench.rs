@@ -161,7 +161,7 @@ mod tests {
         fn new() -> Self {
             let surface = ball(24);
             let youngs = surface.positions.iter().map(|p| 1e4 * (1.0 + 0.25 * p.z)).collect();
-            let moduli = Moduli { youngs, poissons: vec![0.45; surface.positions.len()] };
+            let moduli = Moduli { youngs, poissons: vec![0.45; surface.positions.len()], homogeneous: false };
             let query = SurfaceQuery::new(&surface).expect("triangles");
             Self { smooth: SmoothSurface::new(&surface, |_| true), query, surface, moduli }
         }
