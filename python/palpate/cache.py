@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import Any
 from palpate.errors import StoreError
 from palpate.leftovers import leftovers_in
 
+# Ending of what a process is still writing.
+_WRITTEN = re.compile(r"\.\d+\.(new|partial)$")
 # Longest header of a store that is read to say what it is, bytes.
 HEADER_BYTES = 10_000_000
 
@@ -91,7 +94,7 @@ def _entry(file: Path, folder: Path) -> CachedFile:
 def _about(file: Path, leftover: bool) -> str:
     if leftover:
         return "left by a killed process"
-    if file.name.endswith(".new"):
+    if _WRITTEN.search(file.name):
         return "being written"
     if file.name.endswith(".partial"):
         return "interrupted; the same computation goes on from here"
@@ -101,6 +104,8 @@ def _about(file: Path, leftover: bool) -> str:
         made_of = _metadata(file)
     except (OSError, ValueError, KeyError, TypeError):
         return "not a store"
+    if made_of.get("format") == "palpate-contact":
+        return "what a tool needs to know of the body with the same beginning"
     kind = "modes" if file.name.endswith(".modes.palpate") else f"Green's function, {made_of.get('precision', '')}"
     about = json.loads(made_of.get("description") or "{}")
     counts = f"{about.get('nodes')} nodes, {about.get('tets')} {about.get('element')} tetrahedra" if about else ""

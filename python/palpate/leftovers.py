@@ -1,6 +1,7 @@
 """Files that a killed process was still writing: beside their place, named after it and the process.
 
-Files are written as ``<name>.<process>.new`` (stores) or ``.<process>.<name>`` (everything else) and renamed when they
+Files are written as ``<name>.<process>.new`` (stores), ``<name>.<process>.partial`` (what stands
+beside them) or ``.<process>.<name>`` (everything else) and renamed when they
 are complete. A process that is killed leaves them, in full size; whoever writes there next removes them. Processes are
 those of this machine: what one in another container writes into the same folder looks like a leftover.
 """
@@ -12,7 +13,7 @@ import os
 import re
 from pathlib import Path
 
-_NAMES = (re.compile(r"(?P<name>.+)\.(?P<process>\d+)\.new"), re.compile(r"\.(?P<process>\d+)\.(?P<name>.+)"))
+_NAMES = (re.compile(r"(?P<name>.+)\.(?P<process>\d+)\.(new|partial)"), re.compile(r"\.(?P<process>\d+)\.(?P<name>.+)"))
 
 
 def leftovers_in(folder: Path, name: str | None = None) -> list[Path]:

@@ -8,6 +8,7 @@ import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
 import type { FrameData, SceneData } from "./net/protocol";
 import { Stage } from "./scene/stage";
+import { sidesOf } from "./scene/surface";
 import { Viewport } from "./scene/viewport";
 import { Store } from "./store";
 import { installTestHooks } from "./test_hooks";
@@ -82,6 +83,7 @@ export class Viewer {
     // Frames of the scene before are not drawn any more, but the server still counts on an answer.
     this.frames.take();
     this.control.takeScene(data.header);
+    this.store.update({ sizes: data.bodies.map(({ nodes }) => sidesOf(nodes)) });
     this.stage.setScene(data);
     document.title = `${data.header.title} · Palpate`;
     window.clearTimeout(this.firstStrike);

@@ -16,13 +16,14 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 
+from palpate.body.supports import rigid_constraint_rank
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import face_parts
 
 # Eigenvalue of the system of a part held by three nodes, one of them off the line of the others by 1e-5 of its size.
 SINGULAR = 1e-10
 # Up to so many parts the system is solved densely.
-DENSE_PARTS = 200
+DENSE_PARTS = 50
 # A part moves if it does so by more than this share of the one that moves most.
 MOVES = 1e-3
 
@@ -75,6 +76,8 @@ def _place(point: np.ndarray) -> str:
 def find_mechanism(mesh: TetMesh, fixed: np.ndarray) -> Mechanism | None:
     """Find the smallest part that can move without deforming; ``fixed`` (n, 3) are the fixed components."""
     labels = face_parts(mesh.tets)
+    if labels.max() == 0 and rigid_constraint_rank(mesh.nodes, fixed) == 6:
+        return None
     pairs = np.unique(np.column_stack([np.repeat(labels, mesh.tets.shape[1]), mesh.tets.ravel()]), axis=0)
     part, node = pairs.T
     motions = _strainless_motions(_Parts(mesh.nodes, part, node), fixed)

@@ -8,8 +8,9 @@ import numpy as np
 MOST_CELLS = 64
 # Pairs that are tested at a time.
 CHUNK = 1_000_000
-# A crossing counts if it is this part of the edge, and of the triangle, away from their ends.
-INSIDE = 1e-6
+# An edge is parallel to a triangle below this share of their lengths; one that meets its border counts as piercing it,
+# to this part of its size, for triangles that share no vertex do not touch.
+PARALLEL, BORDER = 1e-6, 1e-9
 
 
 def first_crossing(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
@@ -35,12 +36,12 @@ def _pierced(edges_of: np.ndarray, triangles: np.ndarray) -> np.ndarray | None:
         determinant = np.einsum("ij,ij->i", span, p)
         scale = np.linalg.norm(along, axis=1) * np.linalg.norm(span, axis=1) * np.linalg.norm(across, axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = np.where(np.abs(determinant) > INSIDE * scale, 1.0 / determinant, np.nan)
+            inverse = np.where(np.abs(determinant) > PARALLEL * scale, 1.0 / determinant, np.nan)
         offset = start - a
         q = np.cross(offset, span)
         u, v = inverse * np.einsum("ij,ij->i", offset, p), inverse * np.einsum("ij,ij->i", along, q)
         t = inverse * np.einsum("ij,ij->i", across, q)
-        hit = (u > INSIDE) & (v > INSIDE) & (u + v < 1 - INSIDE) & (t > INSIDE) & (t < 1 - INSIDE)
+        hit = (np.minimum(u, v) > -BORDER) & (u + v < 1 + BORDER) & (np.abs(t - 0.5) < 0.5 + BORDER)
         if hit.any():
             k = int(np.argmax(hit))
             return start[k] + t[k] * along[k]

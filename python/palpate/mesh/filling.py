@@ -35,6 +35,9 @@ PARTS = {"linear": 15.0, "quadratic": 7.5}
 # where more than this share of the volume is lost, for such a mesh does not tell where.
 FINEST, ATTEMPTS, LOST = 4.0, 5, 0.05
 
+# Seconds for NETGEN to prove that a surface that intersects itself can be filled: mostly it hangs, or crashes.
+PATIENCE = 30.0
+
 # The mesh may cut corners of a curved surface, but not lose a part of it.
 VOLUME_TOLERANCE = 0.1
 REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install pytetwild pyvista' and --repair"
@@ -86,7 +89,8 @@ class Filling:
         least = size / FINEST if self.size is None else size
         found: tuple[TetMesh, Fit] | None = None
         points, local = np.empty((0, 3)), np.empty(0)
-        deadline = time.monotonic() + self.time_limit
+        patience = self.time_limit if self._crossing is None else min(self.time_limit, PATIENCE)
+        deadline = time.monotonic() + patience
         for _ in range(ATTEMPTS):
             made = self._tetrahedra(size, points, local, deadline)
             fit = Fit.of(made, self.shape) if isinstance(made, TetMesh) else None
@@ -96,12 +100,10 @@ class Filling:
             if late or size <= least or (fit is not None and fit.is_good(size)):
                 break
             if fit is None or abs(fit.loss) > LOST:
-                if self._crossing is not None:
-                    break
                 size, points, local = max(size / 2, least), np.empty((0, 3)), np.empty(0)
                 continue
             before = np.full(len(fit.points), size) if len(local) == 0 else local
-            points, local = fit.points, fit.sizes(before, least, self.shape)
+            points, local = fit.points, fit.sizes(before, least)
             if np.array_equal(before, local):
                 break
         if found is None:
@@ -119,7 +121,7 @@ class Filling:
         smaller = f"elements of {_length(fit.size_for_good(min(size, _mean_edge(mesh))))} (--max-size) should do"
         if abs(fit.loss) > VOLUME_TOLERANCE:
             raise MeshError(f"{message}; {self._crossing or f'they are too large for it, {smaller}'}")
-        warnings.warn(f"{message}; for less, {smaller}", MeshWarning, stacklevel=5)
+        warnings.warn(f"{message}; {self._crossing or f'for less, {smaller}'}", MeshWarning, stacklevel=5)
 
     def _reason(self, size: float, failures: str) -> str:
         """Why no mesh was made."""

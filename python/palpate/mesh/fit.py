@@ -63,12 +63,13 @@ class Fit:
         """Whether volume and surface are kept, by elements of this size."""
         return abs(self.loss) <= GOOD_LOSS and self.gaps.max() <= GOOD_GAP * size
 
-    def sizes(self, now: np.ndarray, least: float, shape: trimesh.Trimesh) -> np.ndarray:
+    def sizes(self, now: np.ndarray, least: float) -> np.ndarray:
         """Sizes (k,) at the points that should do, where they are ``now`` (k,) and none shall be below ``least``."""
-        # A layer of this thickness all over the surface holds the volume that may be lost.
-        allowed = GOOD_LOSS * shape.volume / shape.area
         if abs(self.loss) <= GOOD_LOSS:
             allowed = 0.5 * GOOD_GAP * now
+        else:
+            # All gaps smaller in the same proportion as the loss has to be; smaller ones may stay.
+            allowed = self.gaps.mean() * GOOD_LOSS / abs(self.loss)
         factor = (allowed / np.maximum(self.gaps, np.finfo(float).tiny)) ** (1.0 / self.order)
         return np.where(factor < 1, np.maximum(MARGIN * factor * now, np.minimum(least, now)), now)
 

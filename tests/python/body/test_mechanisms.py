@@ -90,6 +90,24 @@ def test_parts_welded_along_edges_that_are_not_in_line_are_held():
     body.require_supported()
 
 
+@pytest.mark.parametrize("hangs", [False, True])
+def test_one_hinge_among_hundreds_of_welds_is_found(hangs):
+    """A lattice of 256 cubes, each along edges of its neighbours; then a corner of it by one edge alone."""
+    filled = np.indices((8, 8, 8)).sum(axis=0) % 2 == 0
+    if hangs:
+        filled[5:, 5:, 4:] = False
+        filled[7, 7, 6] = filled[6, 6, 6] = filled[6, 5, 5] = filled[5, 6, 5] = filled[5, 5, 6] = True
+    mesh = voxels(filled)
+    body = palpate.Body(mesh, material=SOFT, fixed=bottom)
+    if not hangs:
+        body.require_supported()
+        return
+    with pytest.raises(
+        palpate.BodyError, match=r"around \(0.075, 0.075, 0.065\) m meets the other \d+ only at the edge"
+    ):
+        body.require_supported()
+
+
 @pytest.mark.parametrize("seed", range(60))
 def test_the_verdict_is_that_of_the_rank(seed):
     """Random cubes of a grid, welded by faces, edges and vertices in any way, with random supports."""

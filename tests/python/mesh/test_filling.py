@@ -86,7 +86,7 @@ def test_crossings_are_found_where_they_are():
 def test_a_knot_that_runs_through_itself_is_refused_by_its_place():
     shape = surfaces.knot(tube=0.016)
     with pytest.raises(palpate.MeshError, match=r"the surface intersects itself near \(.*\) m") as refusal:
-        palpate.tetrahedralize(shape, time_limit=100)
+        palpate.tetrahedralize(shape, time_limit=20)
     place = np.array([float(x) for x in str(refusal.value).split("near (")[1].split(")")[0].split(",")])
     assert np.abs(trimesh.Trimesh(shape.vertices, shape.faces).bounds - place).min() >= 0
 

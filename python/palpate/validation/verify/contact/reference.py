@@ -103,7 +103,11 @@ class Block:
 
     def _fine(self, reach: float) -> float:
         """How far from the contact elements are small, m."""
-        return reach if self.nodule is None else max(reach, self.nodule.depth + self.nodule.radius, self.nodule.aside + self.nodule.radius)
+        return (
+            reach
+            if self.nodule is None
+            else max(reach, self.nodule.depth + self.nodule.radius, self.nodule.aside + self.nodule.radius)
+        )
 
     def _body(self, mesh: TetMesh, fixed: np.ndarray, parts: int) -> Body:
         if self.nodule is None:
