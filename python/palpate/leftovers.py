@@ -1,9 +1,9 @@
 """Files that a killed process was still writing: beside their place, named after it and the process.
 
-Files are written as ``<name>.<process>.new`` (stores), ``<name>.<process>.partial`` (what stands
-beside them) or ``.<process>.<name>`` (everything else) and renamed when they
-are complete. A process that is killed leaves them, in full size; whoever writes there next removes them. Processes are
-those of this machine: what one in another container writes into the same folder looks like a leftover.
+Files are written as ``<name>.<process>.new`` (stores), ``<name>.<process>.partial`` (what stands beside them) or
+``.<process>.<name>`` (everything else) and renamed when they are complete. A process that is killed leaves them, in
+full size; whoever writes there next removes them. Processes are those of this machine: what one in another container
+writes into the same folder looks like a leftover.
 """
 
 from __future__ import annotations
