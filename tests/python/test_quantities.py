@@ -52,7 +52,7 @@ def test_numbers_of_numpy_are_numbers():
         (lambda green: palpate.Loads(pressure=[([0], "much")]), "'much' is not a pressure"),
         (lambda green: palpate.Loads(forces=[1, 2, 3]), "forces must map nodes"),
         (lambda green: palpate.shapes.Sphere((0, 0, 0), "x"), "'x' is not a length"),
-        (lambda green: palpate.tetrahedralize("examples/block.obj", "4 apples"), "unknown unit 'apples'"),
+        (lambda green: palpate.tetrahedralize("examples/block.obj", "4 apples", unit="mm"), "unknown unit 'apples'"),
     ],
 )
 def test_values_of_a_wrong_kind_are_refused_by_name(call, message, block_green):
