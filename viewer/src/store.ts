@@ -9,6 +9,7 @@ import type {
   SceneMessage,
   SettingsMessage,
   StatusMessage,
+  Vec3,
 } from "./net/protocol";
 
 export type Axis = "x" | "y" | "z";
@@ -38,6 +39,8 @@ export interface State {
   models: Choice[];
   status: StatusMessage | null;
   scene: SceneMessage | null;
+  /** Sides of the box around each body at rest, in its own frame, m. */
+  sizes: readonly Vec3[];
   settings: SettingsMessage | null;
   /** The newest one that is drawn. */
   frame: FrameMessage | null;
@@ -75,6 +78,7 @@ export function initialState(): State {
     models: [],
     status: null,
     scene: null,
+    sizes: [],
     settings: null,
     frame: null,
     notices: [],

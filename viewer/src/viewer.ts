@@ -8,6 +8,7 @@ import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
 import type { FrameData, SceneData } from "./net/protocol";
 import { Stage } from "./scene/stage";
+import { sidesOf } from "./scene/surface";
 import { Viewport } from "./scene/viewport";
 import { Store } from "./store";
 import { installTestHooks } from "./test_hooks";
@@ -85,6 +86,7 @@ export class Viewer {
     this.frames.take();
     const again = data.header.name === this.store.get().scene?.name;
     this.control.takeScene(data.header);
+    this.store.update({ sizes: data.bodies.map(({ nodes }) => sidesOf(nodes)) });
     this.stage.setScene(data);
     document.title = `${data.header.title} · Palpate`;
     window.clearTimeout(this.firstStrike);

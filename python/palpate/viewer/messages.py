@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
+from palpate.units import to_float
 from palpate.vectors import three_numbers
 
 VERSION = 6
@@ -73,7 +74,7 @@ def parse(text: str | bytes) -> dict[str, Any]:
 def number(message: Mapping[str, Any], key: str) -> float:
     """Take a finite number of a client's message."""
     value = message.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(to_float(value)):
         raise ViewerError(f"{message['type']}: {key} must be a finite number")
     return float(value)
 

@@ -23,6 +23,7 @@ from palpate import __version__
 from palpate.errors import Error, SimulationError, ViewerError
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
+from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.pages import headers, host_is_ours, load_pages
 from palpate.viewer.session import Session, Wants, choices
@@ -106,9 +107,13 @@ class ViewerServer:
     @property
     def address(self) -> str:
         """What a person opens; the token stays in the browser, for fragments are never sent."""
-        shown = "127.0.0.1" if self.host in {"0.0.0.0", "::", ""} else self.host
-        name = f"[{shown}]" if ":" in shown else shown
-        return f"http://{name}:{self.port}/#token={self.token}"
+        return self.addresses[0]
+
+    @property
+    def addresses(self) -> list[str]:
+        """All that a person may open: a server bound to every address is reached from other machines too."""
+        names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
+        return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
 
     async def start(self) -> None:
         """Listen.
@@ -165,13 +170,12 @@ class ViewerServer:
 
     def _request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Serve the page, let the websocket through, refuse everything else."""
-        host = request.headers.get("Host")
-        if not host_is_ours(host, self.host, self.port):
+        host = _only(request.headers, "Host")
+        if host is None or not host_is_ours(host, self.host, self.port):
             return _answer(403, "text/plain", b"wrong Host\n", "")
-        assert host is not None
         path = request.path.partition("?")[0]
         if path == "/socket":
-            if request.headers.get("Origin") != f"http://{host}":
+            if _only(request.headers, "Origin") != f"http://{host}":
                 return _answer(403, "text/plain", b"wrong Origin\n", host)
             return None
         kind, content = self._pages.get(path, ("text/plain", b"not found\n"))
@@ -208,7 +212,7 @@ class ViewerServer:
         except (asyncio.TimeoutError, ConnectionClosed, ViewerError):
             hello = {}
         token = hello.get("token")
-        if not (isinstance(token, str) and secrets.compare_digest(token.encode(), self.token.encode())):
+        if not (isinstance(token, str) and secrets.compare_digest(_bytes(token), _bytes(self.token))):
             await connection.close(BAD_TOKEN, "wrong or missing token")
             return False
         if hello.get("version") != messages.VERSION:
@@ -371,6 +375,17 @@ class ViewerServer:
             loop.call_soon_threadsafe(lambda: loop.create_task(self._tell_all(status)))
 
         return report
+
+
+def _only(headers: Headers, name: str) -> str | None:
+    """Value of a header that stands there once; None for none, or for several, of which a proxy may see another."""
+    values = headers.get_all(name)
+    return values[0] if len(values) == 1 else None
+
+
+def _bytes(token: str) -> bytes:
+    """Bytes of any text of JSON, half surrogate pairs too, which UTF-8 has no bytes for."""
+    return token.encode("utf-8", "surrogatepass")
 
 
 def _answer(status: int, kind: str, content: bytes, host: str) -> Response:

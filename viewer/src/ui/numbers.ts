@@ -48,6 +48,13 @@ export function millimetres(metres: number): string {
   return `${(1000 * metres).toFixed(1)} mm`;
 }
 
+/** Sides of a body in m, told in the unit that suits the longest: 200 × 123.4 × 80 mm. */
+export function sizeText(sides: readonly number[]): string {
+  const largest = Math.max(...sides);
+  const [unit, scale] = largest < 1e-3 ? ["µm", 1e6] : largest > 3 ? ["m", 1] : ["mm", 1e3];
+  return `${sides.map((side) => Number((scale * side).toPrecision(4))).join(" × ")} ${unit}`;
+}
+
 /** An angle in degrees, with its sign. */
 export function degrees(angle: number): string {
   const whole = Math.round(angle);
