@@ -25,6 +25,12 @@ export interface Pressing {
   depth: number;
 }
 
+/** How a tool is held on the surface that it touches, degrees: how far it leans from upright, and where to. */
+export interface Posture {
+  tilt: number;
+  turn: number;
+}
+
 export interface State {
   connection: ConnectionState;
   role: Role;
@@ -56,6 +62,8 @@ export interface State {
   strike: boolean;
   impulse: number;
   pressing: Readonly<Pressing> | null;
+  /** Of each tool. */
+  postures: readonly Readonly<Posture>[];
   /** Tools that stay where they were left. */
   pinned: readonly number[];
   /** Whether the next press stays where it is let go. */
@@ -84,6 +92,7 @@ export function initialState(): State {
     strike: false,
     impulse: 0,
     pressing: null,
+    postures: [],
     pinned: [],
     pinNext: false,
   };

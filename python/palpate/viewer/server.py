@@ -306,29 +306,39 @@ class ViewerServer:
         """Switch to another model; the one shown goes on until the new one is ready."""
         if self._scene_of is None or name not in self._models:
             raise ViewerError(f"there is no model '{str(name)[:40]}'")
-        if self._building is not None:
-            raise ViewerError("another model is being prepared")
-        self._building = LongWork()
-        self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name), self._building))
-
-    async def _reshape(self, message: dict[str, Any]) -> None:
-        """Give a tool another shape: another loop on the same bodies."""
-        if self._building is not None:
-            raise ViewerError("another model is being prepared")
-        session = await self._worker.call(self._session.reshaped, message)
-        if session is not None:
-            await self._worker.call(self._exchange, session)
-            await self._tell_all(await self._worker.call(session.settings))
-
-    async def _switch(self, name: str, scene: Scene, building: LongWork) -> None:
+        scene, building = self._scene_of(name), self._begin_building()
         solving = self._reporter(f"Solving the {name}", building)
         modes = self._reporter(f"Computing the modes of the {name}", building)
+        make = lambda: Session(scene.build(solving, modes))  # noqa: E731
+        self._build_task = asyncio.create_task(self._switch(f"Loading the {name}", make, self._exchange, building))
+
+    async def _reshape(self, message: dict[str, Any]) -> None:
+        """Give a tool another shape: another loop on the same bodies, while the one before goes on."""
+        before = self._session
+        built = await self._worker.call(before.reshaped, message)
+        if built is None:
+            return
+        make = lambda: Session(built, before.own_tools)  # noqa: E731
+        building = self._begin_building()
+        self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
+
+    def _begin_building(self) -> LongWork:
+        if self._building is not None:
+            raise ViewerError("wait until what is being prepared is ready, or cancel it")
+        self._building = LongWork()
+        return self._building
+
+    async def _switch(
+        self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: LongWork
+    ) -> None:
+        """Make a session beside the one that runs, and put it in its place."""
         try:
-            await self._tell_all({"type": "status", "text": f"Loading the {name}", "progress": None, "left_s": None})
+            await self._tell_all({"type": "status", "text": text, "progress": None, "left_s": None})
             await self._worker.call(self._session.release)
-            session = await building.run(lambda: Session(scene.build(solving, modes)), Session.close)
+            session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
-            await self._worker.call(self._exchange, session)
+            await self._worker.call(exchange, session)
+            await self._tell_all(await self._worker.call(session.settings))
         except Error as error:
             await self._tell_all({"type": "error", "text": str(error)})
         finally:
@@ -339,6 +349,10 @@ class ViewerServer:
         self._session.close()
         session.start()
         self._session = session
+
+    def _inherit(self, session: Session) -> None:
+        session.take_over(self._session)
+        self._exchange(session)
 
     def _reporter(self, text: str, work: LongWork) -> Callable[[int, int], None]:
         """Tell all pages how far a long work is, from any thread; it begins with the first call.

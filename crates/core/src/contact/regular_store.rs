@@ -4,18 +4,15 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use glam::DMat3;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
-use super::regular::{CompliantBody, RegularCompliance};
+use super::regular::{CompliantBody, FIELDS, FanFields, RegularCompliance};
 use crate::Result;
 use crate::files::{unwritten, write_whole};
 
 /// Version of what is computed and of the file's layout; part of the key.
-const VERSION: u32 = 1;
+const VERSION: u32 = 3;
 const FORMAT: &str = "palpate-contact";
-/// Places of the symmetric block's numbers in a matrix by columns.
-const UPPER: [usize; 6] = [0, 3, 6, 4, 7, 8];
 
 impl RegularCompliance {
     /// Takes what stands beside the store of the body, for a tool of `radius`, m, on a device up to `max_stiffness`, N/m;
@@ -50,16 +47,15 @@ fn key(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> String {
 }
 
 fn save(computed: &RegularCompliance, path: &Path, key: &str) -> Result<()> {
-    let blocks: Vec<f64> = computed.blocks.iter().flat_map(|b| UPPER.map(|i| b.to_cols_array()[i])).collect();
+    let bytes: &[u8] = bytemuck::cast_slice(&computed.fields);
     let metadata = HashMap::from([
         ("format".to_string(), FORMAT.to_string()),
         ("key".to_string(), key.to_string()),
-        ("checksum".to_string(), checksum(&blocks, &computed.widths)),
+        ("checksum".to_string(), checksum(bytes)),
     ]);
-    let count = computed.widths.len();
     let failed = |e| unwritten(path, e);
-    let view = |shape, numbers| TensorView::new(Dtype::F64, shape, bytemuck::cast_slice(numbers)).map_err(failed);
-    let views = [("blocks", view(vec![count, 6], &blocks)?), ("widths", view(vec![count], &computed.widths)?)];
+    let shape = vec![computed.fields.len(), FIELDS];
+    let views = [("fields", TensorView::new(Dtype::F64, shape, bytes).map_err(failed)?)];
     write_whole(path, |partial| safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed))
 }
 
@@ -69,20 +65,14 @@ fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
     let (_, header) = SafeTensors::read_metadata(&bytes).ok()?;
     let metadata = header.metadata().clone()?;
     let tensors = SafeTensors::deserialize(&bytes).ok()?;
-    let numbers = |name: &str, count: usize| -> Option<Vec<f64>> {
-        let tensor = tensors.tensor(name).ok()?;
-        let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
-        let found: Vec<f64> = tensor.data().chunks_exact(8).map(number).collect();
-        (tensor.dtype() == Dtype::F64 && found.len() == count).then_some(found)
-    };
-    let (blocks, widths) = (numbers("blocks", 6 * fans)?, numbers("widths", fans)?);
-    let right = metadata.get("key")? == key && metadata.get("checksum")? == &checksum(&blocks, &widths);
-    let matrix = |b: &[f64]| DMat3::from_cols_array(&[b[0], b[1], b[2], b[1], b[3], b[4], b[2], b[4], b[5]]);
-    right.then(|| RegularCompliance { blocks: blocks.chunks_exact(6).map(matrix).collect(), widths })
+    let tensor = tensors.tensor("fields").ok()?;
+    let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
+    let entry = |bytes: &[u8]| -> FanFields { std::array::from_fn(|i| number(&bytes[8 * i..8 * (i + 1)])) };
+    let whole = tensor.dtype() == Dtype::F64 && tensor.shape() == [fans, FIELDS];
+    let right = whole && metadata.get("key")? == key && metadata.get("checksum")? == &checksum(tensor.data());
+    right.then(|| RegularCompliance { fields: tensor.data().chunks_exact(8 * FIELDS).map(entry).collect() })
 }
 
-fn checksum(blocks: &[f64], widths: &[f64]) -> String {
-    let mut hash = blake3::Hasher::new();
-    hash.update(bytemuck::cast_slice(blocks)).update(bytemuck::cast_slice(widths));
-    hash.finalize().to_hex().to_string()
+fn checksum(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
 }

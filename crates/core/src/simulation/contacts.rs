@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
-use super::law::LocalContact;
+use super::law::{ASKED, LocalContact};
 use super::tool::LawKind;
 use crate::contact::TouchPatch;
 
@@ -63,6 +63,21 @@ pub struct Contact {
     pub local: LocalContact,
 }
 
+impl Contact {
+    /// Place at which its strain was asked for under a serial, m.
+    pub(super) fn asked_at(&self, serial: u64) -> DVec3 {
+        self.local.asked[serial as usize % ASKED]
+    }
+
+    /// Has its strain asked for anew where it has slid on by more than `way`, m, since it was asked for last.
+    pub(super) fn ask_anew(&mut self, way: f64) {
+        if self.asked_at(self.serial).distance(self.point) > way {
+            self.serial += 1;
+            self.local.asked[self.serial as usize % ASKED] = self.point;
+        }
+    }
+}
+
 /// Slots for contacts. The patches stand apart, so that looking through the slots touches little memory.
 #[derive(Clone, Debug)]
 pub struct Contacts {
@@ -78,7 +93,7 @@ impl Default for Contacts {
 }
 
 /// Bits of a serial that count the places of one contact.
-pub(super) const REVISIONS: u32 = 16;
+pub(super) const REVISIONS: u32 = 24;
 
 impl Contacts {
     /// Serial of a contact that begins.
@@ -116,8 +131,13 @@ impl Contacts {
     pub(super) fn copy_from(&mut self, other: &Contacts) {
         self.begun = other.begun;
         for slot in 0..MAX_CONTACTS {
+            let empty = |contact: &Contact| contact.mode == Mode::Free;
+            // Empty slots are all alike.
+            if empty(&self.slots[slot]) && empty(&other.slots[slot]) {
+                continue;
+            }
             self.slots[slot] = other.slots[slot];
-            if other.slots[slot].mode != Mode::Free {
+            if !empty(&other.slots[slot]) {
                 self.patches[slot].copy_from(&other.patches[slot]);
             }
         }

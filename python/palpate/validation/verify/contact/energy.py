@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +29,6 @@ FRICTIONS = (0.0, 0.3, 1.0)
 PATHS, TICKS = 10_000, 400
 # Limits that scenes have unless they say otherwise.
 DEFAULT_DEVICE: dict = {}
-# Ticks of the force loop's ramp after its start, and some. Two tools wait for it: each port balances by itself what the
-# ramp withholds, and what one hand presses into the body meanwhile comes out at the other (0.5 % of the peak, once).
-RAMP = 300
 PASSIVE = "passivity"
 
 
@@ -69,11 +68,26 @@ def closed_paths() -> Outcome:
     return Outcome(checks)
 
 
+@dataclass(frozen=True)
+class HeldTool:
+    """A tool's table without its friction, and how it is held: its origin ``height`` over its lowest point, m.
+
+    ``orientation`` is the one about which paths turn it, w x y z.
+    """
+
+    table: Mapping[str, Any]
+    height: float
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+SPHERE = HeldTool(sphere(RADIUS), RADIUS)
+
+
 class EnergyBench:
     """Loops over one block."""
 
-    def __init__(self, body: Body, count: int = 60):
-        self.body = body
+    def __init__(self, body: Body, tool: HeldTool = SPHERE, count: int = 60):
+        self.body, self.tool = body, tool
         self.green = green_of(body, touch=top_nodes(body))
         with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
             basis = modes(body, count, path=Path(folder) / "modes.palpate", progress=False)
@@ -83,7 +97,7 @@ class EnergyBench:
 
     def simulation(self, condition: Condition) -> Simulation:
         """Force loop for a condition."""
-        tools = [sphere(RADIUS, condition.friction)] * condition.tools
+        tools = [{**self.tool.table, "friction": condition.friction}] * condition.tools
         device = DEFAULT_DEVICE if condition.limited else None
         return loop_of(self.body, self.green, tools, device, self.motion if condition.moving else None)
 
@@ -93,20 +107,27 @@ class EnergyBench:
         middle = (low + high) / 2
         apart = 0.0 if condition.tools == 1 else SLIDE + RADIUS
         centres = np.array([[middle[0] + side * apart, middle[1], high[2]] for side in (-1, 1)[: condition.tools]])
-        return ClosedPaths.over(
-            centres, RADIUS, paths=count, ticks=TICKS, slide=SLIDE, depth=(5e-4, 3e-3), seed=CONDITIONS.index(condition)
+        paths = ClosedPaths.over(
+            centres,
+            self.tool.height,
+            paths=count,
+            ticks=TICKS,
+            slide=SLIDE,
+            depth=(5e-4, 3e-3),
+            seed=CONDITIONS.index(condition),
         )
+        return paths.holding(self.tool.orientation)
 
     def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
-        """Return forces and torques (paths, ticks, tools, 3); a body in motion starts each path at rest."""
+        """Return forces and torques (paths, ticks, tools, 3).
+
+        A body in motion starts each path at rest, and a device with limits each at the start of its ramp, which lasts
+        for more than half of a path.
+        """
         simulation = self.simulation(condition)
-        if not condition.moving:
-            positions, orientations = paths.script()
-            lead = RAMP if condition.tools == 2 and condition.limited else 0
-            before = np.full((lead, *positions.shape[1:]), np.nan)
-            upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (lead, *orientations.shape[1:]))
-            recording = simulation.play(np.vstack([before, positions]), np.vstack([upright, orientations]))
-            return tuple(paths.of_script(rows[lead:]) for rows in (recording.forces, recording.torques))
+        if not (condition.moving or condition.limited):
+            recording = simulation.play(*paths.script())
+            return tuple(paths.of_script(rows) for rows in (recording.forces, recording.torques))
         played = [simulation.play(*path) for path in zip(paths.positions, paths.orientations, strict=True)]
         return np.stack([each.forces for each in played]), np.stack([each.torques for each in played])
 

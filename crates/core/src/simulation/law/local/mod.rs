@@ -24,10 +24,11 @@ mod reference;
 mod response;
 mod wrench;
 
+pub(in crate::simulation) use contact::ASKED;
 pub use contact::LocalContact;
 pub use met::{LocalBody, LocalTool};
 pub use reference::depth_below;
-pub use response::{LocalResponse, Others, evaluate};
+pub use response::{Guess, LocalResponse, Others, evaluate};
 pub use wrench::{Cells, takes_cells};
 
 use glam::{DMat3, DVec3};
@@ -36,11 +37,11 @@ use self::reference::Reference;
 use super::{Approach, Law};
 use crate::contact::Refusal;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::FootPoint;
-use crate::simulation::body::{BodyDynamics, LocalSurface};
+use crate::contact::smooth::{FootPoint, Neighbourhood};
+use crate::simulation::body::LocalSurface;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
-use crate::simulation::tool::{LawKind, ToolModel};
+use crate::simulation::tool::LawKind;
 
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
 const JUMP: f64 = 2.0;
@@ -48,21 +49,29 @@ const JUMP: f64 = 2.0;
 /// The law.
 pub struct Local;
 
-/// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m.
-fn first_foot(approach: &Approach<'_>, local: &LocalSurface, place: DVec3) -> Option<(FootPoint, f64)> {
+/// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m. `None` where it
+/// is too far to reach it.
+fn first_foot(
+    approach: &Approach<'_>,
+    local: &LocalSurface,
+    place: DVec3,
+    near: &mut Neighbourhood,
+) -> Option<(FootPoint, f64)> {
     let (body, tool) = (approach.body, approach.tool);
-    let foot_of = |point| local.smooth.foot_anywhere(&body.loaded, &body.query, point);
-    if let ToolShape::Sphere { radius } = tool.shape {
-        let foot = foot_of(place)?;
-        return Some((foot, radius - foot.distance));
+    let (drawn, rotation) = (body.drawn(), DMat3::from_quat(approach.orientation));
+    let centre = place + rotation * tool.shape.centre();
+    let closest = body.closest(centre)?;
+    if local.smooth.surely_beyond(tool.shape.bounding_radius(), &closest) {
+        return None;
     }
-    let rotation = DMat3::from_quat(approach.orientation);
-    let from = foot_of(place + rotation * tool.shape.centre())?;
+    let from = local.smooth.foot_from(drawn, centre, &closest, near);
+    if let ToolShape::Sphere { radius } = tool.shape {
+        return Some((from, radius - from.distance));
+    }
     if from.distance > tool.shape.bounding_radius() {
         return Some((from, 0.0));
     }
-    let met = (&local.smooth, &body.loaded, &body.query);
-    let (foot, _) = Reference::find(met, &tool.shape, (place, rotation), &from)?;
+    let (foot, _) = Reference::find((&local.smooth, drawn), &tool.shape, (place, rotation), &from, near)?;
     Some((foot, depth_below(&tool.shape, (place, rotation), &foot)))
 }
 
@@ -71,11 +80,15 @@ impl Law for Local {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        _covering: &mut Covering,
+        covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };
-        let Some((foot, depth)) = first_foot(approach, local, met) else { return Ok(None) };
+        covering.near.forget();
+        let Some((foot, depth)) = first_foot(approach, local, met, &mut covering.near) else {
+            *entry_depth = 0.0;
+            return Ok(None);
+        };
         *entry_depth = entry_depth.min(depth.max(0.0));
         if depth <= *entry_depth {
             return Ok(None);
@@ -88,7 +101,7 @@ impl Law for Local {
             entry: *entry_depth,
             foot,
             share: 1.0,
-            watched: foot.position,
+            asked: [foot.position; ASKED],
             ..LocalContact::default()
         };
         Ok(Some(Contact {
@@ -110,10 +123,6 @@ impl Law for Local {
         (local.tool, local.orientation) = (approach.position, approach.orientation);
         // Withdrawn, it may come in again as deep as it has been left.
         !approach.grab && !jumped
-    }
-
-    fn respond(&self, _tool: &ToolModel, dynamics: Option<&BodyDynamics>, _own: &DMat3) -> f64 {
-        dynamics.map_or(0.0, |dynamics| 1.0 / dynamics.coupling)
     }
 
     fn end(&self, contact: &Contact) -> bool {
