@@ -1,8 +1,4 @@
-<<<<<<< HEAD
 """Feel for a hard nodule in soft tissue: a fingertip slides over it at constant depth, and over tissue without one.
-=======
-"""Feel for a hard nodule in soft tissue: a fingertip slides over it at constant depth, and over tissue without.
->>>>>>> messages
 
 Usage: nodule.py [plot.png]
 """

@@ -20,7 +20,7 @@ from palpate.validation.verify.solution import green_of, quiet_body
 
 MM = 1e-3
 # Size of the elements far away, in the ball, and under the sphere, mm.
-FAR, IN_BALL, UNDER = 8.0, 1.7, 0.9
+FAR, IN_BALL, UNDER = 8.0, 2.2, 1.1
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class HiddenBall:
         geometry = CSGeometry()
         geometry.Add(block - ball)
         geometry.Add((block * ball).maxh(IN_BALL))
-        parameters = MeshingParameters(maxh=FAR, grading=0.45)
+        parameters = MeshingParameters(maxh=FAR, grading=0.5)
         for x in np.arange(max(left, -reach), reach, 0.5):
             for y in np.arange(0, reach, 0.5):
                 parameters.RestrictH(x, y, 0, UNDER)

@@ -17,8 +17,8 @@ MIDDLE, TOP, DEPTH, DEEPER = 0.04, 0.04, 1.5e-3, 0.2e-3
 SOFT = palpate.Material(5e3, 0.45)
 # Young's modulus of the nodule, Pa, and its radius, m, 10 mm deep: contrasts of 6, 12 and 27 per cent.
 NODULES = ((11e3, 5e-3), (26e3, 5e-3), (13.5e3, 7e-3))
-# Largest difference from the direct contrast of force; that of stiffness is a difference of such forces.
-POINTS, POINTS_OF_STIFFNESS = 0.02, 0.03
+# Largest difference from the direct contrasts.
+POINTS = 0.02
 
 
 def scene(youngs_modulus: float, radius: float) -> palpate.Scene:
@@ -72,14 +72,13 @@ def test_a_nodule_is_felt_as_the_direct_solution_says(plain, radius):
     for modulus, expected in zip(moduli, contrasts(plain.scene.tools[0].radius, radius, moduli), strict=True):
         gain = felt(scene(modulus, radius).build(progress=False), line) / without - 1
         print(f"E {modulus:g} Pa, radius {radius:g} m: {gain[middle]}, direct {expected}")
-        tolerances = np.array([POINTS, POINTS_OF_STIFFNESS])
-        assert (np.abs(gain[middle] - expected) < tolerances).all()
+        assert np.abs(gain[middle] - expected).max() < POINTS
         # It is felt where it is, and is gone twenty millimetres away.
         assert np.abs(line[gain.argmax(axis=0)] - MIDDLE).max() < 2e-3
         assert np.abs(gain[[0, -1]]).max() < 0.02
         # Tolerances that can fail: another force on the body with the nodule, or another sign.
         for wrong in (1.05, -1.0):
-            assert (np.abs(wrong * (1 + gain[middle]) - (1 + expected)) > tolerances).all()
+            assert np.abs(wrong * (1 + gain[middle]) - (1 + expected)).min() > POINTS
 
 
 @pytest.mark.slow
@@ -89,7 +88,7 @@ def test_beside_the_nodule_the_force_is_that_of_the_direct_solution(plain):
     line = np.array([MIDDLE - aside, MIDDLE + aside])
     gain = felt(scene(modulus, radius).build(progress=False), line) / felt(plain, line) - 1
     print(f"{aside:g} m beside: {gain}, direct {expected}")
-    assert (np.abs(gain - expected) < (POINTS, POINTS_OF_STIFFNESS)).all()
+    assert np.abs(gain - expected).max() < POINTS
 
 
 @pytest.mark.slow
