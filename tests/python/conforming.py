@@ -36,7 +36,19 @@ class HiddenBall:
     size: float = 0.04
 
     def mesh(self, reach: float) -> palpate.TetMesh:
-        """Return the part with the origin under the sphere; regions 0 and, in the ball, 1."""
+        """Return the part with the origin under the sphere; regions 0 and, in the ball, 1, which has the ball's volume."""
+        mesh = self._mesh(reach, self.radius)
+        corners = mesh.nodes[mesh.tets[mesh.regions == 1][:, :4]]
+        found = self._parts * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
+        # Its flat faces lie within the ball.
+        return self._mesh(reach, self.radius * (4 / 3 * np.pi * self.radius**3 / found) ** (1 / 3))
+
+    @property
+    def _parts(self) -> int:
+        """How many of what is meshed make the block."""
+        return 4 if self.aside == 0 else 2
+
+    def _mesh(self, reach: float, radius: float) -> palpate.TetMesh:
         size, reach, aside = self.size / MM, reach / MM, self.aside / MM
         left = 0.0 if aside == 0 else aside - size
         corners = {-1: Pnt(left, 0, -size), 1: Pnt(aside + size, size, 0)}
@@ -44,7 +56,7 @@ class HiddenBall:
         block = planes[0]
         for plane in planes[1:]:
             block = block * plane
-        ball = Sphere(Pnt(aside, 0, -self.depth / MM), self.radius / MM)
+        ball = Sphere(Pnt(aside, 0, -self.depth / MM), radius / MM)
         geometry = CSGeometry()
         geometry.Add(block - ball)
         geometry.Add((block * ball).maxh(IN_BALL))
@@ -75,6 +87,5 @@ class HiddenBall:
         for modulus in moduli:
             material = {0: soft, 1: palpate.Material(modulus, soft.poissons_ratio)}
             problem = ContactProblem.on_top(green_of(quiet_body(mesh, material, fixed), touch=touch), mesh)
-            parts = 4 if self.aside == 0 else 2
-            forces.append([parts * press.force for press in problem.press(tools.sphere(radius), depths)])
+            forces.append([self._parts * press.force for press in problem.press(tools.sphere(radius), depths)])
         return np.array(forces)
