@@ -36,7 +36,7 @@ class HiddenBall:
     size: float = 0.04
 
     def mesh(self, reach: float) -> palpate.TetMesh:
-        """Return the part with the origin under the sphere; regions 0 and, in the ball, 1, which has the ball's volume."""
+        """Return the part with the origin under the sphere; regions 0 and 1, the ball, of its volume."""
         mesh = self._mesh(reach, self.radius)
         corners = mesh.nodes[mesh.tets[mesh.regions == 1][:, :4]]
         found = self._parts * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
