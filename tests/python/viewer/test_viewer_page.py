@@ -31,12 +31,6 @@ def struck(cache):
 
 
 @pytest.fixture
-def page(chromium, program):
-    with opened(chromium, program) as page:
-        yield page
-
-
-@pytest.fixture
 def moving_page(chromium, struck):
     with opened(chromium, struck) as page:
         yield page
