@@ -17,7 +17,19 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
 
-from browser import CHROMIUM, FLAGS, Program, drag, opened, press, settled_depth, settled_force, state, until  # noqa: E402
+from browser import (  # noqa: E402
+    CHROMIUM,
+    FLAGS,
+    STILL_CELLS,
+    Program,
+    drag,
+    opened,
+    press,
+    settled_depth,
+    settled_force,
+    state,
+    until,
+)
 from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
 
 # So long the page has stood before its picture, s: the plots show ten seconds.
@@ -93,7 +105,7 @@ def tools(chromium: Browser, out: Path) -> None:
         page.keyboard.down("Alt")
         drag(page, (x, y + 40), (x + 50, y + 30))
         page.keyboard.up("Alt")
-        settled_force(page)
+        settled_force(page, STILL_CELLS)
         time.sleep(STANDS)
         take(page, out / "tools.png", 1)
 
