@@ -21,6 +21,7 @@ export class Viewport {
   readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.001, 10);
   readonly controls: OrbitControls;
   private readonly renderer: THREE.WebGLRenderer;
+  private readonly viewListeners: (() => void)[] = [];
   private dirty = true;
   private framed: { points: Float32Array; scene: SceneMessage } | null = null;
   private region: Region = { left: 0, top: 0, width: 1, height: 1 };
@@ -38,7 +39,9 @@ export class Viewport {
     this.addLights();
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.mouseButtons = { LEFT: THREE.MOUSE.ROTATE, MIDDLE: THREE.MOUSE.PAN, RIGHT: THREE.MOUSE.ROTATE };
-    this.controls.addEventListener("change", () => this.invalidate());
+    // One finger presses wherever it meets a body, so two must do for all of the rest, but for moving: three do that.
+    this.controls.touches = { ONE: THREE.TOUCH.ROTATE, TWO: THREE.TOUCH.DOLLY_ROTATE };
+    this.controls.addEventListener("change", () => this.changeView());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
     this.renderer.setAnimationLoop(() => this.tick());
@@ -71,7 +74,7 @@ export class Viewport {
     this.controls.minDistance = 0.1 * size;
     this.controls.maxDistance = 15 * size;
     this.controls.update();
-    this.invalidate();
+    this.changeView();
   }
 
   reframe(): void {
@@ -111,22 +114,21 @@ export class Viewport {
     return (2 * depth * Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW_DEG) / 2)) / this.canvas.clientHeight;
   }
 
-  /** The picture as PNG. Drawn anew first: the browser may clear what it has shown. */
-  toPng(): Promise<Blob | null> {
-    const background = backdrop();
-    this.scene.background = background;
+  /** Draws at once. */
+  render(): void {
     this.renderer.render(this.scene, this.camera);
-    this.scene.background = null;
-    background.dispose();
-    this.invalidate();
-    return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
+  }
+
+  /** Calls a listener whenever the bodies are seen from elsewhere, or larger, or smaller. */
+  onView(listener: () => void): void {
+    this.viewListeners.push(listener);
   }
 
   private tick(): void {
     if (this.beforeDraw()) this.dirty = true;
     if (this.dirty) {
       this.dirty = false;
-      this.renderer.render(this.scene, this.camera);
+      this.render();
     }
     this.afterDraw();
   }
@@ -145,8 +147,13 @@ export class Viewport {
     if (fitBefore > 0) {
       this.camera.position.sub(target).multiplyScalar(this.fitHere() / fitBefore).add(target);
     }
-    this.renderer.render(this.scene, this.camera);
+    this.render();
+    this.changeView();
+  }
+
+  private changeView(): void {
     this.invalidate();
+    for (const listener of this.viewListeners) listener();
   }
 
   private fitHere(): number {
@@ -192,19 +199,4 @@ function drawsInSoftware(): boolean {
   const name = String(probe.getParameter(probe.RENDERER));
   probe.getExtension("WEBGL_lose_context")?.loseContext();
   return SOFTWARE_DRIVER.test(name);
-}
-
-/** For pictures that are saved: dark, and a little lighter in the middle, as the style of the page has it. */
-function backdrop(): THREE.CanvasTexture {
-  const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = 256;
-  const context = canvas.getContext("2d")!;
-  const gradient = context.createRadialGradient(128, 112, 10, 128, 128, 190);
-  gradient.addColorStop(0, "#343b46");
-  gradient.addColorStop(1, "#171a20");
-  context.fillStyle = gradient;
-  context.fillRect(0, 0, 256, 256);
-  const texture = new THREE.CanvasTexture(canvas);
-  texture.colorSpace = THREE.SRGBColorSpace;
-  return texture;
 }
