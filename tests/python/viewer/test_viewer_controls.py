@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from browser import MARKS, Program, press, settled_force, state, until
 
+import palpate
+
 pytestmark = MARKS
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
@@ -231,6 +233,28 @@ def test_all_is_within_reach_on_a_phone(phone, sheet):
     assert phone.get_by_test_id("legend-max").is_visible()
     width, height = phone.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert (width, height) == (390, 844)
+
+
+def test_the_body_stays_in_sight_when_the_sheet_goes(phone):
+    nodes = palpate.models.load("liver", paper=True).nodes
+    ends = nodes[np.concatenate([nodes.argmin(axis=0), nodes.argmax(axis=0)])]
+
+    def seen() -> np.ndarray:
+        time.sleep(0.5)
+        return np.array([phone.evaluate("p => window.palpate.project(p)", end.tolist()) for end in ends])
+
+    first = seen()
+    phone.get_by_test_id("sheet-toggle").tap()
+    alone = seen()
+    canvas = phone.locator("#canvas").bounding_box()
+    assert canvas["height"] > 700
+    assert (alone > [0, 0]).all() and (alone < [canvas["width"], canvas["height"]]).all()
+    # It uses the room that it has.
+    assert np.ptp(alone[:, 0]) > 0.6 * canvas["width"] and np.ptp(alone[:, 0]) > np.ptp(first[:, 0])
+    phone.get_by_test_id("sheet-toggle").tap()
+    assert np.allclose(seen(), first, atol=2)
+    phone.get_by_test_id("sheet-tall").tap()
+    assert np.allclose(seen(), first, atol=2)
 
 
 class Fingers:

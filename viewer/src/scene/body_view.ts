@@ -231,6 +231,7 @@ export class BodyView {
   private applyCut(): void {
     const { normal, offset } = this.plane;
     this.solid.cut(this.cutShown ? this.plane : null);
+    this.supports.cut(this.cutShown ? this.plane : null);
     if (this.cutShown) this.section?.setPlane(normal, offset);
   }
 

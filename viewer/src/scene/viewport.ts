@@ -25,6 +25,8 @@ export class Viewport {
   private dirty = true;
   private framed: { points: Float32Array; scene: SceneMessage } | null = null;
   private region: Region = { left: 0, top: 0, width: 1, height: 1 };
+  /** Of the picture that the region is a part of, CSS pixels. */
+  private pictureHeight = 1;
 
   /** Bodies are framed beside the overlays; beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
   constructor(
@@ -163,15 +165,16 @@ export class Viewport {
   private fit(target: THREE.Vector3, towardsViewer: THREE.Vector3): number {
     if (!this.framed) return 0;
     const { points, scene } = this.framed;
-    const { camera, region, canvas } = this;
+    const { camera, region, pictureHeight } = this;
     const room = 2 * Math.max(0, ...scene.tools.map(({ radius }) => radius));
-    return fitDistance(points, target, towardsViewer, camera, room, region, canvas.clientHeight);
+    return fitDistance(points, target, towardsViewer, camera, room, region, pictureHeight);
   }
 
   /** What the camera looks at stands in the middle of the region that nothing is written over. */
   private centreInFreeRegion(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.region = freeRegion(this.canvas, this.overlays);
+    this.pictureHeight = height;
     const { left, top } = this.region;
     const [x, y] = [left + this.region.width / 2 - width / 2, top + this.region.height / 2 - height / 2];
     this.camera.setViewOffset(width, height, -x, -y, width, height);
