@@ -4,6 +4,7 @@ mod closest;
 mod compliance;
 mod curved;
 mod face;
+mod hollows;
 mod lattice;
 pub mod local;
 mod moments;
@@ -17,6 +18,7 @@ mod touchable;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
+pub use hollows::Hollows;
 pub use compliance::{smallest_eigenvalue, touch};
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;

@@ -40,6 +40,14 @@ pub struct FootPoint {
     pub on_crease: bool,
 }
 
+impl FootPoint {
+    /// The same point for a place elsewhere, the surface being taken for its plane and the point for fixed in it.
+    pub fn held(&self, p: DVec3) -> Self {
+        let distance = (p - self.position).dot(self.normal);
+        Self { distance, turning: DMat3::ZERO, shift: DMat3::ZERO, ..*self }
+    }
+}
+
 impl SmoothSurface {
     /// The foot of `p`, followed from `start`, a triangle and a point near it. `None` for a point that is not finite.
     pub fn foot(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3, start: (u32, DVec3)) -> Option<FootPoint> {

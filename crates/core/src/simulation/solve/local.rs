@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
 use crate::contact::patch_weights;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint};
+use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
@@ -22,6 +22,7 @@ use crate::simulation::law::{
 };
 use crate::simulation::model::Model;
 use crate::simulation::solve::forces::dent_of;
+use crate::simulation::solve::handover::{go_on, hand_over, has_jumped, join};
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -41,15 +42,16 @@ const MOST_DEPTH: f64 = 1.6;
 /// Radius of the patch by which a body in motion is met, over the tool's, at least: in a step a body may be as good as rigid,
 /// and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of the patch.
 const WIDER: f64 = 1.6;
-/// A foot that goes farther in a tick, over the tool's radius, has jumped.
-const FOOT_JUMP: f64 = 0.25;
+/// Two places of a tool closer than this, over its radius, are carried along as one the closer they are: nodes do not tell
+/// them apart.
+const JOINED: f64 = 0.5;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
 /// Memory of the method.
 pub struct LocalScratch {
     weights: Vec<FanWeights>,
-    responses: Vec<LocalResponse>,
+    pub(super) responses: Vec<LocalResponse>,
     /// Compliance between contacts, and what the others do at each.
     between: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
     /// Compliance of one step less that at rest, on a body in motion, with the coupling on the diagonal.
@@ -57,7 +59,7 @@ pub struct LocalScratch {
     others: [Others; MAX_CONTACTS],
     /// What every contact counts from.
     from: [DVec3; MAX_CONTACTS],
-    places: [DVec3; MAX_CONTACTS],
+    pub(super) places: [DVec3; MAX_CONTACTS],
     steps: [DVec3; MAX_CONTACTS],
     /// Largest change of a force in the latest step, over that force.
     changed: f64,
@@ -67,6 +69,12 @@ pub struct LocalScratch {
 }
 
 impl LocalScratch {
+    /// Weighs the fans around a foot that no contact has yet.
+    pub fn weigh(&mut self, smooth: &SmoothSurface, foot: &FootPoint) -> &FanWeights {
+        smooth.weigh(foot, &mut self.weights[0]);
+        &self.weights[0]
+    }
+
     /// Takes the step.
     fn go(&mut self) {
         self.places.iter_mut().zip(&self.steps).for_each(|(place, step)| *place += *step);
@@ -139,20 +147,38 @@ pub struct Memory<'a> {
     pub system: &'a mut System,
 }
 
-/// Forces of the contacts of a body under the local law.
-pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: usize, controls: &Controls) {
-    let mut slots = [0; MAX_CONTACTS];
-    let mut count = 0;
-    for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
-        slots[count] = slot;
-        count += 1;
+/// Forces of the contacts of a body under the local law. Where the foot of one has jumped they are found once more, with what
+/// takes its place.
+pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, body: usize, controls: &Controls) {
+    for last in [false, true] {
+        let mut slots = [0; MAX_CONTACTS];
+        let mut count = 0;
+        for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
+            slots[count] = slot;
+            count += 1;
+        }
+        let slots = &slots[..count];
+        if count == 0 || !settle(model, state, &mut memory, slots, body, controls) {
+            return;
+        }
+        if last || !hand_over(model, state, &memory, slots) {
+            take_up(model, state, memory.local, slots, body);
+            return;
+        }
     }
-    if count == 0 {
-        return;
-    }
-    let slots = &slots[..count];
+}
+
+/// Newton's method; false where a contact had to be let go.
+fn settle(
+    model: &Model,
+    state: &mut State,
+    memory: &mut Memory<'_>,
+    slots: &[usize],
+    body: usize,
+    controls: &Controls,
+) -> bool {
     let Memory { covering, local, system } = memory;
-    local.others[..count].fill(Others::default());
+    local.others[..slots.len()].fill(Others::default());
     follow_motion(model, state, covering, local, slots, body);
     let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
@@ -169,7 +195,7 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
     let most = if cells { MOST_CELL_STEPS } else { MOST_STEPS };
     for step in 0..most {
         if !meet(model, state, local, slots, body, controls, step) {
-            return;
+            return false;
         }
         let longest = advance(local, system, &deepest, slots.len());
         let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
@@ -180,7 +206,7 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
             local.go();
         }
     }
-    take_up(model, state, local, slots, body);
+    true
 }
 
 /// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, and what
@@ -296,10 +322,12 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
     for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
             let patches = &state.contacts.patches;
+            let joined = joined(model, state, local, (a, slot), (b, other));
+            let mean = (local.responses[a].compliance + local.responses[b].compliance) * 0.5;
             if state.bodies[body].motion.is_some() {
                 // The slope is that of the moving surface, whoever moves it.
                 let at_rest = patches[slot].compliance_with(green, &patches[other]);
-                local.between[a][b] = at_rest + local.change[a][b];
+                local.between[a][b] = at_rest * (1.0 - joined) + mean * joined + local.change[a][b];
                 continue;
             }
             let (mut block, mut slope) = (DMat3::ZERO, DVec3::ZERO);
@@ -309,10 +337,30 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
                 block += of_node * (weight / scale);
                 slope += gradient * (own.dot(of_node * force) / scale);
             }
-            local.between[a][b] = block;
+            if joined > 0.0
+                && let Some(met) = local_body(model, state, state.contacts.slots[slot].tool, body)
+            {
+                let mut shared = DVec3::ZERO;
+                for (fan, _, gradient) in local.weights[a].with_gradients() {
+                    shared += gradient * (0.5 * own.dot(met.regular[fan] * force) / scale);
+                }
+                slope = slope * (1.0 - joined) + shared * joined;
+            }
+            local.between[a][b] = block * (1.0 - joined) + mean * joined;
             local.others[a].slope += slope;
         }
     }
+}
+
+/// Part by which two contacts are carried along as one: places of one tool that are close together.
+fn joined(model: &Model, state: &State, local: &LocalScratch, (a, own): (usize, usize), (b, other): (usize, usize)) -> f64 {
+    let tool = state.contacts.slots[own].tool;
+    if state.contacts.slots[other].tool != tool {
+        return 0.0;
+    }
+    let apart = local.responses[a].foot.position.distance(local.responses[b].foot.position);
+    let t = (apart / (JOINED * model.tools[tool].radius)).min(1.0);
+    1.0 - t * t * (3.0 - 2.0 * t)
 }
 
 /// The nodes below a contact, as blended.
@@ -361,20 +409,13 @@ fn held_out(step: DVec3, foot: &FootPoint, deepest: f64) -> DVec3 {
     if beyond > 0.0 { step + foot.normal * beyond } else { step }
 }
 
-/// Whether a foot has come elsewhere than where the tool has gone: off a ridge, or through a body. The force there has
-/// nothing to do with the one before, and might have more energy: such a contact ends, and the next starts from none.
-fn has_jumped(contact: &Contact, response: &LocalResponse, place: DVec3, radius: f64) -> bool {
-    let gone = place.distance(contact.local.relative);
-    response.foot.position.distance(contact.local.foot.position) > 4.0 * gone + FOOT_JUMP * radius
-}
-
 /// Writes the answers down.
 fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
     for (a, &slot) in slots.iter().enumerate() {
         let response = &local.responses[a];
         let contact = &state.contacts.slots[slot];
-        let (tool, radius) = (contact.tool, model.tools[contact.tool].radius);
-        if has_jumped(contact, response, local.places[a], radius) {
+        let tool = contact.tool;
+        if has_jumped(model, contact, response, local.places[a]) {
             state.tools[tool].entry_depth[body] = f64::INFINITY;
             state.contacts.clear(slot);
             continue;
@@ -404,7 +445,11 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         own.energy = indentation.energy + response.springs().energy();
         own.dissipated = response.friction.dissipated;
         own.depth = depth(&model.tools[contact.tool].shape, own, &response.foot);
+        if !go_on(&model.tools[tool], contact) {
+            state.contacts.clear(slot);
+        }
     }
+    join(model, state, slots);
 }
 
 /// How far a tool reaches below the surface at rest, m.

@@ -44,13 +44,13 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// Of the body's constants at the foot and the tool's pad.
-    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, weights: &FanWeights) -> Self {
+    /// Of the body's constants at the foot and the tool's pad; of it a contact has a `part`.
+    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, weights: &FanWeights, part: f64) -> Self {
         let fans = body.smooth.fans();
         let (own, own_slope) = weights.field(|fan| body.scale * body.moduli.plane_strain(fans[fan].node));
         let (poisson, _) = weights.field(|fan| body.moduli.poissons[fans[fan].node as usize]);
-        let modulus = effective_modulus(own, 0.0, tool.pad);
-        let slope = own_slope * (modulus / own).powi(2);
+        let whole = effective_modulus(own, 0.0, tool.pad);
+        let (modulus, slope) = (part * whole, own_slope * (part * (whole / own).powi(2)));
         Self { modulus, slope, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
     }
 }

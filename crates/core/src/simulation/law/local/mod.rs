@@ -30,13 +30,14 @@ pub use reference::depth_below;
 pub use response::{LocalResponse, Others, evaluate};
 pub use wrench::{Cells, takes_cells};
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 use self::reference::Reference;
 use super::{Approach, Law};
-use crate::contact::Refusal;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::FootPoint;
+use crate::contact::smooth::{FootPoint, SmoothSurface};
+use crate::contact::{Refusal, SurfaceQuery};
+use crate::mesh::Surface;
 use crate::simulation::body::{BodyDynamics, LocalSurface};
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
@@ -47,6 +48,55 @@ const JUMP: f64 = 2.0;
 
 /// The law.
 pub struct Local;
+
+/// A tool that comes is followed from where it was in steps no longer than this, over its radius: within one of them it does not
+/// pass the middle of a part that is thicker than its radius.
+const STRIDE: f64 = 0.25;
+
+/// The foot of a tool that comes to a place over the surface at rest: once the tool touches on its way, the foot is followed, so
+/// that it lies on the side that the tool has come from. And how far the tool reaches below the plane through it, m.
+fn arrival(approach: &Approach<'_>, local: &LocalSurface, place: DVec3) -> Option<(FootPoint, f64)> {
+    let (gone, radius) = (approach.gone, approach.tool.radius);
+    let strides = (gone.length() / (STRIDE * radius)).ceil();
+    if strides > JUMP / STRIDE {
+        return first_foot(approach, local, place);
+    }
+    let mut touched: Option<FootPoint> = None;
+    for left in (1..strides.max(1.0) as u32).rev() {
+        let at = place - gone * (f64::from(left) / strides);
+        touched = match touched {
+            Some(foot) => Some(follow(approach, local, at, &foot)?.0),
+            None => first_foot(approach, local, at).filter(|(_, depth)| *depth > 0.0).map(|(foot, _)| foot),
+        };
+    }
+    match touched {
+        Some(foot) => follow(approach, local, place, &foot),
+        None => first_foot(approach, local, place),
+    }
+}
+
+/// The foot followed from an earlier one, and the depth.
+fn follow(approach: &Approach<'_>, local: &LocalSurface, place: DVec3, from: &FootPoint) -> Option<(FootPoint, f64)> {
+    let (body, shape) = (approach.body, &approach.tool.shape);
+    place_near((&local.smooth, &body.loaded, &body.query), shape, (place, approach.orientation), from)
+}
+
+/// The foot of a tool at a place, followed from one near it, and how far the tool reaches below the plane through it, m.
+pub fn place_near(
+    met: (&SmoothSurface, &Surface, &SurfaceQuery),
+    shape: &ToolShape,
+    (place, orientation): (DVec3, DQuat),
+    from: &FootPoint,
+) -> Option<(FootPoint, f64)> {
+    if let ToolShape::Sphere { radius } = *shape {
+        let (smooth, surface, query) = met;
+        let foot = smooth.foot(surface, query, place, (from.triangle, from.position))?;
+        return Some((foot, radius - foot.distance));
+    }
+    let pose = (place, DMat3::from_quat(orientation));
+    let (foot, _) = Reference::find(met, shape, pose, from)?;
+    Some((foot, depth_below(shape, pose, &foot)))
+}
 
 /// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m.
 fn first_foot(approach: &Approach<'_>, local: &LocalSurface, place: DVec3) -> Option<(FootPoint, f64)> {
@@ -75,7 +125,7 @@ impl Law for Local {
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };
-        let Some((foot, depth)) = first_foot(approach, local, met) else { return Ok(None) };
+        let Some((foot, depth)) = arrival(approach, local, met) else { return Ok(None) };
         *entry_depth = entry_depth.min(depth.max(0.0));
         if depth <= *entry_depth {
             return Ok(None);
@@ -87,6 +137,7 @@ impl Law for Local {
             turned: approach.orientation,
             entry: *entry_depth,
             foot,
+            part: 1.0,
             share: 1.0,
             watched: foot.position,
             ..LocalContact::default()
@@ -117,6 +168,6 @@ impl Law for Local {
     }
 
     fn end(&self, contact: &Contact) -> bool {
-        contact.force == DVec3::ZERO
+        contact.force == DVec3::ZERO && !contact.local.further
     }
 }

@@ -69,8 +69,10 @@ pub fn evaluate(
     if weights.touchable < 0.5 {
         return None;
     }
+    // One that has just been found counts from where it is.
     let indentation = match &reference {
-        None => indent(body, tool, &foot, tool.radius - contact.entry - foot.distance, weights),
+        _ if contact.found => Indentation::default(),
+        None => indent(body, tool, contact, &foot, weights),
         Some(reference) => indent_shape(body, tool, contact, place, (&foot, reference), weights, cells),
     };
     let mut compliance = DMat3::ZERO;
@@ -112,12 +114,17 @@ pub fn evaluate(
 
 fn meet(body: LocalBody<'_>, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3) -> Option<Met> {
     if let ToolShape::Sphere { .. } = tool.shape {
+        if contact.held {
+            return Some(Met { foot: contact.foot.held(place), reference: None });
+        }
         let start = (contact.foot.triangle, contact.foot.position);
         return Some(Met { foot: body.smooth.foot(body.surface, body.query, place, start)?, reference: None });
     }
     let pose = (place, DMat3::from_quat(contact.orientation));
-    let met = (body.smooth, body.surface, body.query);
-    let (foot, reference) = Reference::find(met, tool.shape, pose, &contact.foot)?;
+    let (foot, reference) = match contact.held {
+        true => Reference::held(tool.shape, pose, &contact.foot)?,
+        false => Reference::find((body.smooth, body.surface, body.query), tool.shape, pose, &contact.foot)?,
+    };
     Some(Met { foot, reference: Some(reference) })
 }
 
@@ -137,11 +144,18 @@ fn slope(body: LocalBody<'_>, force: DVec3, others: Others, weights: &FanWeights
 }
 
 /// Of a sphere.
-fn indent(body: LocalBody<'_>, tool: LocalTool<'_>, foot: &FootPoint, depth: f64, weights: &FanWeights) -> Indentation {
+fn indent(
+    body: LocalBody<'_>,
+    tool: LocalTool<'_>,
+    contact: &LocalContact,
+    foot: &FootPoint,
+    weights: &FanWeights,
+) -> Indentation {
+    let depth = tool.radius - contact.entry - foot.distance;
     let fans = body.smooth.fans();
     let (mean, mean_slope) = weights.field(|fan| fans[fan].mean);
     let (gauss, gauss_slope) = weights.field(|fan| fans[fan].gauss);
-    let half_space = HalfSpace::new(body, tool, weights);
+    let half_space = HalfSpace::new(body, tool, weights, contact.part);
     let curved = 1.0 / tool.radius;
     let product = curved * curved + 2.0 * mean * curved + gauss;
     let product_slope = mean_slope * (2.0 * curved) + gauss_slope;
