@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::{MAX_CONTACTS, MAX_FURTHER};
 use super::law::LocalContact;
 use super::tool::LawKind;
+use super::{MAX_CONTACTS, MAX_FURTHER};
 use crate::contact::TouchPatch;
 
 /// What a contact does.

@@ -58,12 +58,8 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
             return;
         }
         let fan = &own.smooth.fans()[start as usize];
-        let from = FootPoint {
-            triangle: fan.triangle,
-            position: fan.position,
-            normal: fan.normal,
-            ..FootPoint::default()
-        };
+        let from =
+            FootPoint { triangle: fan.triangle, position: fan.position, normal: fan.normal, ..FootPoint::default() };
         let met = (&own.smooth, &fixed.loaded, &fixed.query);
         let foot_at = |at: DVec3, from: &FootPoint| place_near(met, shape, (at, local.orientation), from);
         // As if the body were carried along there as it is below the place that is known; then as it is.
@@ -116,8 +112,10 @@ fn is_another(state: &State, (tool, body): (usize, usize), foot: &FootPoint, rad
     if foot.on_crease {
         return false;
     }
-    state.contacts.of(tool, body).map(|slot| &state.contacts.slots[slot].local).filter(|known| !known.held).all(|known| {
-        let apart = foot.position.distance(known.foot.position);
-        apart > (LEAST_DISTANCE * radius).max(known.radius) && foot.normal.dot(known.foot.normal) < APART
-    })
+    state.contacts.of(tool, body).map(|slot| &state.contacts.slots[slot].local).filter(|known| !known.held).all(
+        |known| {
+            let apart = foot.position.distance(known.foot.position);
+            apart > (LEAST_DISTANCE * radius).max(known.radius) && foot.normal.dot(known.foot.normal) < APART
+        },
+    )
 }

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from palpate.errors import Error
 from palpate.validation.verify import bending, curved, exactness, felt, half_space, vibration
 from palpate.validation.verify.check import Benchmark
-from palpate.validation.verify.contact import balance, beside, energy, friction, pressing, sliding
+from palpate.validation.verify.contact import balance, beside, energy, friction, groove, pressing, sliding
 
 BENCHMARKS = {
     benchmark.name: benchmark
@@ -30,6 +30,7 @@ BENCHMARKS = {
         Benchmark("felt", "Stiffness felt on a block", felt.felt_stiffness, slow=True),
         Benchmark("hertz", "A sphere in the tick, R = 10 mm, on a block of 10 kPa", pressing.hertz, slow=True),
         Benchmark("beside", "A sphere beside an edge, and beside another", beside.edges_and_neighbours, slow=True),
+        Benchmark("groove", "A sphere in a groove: two places at once", groove.groove, slow=True),
         Benchmark("slide", "Sliding without friction at constant depth", sliding.ripple, slow=True),
         Benchmark("sweep", "Sweeps by the micrometre", sliding.jumps, slow=True),
         Benchmark("friction", "Coulomb's cone, Mindlin's partial slip", friction.friction, slow=True),

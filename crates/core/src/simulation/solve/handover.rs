@@ -29,7 +29,7 @@ const STRETCH: f64 = 4.0;
 const JUMP: f64 = 0.02;
 const JUMP_OF_SHAPES: f64 = 0.25;
 /// The next place is no farther than this, over the tool's radius, and its normal is turned by no more than this cosine.
-const NEXT: f64 = 1.0;
+const NEXT: f64 = 0.25;
 const SAME_SIDE: f64 = 0.3;
 /// Feet closer than this, over the tool's radius, are one.
 const ONE: f64 = 0.02;

@@ -30,6 +30,13 @@ use crate::tensor::outer;
 
 /// Most steps; three or four are usual.
 pub const MOST_STEPS: usize = 16;
+/// From this step on steps are shortened, ever more: in a hollow about as narrow as the tool the force turns with the place so
+/// fast that whole steps go to and fro.
+const USUAL_STEPS: usize = 6;
+/// Longest step, over the tool's radius.
+const LONGEST: f64 = 0.5;
+/// Where the last step is longer than this, over the tool's radius, nothing has been found: contacts stay as they were a tick ago.
+const LOST: f64 = 1e-3;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
@@ -168,7 +175,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
     }
 }
 
-/// Newton's method; false where a contact had to be let go.
+/// Newton's method; false where nothing has been found, or a contact had to be let go.
 fn settle(
     model: &Model,
     state: &mut State,
@@ -197,13 +204,23 @@ fn settle(
         if !meet(model, state, local, slots, body, controls, step) {
             return false;
         }
-        let longest = advance(local, system, &deepest, slots.len());
         let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
+        let longest = advance(local, system, &deepest, slots.len());
+        if step >= USUAL_STEPS || (!cells && longest > LONGEST * radius) {
+            let share = (LONGEST * radius / longest).min(if step < USUAL_STEPS { 1.0 } else { 0.5 });
+            local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
+        }
         if longest < SETTLED * radius && step > 0 && local.changed < SAME {
             break;
         }
         if step + 1 < most {
             local.go();
+        } else if !cells && longest > LOST * radius {
+            for &slot in slots {
+                let contact = &mut state.contacts.slots[slot];
+                contact.force = contact.local.force;
+            }
+            return false;
         }
     }
     true
@@ -353,7 +370,13 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
 }
 
 /// Part by which two contacts are carried along as one: places of one tool that are close together.
-fn joined(model: &Model, state: &State, local: &LocalScratch, (a, own): (usize, usize), (b, other): (usize, usize)) -> f64 {
+fn joined(
+    model: &Model,
+    state: &State,
+    local: &LocalScratch,
+    (a, own): (usize, usize),
+    (b, other): (usize, usize),
+) -> f64 {
     let tool = state.contacts.slots[own].tool;
     if state.contacts.slots[other].tool != tool {
         return 0.0;
