@@ -2,8 +2,8 @@
 //!
 //! Each place is a contact of its own, with its foot, friction and history; they are solved together, as those of several tools
 //! are. One is looked for from the few nodes that a hollow has (`contact::Hollows`), and taken up before the tool touches it:
-//! it waits without a force, which then rises from zero with the approach. One that is found with the tool already in it
-//! counts from there. So a force begins at zero whatever the surface does, and no place makes energy.
+//! it waits without a force, which then rises from zero with the approach. One that is found with the tool deeper in it than the
+//! tool can have come since counts from there. So a force begins at zero whatever the surface does, and no place makes energy.
 //!
 //! A place is on the side of the surface that the tool has come from: its normal faces the tool's middle. The far side of a thin
 //! part never does.
@@ -14,18 +14,15 @@ use super::contacts::{Contact, Mode};
 use super::law::{LocalContact, place_near};
 use super::model::Model;
 use super::scratch::Scratch;
-use super::solve::{add_contact, dent_at};
+use super::solve::{DEEPEST, add_contact, dent_at};
 use super::state::State;
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, MAX_PLACES};
 use crate::contact::Hollows;
 use crate::contact::smooth::FootPoint;
 
-/// A place waits from where the tool is as near as this, over the tool's radius, and goes where it is farther than `FAR`.
+/// A place waits from where the tool is as near as this, over the tool's radius.
 const NEAR: f64 = 0.4;
-pub const FAR: f64 = 0.6;
-/// A place in which the tool is deeper than this when it is found, over its radius, is none: the tool did not come that way.
-pub const DEEPEST: f64 = 0.4;
 /// Least distance of two places, over the tool's radius, and largest cosine of the angle between their normals.
 const LEAST_DISTANCE: f64 = 0.25;
 const APART: f64 = 0.97;
@@ -52,6 +49,9 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
     let Contact { tool, body, local, .. } = state.contacts.slots[slot];
     let (fixed, shape, radius) = (&model.bodies[body], &model.tools[tool].shape, model.tools[tool].radius);
     let Some(own) = &fixed.local else { return };
+    // The first place of a tool is known from the tick after it has begun.
+    let before = state.tools[tool].before.map_or(local.tool, |before| fixed.placement.point_to_body(before));
+    let came = 2.0 * local.tool.distance(before);
     for &start in hollows.starts(local.foot.triangle) {
         let lasting = state.contacts.of(tool, body).filter(|&slot| !state.contacts.slots[slot].local.held).count();
         if lasting >= MAX_PLACES {
@@ -85,6 +85,7 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
                 foot,
                 further: true,
                 found: true,
+                came,
                 part: 1.0,
                 share: 1.0,
                 watched: foot.position,

@@ -10,15 +10,18 @@
 use glam::{DMat3, DVec3};
 
 use super::compliance::add_contact;
-use super::local::Memory;
 use crate::contact::shape::ToolShape;
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::further::{DEEPEST, FAR};
+use crate::simulation::covering::Covering;
 use crate::simulation::law::{LocalResponse, depth_below};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::tool::ToolModel;
 
+/// A place that waits goes where the tool is farther than this, over the tool's radius; one in which the tool is deeper than this
+/// when it is found is none: the tool did not come that way.
+const FAR: f64 = 0.6;
+pub const DEEPEST: f64 = 0.4;
 /// Ticks in which a contact fades.
 const FADING: f64 = 100.0;
 /// Least part of the half-space that a contact has.
@@ -33,6 +36,14 @@ const NEXT: f64 = 0.25;
 const SAME_SIDE: f64 = 0.3;
 /// Feet closer than this, over the tool's radius, are one.
 const ONE: f64 = 0.02;
+
+/// What has been found for the contacts of a body.
+#[derive(Clone, Copy)]
+pub struct Found<'a> {
+    pub responses: &'a [LocalResponse],
+    pub places: &'a [DVec3],
+    pub covering: &'a Covering,
+}
 
 /// Whether a foot has come elsewhere than where the tool has gone.
 pub fn has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, place: DVec3) -> bool {
@@ -50,10 +61,10 @@ pub fn has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, pl
 }
 
 /// Holds the contacts whose feet have jumped, and begins those that take their place; whether there were any.
-pub fn hand_over(model: &Model, state: &mut State, memory: &Memory<'_>, slots: &[usize]) -> bool {
+pub fn hand_over(model: &Model, state: &mut State, found: Found<'_>, slots: &[usize]) -> bool {
     let mut any = false;
     for (a, &slot) in slots.iter().enumerate() {
-        let (response, place) = (&memory.local.responses[a], memory.local.places[a]);
+        let (response, place) = (&found.responses[a], found.places[a]);
         if !has_jumped(model, &state.contacts.slots[slot], response, place) {
             continue;
         }
@@ -67,13 +78,13 @@ pub fn hand_over(model: &Model, state: &mut State, memory: &Memory<'_>, slots: &
             continue;
         }
         hold(&mut state.contacts.slots[slot]);
-        if is_known(model, state, memory, slots, a) {
+        if is_known(model, state, found, slots, a) {
             continue;
         }
         let radius = model.tools[contact.tool].radius;
         let near = response.foot.position.distance(contact.local.foot.position) < NEXT * radius;
         if near && response.foot.normal.dot(contact.local.foot.normal) > SAME_SIDE {
-            begin_next(model, state, memory, &contact, (response, place));
+            begin_next(model, state, found, &contact, (response, place));
         } else {
             // Another one begins from no force.
             state.tools[contact.tool].entry_depth[contact.body] = f64::INFINITY;
@@ -89,12 +100,12 @@ fn hold(contact: &mut Contact) {
 }
 
 /// Whether another contact of the same tool has the foot that this one has jumped to. One that fades there comes up again.
-fn is_known(model: &Model, state: &mut State, memory: &Memory<'_>, slots: &[usize], a: usize) -> bool {
-    let (own, foot) = (state.contacts.slots[slots[a]], &memory.local.responses[a].foot);
+fn is_known(model: &Model, state: &mut State, found: Found<'_>, slots: &[usize], a: usize) -> bool {
+    let (own, foot) = (state.contacts.slots[slots[a]], &found.responses[a].foot);
     let one = ONE * model.tools[own.tool].radius;
     for (b, &slot) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
         let other = &mut state.contacts.slots[slot];
-        let near = memory.local.responses[b].foot.position.distance(foot.position) < one;
+        let near = found.responses[b].foot.position.distance(foot.position) < one;
         if near && (other.tool, other.body) == (own.tool, own.body) {
             if other.local.held {
                 (other.local.held, other.local.change, other.local.foot) = (false, 1.0 / FADING, *foot);
@@ -109,7 +120,7 @@ fn is_known(model: &Model, state: &mut State, memory: &Memory<'_>, slots: &[usiz
 fn begin_next(
     model: &Model,
     state: &mut State,
-    memory: &Memory<'_>,
+    found: Found<'_>,
     before: &Contact,
     (response, place): (&LocalResponse, DVec3),
 ) {
@@ -125,7 +136,7 @@ fn begin_next(
     (own.part, own.change) = (LEAST_PART, 1.0 / FADING);
     (own.friction, own.force) = Default::default();
     next.force = DVec3::ZERO;
-    add_contact(model, state, next, memory.covering);
+    add_contact(model, state, next, found.covering);
 }
 
 /// How far a tool at a place reaches below the plane through its contact's foot, m.
@@ -142,7 +153,7 @@ pub fn go_on(tool: &ToolModel, contact: &mut Contact) -> bool {
     let approach = approach(tool, contact, contact.local.relative);
     let own = &mut contact.local;
     if own.found {
-        (own.found, own.entry) = (false, approach.max(0.0));
+        (own.found, own.entry) = (false, (approach - own.came).max(0.0));
         return approach < DEEPEST * tool.radius;
     }
     if own.change != 0.0 {

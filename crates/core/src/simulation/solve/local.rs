@@ -22,7 +22,7 @@ use crate::simulation::law::{
 };
 use crate::simulation::model::Model;
 use crate::simulation::solve::forces::dent_of;
-use crate::simulation::solve::handover::{go_on, hand_over, has_jumped, join};
+use crate::simulation::solve::handover::{Found, go_on, hand_over, has_jumped, join};
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -32,11 +32,11 @@ use crate::tensor::outer;
 pub const MOST_STEPS: usize = 16;
 /// From this step on steps are shortened, ever more: in a hollow about as narrow as the tool the force turns with the place so
 /// fast that whole steps go to and fro.
-const USUAL_STEPS: usize = 6;
+const USUAL_STEPS: usize = 10;
 /// Longest step, over the tool's radius.
 const LONGEST: f64 = 0.5;
 /// Where the last step is longer than this, over the tool's radius, nothing has been found: contacts stay as they were a tick ago.
-const LOST: f64 = 1e-3;
+const LOST: f64 = 0.02;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
@@ -58,7 +58,7 @@ const FOLLOWED: usize = 3;
 /// Memory of the method.
 pub struct LocalScratch {
     weights: Vec<FanWeights>,
-    pub(super) responses: Vec<LocalResponse>,
+    responses: Vec<LocalResponse>,
     /// Compliance between contacts, and what the others do at each.
     between: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
     /// Compliance of one step less that at rest, on a body in motion, with the coupling on the diagonal.
@@ -66,7 +66,7 @@ pub struct LocalScratch {
     others: [Others; MAX_CONTACTS],
     /// What every contact counts from.
     from: [DVec3; MAX_CONTACTS],
-    pub(super) places: [DVec3; MAX_CONTACTS],
+    places: [DVec3; MAX_CONTACTS],
     steps: [DVec3; MAX_CONTACTS],
     /// Largest change of a force in the latest step, over that force.
     changed: f64,
@@ -168,7 +168,9 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         if count == 0 || !settle(model, state, &mut memory, slots, body, controls) {
             return;
         }
-        if last || !hand_over(model, state, &memory, slots) {
+        let (responses, places) = (&memory.local.responses, &memory.local.places);
+        let found = Found { responses, places, covering: memory.covering };
+        if last || !hand_over(model, state, found, slots) {
             take_up(model, state, memory.local, slots, body);
             return;
         }

@@ -1,7 +1,8 @@
 """A sphere in a groove: it touches both walls at once, and slides across the bottom from one to the other.
 
-The groove has a right angle and runs along y through the middle of a block's top. The direct solution has one half of the sphere
-on one wall of a quarter of the block: a flat contact problem, with the gap and the compliance taken along the wall's normal.
+The groove has a right angle and runs along y through the middle of a block's top. The direct solution has one half of
+the sphere on one wall of a quarter of the block: a flat contact problem, with gap and compliance taken along the
+wall's normal.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ from palpate.validation.verify.solution import green_of, quiet_body
 # Widths and height of the block, and the depth of its groove, m.
 SIZE, DEEP = (0.1, 0.1, 0.05), 0.02
 RADIUS, SPACING = 0.01, 0.005
-# How far the sphere is pressed down from where it touches both walls, m; the reach of the touchable wall beside the foot and
-# the edge of the elements there, m.
+# How far the sphere is pressed down from where it touches both walls, m; reach of the touchable wall beside the foot
+# and the edge of the elements there, m.
 DEPTHS, REACH, CELL = (1e-3, 2e-3), 5e-3, 0.7e-3
 # Height of the sphere's middle where it touches both walls, m.
 TOUCHES = SIZE[2] - DEEP + np.sqrt(2) * RADIUS
@@ -92,7 +93,7 @@ def pressed(simulation: Simulation, depth: float) -> np.ndarray:
 
 
 def sweeps(simulation: Simulation, length: float = 4e-3, step: float = 1e-6) -> dict[str, np.ndarray]:
-    """Forces (n, 3), N, of sweeps by the micrometre: from one wall over to the other, along the bottom, and down."""
+    """Return forces (n, 3), N, of sweeps by the micrometre: over from wall to wall, along the bottom, and down."""
     pressed_in = np.array([0.0, 1e-3, TOUCHES]) + 1.5e-3 * DOWN
     across = straight(pressed_in - (length / 2, 0, 0), pressed_in + (length / 2, 0, 0), step)
     # On a wall it is as deep as where it touches both.

@@ -86,7 +86,7 @@ class ContactProblem:
 
     @classmethod
     def on(cls, faces: np.ndarray, plane: np.ndarray, compliance: Callable[[np.ndarray], np.ndarray]) -> ContactProblem:
-        """Of faces (k, 3 or 6) of a plane: places (nodes of the mesh, 2), m, in it, and `Psi` across it between nodes."""
+        """Of faces (k, 3 or 6) of a plane: places (nodes of the mesh, 2), m, in it, and `Psi` across it."""
         nodes, corners = np.unique(faces, return_inverse=True)
         load, (places, hats) = _integrals(plane[nodes], corners.reshape(faces.shape))
         return cls(plane[nodes], hats.sum(axis=0), load.T @ compliance(nodes) @ load, (places, hats))

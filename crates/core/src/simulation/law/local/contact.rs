@@ -26,6 +26,8 @@ pub struct LocalContact {
     pub(in crate::simulation) further: bool,
     /// Whether it has just been found, and counts from where it is then.
     pub(in crate::simulation) found: bool,
+    /// Depth that it may have come to since it was looked for last, m.
+    pub(in crate::simulation) came: f64,
     /// Whether its foot stays on the plane where it was: the surface there has no closest point any more.
     pub(in crate::simulation) held: bool,
     /// Part of the half-space's stiffness that it has, and how that changes in a tick.
