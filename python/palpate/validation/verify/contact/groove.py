@@ -115,8 +115,9 @@ def given_out(simulation: Simulation, paths: int) -> float:
     centre = np.array([[0.0, 0.0, TOUCHES - RADIUS]])
     closed = ClosedPaths.over(centre, RADIUS, paths=paths, ticks=600, slide=5e-3, depth=(1e-3, 3e-3))
     positions, orientations = closed.script()
-    forces = closed.of_script(simulation.play(positions[:, 0], orientations[:, 0]).forces[:, None])
-    return measures.leak(*measures.given_out(closed.positions, forces))
+    played = simulation.play(positions[:, 0], orientations[:, 0])
+    forces, torques = (closed.of_script(rows[:, None]) for rows in (played.forces, played.torques))
+    return measures.leak(*measures.given_out(closed.positions, forces, closed.orientations, torques))
 
 
 def direct_forces(depths: Sequence[float]) -> list[float]:
