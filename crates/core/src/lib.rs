@@ -8,7 +8,7 @@
 //! rayon.
 //!
 //! Nothing here reads a clock, starts threads of its own (rayon in the offline part apart) or touches a file other than
-//! the stores of Green's functions and modes.
+//! the stores of Green's functions and modes and what is kept beside them.
 
 #[cfg(feature = "offline")]
 pub mod capacitance;
@@ -18,6 +18,7 @@ pub mod element;
 mod error;
 #[cfg(feature = "offline")]
 pub mod fem;
+mod files;
 pub mod green;
 pub mod mesh;
 pub mod simulation;

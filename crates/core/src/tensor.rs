@@ -11,3 +11,9 @@ pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
 pub fn across(normal: DVec3) -> DMat3 {
     DMat3::IDENTITY - outer(normal, normal)
 }
+
+/// A symmetric matrix by `xx, xy, xz, yy, yz, zz`.
+#[inline(always)]
+pub fn symmetric([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> DMat3 {
+    DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
+}

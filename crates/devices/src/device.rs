@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use glam::DVec3;
-
 use crate::{Pose, Twist, Wrench};
 
 /// Buttons of a device, a bit each.
@@ -84,8 +82,6 @@ pub struct DeviceLimits {
     /// Fastest that a hand moves its tip, m/s: what looks faster is a fault of its sensors. `None` for a device without
     /// sensors, whose pose is commanded and may jump.
     pub max_speed: Option<f64>,
-    /// Opposite corners of the box that its tip reaches, m, in the world.
-    pub workspace: Option<(DVec3, DVec3)>,
     /// Fastest rate at which it takes wrenches, Hz.
     pub rate: Option<f64>,
 }
@@ -101,7 +97,6 @@ impl DeviceLimits {
         own_damping: None,
         delay: 0.0,
         max_speed: None,
-        workspace: None,
         rate: None,
     };
 

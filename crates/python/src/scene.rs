@@ -17,8 +17,8 @@ use crate::green::GreenCore;
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
 /// and the spring between tools and patches, N/m.
 pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
-/// Young's modulus (s, Pa) and Poisson's ratio (s) at the surface nodes.
-pub type ModuliArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+/// Young's modulus (s, Pa) and Poisson's ratio (s) at the surface nodes, and whether all of the body is of one material.
+pub type ModuliArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, bool);
 /// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, and its elastic constants.
 pub type BodyArguments<'py> =
     (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>, Option<ModuliArguments<'py>>);
@@ -55,8 +55,9 @@ pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
         Placement { position: DVec3::from(*position), rotation: DMat3::from_quat(quaternion(*orientation)) };
     let moduli = moduli
         .as_ref()
-        .map(|(youngs, poissons)| -> PyResult<_> {
-            Ok(Moduli { youngs: youngs.as_slice()?.to_vec(), poissons: poissons.as_slice()?.to_vec() })
+        .map(|(youngs, poissons, homogeneous)| -> PyResult<_> {
+            let (youngs, poissons) = (youngs.as_slice()?.to_vec(), poissons.as_slice()?.to_vec());
+            Ok(Moduli { youngs, poissons, homogeneous: *homogeneous })
         })
         .transpose()?;
     Ok(BodyParts { green: green.green.clone(), placement, modes, moduli })

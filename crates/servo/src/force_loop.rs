@@ -11,7 +11,7 @@ use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
 use crate::preparer::{StrainPreparer, StrainWorker};
-use crate::safety::{Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
+use crate::safety::{Computed, Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
 use crate::settings::{Settings, refuse_unless};
 use crate::subnormals::FlushSubnormals;
 use crate::timing::{Clock, Timing};
@@ -208,9 +208,11 @@ impl ForceLoop {
     /// Wrenches of the devices, made safe.
     fn write_devices(&mut self, output: &Output, period: f64) {
         let common = self.fault;
+        let share = SafetyStage::scene_share(&mut self.stages);
         for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
             common.into_iter().for_each(|reason| stage.latch(reason));
-            let wrench = stage.apply(output.wrench_on_device[tool], period);
+            let computed = Computed { law: output.unlimited[tool], limited: output.wrench_on_device[tool] };
+            let wrench = stage.apply(computed, share, period);
             self.status.wrenches[tool] = wrench;
             self.status.ports[tool] = stage.energy();
             if let Err(fault) = device.write(wrench) {

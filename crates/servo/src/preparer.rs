@@ -66,10 +66,14 @@ impl StrainPreparer {
 }
 
 impl PreparerEnd {
-    /// Answers one request, if there is one; `later` takes the response in place of the ring.
+    /// Answers one request, if there is one: of those for one body that wait behind each other the latest, for a contact that
+    /// slides asks again and again.
     pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<(usize, Box<StrainWatch>)>> {
         while self.replaced.pop().is_ok() {}
-        let request = self.requests.pop().ok()?;
+        let mut request = self.requests.pop().ok()?;
+        while self.requests.peek().is_ok_and(|next| next.body == request.body) {
+            request = self.requests.pop().ok()?;
+        }
         Some(preparer.prepare(&request))
     }
 

@@ -11,6 +11,8 @@ pub struct Histogram {
     counts: Box<[u32; PER_OCTAVE * OCTAVES]>,
     total: u64,
     max_ns: u64,
+    /// The first bucket in use.
+    least: usize,
 }
 
 /// Percentiles in microseconds.
@@ -28,35 +30,34 @@ pub struct Summary {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: Box::new([0; PER_OCTAVE * OCTAVES]), total: 0, max_ns: 0 }
+        Self { counts: Box::new([0; PER_OCTAVE * OCTAVES]), total: 0, max_ns: 0, least: PER_OCTAVE * OCTAVES - 1 }
     }
 }
 
 impl Histogram {
     /// Counts one duration; never allocates.
     pub fn record(&mut self, nanoseconds: u64) {
-        let bucket = &mut self.counts[bucket(nanoseconds)];
-        *bucket = bucket.saturating_add(1);
+        let index = bucket(nanoseconds);
+        self.counts[index] = self.counts[index].saturating_add(1);
+        self.least = self.least.min(index);
         self.total += 1;
         self.max_ns = self.max_ns.max(nanoseconds);
     }
 
-    /// Percentiles so far.
+    /// Percentiles so far, by one pass over the buckets in use.
     pub fn summary(&self) -> Summary {
-        let at = |share| self.percentile(share) / 1000.0;
-        Summary { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: self.max_ns as f64 / 1000.0 }
-    }
-
-    fn percentile(&self, share: f64) -> f64 {
-        let rank = (share * self.total as f64).ceil() as u64;
-        let mut seen = 0;
-        for (index, &count) in self.counts.iter().enumerate() {
-            seen += u64::from(count);
-            if seen >= rank && count > 0 {
-                return upper_edge(index).min(self.max_ns as f64);
+        let shares = [0.5, 0.99, 0.999];
+        let ranks = shares.map(|share| (share * self.total as f64).ceil() as u64);
+        let (mut seen, mut found, mut next) = (0, [0.0; 3], 0);
+        for index in self.least..=bucket(self.max_ns) {
+            seen += u64::from(self.counts[index]);
+            while next < ranks.len() && seen >= ranks[next] && seen > 0 {
+                found[next] = upper_edge(index).min(self.max_ns as f64) / 1000.0;
+                next += 1;
             }
         }
-        0.0
+        let [p50, p99, p999] = found;
+        Summary { p50, p99, p999, max: self.max_ns as f64 / 1000.0 }
     }
 }
 

@@ -40,11 +40,11 @@ struct Outcome {
     out: Vec<Wrench>,
 }
 
-/// Ticks along a path, measured `every` so many of them, before a law that depends on the tick too; the work of what goes
-/// out by the trapezoid rule.
 /// A wrench by tick and pose.
 type Law = dyn Fn(usize, &Pose) -> Wrench;
 
+/// Ticks along a path, measured `every` so many of them, before a law that depends on the tick too; the work of what goes
+/// out by the trapezoid rule.
 fn follow(stage: &mut SafetyStage, path: &[Pose], every: usize, law: impl Fn(usize, &Pose) -> Wrench) -> Outcome {
     let (mut stored, mut outcome) = (0.0, Outcome { given: 0.0, peak: 0.0, port: stage.energy(), out: Vec::new() });
     let mut last: Option<(Pose, Wrench, Wrench)> = None;
@@ -53,7 +53,7 @@ fn follow(stage: &mut SafetyStage, path: &[Pose], every: usize, law: impl Fn(usi
         let (pose, timestamp_ns) = (path[measured], nanoseconds(measured));
         stage.admit(Ok(Reading { pose, active: true, timestamp_ns, ..Reading::default() }), nanoseconds(tick), PERIOD);
         let computed = law(tick, &pose);
-        let out = stage.apply(computed, PERIOD);
+        let out = stage.apply(computed, 1.0, PERIOD);
         assert_eq!(stage.fault(), None);
         if let Some((before, computed_before, out_before)) = last {
             let moved = pose.position - before.position;
@@ -192,6 +192,80 @@ fn random_closed_paths_give_out_no_energy() {
     assert!(open_paths > 500, "without the controller {open_paths} of 1000 give out energy");
 }
 
+/// Forces of two tips on one body that gives by `compliance`, m/N, under depths of which neither can pull, N.
+fn pressed_together(compliance: [[f64; 2]; 2], depths: [f64; 2]) -> [f64; 2] {
+    let [[own, cross], [_, other]] = compliance;
+    let determinant = own * other - cross * cross;
+    let both =
+        [(other * depths[0] - cross * depths[1]) / determinant, (own * depths[1] - cross * depths[0]) / determinant];
+    match both {
+        [_, second] if second <= 0.0 => [(depths[0] / own).max(0.0), 0.0],
+        [first, _] if first <= 0.0 => [0.0, (depths[1] / other).max(0.0)],
+        both => both,
+    }
+}
+
+/// A random way down and up again, with presses between, at most 4 mm deep.
+fn random_press(noise: &mut Noise, ticks: usize) -> Vec<f64> {
+    let (deepest, clear) = (noise.between(1e-3, 4e-3), noise.between(1e-4, 2e-3));
+    let waves: [(f64, f64); 3] = std::array::from_fn(|_| (0.4 * noise.next(), PI * noise.next()));
+    let depth = |tick: usize| {
+        let phase = PI * tick as f64 / ticks as f64;
+        let sines = waves.iter().enumerate();
+        let wave: f64 = sines.map(|(m, (size, shift))| size * (2.0 * (m + 1) as f64 * phase + shift).sin()).sum();
+        phase.sin().powi(2) * (clear + deepest) * (1.0 + wave) - clear
+    };
+    (0..=ticks).map(depth).collect()
+}
+
+/// What two hands get over closed paths on one body, out of their devices and as computed, and the most that the body held, J.
+fn given_to_two(ways: [&[f64]; 2], compliance: [[f64; 2]; 2], together: bool) -> (f64, f64, f64) {
+    let limits = SafetyLimits::default();
+    let mut stages = [SafetyStage::new(limits, false), SafetyStage::new(limits, false)];
+    let (mut given, mut peak) = ([0.0; 2], 0.0f64);
+    let mut before = ([[0.0; 2]; 2], [0.0; 2]);
+    for tick in 0..ways[0].len() {
+        let (depths, timestamp_ns) = ([ways[0][tick], ways[1][tick]], 1_000_000 * tick as u64);
+        for (stage, depth) in stages.iter_mut().zip(depths) {
+            let pose = Pose::at(-depth * DVec3::Z);
+            stage.admit(Ok(Reading { pose, active: true, timestamp_ns, ..Reading::default() }), timestamp_ns, PERIOD);
+        }
+        let share = if together { SafetyStage::scene_share(&mut stages) } else { 1.0 };
+        let computed = pressed_together(compliance, depths);
+        let mut out = [0.0; 2];
+        for (stage, (out, force)) in stages.iter_mut().zip(out.iter_mut().zip(computed)) {
+            *out = stage.apply(Wrench { force: force * DVec3::Z, ..Wrench::default() }, share, PERIOD).force.z;
+        }
+        for (given, (now, then)) in given.iter_mut().zip([(out, before.0[0]), (computed, before.0[1])]) {
+            let work = |port: usize| 0.5 * (now[port] + then[port]) * (before.1[port] - depths[port]);
+            *given += if tick > 0 { work(0) + work(1) } else { 0.0 };
+        }
+        peak = peak.max(-given[1]);
+        before = ([out, computed], depths);
+    }
+    (given[0], given[1], peak)
+}
+
+/// What one hand presses into a body and another gets out of it, while the start ramp withholds force of both.
+#[test]
+fn two_hands_on_one_body_get_no_energy_out_of_it() {
+    let (mut noise, mut leaks_apart) = (Noise(11), 0);
+    for number in 0..1000 {
+        let ticks = noise.between(200.0, 800.0) as usize;
+        let ways: [Vec<f64>; 2] = std::array::from_fn(|_| random_press(&mut noise, ticks));
+        let compliance = {
+            let (own, other) = (1.0 / noise.between(100.0, 600.0), 1.0 / noise.between(100.0, 600.0));
+            let cross = noise.between(0.1, 0.8) * (own * other).sqrt();
+            [[own, cross], [cross, other]]
+        };
+        let (given, computed, peak) = given_to_two([&ways[0], &ways[1]], compliance, true);
+        assert!(given - computed.max(0.0) < PASSIVE * peak, "path {number}: {}", given / peak);
+        let (given, computed, _) = given_to_two([&ways[0], &ways[1]], compliance, false);
+        leaks_apart += usize::from(given - computed.max(0.0) > PASSIVE * peak);
+    }
+    assert!(leaks_apart > 100, "each port by itself, {leaks_apart} of 1000 give out energy");
+}
+
 /// What the controller takes is bounded by the device's damping and force, opposes the motion, and leaves rest alone.
 #[test]
 fn damping_stays_within_the_device() {
@@ -273,10 +347,10 @@ fn a_fault_stays_a_fault() {
     let path = press(0.01, 0.004, 0.3, 0.2);
     let lifted = path.len() - 30;
     follow(&mut stage, &path[..lifted], 1, wall(500.0));
-    stage.apply(Wrench { force: DVec3::NAN, ..Wrench::default() }, PERIOD);
+    stage.apply(Wrench { force: DVec3::NAN, ..Wrench::default() }, 1.0, PERIOD);
     for pose in &path[lifted..] {
         stage.admit(Ok(Reading { pose: *pose, active: true, ..Reading::default() }), 0, PERIOD);
-        assert_eq!(stage.apply(Wrench::default(), PERIOD), Wrench::default());
+        assert_eq!(stage.apply(Wrench::default(), 1.0, PERIOD), Wrench::default());
     }
     assert_eq!(stage.energy().owed, 0.0);
     let before = stage.energy();

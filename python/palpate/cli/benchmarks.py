@@ -83,12 +83,22 @@ def _print_contact(results: ContactResults) -> None:
         cells = (f"{ratio:.2f} +-{part:.2g} %" for ratio, part in zip(ratios, spread, strict=True))
         table.add_row(row.method, row.mesh, *cells, "" if row.step_us is None else f"{row.step_us:.1f}")
     Console().print(table)
-    ticks = Table(title="A tick of a sliding sphere, and numpy solving three equations, in us", title_justify="left")
-    for heading in ("surface nodes", "median", "worst", "numpy"):
+    ticks = Table(
+        title="A tick of a sliding sphere, and numpy: three equations, the whole contact; us", title_justify="left"
+    )
+    for heading in ("surface nodes", "median", "worst", "numpy: solve", "numpy: contact"):
         ticks.add_column(heading, justify="right")
     for tick in results.ticks:
-        ticks.add_row(str(tick.surface_nodes), *(f"{v:.1f}" for v in (tick.median, tick.worst, tick.numpy)))
+        figures = (tick.median, tick.worst, tick.solve, tick.numpy)
+        ticks.add_row(str(tick.surface_nodes), *(f"{v:.1f}" for v in figures))
+    kinds = Table(title="Every kind of tick, us", title_justify="left")
+    kinds.add_column("tick", no_wrap=True)
+    for heading in ("median", "worst"):
+        kinds.add_column(heading, justify="right")
+    for kind in results.kinds:
+        kinds.add_row(kind.kind, f"{kind.median:.1f}", f"{kind.worst:.1f}")
     Console().print(ticks)
+    Console().print(kinds)
     for peer, package in results.missing.items():
         print(f"{peer} was left out: pip install {package}")
 

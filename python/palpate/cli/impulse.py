@@ -74,7 +74,9 @@ def impulse_scene(model: str, paper: bool) -> Scene:
     return Scene(
         body={"model": model, "paper": paper},
         material=asdict(MATERIAL),
-        tool={"radius": TOOLS[model], "contact_radius": 0.0},
+        # Touched, the body answers by the local law. The strike is no contact: its force is given, and only where it
+        # acts is to be said. `contact_radius` 0 is the node alone, as in the paper's figure.
+        tool={"contact": "local", "radius": TOOLS[model], "contact_radius": 0.0},
         dynamics={
             **MODES[paper],
             "dt": STEP,

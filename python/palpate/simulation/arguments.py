@@ -42,5 +42,9 @@ def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
     if local:
         green = body.green
         known = body.body is not None
-        moduli = surface_moduli(body.body) if known else moduli_of_store(green.description, len(green.surface_nodes))
+        young, poisson = (
+            surface_moduli(body.body) if known else moduli_of_store(green.description, len(green.surface_nodes))
+        )
+        materials = green.description.get("materials", {}).values()
+        moduli = young, poisson, len({tuple(values[:2]) for values in materials}) == 1
     return body.green._core, body.position, body.orientation, moving, moduli

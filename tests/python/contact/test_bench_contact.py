@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from palpate.cli import main
-from palpate.validation.bench import contact, contact_peers
-from palpate.validation.bench.contact_tick import TickRow
+from palpate.validation.bench import contact, contact_peers, contact_tick
+from palpate.validation.bench.contact_tick import KindRow, TickRow, numpy_contact
+from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.reference import Block, body_on_table
 
 
@@ -33,7 +34,8 @@ def quick(monkeypatch):
     monkeypatch.setattr(contact, "PLACES", contact.PLACES[:2])
     monkeypatch.setattr(contact_peers, "installed", lambda: ["MuJoCo"])
     monkeypatch.setattr(contact_peers, "mujoco_forces", spring)
-    monkeypatch.setattr(contact, "tick_rows", lambda: [TickRow(100, 2.0, 3.0, 10.0)])
+    monkeypatch.setattr(contact, "tick_rows", lambda: [TickRow(100, 2.0, 3.0, 7.0, 100.0)])
+    monkeypatch.setattr(contact, "kind_rows", lambda: [KindRow("slides", 2.0, 3.0)])
 
 
 @pytest.mark.slow
@@ -55,6 +57,19 @@ def test_forces_of_a_peer_that_takes_forces_are_interpolated_at_depths(monkeypat
     found = contact._at_depths(depths[None] * [[1.0], [2.0]], 40.0 * depths**1.5)
     exact = 40.0 * np.array(contact.DEPTHS) ** 1.5
     np.testing.assert_allclose(found, [exact, exact / 2**1.5], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_contact_in_numpy_is_that_of_a_tick():
+    """Of a sphere that presses and then slides, within what a parabola and the slope of ``C_reg`` make of it."""
+    body, green = contact_tick._plate((14, 14, 6))
+    middle = contact_tick._middle(body)
+    path = np.vstack([straight(middle + (0, 0, 2e-3), middle, 1e-4), straight(middle, middle + (5e-3, 0, 0), 1e-5)])
+    forces = -loop_of(body, green, [sphere(contact_tick.RADIUS, contact_tick.FRICTION)]).run(path)
+    own = numpy_contact(green, middle - (0, 0, contact_tick.RADIUS - contact_tick.DEPTH))
+    found = np.array([own.tick(tool) for tool in path])
+    assert np.abs(found - forces).max() < 0.03 * np.abs(forces).max()
+    assert found[-1, 0] == pytest.approx(-contact_tick.FRICTION * found[-1, 2], rel=1e-9)
 
 
 def check_peer(peer: str) -> None:

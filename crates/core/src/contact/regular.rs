@@ -16,26 +16,49 @@
 //! ```
 //!
 //! and the tangential one `c_n (1 - nu/2) / (1 - nu)` by Cerruti's solution; normal and tangent do not couple.
+//!
+//! What is hidden below the surface no deeper than `b` is spread over soft tissue beside it. As an integral over a smooth
+//! field `C_reg` goes with the second moment of `phi`: `C_reg(b) = C_reg(0) + O(b^2)`. In a body of several materials it is
+//! extrapolated from two radii to that of a contact of half the tool's radius, and its change with the square of the contact
+//! radius is kept (`local::widening`). In a body of one material it changes only with the distance to edges
+//! and supports, and extrapolating would but enlarge the error of the elements.
 
 use glam::DMat3;
 
-use super::smooth::SmoothSurface;
+use super::smooth::{Fan, SmoothSurface};
 use super::{PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, smallest_eigenvalue};
 use crate::contact::Patch;
 use crate::green::GreensFunction;
-use crate::tensor::outer;
+use crate::mesh::Surface;
+use crate::tensor::{outer, symmetric};
 
 /// `k`.
 const HALF_SPACE: f64 = 0.766_544;
 /// `b` over the mean spacing of nodes around: at 2 the ripple of a sliding contact is 1 %, at 3 it is 0.03 %.
 const SPACINGS: f64 = 3.0;
-/// `b` over the tool's radius: a contact is smaller than its tool. A wider one would take a nodule at the depth of the tool's
-/// radius for the half-space.
-const RADII: f64 = 1.0;
+/// Contact radius that `C_reg` is extrapolated to, over the tool's radius.
+const CONTACT: f64 = 0.5;
+/// A Hertzian contact of radius `a` has the second moment of `phi` for `b^2 = 8/5 a^2`.
+const SAME_MOMENT: f64 = 1.6;
+/// Ratio of the two widths from which the regular part is extrapolated; and the least difference of their squares, over that
+/// of the first.
+const SECOND: f64 = 1.5;
+const LEAST_APART: f64 = 0.4;
+/// How fast the regular part may fall and rise with the square of the contact radius, over `1 / (E* R^3)`: up to `a = R` the
+/// approach then grows with the force by at least half of what it does on the half-space (see [`super::local::Widening`]).
+const WIDENING_RANGE: [f64; 2] = [-0.11, 7.0];
 /// Where more nodes than a patch takes lie within `b`, it is shortened by this factor until they fit.
 const SHORTER: f64 = 0.9;
 /// Stiffest regular part over `1 / (E* R)`: the local compliance of the largest contact, `1 / (2 E* R)`, outweighs it.
 const STIFFEST: f64 = 0.45;
+/// Radius of the patch by which a body in motion is met, over the tool's, at least: within a step a body may be as good as
+/// rigid, and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of
+/// the patch. The second is the half-space that the patch may have beyond the regular part.
+const WIDER: f64 = 1.6;
+const LEAST_WIDE: f64 = 1.55;
+/// A patch on a body in motion is widened by steps of this factor, and by no more than that one.
+const WIDENED: f64 = 1.1;
+const WIDEST: f64 = 3.0;
 
 /// Elastic constants at the surface nodes.
 #[derive(Clone, Debug)]
@@ -44,6 +67,8 @@ pub struct Moduli {
     pub youngs: Vec<f64>,
     /// Poisson's ratio.
     pub poissons: Vec<f64>,
+    /// Whether all of the body, not only its surface, is of one material.
+    pub homogeneous: bool,
 }
 
 impl Moduli {
@@ -53,12 +78,31 @@ impl Moduli {
     }
 }
 
-/// What a tool of one radius meets of a body: one entry a fan of its smooth surface.
+/// What a tool meets at a fan: mean and Gaussian curvature (1/m, 1/m^2), `E/(1 - nu^2)` (Pa) and `nu`, `C_reg` by
+/// `xx, xy, xz, yy, yz, zz` (m/N; zero where nothing can be touched), `b` (m), and how its normal part changes with the square
+/// of the contact radius (1/(N m)).
+pub type FanFields = [f64; FIELDS];
+/// Numbers of an entry.
+pub const FIELDS: usize = 12;
+/// Field of the mean curvature.
+pub const MEAN: usize = 0;
+/// Field of the Gaussian curvature.
+pub const GAUSS: usize = 1;
+/// Field of `E/(1 - nu^2)`.
+pub const PLANE_STRAIN: usize = 2;
+/// Field of Poisson's ratio.
+pub const POISSON: usize = 3;
+/// Fields of `C_reg`.
+pub const COMPLIANCE: std::ops::Range<usize> = 4..10;
+/// Field of the radius of the patch by which the body is met: `b`, or more where it moves.
+pub const WIDTH: usize = 10;
+/// Field of the change with the square of the contact radius.
+pub const WIDENING: usize = 11;
+
+/// What a tool of one radius meets of a body.
 pub struct RegularCompliance {
-    /// `C_reg`, symmetric, m/N; zero where nothing can be touched.
-    pub blocks: Vec<DMat3>,
-    /// `b`, m.
-    pub widths: Vec<f64>,
+    /// One entry a fan of the smooth surface.
+    pub fields: Vec<FanFields>,
 }
 
 /// A body as its regular compliance needs it.
@@ -72,6 +116,8 @@ pub struct CompliantBody<'a> {
     pub smooth: &'a SmoothSurface,
     /// Its elastic constants.
     pub moduli: &'a Moduli,
+    /// Whether it moves.
+    pub moves: bool,
 }
 
 impl RegularCompliance {
@@ -81,9 +127,9 @@ impl RegularCompliance {
         let count = body.smooth.fans().len();
         let block = |(scratch, patch): &mut (PatchScratch, Patch), fan: usize| {
             if body.smooth.touchable[fan] {
-                at_fan(body, fan, radius, max_stiffness, scratch, patch)
+                at_fan(body, &body.smooth.fans()[fan], radius, max_stiffness, scratch, patch)
             } else {
-                (DMat3::ZERO, 0.0)
+                AtFan::default()
             }
         };
         let memory = || (PatchScratch::new(&body.green.surface), Patch::default());
@@ -97,47 +143,134 @@ impl RegularCompliance {
             let mut memory = memory();
             (0..count).map(|fan| block(&mut memory, fan)).collect()
         };
-        let (blocks, widths) = found.into_iter().unzip();
-        Self { blocks, widths }
+        let fields = found.into_iter().zip(body.smooth.fans()).map(|(at, fan)| {
+            let AtFan { regular: c, width, widening } = at;
+            let (modulus, poisson) = (body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
+            let [x, y, z] = [c.x_axis, c.y_axis, c.z_axis];
+            [fan.mean, fan.gauss, modulus, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, widening]
+        });
+        Self { fields: fields.collect() }
+    }
+}
+
+/// `C_reg` from blended fields.
+pub fn compliance_of(fields: &FanFields) -> DMat3 {
+    symmetric(std::array::from_fn(|k| fields[COMPLIANCE.start + k]))
+}
+
+/// What is found at one fan.
+struct AtFan {
+    regular: DMat3,
+    width: f64,
+    widening: f64,
+}
+
+impl Default for AtFan {
+    fn default() -> Self {
+        Self { regular: DMat3::ZERO, width: 0.0, widening: 0.0 }
+    }
+}
+
+/// Measures a patch of some radius around one fan.
+struct Probe<'a> {
+    body: CompliantBody<'a>,
+    centre: SurfacePoint,
+    scratch: &'a mut PatchScratch,
+    patch: &'a mut Patch,
+}
+
+impl Probe<'_> {
+    /// `W^T Psi W`, and the radius: `wide`, or less where a patch takes no more nodes.
+    fn whole(&mut self, mut wide: f64) -> (DMat3, f64) {
+        let CompliantBody { green, geometry, .. } = self.body;
+        while patch_weights(&green.surface, geometry, &self.centre, wide, self.scratch, self.patch)
+            == Err(Refusal::TooManyNodes)
+        {
+            wide *= SHORTER;
+        }
+        let mut touched = TouchPatch::default();
+        touched.admit_touchable(green, self.patch);
+        (touched.own_compliance(green), wide)
     }
 }
 
 fn at_fan(
     body: CompliantBody<'_>,
-    rank: usize,
+    fan: &Fan,
     radius: f64,
     max_stiffness: f64,
     scratch: &mut PatchScratch,
     patch: &mut Patch,
-) -> (DMat3, f64) {
-    let (surface, fan) = (&body.green.surface, &body.smooth.fans()[rank]);
+) -> AtFan {
+    let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), scratch, patch };
+    let least = (SAME_MOMENT * reference_area(radius)).sqrt();
+    let (whole, width) = probe.whole((SPACINGS * body.smooth.spacing_around(fan)).max(least));
+    let (mut regular, mut widening) = (whole - half_space(body.moduli, fan, width), 0.0);
+    let unit = 1.0 / (body.moduli.plane_strain(fan.node) * radius);
+    if !body.moduli.homogeneous {
+        let (other, wider) = probe.whole(SECOND * width);
+        let apart = wider * wider - width * width;
+        if apart > LEAST_APART * width * width {
+            let rate = (other - half_space(body.moduli, fan, wider) - regular) * (1.0 / apart);
+            regular += rate * (SAME_MOMENT * reference_area(radius) - width * width);
+            let [least, most] = WIDENING_RANGE.map(|bound| bound * unit / (radius * radius));
+            widening = (SAME_MOMENT * fan.normal.dot(rate * fan.normal)).clamp(least, most);
+        }
+    }
+    let rendered = (1.0 / max_stiffness - smallest_eigenvalue(&whole)).max(0.0);
+    regular += DMat3::IDENTITY * rendered;
+    regular += DMat3::IDENTITY * (-STIFFEST * unit - smallest_eigenvalue(&regular)).max(0.0);
+    let (regular, width) = match body.moves {
+        true => met_in_motion(&mut probe, fan, (regular, width), radius),
+        false => (regular, width),
+    };
+    AtFan { regular, width, widening }
+}
+
+/// Square of the contact radius that `C_reg` belongs to, m^2, for a tool of `radius`, m.
+pub fn reference_area(radius: f64) -> f64 {
+    (CONTACT * radius).powi(2)
+}
+
+/// Widens the patch until it has no more than `regular` and a half-space met over the least radius; where it cannot be
+/// widened, raises `regular` evenly.
+fn met_in_motion(probe: &mut Probe<'_>, fan: &Fan, (regular, wide): (DMat3, f64), radius: f64) -> (DMat3, f64) {
+    let first = wide.max(WIDER * radius);
+    let least = half_space(probe.body.moduli, fan, LEAST_WIDE * radius);
+    let mut wide = first;
+    loop {
+        let (whole, found) = probe.whole(wide);
+        let missing = -smallest_eigenvalue(&(regular - whole + least));
+        if missing <= 0.0 {
+            return (regular, found);
+        }
+        if found < wide || wide > WIDEST * first {
+            return (regular + DMat3::IDENTITY * missing, found);
+        }
+        wide *= WIDENED;
+    }
+}
+
+/// The node of a fan, as a point of its triangle.
+fn centre_of(surface: &Surface, fan: &Fan) -> SurfacePoint {
     let corner = surface.triangles[fan.triangle as usize].iter().position(|&n| n == fan.node).unwrap_or(0);
     let mut barycentric = [0.0; 3];
     barycentric[corner] = 1.0;
-    let centre = SurfacePoint {
+    SurfacePoint {
         position: surface.positions[fan.node as usize],
         triangle: fan.triangle,
         barycentric,
         normal: fan.normal,
         signed_distance: 0.0,
-    };
-    let mut wide = (SPACINGS * body.smooth.spacing_around(fan)).max(RADII * radius);
-    while patch_weights(surface, body.geometry, &centre, wide, scratch, patch) == Err(Refusal::TooManyNodes) {
-        wide *= SHORTER;
     }
-    let mut touched = TouchPatch::default();
-    touched.admit_touchable(body.green, patch);
-    let whole = touched.own_compliance(body.green);
-    let modulus = body.moduli.plane_strain(fan.node);
-    let poisson = body.moduli.poissons[fan.node as usize];
-    let normal = HALF_SPACE / (modulus * wide);
-    let tangential = normal * (1.0 - 0.5 * poisson) / (1.0 - poisson);
-    let along = outer(fan.normal, fan.normal);
-    let half_space = DMat3::IDENTITY * tangential + along * (normal - tangential);
-    let rendered = (1.0 / max_stiffness - smallest_eigenvalue(&whole)).max(0.0);
-    let regular = whole - half_space + DMat3::IDENTITY * rendered;
-    let floor = -STIFFEST / (modulus * radius);
-    (regular + DMat3::IDENTITY * (floor - smallest_eigenvalue(&regular)).max(0.0), wide)
+}
+
+/// `c_half(b)`.
+fn half_space(moduli: &Moduli, fan: &Fan, wide: f64) -> DMat3 {
+    let poisson = moduli.poissons[fan.node as usize];
+    let tangential = (1.0 - 0.5 * poisson) / (1.0 - poisson);
+    let shape = DMat3::IDENTITY * tangential + outer(fan.normal, fan.normal) * (1.0 - tangential);
+    shape * (HALF_SPACE / (moduli.plane_strain(fan.node) * wide))
 }
 
 #[cfg(test)]

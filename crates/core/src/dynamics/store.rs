@@ -1,11 +1,12 @@
 //! A modal basis in a file: safetensors, checked by content key and checksums, replaced only by rename.
 
 use std::collections::HashMap;
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::Path;
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
+use crate::files::{unwritten, write_whole};
 use crate::{Error, Result};
 
 /// Version of the file's layout; part of the key.
@@ -42,16 +43,7 @@ impl Basis {
     /// # Errors
     /// The operating system's, with nothing left behind.
     pub fn save(&self, path: &Path) -> Result<()> {
-        let io = |source| Error::Io { path: path.to_owned(), source };
-        let partial = partial_path(path);
-        let written = self.write(&partial, path).and_then(|()| {
-            File::open(&partial).and_then(|f| f.sync_all()).map_err(io)?;
-            fs::rename(&partial, path).map_err(io)
-        });
-        if written.is_err() {
-            let _ = fs::remove_file(&partial);
-        }
-        written
+        write_whole(path, |partial| self.write(partial, path))
     }
 
     fn write(&self, partial: &Path, path: &Path) -> Result<()> {
@@ -62,10 +54,7 @@ impl Basis {
             ("description".to_string(), self.description.clone()),
             ("checksum".to_string(), self.checksum()),
         ]);
-        let failed = |e: safetensors::SafeTensorError| match e {
-            safetensors::SafeTensorError::IoError(source) => Error::Io { path: path.to_owned(), source },
-            other => refused(path, format!("cannot be written: {other}")),
-        };
+        let failed = |e| unwritten(path, e);
         let modes = self.eigenvalues.len();
         let rows = self.shapes.len() / modes.max(1);
         let view = |shape: Vec<usize>, data| TensorView::new(Dtype::F64, shape, data).map_err(failed);
@@ -122,12 +111,6 @@ impl Basis {
             bytemuck::cast_slice(&self.shapes),
         ])
     }
-}
-
-fn partial_path(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.partial", std::process::id()));
-    path.with_file_name(name)
 }
 
 fn refused(path: &Path, reason: impl Into<String>) -> Error {

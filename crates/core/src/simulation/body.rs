@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::input::Placement;
-use crate::contact::smooth::{FootPoint, SmoothSurface};
+use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
 use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery, barycentric};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
@@ -130,7 +130,13 @@ impl BodyModel {
     /// Closest point of the smooth surface that the local law meets, in the body's frame; `None` without that law, or for a
     /// point that is not finite.
     pub fn foot(&self, point: DVec3) -> Option<FootPoint> {
-        self.local.as_ref()?.smooth.foot_anywhere(&self.loaded, &self.query, point)
+        let smooth = &self.local.as_ref()?.smooth;
+        smooth.foot_anywhere(self.drawn(), point, &mut Neighbourhood::new(std::iter::once(smooth)))
+    }
+
+    /// The drawn surface under the reference loads.
+    pub(super) fn drawn(&self) -> DrawnSurface<'_> {
+        DrawnSurface { surface: &self.loaded, query: &self.query }
     }
 
     /// A foot as a point of the drawn triangle below it.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::law::LocalContact;
+use super::law::{ASKED, LocalContact};
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, MAX_FURTHER};
 use crate::contact::TouchPatch;
@@ -68,6 +68,19 @@ impl Contact {
     pub(super) fn waits(&self) -> bool {
         self.local.further && self.force == DVec3::ZERO
     }
+
+    /// Place at which its strain was asked for under a serial, m.
+    pub(super) fn asked_at(&self, serial: u64) -> DVec3 {
+        self.local.asked[serial as usize % ASKED]
+    }
+
+    /// Has its strain asked for anew where it has slid on by more than `way`, m, since it was asked for last.
+    pub(super) fn ask_anew(&mut self, way: f64) {
+        if self.asked_at(self.serial).distance(self.point) > way {
+            self.serial += 1;
+            self.local.asked[self.serial as usize % ASKED] = self.point;
+        }
+    }
 }
 
 /// Slots for contacts. The patches stand apart, so that looking through the slots touches little memory.
@@ -89,7 +102,7 @@ impl Default for Contacts {
 }
 
 /// Bits of a serial that count the places of one contact.
-pub(super) const REVISIONS: u32 = 16;
+pub(super) const REVISIONS: u32 = 24;
 
 impl Contacts {
     /// Serial of a contact that begins.

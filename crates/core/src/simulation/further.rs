@@ -8,10 +8,10 @@
 //! A place is on the side of the surface that the tool has come from: its normal faces the tool's middle. The far side of a thin
 //! part never does.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::contacts::{Contact, Mode};
-use super::law::{LocalContact, place_near};
+use super::law::{ASKED, LocalContact, place_near};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::solve::{DEEPEST, add_contact, dent_at};
@@ -39,6 +39,7 @@ pub fn find(model: &Model, state: &mut State, scratch: &mut Scratch, (tool, body
             count += 1;
         }
     }
+    scratch.covering.near.forget();
     for &slot in &places[..count] {
         find_beside(model, state, scratch, hollows, slot);
     }
@@ -58,10 +59,16 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
             return;
         }
         let fan = &own.smooth.fans()[start as usize];
-        let from =
-            FootPoint { triangle: fan.triangle, position: fan.position, normal: fan.normal, ..FootPoint::default() };
-        let met = (&own.smooth, &fixed.loaded, &fixed.query);
-        let foot_at = |at: DVec3, from: &FootPoint| place_near(met, shape, (at, local.orientation), from);
+        let from = FootPoint {
+            triangle: fan.triangle,
+            position: fan.position,
+            normal: fan.normal,
+            turning: DMat3::ZERO,
+            shift: DMat3::ZERO,
+            ..FootPoint::default()
+        };
+        let (met, near) = ((&own.smooth, fixed.drawn()), &mut scratch.covering.near);
+        let mut foot_at = |at: DVec3, from: &FootPoint| place_near(met, shape, (at, local.orientation), from, near);
         // As if the body were carried along there as it is below the place that is known; then as it is.
         let mut at = local.relative + local.advance;
         let Some((mut foot, mut depth)) = foot_at(at, &from) else { continue };
@@ -69,12 +76,12 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
             continue;
         }
         if !fixed.moves() {
-            let weights = scratch.local.weigh(&own.smooth, &foot);
+            let weights = scratch.local.weigh(body, &own.smooth, &foot);
             at = local.tool - dent_at(model, state, body, weights);
             let Some(found) = foot_at(at, &foot) else { continue };
             (foot, depth) = found;
         }
-        let touchable = scratch.local.weigh(&own.smooth, &foot).touchable >= 0.5;
+        let touchable = scratch.local.weigh(body, &own.smooth, &foot).touchable >= 0.5;
         let near = depth > -NEAR * radius && depth < DEEPEST * radius;
         if touchable && near && is_another(state, (tool, body), &foot, radius) {
             let local = LocalContact {
@@ -88,7 +95,7 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
                 came,
                 part: 1.0,
                 share: 1.0,
-                watched: foot.position,
+                asked: [foot.position; ASKED],
                 ..LocalContact::default()
             };
             let begun = Contact {

@@ -124,6 +124,8 @@ pub struct Input {
 pub struct Output {
     /// On each device: minus what the tool does to the bodies. Not yet made safe.
     pub wrench_on_device: [Wrench; MAX_TOOLS],
+    /// The same before the limit of strain took from the forces of contacts that slide: what follows from one energy.
+    pub unlimited: [Wrench; MAX_TOOLS],
     /// Whether each tool touches.
     pub in_contact: [bool; MAX_TOOLS],
     /// Whether the limit of strain keeps each tool from following its device.

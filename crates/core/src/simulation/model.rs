@@ -75,6 +75,7 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
         Error::Invalid("the local contact law needs the elastic constants of the body at its surface".into())
     })?;
     let (green, geometry) = (&*body.green, &body.geometry);
-    let compliant = CompliantBody { green, geometry, smooth: &local.smooth, moduli: &local.moduli };
-    Ok(Some(Arc::new(RegularCompliance::new(compliant, tool.radius, tool.max_stiffness))))
+    let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
+    let compliant = CompliantBody { green, geometry, smooth, moduli, moves };
+    Ok(Some(Arc::new(RegularCompliance::kept(compliant, tool.radius, tool.max_stiffness))))
 }

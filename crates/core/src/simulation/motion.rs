@@ -32,6 +32,8 @@ pub struct Motion {
     residual: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
     /// The node that is watched.
     watched: Projection,
+    /// Free motion less what one contact does to the body at rest, and its modal force.
+    remainder: [Vec<Lanes>; 2],
     /// A strike that is under way.
     pub(super) strike: StrikeInProgress,
     account: Account,
@@ -52,6 +54,7 @@ impl Motion {
             compliance: blocks(),
             residual: blocks(),
             watched: Projection::new(modes),
+            remainder: [modes.state().q, modes.state().q],
             strike: StrikeInProgress::new(modes),
             account: Account::default(),
             due: 0.0,
@@ -136,6 +139,20 @@ impl Motion {
     pub(super) fn follow_contact(&mut self, modes: &ModalModel, contacts: &Contacts, slot: usize) {
         gather(&mut self.projections[slot], modes, contacts.patches[slot].patch());
         self.free[slot] = self.projections[slot].read(modes, &self.predicted.free_q);
+    }
+
+    /// Takes the free motion less what `force` on the patch in a slot, N, does to the modes at rest.
+    pub(super) fn leave_out_static(&mut self, modes: &ModalModel, slot: usize, force: DVec3) {
+        let [remainder, load] = &mut self.remainder;
+        remainder.copy_from_slice(&self.predicted.free_q);
+        self.projections[slot].take_static_by(modes, force, remainder, load);
+    }
+
+    /// Displacement of a surface node in what [`Motion::leave_out_static`] took, m.
+    pub(super) fn remaining_displacement(&self, modes: &ModalModel, node: u32) -> DVec3 {
+        let mut moved = [0.0; 3];
+        modes.read(&self.remainder[0], 3 * node as usize.., &mut moved);
+        moved.into()
     }
 
     /// Compliance of one step between the patches in two slots less that at rest, as far as the modes carry it, m/N.

@@ -5,7 +5,7 @@ use super::model::Model;
 use super::solve::LocalScratch;
 use super::system::System;
 
-/// Reusable memory of [`super::step`]: nothing in it outlives a tick.
+/// Reusable memory of [`super::step`]: nothing in it outlives a tick but copies of parts of the model.
 pub struct Scratch {
     pub(super) covering: Covering,
     pub(super) system: Box<System>,
@@ -15,6 +15,6 @@ pub struct Scratch {
 impl Scratch {
     /// For a model.
     pub fn new(model: &Model) -> Self {
-        Self { covering: Covering::new(model), system: Box::default(), local: Box::default() }
+        Self { covering: Covering::new(model), system: Box::default(), local: Box::new(LocalScratch::new(model)) }
     }
 }

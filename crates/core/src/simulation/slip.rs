@@ -59,11 +59,12 @@ pub fn slip(model: &Model, state: &mut State, system: &mut System, body: usize) 
 fn sweep(model: &Model, state: &mut State, system: &mut System, body: usize) -> bool {
     let mut slipped = false;
     for slot in 0..MAX_CONTACTS {
-        let contact = state.contacts.slots[slot];
+        let contact = &state.contacts.slots[slot];
         if contact.mode == Mode::Free || contact.body != body {
             continue;
         }
-        let Some(steepest) = law_of(contact.law).cone(&contact) else { continue };
+        let Some(steepest) = law_of(contact.law).cone(contact) else { continue };
+        let contact = *contact;
         let force = Parts::along(contact.force, contact.normal);
         let Some(direction) = force.beyond(SHALLOWEST) else {
             state.contacts.slots[slot].settled |= force.pressing > 0.0;

@@ -7,7 +7,7 @@ use super::contacts::Contacts;
 use super::law::takes_cells;
 use super::model::Model;
 use super::motion::Motion;
-use super::strain_watch::StrainWatch;
+use super::strain_watch::{LimitShare, StrainWatch};
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 use crate::contact::Refusal;
 use crate::contact::local::cells::PressureState;
@@ -33,6 +33,8 @@ pub struct BodyState {
     pub motion: Option<Motion>,
     /// Strain under the contacts, once it is prepared.
     pub strain: Option<Box<StrainWatch>>,
+    /// What the limit of strain let through of contacts that slide.
+    pub(super) limit_share: LimitShare,
 }
 
 /// State of a simulation.
@@ -57,6 +59,7 @@ impl State {
             stiffness_scale: 1.0,
             motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
             strain: None,
+            limit_share: LimitShare::default(),
         };
         Self {
             bodies: model.bodies.iter().map(body).collect(),

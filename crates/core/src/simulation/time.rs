@@ -17,7 +17,7 @@ pub(super) fn begin_strike(model: &Model, state: &mut State, scratch: &mut Scrat
     }
     let Some(closest) = fixed.closest(fixed.placement.point_to_body(strike.point)) else { return };
     let centre = fixed.material_point(&closest);
-    let Covering { patches, candidate } = &mut scratch.covering;
+    let Covering { patches, candidate, .. } = &mut scratch.covering;
     let surface = &fixed.green.surface;
     let weighed = patch_weights(surface, &fixed.geometry, &centre, strike.radius, &mut patches[body], candidate);
     if weighed.is_ok() {

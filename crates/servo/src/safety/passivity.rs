@@ -1,4 +1,4 @@
-//! Observer and controller of the energy that a device gives to its hand.
+//! Observer and controller of the energy that devices give to hands.
 //!
 //! **What is balanced.** At tick `k` the model computes a wrench `c_k`, and `o_k` goes out. What the stage withholds is
 //! `w_k = c_k - o_k`. With the tip's displacement `dx_k` and rotation since the tick before, by the trapezoid rule,
@@ -43,12 +43,31 @@
 //! lost, what is owed beyond it is overdraft. Where bodies move, energy may come back later, and all that is owed stays. A
 //! credit, `owed < 0`, is forgotten: else what one contact took out would hide what the next one makes.
 //!
+//! **Ports of one body.** What one hand presses into a body may come out at another. By its own account the other then gives
+//! energy that it has not received (`received <= 0`), of which nothing is owed, and the first ends with what it owed
+//! forgotten, as if its body had lost it: with a start ramp two hands get back 0.2 to 0.5 % of the peak. So the ports are
+//! balanced together too. With sums over the ports the energy of the body is one, the hands have paid
+//! `sum received - sum owed` of it, and every port gives back no more than the share of that,
+//!
+//! ```text
+//! o_i . v_i = min(share_i, share) c_i . v_i        share = 1 - sum owed / sum received
+//! ```
+//!
+//! Where a port presses, both sums grow by its own, `d owed <= d received`. Where one gives,
+//! `d owed_i <= (1 - share) d received_i`. Both keep `0 <= sum owed <= sum received`, whichever port gives what another has
+//! taken, so that the sums end at zero together. All first halves of a tick are booked before any share is taken. The sums
+//! begin anew when no port is in contact. They run over all tools of a scene: bodies apart from each other exchange nothing,
+//! and a hand may then be damped for what another owes. Sums for each body would need to know what part of a withheld force
+//! belongs to which body, where a tool touches two.
+//!
 //! Source: Hannaford and Ryu, Time-domain passivity control of haptic interfaces (IEEE Trans. Robotics and Automation 18,
 //! 2002), whose observer takes the port's energy from zero and whose controller acts when it turns negative: the whole
 //! force then falls to zero on the way up. Paying by share spreads the same energy over the lift.
 //!
 //! Not in it: a device holds a force for a tick while the tip moves on, which gives out `K T v^2 / 2` of power for a spring
 //! `K`. The device's own damping must take that (Colgate and Schenkel 1997): `DeviceLimits::largest_stiffness`.
+
+use std::iter::Sum;
 
 use glam::DVec3;
 use palpate_devices::{Pose, Reading, Wrench};
@@ -70,21 +89,6 @@ pub struct PortEnergy {
     pub owed: f64,
     /// What was owed at faults and resets, and when the tool left the scene, in sum: it was never paid.
     pub unpaid: f64,
-}
-
-/// Bounds of the damping.
-#[derive(Clone, Copy, Debug)]
-pub struct DampingLimits {
-    /// N s/m.
-    pub linear: f64,
-    /// N m s/rad.
-    pub angular: f64,
-}
-
-impl From<&SafetyLimits> for DampingLimits {
-    fn from(limits: &SafetyLimits) -> Self {
-        Self { linear: limits.max_damping, angular: limits.max_angular_damping }
-    }
 }
 
 /// A rotation and a displacement, or their rates.
@@ -114,6 +118,40 @@ struct Measurement {
     timestamp_ns: u64,
 }
 
+/// What a model has received at a port, or at several, and what of it hands have not put in, J.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Account {
+    received: f64,
+    owed: f64,
+}
+
+impl Account {
+    /// Part of what the model has received that hands have put in.
+    pub fn share(&self) -> f64 {
+        let owes = self.owed > TOLERANCE && self.received > 0.0;
+        if owes { (1.0 - self.owed / self.received).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// What hands have got beyond what they put in and what the model gave, J.
+    fn overdraft(&self) -> f64 {
+        (self.owed - self.received.max(0.0)).max(0.0)
+    }
+
+    fn add(&mut self, received: f64, owed: f64) {
+        self.received += received;
+        self.owed += owed;
+    }
+}
+
+impl Sum for Account {
+    fn sum<I: Iterator<Item = Self>>(accounts: I) -> Self {
+        accounts.fold(Self::default(), |mut sum, account| {
+            sum.add(account.received, account.owed);
+            sum
+        })
+    }
+}
+
 /// The balance of one device's port.
 #[derive(Clone, Debug, Default)]
 pub struct Port {
@@ -127,14 +165,29 @@ pub struct Port {
     /// Computed and withheld at the tick before.
     computed: Wrench,
     withheld: Wrench,
-    received: f64,
-    energy: PortEnergy,
+    /// Of the contact.
+    account: Account,
+    /// Of all contacts since the ports of the scene were last without any.
+    contribution: Account,
+    /// What has been given, and what never paid, J.
+    given: f64,
+    unpaid: f64,
 }
 
 impl Port {
     /// Energies so far.
     pub fn energy(&self) -> PortEnergy {
-        self.energy
+        PortEnergy { given: self.given, owed: self.account.owed, unpaid: self.unpaid }
+    }
+
+    /// Part in the balance of all ports of the scene; zero once there is no port in contact.
+    pub fn contribution(&mut self) -> &mut Account {
+        &mut self.contribution
+    }
+
+    /// Whether the model computed a wrench at the last tick.
+    pub fn is_in_contact(&self) -> bool {
+        self.computed != Wrench::default()
     }
 
     /// Follows the tip, `period` seconds after the last call. A tool out of the scene has no port.
@@ -162,24 +215,31 @@ impl Port {
 
     /// Ends the balance: no wrench goes out, or nobody knows where the tip is. What is owed then stays unpaid.
     pub fn close(&mut self) {
-        let PortEnergy { given, unpaid, .. } = self.energy;
-        let unpaid = unpaid + self.overdraft();
-        *self = Self { energy: PortEnergy { given, owed: 0.0, unpaid }, ..Self::default() };
+        let unpaid = self.unpaid + self.account.overdraft();
+        *self = Self { given: self.given, unpaid, ..Self::default() };
     }
 
-    /// Damping of this tick, to be taken from what is asked for: `computed`, ramped and clamped, is `asked`.
-    pub fn damping(&self, computed: &Wrench, asked: &Wrench, limits: DampingLimits, period: f64) -> Wrench {
-        if self.energy.owed <= TOLERANCE {
+    /// Damping of this tick, to be taken from what is asked for: `computed`, ramped and clamped, is `asked`. `scene_share` is
+    /// the share of all ports together.
+    pub fn damping(
+        &self,
+        computed: &Wrench,
+        asked: &Wrench,
+        limits: &SafetyLimits,
+        scene_share: f64,
+        period: f64,
+    ) -> Wrench {
+        if self.account.owed <= TOLERANCE && scene_share >= 1.0 {
             return Wrench::default();
         }
         let Motion { linear, angular } = self.velocity;
-        let bounds = [limits.linear * linear.length(), limits.angular * angular.length()];
+        let bounds = [limits.max_damping * linear.length(), limits.max_angular_damping * angular.length()];
         // Power that the bounds allow, and the part of it that pays the overdraft in time.
         let most = bounds[0] * linear.length() + bounds[1] * angular.length();
-        let wanted = self.overdraft() / (PAYMENT_TICKS * period);
+        let wanted = self.account.overdraft() / (PAYMENT_TICKS * period);
         let part = if wanted < most { wanted / most } else { 1.0 };
         let part = if wanted > 0.0 { part } else { 0.0 };
-        let share = self.share();
+        let share = self.account.share().min(scene_share);
         Wrench {
             force: against(linear, computed.force, asked.force, share, part, bounds[0]),
             torque: against(angular, computed.torque, asked.torque, share, part, bounds[1]),
@@ -193,9 +253,8 @@ impl Port {
         self.book_half(computed, withheld);
         (self.computed, self.withheld) = (computed, withheld);
         if computed == Wrench::default() {
-            let left = if keeps_energy { self.energy.owed.max(0.0) } else { self.overdraft() };
-            self.energy.owed = if left > TOLERANCE { left } else { 0.0 };
-            self.received = 0.0;
+            let left = if keeps_energy { self.account.owed.max(0.0) } else { self.account.overdraft() };
+            self.account = Account { received: 0.0, owed: if left > TOLERANCE { left } else { 0.0 } };
         }
         self.moved = Motion::default();
     }
@@ -205,19 +264,9 @@ impl Port {
     fn book_half(&mut self, computed: Wrench, withheld: Wrench) {
         let received = -0.5 * work(&computed, &self.moved);
         let owed = -0.5 * work(&withheld, &self.moved);
-        self.received += received;
-        self.energy.owed += owed;
-        self.energy.given += owed - received;
-    }
-
-    /// Part of what the model has received that the hand has put in.
-    fn share(&self) -> f64 {
-        if self.received > 0.0 { (1.0 - self.energy.owed / self.received).clamp(0.0, 1.0) } else { 1.0 }
-    }
-
-    /// What the hand has got beyond what it put in and what the model gave, J.
-    fn overdraft(&self) -> f64 {
-        (self.energy.owed - self.received.max(0.0)).max(0.0)
+        self.account.add(received, owed);
+        self.contribution.add(received, owed);
+        self.given += owed - received;
     }
 }
 

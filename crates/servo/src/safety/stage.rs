@@ -3,10 +3,26 @@
 use glam::DVec3;
 use palpate_devices::{DeviceFault, Reading, Wrench};
 
-use super::passivity::{DampingLimits, Port, PortEnergy};
+use super::passivity::{Account, Port, PortEnergy};
 use super::reading::ReadingCheck;
 use super::vector::{LimitedVector, clamped};
 use super::{FaultReason, SafetyLimits};
+
+/// What a tick computed for one device.
+#[derive(Clone, Copy, Debug)]
+pub struct Computed {
+    /// By the contact laws, before the limit of strain: the reference of the energy balance.
+    pub law: Wrench,
+    /// What that limit leaves of it.
+    pub limited: Wrench,
+}
+
+impl From<Wrench> for Computed {
+    /// Where strain is not limited.
+    fn from(wrench: Wrench) -> Self {
+        Self { law: wrench, limited: wrench }
+    }
+}
 
 /// The stage's memory.
 #[derive(Clone, Debug)]
@@ -43,6 +59,15 @@ impl SafetyStage {
         self.port.energy()
     }
 
+    /// Share of what the model has received at all ports together that hands have put in, after all stages have taken up what
+    /// their devices said, and before any is applied.
+    pub fn scene_share(stages: &mut [Self]) -> f64 {
+        if !stages.iter().any(|stage| stage.port.is_in_contact()) {
+            stages.iter_mut().for_each(|stage| *stage.port.contribution() = Account::default());
+        }
+        stages.iter_mut().map(|stage| *stage.port.contribution()).sum::<Account>().share()
+    }
+
     /// The latched fault, if any.
     pub fn fault(&self) -> Option<FaultReason> {
         self.fault
@@ -71,11 +96,14 @@ impl SafetyStage {
         said.ok()
     }
 
-    /// The wrench to put out for `computed`, `period` seconds after the last call.
-    pub fn apply(&mut self, computed: Wrench, period: f64) -> Wrench {
+    /// The wrench to put out for `computed`, `period` seconds after the last call; the share is that of
+    /// [`SafetyStage::scene_share`], one for a stage by itself.
+    pub fn apply(&mut self, computed: impl Into<Computed>, scene_share: f64, period: f64) -> Wrench {
+        let Computed { law, limited } = computed.into();
         self.age += period;
         // The magnitude of a finite vector may overflow.
-        if !(computed.force.length().is_finite() && computed.torque.length().is_finite()) {
+        if ![law, limited].iter().all(|wrench| wrench.force.length().is_finite() && wrench.torque.length().is_finite())
+        {
             self.latch(FaultReason::WrenchNotFinite);
         }
         if self.fault.is_some() {
@@ -87,10 +115,10 @@ impl SafetyStage {
         let limits = &self.limits;
         let share = if self.age < limits.ramp { self.age / limits.ramp } else { 1.0 };
         let asked = Wrench {
-            force: clamped(computed.force, share, limits.max_force),
-            torque: clamped(computed.torque, share, limits.max_torque),
+            force: clamped(limited.force, share, limits.max_force),
+            torque: clamped(limited.torque, share, limits.max_torque),
         };
-        let damping = self.port.damping(&computed, &asked, DampingLimits::from(limits), period);
+        let damping = self.port.damping(&law, &asked, limits, scene_share, period);
         // A difference of nothing changes no bit, and does not pass the clamp again.
         let damped = |asked: DVec3, damping: DVec3, most: f64| match damping == DVec3::ZERO {
             true => asked,
@@ -102,7 +130,7 @@ impl SafetyStage {
                 .torque
                 .pass(damped(asked.torque, damping.torque, limits.max_torque), limits.max_torque_slew * period),
         };
-        self.port.book(computed, out, self.keeps_energy);
+        self.port.book(law, out, self.keeps_energy);
         out
     }
 }
@@ -126,7 +154,7 @@ mod tests {
 
     fn settled(limits: SafetyLimits) -> SafetyStage {
         let mut stage = SafetyStage::new(limits, false);
-        (0..1000).for_each(|_| _ = stage.apply(Wrench::default(), PERIOD));
+        (0..1000).for_each(|_| _ = stage.apply(Wrench::default(), 1.0, PERIOD));
         stage
     }
 
@@ -141,7 +169,7 @@ mod tests {
         let limits = SafetyLimits { max_slew: 1e9, ..SafetyLimits::default() };
         let mut stage = SafetyStage::new(limits, false);
         for _ in 0..2 {
-            let out: Vec<f64> = (0..300).map(|_| stage.apply(force(DVec3::X), PERIOD).force.x).collect();
+            let out: Vec<f64> = (0..300).map(|_| stage.apply(force(DVec3::X), 1.0, PERIOD).force.x).collect();
             assert!((out[124] - 0.5).abs() < 1e-9);
             assert_eq!(out[299], 1.0);
             stage.reset();
@@ -154,11 +182,11 @@ mod tests {
         let mut stage = settled(limits);
         let computed = Wrench { force: 20.0 * DVec3::X, torque: -DVec3::Y };
         for tick in 1..40 {
-            let (out, t) = (stage.apply(computed, PERIOD), f64::from(tick) * PERIOD);
+            let (out, t) = (stage.apply(computed, 1.0, PERIOD), f64::from(tick) * PERIOD);
             assert!((out.force - DVec3::X * (500.0 * t).min(8.0)).length() < 1e-12);
             assert!((out.torque + DVec3::Y * (10.0 * t).min(0.2)).length() < 1e-12);
         }
-        assert_eq!(stage.apply(Wrench::default(), PERIOD), Wrench::default(), "letting go is never slowed down");
+        assert_eq!(stage.apply(Wrench::default(), 1.0, PERIOD), Wrench::default(), "letting go is never slowed down");
     }
 
     #[test]
@@ -166,11 +194,11 @@ mod tests {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e200] {
             for wrench in [force(DVec3::new(0.0, bad, 0.0)), torque(DVec3::new(0.0, 0.0, bad))] {
                 let mut stage = settled(SafetyLimits::default());
-                assert_eq!(stage.apply(wrench, PERIOD), Wrench::default());
-                assert_eq!(stage.apply(force(DVec3::X), PERIOD), Wrench::default());
+                assert_eq!(stage.apply(wrench, 1.0, PERIOD), Wrench::default());
+                assert_eq!(stage.apply(force(DVec3::X), 1.0, PERIOD), Wrench::default());
                 assert_eq!(stage.fault(), Some(FaultReason::WrenchNotFinite));
                 stage.reset();
-                assert!(stage.apply(force(DVec3::X), PERIOD).force.x > 0.0);
+                assert!(stage.apply(force(DVec3::X), 1.0, PERIOD).force.x > 0.0);
             }
         }
     }
@@ -229,7 +257,7 @@ mod tests {
     fn the_first_fault_stays() {
         let mut stage = settled(SafetyLimits::default());
         stage.latch(FaultReason::StaleInput);
-        stage.apply(force(DVec3::NAN), PERIOD);
+        stage.apply(force(DVec3::NAN), 1.0, PERIOD);
         assert_eq!(stage.fault(), Some(FaultReason::StaleInput));
     }
 }

@@ -55,7 +55,7 @@ pub fn single(moving: bool) -> Arc<Model> {
 pub fn sliding(moving: bool, shapes: [ToolShape; 2]) -> Arc<Model> {
     let body = BodyModel::new(green(&cube(6)), Placement::default()).expect("a valid body");
     let nodes = body.green().surface_count();
-    let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes] };
+    let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes], homogeneous: true };
     let body = body.with_moduli(moduli).expect("constants that match");
     let body = if moving { set_in_motion(body) } else { body };
     let tools = shapes.map(|shape| ToolModel { shape, radius: 0.01, law: LawKind::Local, ..TOOL });

@@ -17,7 +17,7 @@ import numpy as np
 from palpate.body import Body
 from palpate.green import GreensFunction
 from palpate.validation.bench import contact_peers
-from palpate.validation.bench.contact_tick import TickRow, tick_rows
+from palpate.validation.bench.contact_tick import KindRow, TickRow, kind_rows, tick_rows
 from palpate.validation.plots import plot_contact
 from palpate.validation.verify.contact import tools
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
@@ -76,6 +76,7 @@ class Results:
     truth: np.ndarray
     rows: list[Row]
     ticks: list[TickRow] = field(default_factory=list)
+    kinds: list[KindRow] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
 
 
@@ -92,7 +93,8 @@ def run(report: Callable[[str], None] = lambda _: None, ticks: bool = True) -> R
     rows += _peer_rows(report)
     if ticks:
         report("the cost of a tick")
-    return Results(truth, rows, tick_rows() if ticks else [], contact_peers.missing())
+    costs = (tick_rows(), kind_rows()) if ticks else ([], [])
+    return Results(truth, rows, *costs, contact_peers.missing())
 
 
 def as_json(results: Results) -> dict:
@@ -112,6 +114,7 @@ def as_json(results: Results) -> dict:
             for row in results.rows
         ],
         "ticks": [asdict(row) for row in results.ticks],
+        "kinds": [asdict(row) for row in results.kinds],
         "missing": results.missing,
     }
 

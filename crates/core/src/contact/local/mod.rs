@@ -9,9 +9,11 @@ mod ellipsoid;
 mod modulus;
 mod place;
 mod sphere;
+mod widening;
 
 pub use ellipse::{EllipseContact, indent_ellipse};
 pub use ellipsoid::{EllipsoidContact, EllipsoidProblem};
 pub use modulus::effective_modulus;
 pub use place::{OsculatingSurface, ToolPose};
 pub use sphere::{SphereContact, indent_sphere};
+pub use widening::{WidenedContact, Widening};

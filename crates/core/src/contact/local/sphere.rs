@@ -7,22 +7,27 @@
 //! d = R x t          F = E* R^2 [(1 + x^2) t - x]          dF/dd = 2 E* a
 //! ```
 //!
-//! Hertz's parabola is the limit of small `x`. The parameter solved for is `t`, not `a`: `d = R t tanh t` keeps its relative
-//! precision at every depth, while `1 - a/R` falls below round-off at `d = 18 R`. The energy is
+//! Hertz's parabola is the limit of small `x`. With `q = d/R` the energy is
 //!
 //! ```text
-//! U = int F dd = E* R^3 [f q - x q^2 + int_0^x (s artanh s)^2 ds],    q = d/R, f = F/(E* R^2)
+//! U = int F dd = E* R^3 [f q - x q^2 + int_0^x (s artanh s)^2 ds],    f = F/(E* R^2)
 //! ```
 //!
-//! by parts twice, with `dF = 2 E* a dd`. Below `x = 1/2` these differences cancel, and power series in `x^2` take over.
+//! by parts twice, with `df = 2 x dq`. The equation for `t` and the differences in `U` cost time, and cancel where the contact
+//! is shallow. There everything is a power series in `q`: `x = sqrt(q) X(q)`, and by integration term by term
+//! `f = q^(3/2) F(q)`, `u = q^(5/2) U(q)`. From `dy/dq = 2 y (1 - y)/(q (1 - y) + y)` for `y = x^2` follow the coefficients;
+//! the singularity closest to zero is where `sinh 2t = -2t`, at `|q| = 2.4`.
+//!
+//! Deeper, the parameter solved for is `t`, not `a`: `d = R t tanh t` keeps its relative precision at every depth, while
+//! `1 - a/R` falls below round-off at `d = 18 R`.
 
-/// Contact radius over the sphere's radius below which power series are summed.
+/// Depth over the sphere's radius below which power series are summed.
 const SERIES_BELOW: f64 = 0.5;
-/// Terms of the power series: `(1/2)^(2 * 27)` is below the precision of a double.
-const TERMS: usize = 27;
+/// Terms of the power series: `(0.5/2.4)^24` is below the precision of a double.
+const TERMS: usize = 24;
 /// Newton's steps for the contact radius. The start is within 4 %, so the fourth is already below round-off.
 const MAX_NEWTON_STEPS: usize = 6;
-/// Terms of the dilogarithm's series in `exp(-2 t)`, which is at most 1/3 there.
+/// Terms of the dilogarithm's series in `exp(-2 t)`, which is at most 1/4 there.
 const DILOGARITHM_TERMS: usize = 34;
 
 /// State of a sphere pressed into a half-space.
@@ -49,12 +54,7 @@ pub fn indent_sphere(approach: f64, radius: f64, effective_modulus: f64) -> Sphe
         return SphereContact::default();
     }
     let depth = approach / radius;
-    let t = parameter(depth);
-    let x = t.tanh();
-    let (force, energy) = match x < SERIES_BELOW {
-        true => series(x),
-        false => closed_form(x, t, depth),
-    };
+    let (x, force, energy) = if depth < SERIES_BELOW { series(depth) } else { closed_form(depth) };
     let scale = effective_modulus * radius;
     let contact_radius = radius * x;
     SphereContact {
@@ -82,55 +82,67 @@ fn parameter(depth: f64) -> f64 {
     t
 }
 
-/// Coefficients of `f = x^3 sum c_k x^(2k)`, from `artanh x = sum x^(2k+1)/(2k+1)`.
-const FORCE: [f64; TERMS] = {
-    let mut c = [0.0; TERMS];
-    let mut k = 0;
+/// Coefficients of `X`, `F` and `U` by powers of the depth.
+const COEFFICIENTS: [[f64; TERMS]; 3] = {
+    // Of y/q, by (Y + q Y') (1 + Y - q Y) = 2 Y (1 - q Y).
+    let mut y = [0.0; TERMS];
+    y[0] = 1.0;
+    let mut k = 1;
     while k < TERMS {
-        let n = (k + 1) as f64;
-        c[k] = 4.0 * n / (4.0 * n * n - 1.0);
-        k += 1;
-    }
-    c
-};
-
-/// Coefficients of `u = x^5 sum c_k x^(2k)`: the integral of the product of the series of `f` and of
-/// `dq/dx = sum 2j/(2j-1) x^(2j-1)`.
-const ENERGY: [f64; TERMS] = {
-    let mut c = [0.0; TERMS];
-    let mut k = 0;
-    while k < TERMS {
-        let mut sum = 0.0;
-        let mut i = 0;
+        // All that does not multiply Y_k; its own factor is (k + 1) 2 + 1 - 2.
+        let (mut rest, mut i) = (0.0, 0);
         while i <= k {
-            let j = (k - i + 1) as f64;
-            sum += FORCE[i] * 2.0 * j / (2.0 * j - 1.0);
+            let slope = if i < k { (i + 1) as f64 * y[i] } else { 0.0 };
+            let other = if i > 0 && i < k { y[k - i] } else { 0.0 };
+            let before = if i < k { y[k - 1 - i] } else { 0.0 };
+            rest += slope * (other - before) + if i < k { 2.0 * y[i] * before } else { 0.0 };
             i += 1;
         }
-        c[k] = sum / (2 * k + 5) as f64;
+        y[k] = -rest / (2 * k + 1) as f64;
+        k += 1;
+    }
+    let mut c = [[0.0; TERMS]; 3];
+    let mut k = 0;
+    while k < TERMS {
+        // X^2 = Y.
+        let (mut rest, mut i) = (y[k], 1);
+        while i < k {
+            rest -= c[0][i] * c[0][k - i];
+            i += 1;
+        }
+        c[0][k] = if k == 0 { 1.0 } else { 0.5 * rest };
+        c[1][k] = 2.0 * c[0][k] / (k as f64 + 1.5);
+        c[2][k] = c[1][k] / (k as f64 + 2.5);
         k += 1;
     }
     c
 };
 
-/// `f` and `u` of a small contact.
-fn series(x: f64) -> (f64, f64) {
-    let y = x * x;
-    let (mut force, mut energy) = (0.0, 0.0);
-    for k in (0..TERMS).rev() {
-        force = force * y + FORCE[k];
-        energy = energy * y + ENERGY[k];
+/// `x`, `f` and `u` of a shallow contact.
+fn series(depth: f64) -> (f64, f64, f64) {
+    // Even and odd powers apart: the additions wait for each other half as long.
+    let square = depth * depth;
+    let (mut even, mut odd) = ([0.0; 3], [0.0; 3]);
+    for k in (0..TERMS / 2).rev() {
+        for of in 0..3 {
+            even[of] = even[of] * square + COEFFICIENTS[of][2 * k];
+            odd[of] = odd[of] * square + COEFFICIENTS[of][2 * k + 1];
+        }
     }
-    (x * y * force, x * y * y * energy)
+    let [x, f, u] = std::array::from_fn(|of| even[of] + depth * odd[of]);
+    let root = depth.sqrt();
+    (root * x, depth * root * f, square * root * u)
 }
 
-/// `f` and `u` of a large contact.
-fn closed_form(x: f64, t: f64, depth: f64) -> (f64, f64) {
+/// `x`, `f` and `u` of a deep contact.
+fn closed_form(depth: f64) -> (f64, f64, f64) {
+    let t = parameter(depth);
+    let x = t.tanh();
     let y = x * x;
     let force = (1.0 + y) * t - x;
     // int_0^x (s artanh s)^2 ds, by parts; what is left is int_0^t s tanh s ds.
     let rest = y * x * t * t / 3.0 + (y * t - (t - x)) / 3.0 - 2.0 / 3.0 * integral_of_t_tanh_t(t);
-    (force, force * depth - x * depth * depth + rest)
+    (x, force, force * depth - x * depth * depth + rest)
 }
 
 /// `int_0^t s tanh s ds`, from `tanh s = 1 - 2/(exp(2 s) + 1)` and `int_0^inf s/(exp(2 s) + 1) ds = pi^2/48`.
@@ -232,8 +244,7 @@ mod tests {
 
     #[test]
     fn no_step_where_the_series_ends() {
-        // x = 1/2 exactly at this depth.
-        let d = RADIUS * 0.5 * 0.5f64.atanh();
+        let d = RADIUS * SERIES_BELOW;
         let [below, above] = [d * (1.0 - 1e-14), d * (1.0 + 1e-14)].map(|d| indent_sphere(d, RADIUS, MODULUS));
         assert!((above.force / below.force - 1.0).abs() < 1e-13);
         assert!((above.energy / below.energy - 1.0).abs() < 1e-13);

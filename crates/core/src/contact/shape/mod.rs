@@ -156,7 +156,7 @@ impl ToolShape {
             Self::Sphere { radius } => ellipsoid::line_entry(DVec3::splat(radius), origin, direction),
             Self::Ellipsoid { semi_axes } => ellipsoid::line_entry(semi_axes, origin, direction),
             Self::Capsule { radius, half_length } => capsule::line_entry(radius, half_length, origin, direction),
-            Self::Punch { radius, rounding } => punch::line_entry(radius, rounding, origin, direction),
+            Self::Punch { radius, rounding } => punch::line_entry((radius, rounding), origin, direction, reach),
             Self::Surface(ref surface) => surface.line_entry(origin, direction, reach),
         }
     }

@@ -46,8 +46,13 @@ pub(super) fn curvature_at(radius: f64, rounding: f64, normal: DVec3) -> Princip
     PrincipalCurvatures { curvatures: [parallel, meridian], directions: [around, normal.cross(around)] }
 }
 
-/// Where a line enters.
-pub(super) fn line_entry(radius: f64, rounding: f64, origin: DVec3, direction: DVec3) -> Option<LineEntry> {
+/// Where a line enters, up to `reach`.
+pub(super) fn line_entry(
+    (radius, rounding): (f64, f64),
+    origin: DVec3,
+    direction: DVec3,
+    reach: f64,
+) -> Option<LineEntry> {
     if direction.z > 0.0 {
         let distance = -origin.z / direction.z;
         if (origin + distance * direction).xy().length() <= radius - rounding {
@@ -56,7 +61,9 @@ pub(super) fn line_entry(radius: f64, rounding: f64, origin: DVec3, direction: D
     }
     // From outside of the ball around the punch.
     let centre = DVec3::Z * (0.5 * LENGTH * radius);
-    let mut distance = (centre - origin).dot(direction) - LENGTH * radius;
+    let ball = (centre - origin).dot(direction) - LENGTH * radius;
+    // Coming from in front, nothing is met before the plane of the face.
+    let mut distance = if direction.z > 0.0 { ball.max(-origin.z / direction.z) } else { ball };
     let mut normal = DVec3::NEG_Z;
     for _ in 0..MAX_LINE_STEPS {
         let (value, gradient) = signed_distance(radius, rounding, origin + distance * direction);
@@ -69,6 +76,10 @@ pub(super) fn line_entry(radius: f64, rounding: f64, origin: DVec3, direction: D
             return None;
         }
         distance -= value / slope;
+        // Every step ends before the entry.
+        if distance > reach {
+            return None;
+        }
     }
     Some(LineEntry { distance, normal })
 }

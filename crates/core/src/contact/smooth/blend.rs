@@ -1,10 +1,14 @@
 //! The smooth surface as the zero of a function, `f = sum w_i f_i / sum w_i`: the quadrics `f_i` of the fans around, blended
 //! by weights that depend on the place only (implicit moving least squares; Kolluri, 2005, with quadrics for planes).
+//!
+//! With `r` the distance from a fan, over its reach, the weight is `w = (1 - r^2)^3 / (r^2 + 1/4)^2`: by the denominator the
+//! surface passes close by the nodes.
 
 use glam::{DMat3, DVec3};
+use pulp::NullaryFnOnce;
 
-use super::fans::Fan;
-use crate::tensor::outer;
+use super::neighbourhood::{FanLanes, LANES, Lane, reaches, total};
+use crate::tensor::{outer, symmetric};
 
 /// Squared distance within which a node does not draw the surface towards itself, over its squared reach.
 const SHARP: f64 = 0.25;
@@ -17,61 +21,101 @@ pub struct Blend {
     pub hessian: DMat3,
 }
 
-/// The weight `(1 - r^2 / reach^2)^3` of a fan at an offset from it, its gradient and its Hessian; `None` beyond its reach.
-pub fn weight(fan: &Fan, offset: DVec3) -> Option<(f64, DVec3, DMat3)> {
-    let squared_reach = fan.reach * fan.reach;
-    let left = 1.0 - offset.length_squared() / squared_reach;
-    if left <= 0.0 {
-        return None;
-    }
-    let (first, second) = (-6.0 * left * left / squared_reach, 24.0 * left / (squared_reach * squared_reach));
-    let hessian = outer(offset * second, offset) + DMat3::from_diagonal(DVec3::splat(first));
-    Some((left * left * left, offset * first, hessian))
+/// Sums over fans at a point, as a struct: a closure might be compiled for the narrowest vectors.
+pub struct Blending<'a> {
+    pub fans: &'a [FanLanes],
+    pub point: DVec3,
 }
 
-/// The weight that quadrics are blended with: that of [`weight`] over `(t + SHARP)^2`, `t = r^2 / reach^2`, so that the surface
-/// passes close by the nodes.
-fn sharp_weight(fan: &Fan, offset: DVec3) -> Option<(f64, DVec3, DMat3)> {
-    let squared_reach = fan.reach * fan.reach;
-    let t = offset.length_squared() / squared_reach;
-    let left = 1.0 - t;
-    if left <= 0.0 {
-        return None;
-    }
-    let near = 1.0 / (t + SHARP);
-    let (a, b) = (left * near, near * near);
-    let value = left * a * a;
-    let first = -3.0 * a * a - 2.0 * value * near;
-    let second = 6.0 * left * b + 12.0 * a * a * near + 6.0 * value * b;
-    let hessian = outer(offset * (4.0 * second / (squared_reach * squared_reach)), offset)
-        + DMat3::from_diagonal(DVec3::splat(2.0 * first / squared_reach));
-    Some((value, offset * (2.0 * first / squared_reach), hessian))
+/// Sums of weights and of weighted quadrics: values, gradients, and Hessians by `xx, xy, xz, yy, yz, zz`.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    weight: [Lane; 10],
+    quadric: [Lane; 10],
 }
 
-/// Blends the quadrics of some fans; `None` where no weight is positive.
-pub fn blend<'a>(fans: impl Iterator<Item = &'a Fan>, x: DVec3) -> Option<Blend> {
-    let (mut w, mut wx, mut wxx) = (0.0, DVec3::ZERO, DMat3::ZERO);
-    let (mut n, mut nx, mut nxx) = (0.0, DVec3::ZERO, DMat3::ZERO);
-    for fan in fans {
-        let offset = x - fan.position;
-        let Some((weight, slope, bend)) = sharp_weight(fan, offset) else { continue };
-        let curved = fan.curvature * offset;
-        let value = fan.normal.dot(offset) + 0.5 * offset.dot(curved);
-        let gradient = fan.normal + curved;
-        w += weight;
-        wx += slope;
-        wxx += bend;
-        n += weight * value;
-        nx += weight * gradient + slope * value;
-        let cross = outer(slope, gradient);
-        nxx += fan.curvature * weight + cross + cross.transpose() + bend * value;
+impl NullaryFnOnce for Blending<'_> {
+    type Output = Option<Blend>;
+
+    /// `None` where no weight is positive.
+    #[inline(always)]
+    fn call(self) -> Option<Blend> {
+        let mut sums = Sums::default();
+        let point = self.point.to_array();
+        for fans in self.fans {
+            let (offset, relative) = fans.offset(point);
+            if reaches(&relative) {
+                sums.add(fans, &offset, &relative);
+            }
+        }
+        sums.blend()
     }
-    if w <= 0.0 {
-        return None;
+}
+
+impl Sums {
+    #[inline(always)]
+    fn add(&mut self, fans: &FanLanes, offset: &[Lane; 3], relative: &Lane) {
+        let (n, c) = (&fans.normal, &fans.curvature);
+        for l in 0..LANES {
+            let (x, y, z, inverse) = (offset[0][l], offset[1][l], offset[2][l], fans.inverse_squared_reach[l]);
+            // Beyond its reach a fan has no weight, and all derivatives vanish with it.
+            let left = if relative[l] < 1.0 { 1.0 - relative[l] } else { 0.0 };
+            let near = 1.0 / (relative[l] + SHARP);
+            let (a, b) = (left * near, near * near);
+            let w = left * a * a;
+            // Derivatives of the weight by the square: its gradient is `slope` times the offset, its Hessian `bend` times the
+            // offset's outer product, and `slope` on the diagonal.
+            let slope = -2.0 * inverse * (3.0 * a * a + 2.0 * w * near);
+            let bend = 4.0 * inverse * inverse * (6.0 * left * b + 12.0 * a * a * near + 6.0 * w * b);
+            let (sx, sy, sz) = (slope * x, slope * y, slope * z);
+            let (bx, by, bz) = (bend * x, bend * y, bend * z);
+            let bends = [bx * x + slope, bx * y, bx * z, by * y + slope, by * z, bz * z + slope];
+            let (cx, cy, cz) = (
+                c[0][l] * x + c[1][l] * y + c[2][l] * z,
+                c[1][l] * x + c[3][l] * y + c[4][l] * z,
+                c[2][l] * x + c[4][l] * y + c[5][l] * z,
+            );
+            let flat = n[0][l] * x + n[1][l] * y + n[2][l] * z;
+            let q = flat + 0.5 * (cx * x + cy * y + cz * z);
+            let (gx, gy, gz) = (n[0][l] + cx, n[1][l] + cy, n[2][l] + cz);
+            let crosses =
+                [2.0 * sx * gx, sx * gy + sy * gx, sx * gz + sz * gx, 2.0 * sy * gy, sy * gz + sz * gy, 2.0 * sz * gz];
+            let weights = [w, sx, sy, sz];
+            let quadrics = [w * q, w * gx + sx * q, w * gy + sy * q, w * gz + sz * q];
+            for k in 0..4 {
+                self.weight[k][l] += weights[k];
+                self.quadric[k][l] += quadrics[k];
+            }
+            for k in 0..6 {
+                self.weight[4 + k][l] += bends[k];
+                self.quadric[4 + k][l] += c[k][l] * w + crosses[k] + bends[k] * q;
+            }
+        }
     }
-    let value = n / w;
-    let gradient = (nx - value * wx) / w;
-    let cross = outer(gradient, wx);
-    let hessian = (nxx - wxx * value - cross - cross.transpose()) * (1.0 / w);
-    Some(Blend { value, gradient, hessian })
+
+    #[inline(always)]
+    fn blend(&self) -> Option<Blend> {
+        let ([w, wx, wy, wz, w_second @ ..], [n, nx, ny, nz, n_second @ ..]) =
+            (totals(&self.weight), totals(&self.quadric));
+        if w <= 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / w;
+        let value = n * inverse;
+        let by_weight = DVec3::new(wx, wy, wz);
+        let gradient = (DVec3::new(nx, ny, nz) - value * by_weight) * inverse;
+        let cross = outer(gradient, by_weight);
+        let hessian = symmetric(n_second) - symmetric(w_second) * value - cross - cross.transpose();
+        Some(Blend { value, gradient, hessian: hessian * inverse })
+    }
+}
+
+/// Sums over the lanes.
+#[inline(always)]
+fn totals(lanes: &[Lane; 10]) -> [f64; 10] {
+    let mut totals = [0.0; 10];
+    for k in 0..10 {
+        totals[k] = total(lanes[k]);
+    }
+    totals
 }

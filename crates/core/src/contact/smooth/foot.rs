@@ -7,7 +7,8 @@
 use glam::{DMat3, DVec3};
 
 use super::SmoothSurface;
-use super::blend::blend;
+use super::blend::Blending;
+use super::neighbourhood::Neighbourhood;
 use crate::contact::{SurfacePoint, SurfaceQuery};
 use crate::mesh::Surface;
 use crate::tensor::across;
@@ -20,6 +21,15 @@ const SETTLED: f64 = 1e-5;
 const CROSSINGS: usize = 16;
 /// The surface is not followed where it would turn back: least `1 + s kappa`.
 const LEAST_STRETCH: f64 = 0.1;
+
+/// The drawn surface below a smooth one.
+#[derive(Clone, Copy)]
+pub struct DrawnSurface<'a> {
+    /// Its triangles.
+    pub surface: &'a Surface,
+    /// Where they are.
+    pub query: &'a SurfaceQuery,
+}
 
 /// A point of the surface closest to a point `p` near it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,20 +56,52 @@ impl FootPoint {
         let distance = (p - self.position).dot(self.normal);
         Self { distance, turning: DMat3::ZERO, shift: DMat3::ZERO, ..*self }
     }
+
+    /// The point that it is the foot of.
+    fn of(&self) -> DVec3 {
+        self.position + self.normal * self.distance
+    }
 }
 
 impl SmoothSurface {
-    /// The foot of `p`, followed from `start`, a triangle and a point near it. `None` for a point that is not finite.
-    pub fn foot(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3, start: (u32, DVec3)) -> Option<FootPoint> {
-        self.follow(surface, p, start).or_else(|| self.foot_anywhere(surface, query, p))
+    /// The foot of `p`, followed from that of a point near it. `None` for a point that is not finite.
+    pub fn foot(
+        &self,
+        drawn: DrawnSurface<'_>,
+        p: DVec3,
+        from: &FootPoint,
+        near: &mut Neighbourhood,
+    ) -> Option<FootPoint> {
+        let start = from.position + from.shift * (p - from.of());
+        let triangle = self.triangle_below(drawn.surface, from.triangle, start);
+        let followed = triangle.and_then(|triangle| self.follow(drawn.surface, p, (triangle, start), near));
+        followed.or_else(|| self.foot_anywhere(drawn, p, near))
     }
 
     /// The foot of `p` from wherever the drawn surface is closest.
-    pub fn foot_anywhere(&self, surface: &Surface, query: &SurfaceQuery, p: DVec3) -> Option<FootPoint> {
-        let closest = query.closest(surface, p)?;
+    pub fn foot_anywhere(&self, drawn: DrawnSurface<'_>, p: DVec3, near: &mut Neighbourhood) -> Option<FootPoint> {
+        let closest = drawn.query.closest(drawn.surface, p)?;
+        Some(self.foot_from(drawn, p, &closest, near))
+    }
+
+    /// The foot of `p` from the closest point of the drawn surface.
+    pub fn foot_from(
+        &self,
+        drawn: DrawnSurface<'_>,
+        p: DVec3,
+        closest: &SurfacePoint,
+        near: &mut Neighbourhood,
+    ) -> FootPoint {
         let start = (closest.triangle, closest.position);
-        let smooth = if self.is_within(&closest) { self.follow(surface, p, start) } else { None };
-        Some(smooth.unwrap_or_else(|| on_crease(&closest)))
+        let smooth = if self.is_within(closest) { self.follow(drawn.surface, p, start, near) } else { None };
+        smooth.unwrap_or_else(|| on_crease(closest))
+    }
+
+    /// Height over the drawn surface beyond which the smooth one is farther than `distance` too, m: no quadric departs from the
+    /// drawn triangles by as much as its fan reaches.
+    pub fn surely_beyond(&self, distance: f64, closest: &SurfacePoint) -> bool {
+        let first = self.met[self.ranges[closest.triangle as usize][0] as usize];
+        closest.signed_distance > distance + self.fans[first as usize].reach
     }
 
     /// Whether the closest point of the drawn surface is on no crease.
@@ -70,9 +112,16 @@ impl SmoothSurface {
     }
 
     /// On the smooth side of a triangle; `None` where it ends.
-    fn follow(&self, surface: &Surface, p: DVec3, (mut triangle, mut x): (u32, DVec3)) -> Option<FootPoint> {
+    fn follow(
+        &self,
+        surface: &Surface,
+        p: DVec3,
+        (mut triangle, mut x): (u32, DVec3),
+        near: &mut Neighbourhood,
+    ) -> Option<FootPoint> {
         for step in 0..STEPS {
-            let at = blend(self.own(triangle), x)?;
+            near.take_up(self, triangle);
+            let at = self.arch.dispatch(Blending { fans: near.own(), point: x })?;
             let size = at.gradient.length();
             let normal = at.gradient / size;
             let across = across(normal);
@@ -85,7 +134,7 @@ impl SmoothSurface {
             }
             let inverse = stretch.inverse();
             let along = p - x - normal * distance;
-            let spacing = self.fans[self.met[self.ranges[triangle as usize][0] as usize] as usize].spacing;
+            let spacing = near.spacing;
             let mut dx = inverse * along - normal * (at.value / size);
             let settled = dx.length_squared() < (SETTLED * spacing).powi(2);
             if settled || step + 1 == STEPS {

@@ -8,15 +8,19 @@
 mod blend;
 mod fans;
 mod foot;
+mod neighbourhood;
 mod weights;
 
 use glam::DVec3;
+use pulp::Arch;
 
 pub use fans::Fan;
-pub use foot::FootPoint;
-pub use weights::{FanWeights, MAX_FANS};
+pub use foot::{DrawnSurface, FootPoint};
+pub use neighbourhood::Neighbourhood;
+pub use weights::{Blended, FanWeights, MAX_FANS};
 
 use self::fans::Fans;
+use self::neighbourhood::LANES;
 use crate::mesh::Surface;
 
 /// Fans of nodes whose normals are turned farther than this from a triangle's do not belong to it (cosine).
@@ -36,6 +40,7 @@ pub struct SmoothSurface {
     /// For each triangle where its fans begin in `met`, where those begin that lie beyond creases, and the end.
     ranges: Vec<[u32; 3]>,
     met: Vec<u32>,
+    arch: Arch,
 }
 
 impl SmoothSurface {
@@ -44,8 +49,8 @@ impl SmoothSurface {
         let Fans { fans, of_corners, neighbours, creases } = Fans::new(surface);
         let touchable = fans.iter().map(|fan| touchable(fan.node)).collect();
         let walked = of_corners.clone();
-        let (ranges, met) = (Vec::new(), Vec::new());
-        let mut smooth = Self { fans, touchable, of_corners, neighbours, creases, ranges, met };
+        let (ranges, met, arch) = (Vec::new(), Vec::new(), Arch::new());
+        let mut smooth = Self { fans, touchable, of_corners, neighbours, creases, ranges, met, arch };
         let mut walk = Walk {
             surface,
             of_corners: &walked,
@@ -80,13 +85,14 @@ impl SmoothSurface {
         self.met[from as usize..to as usize].iter().map(|&fan| &self.fans[fan as usize])
     }
 
-    /// Ranks of all fans that a triangle meets.
-    fn all(&self, triangle: u32) -> &[u32] {
-        let [from, _, to] = self.ranges[triangle as usize];
-        &self.met[from as usize..to as usize]
+    /// Groups of lanes that the fans of any triangle fill at most.
+    fn most_groups(&self) -> usize {
+        let groups = |fans: u32| (fans as usize).div_ceil(LANES);
+        self.ranges.iter().map(|[from, between, to]| groups(between - from) + groups(to - between)).max().unwrap_or(0)
     }
 
-    /// Lists the fans that reach a triangle, first those on its side of all creases.
+    /// Lists the fans that reach a triangle, first those on its side of all creases. These are in order of their direction, so that
+    /// fans side by side reach the same places.
     fn meet(&mut self, walk: &mut Walk<'_>, triangle: u32) {
         let corners = walk.surface.corners(triangle);
         let centre: DVec3 = corners.into_iter().sum::<DVec3>() / 3.0;
@@ -123,11 +129,26 @@ impl SmoothSurface {
                 }
             }
             if !crossing {
+                let (fans, along) = (&self.fans, corners[0] - centre);
+                let angle = |rank: &u32| {
+                    let fan = &fans[*rank as usize];
+                    let offset = fan.position - centre;
+                    // Those that reach everywhere come first.
+                    let anywhere = offset.length() + size < fan.reach;
+                    if anywhere { f64::NEG_INFINITY } else { turn(along.dot(offset), normal.cross(along).dot(offset)) }
+                };
+                self.met[from as usize..].sort_by(|a, b| angle(a).total_cmp(&angle(b)));
                 between = self.met.len() as u32;
             }
         }
         self.ranges.push([from, between, self.met.len() as u32]);
     }
+}
+
+/// Grows with the angle of a vector, from -2 to 2.
+fn turn(x: f64, y: f64) -> f64 {
+    let part = x / (x.abs() + y.abs()).max(f64::MIN_POSITIVE);
+    if y < 0.0 { part - 1.0 } else { 1.0 - part }
 }
 
 /// Memory of a walk over the triangles.
@@ -145,6 +166,11 @@ pub(crate) mod tests {
 
     use super::*;
     use crate::contact::SurfaceQuery;
+
+    /// Memory for a surface.
+    pub(crate) fn near(smooth: &SmoothSurface) -> Neighbourhood {
+        Neighbourhood::new(std::iter::once(smooth))
+    }
 
     /// A ball of radius one, of `n` rows of triangles.
     pub(crate) fn ball(n: u32) -> Surface {
@@ -192,9 +218,10 @@ pub(crate) mod tests {
     fn the_distance_of_a_ball_is_that_of_the_ball_and_its_derivatives_are_exact() {
         let surface = ball(16);
         let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
-        let mut worst = 0.0f64;
+        let (mut worst, mut near) = (0.0f64, near(&smooth));
+        let drawn = DrawnSurface { surface: &surface, query: &query };
         for p in points(1.2) {
-            let foot = |p| smooth.foot_anywhere(&surface, &query, p).expect("a foot");
+            let mut foot = |p| smooth.foot_anywhere(drawn, p, &mut near).expect("a foot");
             let at = foot(p);
             assert!(!at.on_crease);
             worst = worst.max((at.distance - 0.2).abs());
@@ -216,11 +243,15 @@ pub(crate) mod tests {
     fn weights_sum_to_one_and_their_gradients_are_exact() {
         let surface = ball(16);
         let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
-        let mut weights = FanWeights::default();
+        let drawn = DrawnSurface { surface: &surface, query: &query };
+        let heights: Vec<_> = smooth.fans().iter().map(|fan| [fan.position.z]).collect();
+        let mut weights = FanWeights::new(near(&smooth));
         let mut height = |p| {
-            smooth.weigh(&smooth.foot_anywhere(&surface, &query, p).expect("a foot"), &mut weights);
+            let foot = smooth.foot_anywhere(drawn, p, &mut weights.near).expect("a foot");
+            smooth.weigh(&foot, &mut weights);
             assert!((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-12);
-            weights.field(|fan| smooth.fans()[fan].position.z)
+            let blended = weights.blend(&heights);
+            (blended.values[0], blended.slope(0))
         };
         for p in points(1.1) {
             let (_, slope) = height(p);
@@ -236,14 +267,15 @@ pub(crate) mod tests {
         let surface = cube();
         let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
         assert_eq!(smooth.fans().len(), 24);
-        let foot = |p| smooth.foot_anywhere(&surface, &query, p).expect("a foot");
+        let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
+        let mut foot = |p| smooth.foot_anywhere(drawn, p, &mut near).expect("a foot");
         let over = foot(DVec3::new(0.3, 0.6, 1.2));
         assert!((over.distance - 0.2).abs() < 1e-12 && over.normal.distance(DVec3::Z) < 1e-12, "{over:?}");
         let beside = foot(DVec3::new(1.1, 0.5, 1.1));
         assert!(beside.on_crease && (beside.distance - 0.02f64.sqrt()).abs() < 1e-12);
         // Followed from the face, the foot stops at the crease.
-        let followed = smooth.foot(&surface, &query, DVec3::new(1.1, 0.5, 1.1), (over.triangle, over.position));
+        let followed = smooth.foot(drawn, DVec3::new(1.1, 0.5, 1.1), &over, &mut near);
         assert!(followed.expect("a foot").position.distance(beside.position) < 1e-12);
-        assert!(smooth.foot_anywhere(&surface, &query, DVec3::splat(f64::NAN)).is_none());
+        assert!(smooth.foot_anywhere(drawn, DVec3::splat(f64::NAN), &mut near).is_none());
     }
 }

@@ -1,13 +1,14 @@
 //! Blending weights of the fans around a foot: what is known at the nodes becomes a smooth field of the tool's place.
 //!
-//! `nu_i = w_i eta_i / sum w_j eta_j`, with `w` of the distance (`blend`) and `eta` rising smoothly from zero, where the
-//! fan's normal is at a right angle to that of the contact, to one at 60 degrees.
+//! `nu_i = w_i eta_i / sum w_j eta_j`, with `w = (1 - r^2)^3` of the distance from the fan over its reach, and `eta` rising
+//! smoothly from zero, where the fan's normal is at a right angle to that of the contact, to one at 60 degrees.
 
 use glam::DVec3;
+use pulp::{Arch, NullaryFnOnce};
 
 use super::SmoothSurface;
-use super::blend::weight;
 use super::foot::FootPoint;
+use super::neighbourhood::{FanLanes, LANES, Lane, Neighbourhood, reaches};
 
 /// Most fans around a foot.
 pub const MAX_FANS: usize = 160;
@@ -17,27 +18,47 @@ const FULLY: f64 = 0.5;
 /// Fans around a foot, with weights that sum to one and their gradients by the tool's place.
 #[derive(Clone, Debug)]
 pub struct FanWeights {
+    /// The fans of the triangle at the foot.
+    pub near: Neighbourhood,
     count: usize,
     fans: [u32; MAX_FANS],
     weights: [f64; MAX_FANS],
     gradients: [DVec3; MAX_FANS],
     /// Part of all weight that lies on nodes which may be touched.
     pub touchable: f64,
+    arch: Arch,
 }
 
-impl Default for FanWeights {
-    fn default() -> Self {
+/// Fields known at the fans, blended.
+#[derive(Clone, Copy, Debug)]
+pub struct Blended<const N: usize> {
+    /// Their values.
+    pub values: [f64; N],
+    /// Their derivatives by each coordinate of the tool's place.
+    slopes: [[f64; N]; 3],
+}
+
+impl<const N: usize> Blended<N> {
+    /// Gradient of a field by the tool's place.
+    pub fn slope(&self, field: usize) -> DVec3 {
+        DVec3::from_array(self.slopes.map(|along| along[field]))
+    }
+}
+
+impl FanWeights {
+    /// With memory for any triangle of some surfaces.
+    pub fn new(near: Neighbourhood) -> Self {
         Self {
+            near,
             count: 0,
             fans: [0; MAX_FANS],
             weights: [0.0; MAX_FANS],
             gradients: [DVec3::ZERO; MAX_FANS],
             touchable: 0.0,
+            arch: Arch::new(),
         }
     }
-}
 
-impl FanWeights {
     /// Rank of each fan and its weight.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.fans[..self.count].iter().zip(&self.weights).map(|(&fan, &weight)| (fan as usize, weight))
@@ -48,50 +69,111 @@ impl FanWeights {
         self.iter().zip(&self.gradients).map(|((fan, weight), &gradient)| (fan, weight, gradient))
     }
 
-    /// A scalar field known at the fans, and its gradient.
-    pub fn field(&self, value: impl Fn(usize) -> f64) -> (f64, DVec3) {
-        let mut sum = (0.0, DVec3::ZERO);
-        for (fan, weight, gradient) in self.with_gradients() {
-            let value = value(fan);
-            sum.0 += weight * value;
-            sum.1 += gradient * value;
+    /// Fields known at the fans, and their gradients.
+    pub fn blend<const N: usize>(&self, fields: &[[f64; N]]) -> Blended<N> {
+        self.arch.dispatch(Blending { weights: self, fields })
+    }
+}
+
+/// The sums as a struct: a closure might be compiled for the narrowest vectors.
+struct Blending<'a, const N: usize> {
+    weights: &'a FanWeights,
+    fields: &'a [[f64; N]],
+}
+
+impl<const N: usize> NullaryFnOnce for Blending<'_, N> {
+    type Output = Blended<N>;
+
+    #[inline(always)]
+    fn call(self) -> Blended<N> {
+        let (mut values, mut slopes) = ([0.0; N], [[0.0; N]; 3]);
+        let FanWeights { count, fans, weights, gradients, .. } = self.weights;
+        for ((&fan, &weight), gradient) in fans[..*count].iter().zip(weights).zip(gradients) {
+            let own = &self.fields[fan as usize];
+            for k in 0..N {
+                values[k] += weight * own[k];
+                slopes[0][k] += gradient.x * own[k];
+                slopes[1][k] += gradient.y * own[k];
+                slopes[2][k] += gradient.z * own[k];
+            }
         }
-        sum
+        Blended { values, slopes }
     }
 }
 
 impl SmoothSurface {
     /// Weighs the fans around a foot that may be touched.
     pub fn weigh(&self, foot: &FootPoint, weights: &mut FanWeights) {
-        let (mut sum, mut slope, mut all) = (0.0, DVec3::ZERO, 0.0);
-        weights.count = 0;
-        for &rank in self.all(foot.triangle) {
-            let fan = &self.fans[rank as usize];
-            let Some((near, fall, _)) = weight(fan, foot.position - fan.position) else { continue };
-            let cosine = fan.normal.dot(foot.normal);
-            if cosine <= 0.0 || weights.count == MAX_FANS {
+        weights.near.take_up(self, foot.triangle);
+        self.arch.dispatch(Weighing { foot, weights });
+    }
+}
+
+/// Weighs the fans that are near.
+struct Weighing<'a> {
+    foot: &'a FootPoint,
+    weights: &'a mut FanWeights,
+}
+
+impl NullaryFnOnce for Weighing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let FanWeights { near, count, fans, weights, gradients, touchable, .. } = self.weights;
+        let (position, mut all, mut place) = (self.foot.position.to_array(), 0.0, 0);
+        let (mut sum, mut slope) = (0.0, DVec3::ZERO);
+        for group in near.all() {
+            let (offset, relative) = group.offset(position);
+            if !reaches(&relative) {
                 continue;
             }
-            let t = (cosine / FULLY).min(1.0);
-            let (facing, rise) = (t * t * (3.0 - 2.0 * t), if t < 1.0 { 6.0 * t * (1.0 - t) / FULLY } else { 0.0 });
-            all += near * facing;
-            if !self.touchable[rank as usize] {
-                continue;
+            let (weight, gradient) = weigh_lanes(group, &offset, &relative, self.foot);
+            for l in 0..LANES {
+                all += weight[l];
+                if weight[l] == 0.0 || group.touchable[l] == 0.0 || place == MAX_FANS {
+                    continue;
+                }
+                let own = DVec3::new(gradient[0][l], gradient[1][l], gradient[2][l]);
+                (fans[place], weights[place], gradients[place]) = (group.ranks[l], weight[l], own);
+                place += 1;
+                sum += weight[l];
+                slope += own;
             }
-            // Both derivative matrices are symmetric.
-            let gradient = foot.shift * (fall * facing) + foot.turning * (fan.normal * (near * rise));
-            let place = weights.count;
-            (weights.fans[place], weights.weights[place], weights.gradients[place]) = (rank, near * facing, gradient);
-            weights.count += 1;
-            sum += near * facing;
-            slope += gradient;
         }
-        weights.touchable = if all > 0.0 { sum / all } else { 0.0 };
+        *count = place;
+        *touchable = if all > 0.0 { sum / all } else { 0.0 };
         let inverse = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         let relative = slope * inverse;
-        for place in 0..weights.count {
-            weights.weights[place] *= inverse;
-            weights.gradients[place] = weights.gradients[place] * inverse - relative * weights.weights[place];
+        for (weight, gradient) in weights[..place].iter_mut().zip(gradients) {
+            *weight *= inverse;
+            *gradient = *gradient * inverse - relative * *weight;
         }
     }
+}
+
+/// `w eta` of fans side by side, and its gradient by the tool's place.
+#[inline(always)]
+fn weigh_lanes(fans: &FanLanes, offset: &[Lane; 3], relative: &Lane, foot: &FootPoint) -> (Lane, [Lane; 3]) {
+    let (mut weights, mut gradients) = ([0.0; LANES], [[0.0; LANES]; 3]);
+    let [x, y, z] = foot.normal.to_array();
+    // Both derivative matrices are symmetric.
+    let (s, d) = (foot.shift.to_cols_array_2d(), foot.turning.to_cols_array_2d());
+    let n = &fans.normal;
+    for l in 0..LANES {
+        let left = if relative[l] < 1.0 { 1.0 - relative[l] } else { 0.0 };
+        let (w, fall) = (left * left * left, -6.0 * left * left * fans.inverse_squared_reach[l]);
+        let cosine = n[0][l] * x + n[1][l] * y + n[2][l] * z;
+        let t = if cosine < FULLY { cosine * (1.0 / FULLY) } else { 1.0 };
+        let t = if t > 0.0 { t } else { 0.0 };
+        let (facing, rise) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) * (1.0 / FULLY));
+        weights[l] = w * facing;
+        let (by_place, by_normal) = (fall * facing, w * rise);
+        let (ox, oy, oz) = (offset[0][l] * by_place, offset[1][l] * by_place, offset[2][l] * by_place);
+        let (nx, ny, nz) = (n[0][l] * by_normal, n[1][l] * by_normal, n[2][l] * by_normal);
+        for k in 0..3 {
+            gradients[k][l] = s[k][0] * ox + s[k][1] * oy + s[k][2] * oz + d[k][0] * nx + d[k][1] * ny + d[k][2] * nz;
+        }
+    }
+    (weights, gradients)
 }

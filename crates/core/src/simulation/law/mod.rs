@@ -1,4 +1,4 @@
-//! Contact laws: when a contact begins, how it follows its tool, how it gives, when it ends.
+//! Contact laws: when a contact begins, how it follows its tool, when it ends.
 //!
 //! A law is a file here that implements [`Law`]; `step` calls it and knows nothing else of it. What a law does must not
 //! allocate, and must not hand out energy over a closed path of the tool.
@@ -8,13 +8,16 @@ mod node;
 mod patch;
 mod stick;
 
+pub(super) use local::ASKED;
 pub use local::{
-    Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, place_near, takes_cells,
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, place_near,
+    takes_cells,
 };
+pub use stick::series_compliance;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 
-use super::body::{BodyDynamics, BodyModel};
+use super::body::BodyModel;
 use super::contacts::Contact;
 use super::covering::Covering;
 use super::input::Input;
@@ -52,9 +55,6 @@ pub trait Law: Sync {
 
     /// Follows the tool; false ends the contact.
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool;
-
-    /// Compliance in series with the body's own at the contact, the same in all directions, m/N.
-    fn respond(&self, tool: &ToolModel, dynamics: Option<&BodyDynamics>, own: &DMat3) -> f64;
 
     /// Whether the contact ends by the force that was found.
     fn end(&self, contact: &Contact) -> bool;

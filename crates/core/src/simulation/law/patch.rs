@@ -15,7 +15,7 @@ impl Footprint for Patch {
     }
 
     fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, covering: &mut Covering) -> Result<(), Refusal> {
-        let Covering { patches, candidate } = covering;
+        let Covering { patches, candidate, .. } = covering;
         let (body, patch_scratch) = (approach.body, &mut patches[approach.body_index]);
         patch_weights(&body.green.surface, &body.geometry, centre, approach.contact_radius, patch_scratch, candidate)
     }

@@ -35,6 +35,17 @@ pub trait Footprint: Sync {
     fn cover(&self, approach: &Approach<'_>, centre: &SurfacePoint, covering: &mut Covering) -> Result<(), Refusal>;
 }
 
+/// Compliance in series with the body's own at a contact that sticks, the same in all directions, m/N.
+///
+/// A body in motion is coupled by a spring. Near a support, where a body at rest is stiffer than any device can render, its
+/// compliance is raised evenly so that no direction exceeds the tool's maximum stiffness.
+pub fn series_compliance(tool: &ToolModel, dynamics: Option<&BodyDynamics>, own: &DMat3) -> f64 {
+    match dynamics {
+        Some(dynamics) => 1.0 / dynamics.coupling,
+        None => (1.0 / tool.max_stiffness - smallest_eigenvalue(own)).max(0.0),
+    }
+}
+
 /// The sticking law on a footprint.
 pub struct Sticking<F>(pub F);
 
@@ -82,15 +93,6 @@ impl<F: Footprint> Law for Sticking<F> {
             _ => {}
         }
         true
-    }
-
-    /// A body in motion is coupled by a spring. Near a support, where a body at rest is stiffer than any device can render,
-    /// its compliance is raised evenly so that no direction exceeds the tool's maximum stiffness.
-    fn respond(&self, tool: &ToolModel, dynamics: Option<&BodyDynamics>, own: &DMat3) -> f64 {
-        match dynamics {
-            Some(dynamics) => 1.0 / dynamics.coupling,
-            None => (1.0 / tool.max_stiffness - smallest_eigenvalue(own)).max(0.0),
-        }
     }
 
     fn end(&self, contact: &Contact) -> bool {

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use crate::contact::smooth::FanWeights;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::Contact;
-use crate::simulation::law::law_of;
+use crate::simulation::law::series_compliance;
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
@@ -45,15 +45,15 @@ pub fn own_compliance(model: &Model, state: &State, slot: usize) -> DMat3 {
         Some(motion) => motion.compliance(slot, slot),
         None => state.compliance[slot][slot] * (1.0 / body.stiffness_scale),
     };
-    with_law(model, contact, own)
+    in_series(model, contact, own)
 }
 
-fn with_law(model: &Model, contact: &Contact, own: DMat3) -> DMat3 {
+fn in_series(model: &Model, contact: &Contact, own: DMat3) -> DMat3 {
     let (tool, dynamics) = (&model.tools[contact.tool], model.bodies[contact.body].dynamics.as_ref());
-    own + DMat3::from_diagonal(DVec3::splat(law_of(contact.law).respond(tool, dynamics, &own)))
+    own + DMat3::from_diagonal(DVec3::splat(series_compliance(tool, dynamics, &own)))
 }
 
-/// What the contacts of some laws did a tick ago at the contact in a slot, m, on a body at rest.
+/// What the contacts of some laws do, by their forces as far as they are known, at the contact in a slot, m, on a body at rest.
 pub fn dent_of(model: &Model, state: &State, slot: usize, laws: impl Fn(LawKind) -> bool) -> DVec3 {
     let (contacts, body) = (&state.contacts, state.contacts.slots[slot].body);
     let green = &model.bodies[body].green;
@@ -100,7 +100,7 @@ pub fn solve_with(
     for (i, &a) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[a];
         for (j, &b) in slots.iter().enumerate() {
-            let block = if a == b { with_law(model, contact, compliance(a, a)) } else { compliance(a, b) };
+            let block = if a == b { in_series(model, contact, compliance(a, a)) } else { compliance(a, b) };
             for row in 0..3 {
                 for column in 0..3 {
                     system.matrix[3 * i + row][3 * j + column] = block.col(column)[row];

@@ -11,14 +11,15 @@ use glam::{DMat3, DVec3};
 
 use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
 use crate::contact::patch_weights;
+use crate::contact::regular::{WIDTH, compliance_of};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::covering::Covering;
+use crate::simulation::covering::{Covering, neighbourhood};
 use crate::simulation::input::Controls;
 use crate::simulation::law::{
-    Cells, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
 };
 use crate::simulation::model::Model;
 use crate::simulation::solve::forces::dent_of;
@@ -40,15 +41,14 @@ const LOST: f64 = 0.02;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
-const SETTLED: f64 = 1e-8;
-/// A force that changes by less than this part from step to step stays.
-const SAME: f64 = 1e-8;
+const SETTLED: f64 = 1e-7;
+/// A force that differs by less than this part from what was expected is found.
+const SAME: f64 = 1e-7;
+/// Both, over those above, where a tool takes pressure cells, which are found to about as much.
+const CELLS_LOOSER: f64 = 100.0;
 /// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
 /// longer one. A half-space under a sphere is strained far beyond what is linear there.
 const MOST_DEPTH: f64 = 1.6;
-/// Radius of the patch by which a body in motion is met, over the tool's, at least: in a step a body may be as good as rigid,
-/// and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of the patch.
-const WIDER: f64 = 1.6;
 /// Two places of a tool closer than this, over its radius, are carried along as one the closer they are: nodes do not tell
 /// them apart.
 const JOINED: f64 = 0.5;
@@ -57,6 +57,8 @@ const FOLLOWED: usize = 3;
 
 /// Memory of the method.
 pub struct LocalScratch {
+    /// The body that the fans in `weights` belong to.
+    body: Option<usize>,
     weights: Vec<FanWeights>,
     responses: Vec<LocalResponse>,
     /// Compliance between contacts, and what the others do at each.
@@ -68,7 +70,7 @@ pub struct LocalScratch {
     from: [DVec3; MAX_CONTACTS],
     places: [DVec3; MAX_CONTACTS],
     steps: [DVec3; MAX_CONTACTS],
-    /// Largest change of a force in the latest step, over that force.
+    /// Largest difference of a force from what was expected, over that force.
     changed: f64,
     cells: Box<CellScratch>,
     /// For contacts without cells.
@@ -77,21 +79,36 @@ pub struct LocalScratch {
 
 impl LocalScratch {
     /// Weighs the fans around a foot that no contact has yet.
-    pub fn weigh(&mut self, smooth: &SmoothSurface, foot: &FootPoint) -> &FanWeights {
+    pub fn weigh(&mut self, body: usize, smooth: &SmoothSurface, foot: &FootPoint) -> &FanWeights {
+        self.turn_to(body);
         smooth.weigh(foot, &mut self.weights[0]);
         &self.weights[0]
     }
 
-    /// Takes the step.
-    fn go(&mut self) {
-        self.places.iter_mut().zip(&self.steps).for_each(|(place, step)| *place += *step);
+    /// Forgets the fans of another body.
+    fn turn_to(&mut self, body: usize) {
+        if self.body != Some(body) {
+            self.body = Some(body);
+            self.weights.iter_mut().for_each(|weights| weights.near.forget());
+        }
+    }
+
+    /// Takes the step. The forces are expected to follow.
+    fn go(&mut self, count: usize) {
+        for a in 0..count {
+            self.places[a] += self.steps[a];
+            let response = &mut self.responses[a];
+            response.force += response.jacobian * self.steps[a];
+        }
     }
 }
 
-impl Default for LocalScratch {
-    fn default() -> Self {
+impl LocalScratch {
+    /// For a model.
+    pub fn new(model: &Model) -> Self {
         Self {
-            weights: vec![FanWeights::default(); MAX_CONTACTS],
+            body: None,
+            weights: vec![FanWeights::new(neighbourhood(model)); MAX_CONTACTS],
             responses: vec![LocalResponse::default(); MAX_CONTACTS],
             between: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
             change: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
@@ -112,11 +129,9 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
     let local = fixed.local.as_ref()?;
     let regular = model.regular[tool][body].as_deref()?;
     Some(LocalBody {
-        surface: &fixed.loaded,
-        query: &fixed.query,
+        drawn: fixed.drawn(),
         smooth: &local.smooth,
-        moduli: &local.moduli,
-        regular: &regular.blocks,
+        fields: &regular.fields,
         scale: state.bodies[body].stiffness_scale,
     })
 }
@@ -187,6 +202,7 @@ fn settle(
     controls: &Controls,
 ) -> bool {
     let Memory { covering, local, system } = memory;
+    local.turn_to(body);
     local.others[..slots.len()].fill(Others::default());
     follow_motion(model, state, covering, local, slots, body);
     let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
@@ -196,12 +212,13 @@ fn settle(
         local.places[a] = contact.local.relative + contact.local.advance;
         local.from[a] = contact.local.tool - free_displacement(model, state, body, slot);
         local.responses[a].force = contact.local.force;
+        local.responses[a].foot = contact.local.foot;
         if let ToolShape::Sphere { radius } = model.tools[contact.tool].shape {
             deepest[a] = (1.0 - MOST_DEPTH) * radius - contact.local.entry;
         }
     }
     let cells = slots.iter().any(|&slot| takes_pressures(model, state, slot));
-    let most = if cells { MOST_CELL_STEPS } else { MOST_STEPS };
+    let (most, looser) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, 1.0) };
     for step in 0..most {
         if !meet(model, state, local, slots, body, controls, step) {
             return false;
@@ -212,11 +229,13 @@ fn settle(
             let share = (LONGEST * radius / longest).min(if step < USUAL_STEPS { 1.0 } else { 0.5 });
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
         }
-        if longest < SETTLED * radius && step > 0 && local.changed < SAME {
+        // What contacts do to each other is known from the first step on.
+        let knows_others = step > 0 || slots.len() == 1;
+        if knows_others && longest < looser * SETTLED * radius && local.changed < looser * SAME {
             break;
         }
         if step + 1 < most {
-            local.go();
+            local.go(slots.len());
         } else if !cells && longest > LOST * radius {
             for &slot in slots {
                 let contact = &mut state.contacts.slots[slot];
@@ -228,8 +247,8 @@ fn settle(
     true
 }
 
-/// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, and what
-/// contacts that stick did to it a tick ago, m.
+/// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, or on one at
+/// rest what contacts that stick do to it, m.
 fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> DVec3 {
     match &state.bodies[body].motion {
         Some(motion) => motion.free_displacement(slot),
@@ -237,8 +256,8 @@ fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> 
     }
 }
 
-/// On a body in motion each contact is met where it was a step ago, over the radius `b` that its regular compliance belongs
-/// to: by smaller patches the compliance of a single step could outweigh what is left of the half-space.
+/// On a body in motion each contact is met where it was a step ago, over a patch so wide that what the local law has less
+/// than the patch is monotonic even where the body is rigid within a step ([`RegularCompliance::widths`]).
 fn follow_motion(
     model: &Model,
     state: &mut State,
@@ -256,8 +275,7 @@ fn follow_motion(
         let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
         let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
         own.smooth.weigh(foot, weights);
-        let radius = model.tools[contacts.slots[slot].tool].radius;
-        let wide = weights.field(|fan| regular.widths[fan]).0.max(WIDER * radius);
+        let wide = weights.blend(&regular.fields).values[WIDTH];
         let centre = fixed.material_point(&fixed.surface_point(foot));
         let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
         // As many nodes as at the fans around fit.
@@ -265,9 +283,10 @@ fn follow_motion(
             contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
+        motion.leave_out_static(&dynamics.modes, slot, contacts.slots[slot].force);
         let mut moving = DMat3::ZERO;
         for (fan, _, gradient) in weights.with_gradients() {
-            let moved = motion.predicted_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
+            let moved = motion.remaining_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
             moving += outer(gradient, moved);
         }
         local.others[a].moving = Some(moving);
@@ -303,7 +322,8 @@ fn meet(
             let pressures = state.pressures.get_mut(slot).unwrap_or(unused);
             let cells = Cells { state: pressures, scratch: cells, resolution };
             let tool = local_tool(model, controls, tool);
-            evaluate(met, tool, contact, (places[a], responses[a].force), others[a], &mut weights[a], cells)
+            let guess = Guess { place: places[a], force: responses[a].force, foot: &responses[a].foot };
+            evaluate(met, tool, contact, guess, others[a], &mut weights[a], cells)
         });
         match answer {
             Some(answer) => {
@@ -361,7 +381,7 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
             {
                 let mut shared = DVec3::ZERO;
                 for (fan, _, gradient) in local.weights[a].with_gradients() {
-                    shared += gradient * (0.5 * own.dot(met.regular[fan] * force) / scale);
+                    shared += gradient * (0.5 * own.dot(compliance_of(&met.fields[fan]) * force) / scale);
                 }
                 slope = slope * (1.0 - joined) + shared * joined;
             }

@@ -27,9 +27,6 @@ FRICTIONS = (0.0, 0.3, 1.0)
 PATHS, TICKS = 10_000, 400
 # Limits that scenes have unless they say otherwise.
 DEFAULT_DEVICE: dict = {}
-# Ticks of the force loop's ramp after its start, and some. Two tools wait for it: each port balances by itself what the
-# ramp withholds, and what one hand presses into the body meanwhile comes out at the other (0.5 % of the peak, once).
-RAMP = 300
 PASSIVE = "passivity"
 
 
@@ -98,15 +95,15 @@ class EnergyBench:
         )
 
     def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
-        """Return forces and torques (paths, ticks, tools, 3); a body in motion starts each path at rest."""
+        """Return forces and torques (paths, ticks, tools, 3).
+
+        A body in motion starts each path at rest, and a device with limits each at the start of its ramp, which lasts
+        for more than half of a path.
+        """
         simulation = self.simulation(condition)
-        if not condition.moving:
-            positions, orientations = paths.script()
-            lead = RAMP if condition.tools == 2 and condition.limited else 0
-            before = np.full((lead, *positions.shape[1:]), np.nan)
-            upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (lead, *orientations.shape[1:]))
-            recording = simulation.play(np.vstack([before, positions]), np.vstack([upright, orientations]))
-            return tuple(paths.of_script(rows[lead:]) for rows in (recording.forces, recording.torques))
+        if not (condition.moving or condition.limited):
+            recording = simulation.play(*paths.script())
+            return tuple(paths.of_script(rows) for rows in (recording.forces, recording.torques))
         played = [simulation.play(*path) for path in zip(paths.positions, paths.orientations, strict=True)]
         return np.stack([each.forces for each in played]), np.stack([each.torques for each in played])
 

@@ -27,11 +27,15 @@ RESOLUTION, GROWTH, GROWTH_FAR, NEAR_CELLS = 7.0, 1.6, 2.3, 3
 
 @dataclass(frozen=True)
 class Nodule:
-    """A ball of another Young's modulus, Pa, in the middle of a block: depth of its centre and radius, m."""
+    """A ball of another Young's modulus, Pa, in a block.
+
+    Depth of its centre and radius, m; ``aside`` is how far along x from under the tool its centre lies, m.
+    """
 
     depth: float
     radius: float
     youngs_modulus: float
+    aside: float = 0.0
 
     def elements(self, mesh: TetMesh, share: int) -> np.ndarray:
         """Mask (m,) of elements of a mesh of one of ``share`` equal parts of the block, its top at z = 0.
@@ -40,7 +44,7 @@ class Nodule:
         """
         corners = mesh.nodes[mesh.tets[:, :4]]
         volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-        order = np.argsort(np.linalg.norm(corners.mean(axis=1) + (0, 0, self.depth), axis=1), kind="stable")
+        order = np.argsort(np.linalg.norm(corners.mean(axis=1) - (self.aside, 0, -self.depth), axis=1), kind="stable")
         volume = 4 / 3 * np.pi * self.radius**3 / share
         inside = np.zeros(len(mesh.tets), dtype=bool)
         inside[order[np.cumsum(volumes[order]) < volume]] = True
@@ -99,7 +103,7 @@ class Block:
 
     def _fine(self, reach: float) -> float:
         """How far from the contact elements are small, m."""
-        return reach if self.nodule is None else max(reach, self.nodule.depth + self.nodule.radius)
+        return reach if self.nodule is None else max(reach, self.nodule.depth + self.nodule.radius, self.nodule.aside + self.nodule.radius)
 
     def _body(self, mesh: TetMesh, fixed: np.ndarray, parts: int) -> Body:
         if self.nodule is None:

@@ -64,7 +64,7 @@ impl Influence {
             let y = aspect * (j as f64 + 0.5);
             for i in 0..self.cells {
                 let x = i as f64 + 0.5;
-                let r = x.hypot(y);
+                let r = (x * x + y * y).sqrt();
                 by_y[j][i] = ((x + r) / y).ln();
                 value[j][i] = x * ((y + r) / x).ln() + y * by_y[j][i];
             }

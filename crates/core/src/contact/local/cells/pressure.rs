@@ -12,7 +12,7 @@ use super::influence::{Grid, Influence, MAX_CELLS};
 /// Most products with the influence that one solution takes: a bound of its time.
 pub const MAX_PRODUCTS: usize = 40;
 /// Overlap or gap left under a tool, over its depth, at which the solution is accepted.
-pub const TOLERANCE: f64 = 1e-7;
+pub const TOLERANCE: f64 = 1e-6;
 /// Steps towards the stiffness of a punch; they leave 1e-3 from a uniform start.
 const PUNCH_STEPS: usize = 2;
 

@@ -5,6 +5,9 @@ use glam::{DQuat, DVec3};
 use super::friction::Friction;
 use crate::contact::smooth::FootPoint;
 
+/// How many requests for strain are remembered: more than are under way.
+pub(in crate::simulation) const ASKED: usize = 8;
+
 /// State of a contact under the local law; vectors are in the body's frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LocalContact {
@@ -53,6 +56,6 @@ pub struct LocalContact {
     pub(in crate::simulation) dissipated: f64,
     /// Share of its force that the limit of strain lets through.
     pub(in crate::simulation) share: f64,
-    /// Place at which its strain was last asked for, m.
-    pub(in crate::simulation) watched: DVec3,
+    /// Places at which its strain was asked for, m, by the lowest digits of its serial then.
+    pub(in crate::simulation) asked: [DVec3; ASKED],
 }

@@ -15,8 +15,9 @@
 //! proportion; where it rises they keep their force: neither adds energy, so no cycle of pressing, shearing and lifting makes any.
 
 use glam::{DMat3, DVec3};
+use pulp::{Arch, NullaryFnOnce};
 
-use crate::tensor::{across, outer};
+use crate::tensor::{across, symmetric};
 
 /// Springs with sliders.
 pub const SPRINGS: usize = 8;
@@ -33,10 +34,13 @@ const BOUNDS: [f64; SPRINGS] = {
     bounds
 };
 
-/// Forces of the springs on the body, N, and what they were stretched with.
+/// A number for each spring.
+type Springs = [f64; SPRINGS];
+
+/// Forces of the springs on the body, N, by component, and what they were stretched with.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Friction {
-    springs: [DVec3; SPRINGS],
+    springs: [Springs; 3],
     /// `k`, N/m.
     stiffness: f64,
 }
@@ -60,50 +64,102 @@ pub struct Answer {
 impl Friction {
     /// Energy of the springs, J.
     pub fn energy(&self) -> f64 {
-        let squares: f64 = self.springs.iter().map(|spring| spring.length_squared()).sum();
+        let squares = self.springs.iter().flatten().map(|force| force * force).sum::<f64>();
         if self.stiffness > 0.0 { 0.5 * SPRINGS as f64 * squares / self.stiffness } else { 0.0 }
+    }
+
+    /// Force of all springs, N.
+    fn force(&self) -> DVec3 {
+        DVec3::from_array(self.springs.map(total))
     }
 
     /// The springs after the tool has gone on by `displacement` along the surface (m; its part along the normal does not
     /// count), under a pressing force whose bound `mu F` is `bound`, N, with the stiffness `k` and the normal as they are now.
     pub fn answer(&self, displacement: DVec3, bound: f64, coefficient: f64, stiffness: f64, normal: DVec3) -> Answer {
-        // A matrix is the identity by default.
-        let mut answer = Answer { by_displacement: DMat3::ZERO, ..Answer::default() };
-        answer.friction.stiffness = stiffness;
-        let along = across(normal);
         let kept = if self.stiffness > stiffness { stiffness / self.stiffness } else { 1.0 };
         let spring = stiffness / SPRINGS as f64;
-        let stretch = along * displacement * spring;
-        let mut giving = 0;
-        for (i, (before, after)) in self.springs.iter().zip(&mut answer.friction.springs).enumerate() {
-            let turned = turned(*before, normal) * kept;
-            let tried = turned + stretch;
-            let (size, most) = (tried.length(), BOUNDS[i] * bound);
-            if size <= most {
-                *after = tried;
-                answer.by_displacement += along * spring;
-            } else {
-                let direction = tried / size;
-                *after = direction * most;
-                answer.by_displacement += (along - outer(direction, direction)) * (spring * most / size);
-                answer.by_pressing += direction * (BOUNDS[i] * coefficient);
-                giving += 1;
-            }
-            answer.force += *after;
-        }
-        answer.slipping = giving == SPRINGS;
-        let before: DVec3 = self.springs.iter().sum();
-        let work = 0.5 * (before + answer.force).dot(along * displacement);
+        let along = displacement - normal * normal.dot(displacement);
+        let sliders = Sliders { springs: &self.springs, kept, stretch: along * spring, bound, normal };
+        let given = Arch::new().dispatch(sliders);
+        let mut answer = Answer { friction: Friction { springs: given.springs, stiffness }, ..Answer::default() };
+        answer.force = answer.friction.force();
+        // A slider that gives turns with the displacement, and holds its bound.
+        answer.by_displacement = (across(normal) * total(given.shares) - symmetric(given.turning.map(total))) * spring;
+        answer.by_pressing = DVec3::from_array(given.directions.map(total)) * coefficient;
+        answer.slipping = given.giving.iter().all(|&gives| gives > 0.0);
+        let work = 0.5 * (self.force() + answer.force).dot(along);
         answer.dissipated = work + self.energy() - answer.friction.energy();
         answer
     }
 }
 
-/// A force across one normal turned to lie across another, its size kept.
-fn turned(force: DVec3, normal: DVec3) -> DVec3 {
-    let across = force - normal * force.dot(normal);
-    let (size, left) = (force.length(), across.length());
-    if left > 0.5 * size { across * (size / left) } else { across }
+/// All sliders at once, as a struct: a closure might be compiled for the narrowest vectors.
+struct Sliders<'a> {
+    springs: &'a [Springs; 3],
+    /// What unloading leaves of their forces.
+    kept: f64,
+    /// What is added to each, N.
+    stretch: DVec3,
+    bound: f64,
+    normal: DVec3,
+}
+
+/// What becomes of them.
+struct Given {
+    springs: [Springs; 3],
+    /// One for those that give.
+    giving: Springs,
+    /// What is left of each force.
+    shares: Springs,
+    /// Of those that give the direction, by their share of the bound, and its outer product by `xx, xy, xz, yy, yz, zz`, by
+    /// what is left.
+    directions: [Springs; 3],
+    turning: [Springs; 6],
+}
+
+impl NullaryFnOnce for Sliders<'_> {
+    type Output = Given;
+
+    #[inline(always)]
+    fn call(self) -> Given {
+        let zero = [0.0; SPRINGS];
+        let mut given =
+            Given { springs: [zero; 3], giving: zero, shares: zero, directions: [zero; 3], turning: [zero; 6] };
+        let ([nx, ny, nz], [sx, sy, sz]) = (self.normal.to_array(), self.stretch.to_array());
+        for i in 0..SPRINGS {
+            // Turned to lie across the new normal, their sizes kept, unless that has come to lie along them.
+            let (x, y, z) = (self.springs[0][i], self.springs[1][i], self.springs[2][i]);
+            let off = x * nx + y * ny + z * nz;
+            let (ax, ay, az) = (x - nx * off, y - ny * off, z - nz * off);
+            let (size, left) = (x * x + y * y + z * z, ax * ax + ay * ay + az * az);
+            let turns = left > 0.25 * size;
+            let grown = self.kept * (if turns { size / left } else { 1.0 }).sqrt();
+            let (tx, ty, tz) = (ax * grown + sx, ay * grown + sy, az * grown + sz);
+            let (size, most) = ((tx * tx + ty * ty + tz * tz).sqrt(), BOUNDS[i] * self.bound);
+            let gives = size > most;
+            let share = if gives { most / size } else { 1.0 };
+            let inverse = if gives { 1.0 / size } else { 0.0 };
+            let (dx, dy, dz) = (tx * inverse, ty * inverse, tz * inverse);
+            let (qx, qy, qz) = (dx * share, dy * share, dz * share);
+            given.giving[i] = if gives { 1.0 } else { 0.0 };
+            given.shares[i] = share;
+            for (to, value) in given.springs.iter_mut().zip([tx * share, ty * share, tz * share]) {
+                to[i] = value;
+            }
+            for (to, value) in given.directions.iter_mut().zip([dx * BOUNDS[i], dy * BOUNDS[i], dz * BOUNDS[i]]) {
+                to[i] = value;
+            }
+            for (to, value) in given.turning.iter_mut().zip([qx * dx, qx * dy, qx * dz, qy * dy, qy * dz, qz * dz]) {
+                to[i] = value;
+            }
+        }
+        given
+    }
+}
+
+/// Sum over the springs.
+fn total([a, b, c, d, e, f, g, h]: Springs) -> f64 {
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 #[cfg(test)]

@@ -1,22 +1,19 @@
 //! What meets in a local contact, and what comes of it.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use crate::contact::local::effective_modulus;
+use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, SmoothSurface};
-use crate::contact::{Moduli, SurfaceQuery};
-use crate::mesh::Surface;
+use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
 
 /// What a tool meets of a body.
 #[derive(Clone, Copy)]
 pub struct LocalBody<'a> {
-    pub surface: &'a Surface,
-    pub query: &'a SurfaceQuery,
+    pub drawn: DrawnSurface<'a>,
     pub smooth: &'a SmoothSurface,
-    pub moduli: &'a Moduli,
-    /// `C_reg` at the fans, m/N.
-    pub regular: &'a [DMat3],
+    /// What the tool meets at the fans.
+    pub fields: &'a [FanFields],
     /// Young's modulus over the Green's function's.
     pub scale: f64,
 }
@@ -34,6 +31,9 @@ pub struct LocalTool<'a> {
     pub coefficient: f64,
 }
 
+/// What the tool meets at a foot.
+pub type Fields = Blended<{ size_of::<FanFields>() / size_of::<f64>() }>;
+
 /// The half-space below a tool.
 pub struct HalfSpace {
     /// `E*`, Pa, and its gradient by the place of the foot's point.
@@ -45,12 +45,12 @@ pub struct HalfSpace {
 
 impl HalfSpace {
     /// Of the body's constants at the foot and the tool's pad; of it a contact has a `part`.
-    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, weights: &FanWeights, part: f64) -> Self {
-        let fans = body.smooth.fans();
-        let (own, own_slope) = weights.field(|fan| body.scale * body.moduli.plane_strain(fans[fan].node));
-        let (poisson, _) = weights.field(|fan| body.moduli.poissons[fans[fan].node as usize]);
+    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, fields: &Fields, part: f64) -> Self {
+        let own = body.scale * fields.values[PLANE_STRAIN];
         let whole = effective_modulus(own, 0.0, tool.pad);
-        let (modulus, slope) = (part * whole, own_slope * (part * (whole / own).powi(2)));
+        let modulus = part * whole;
+        let slope = fields.slope(PLANE_STRAIN) * (part * body.scale * (whole / own).powi(2));
+        let poisson = fields.values[POISSON];
         Self { modulus, slope, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
     }
 }

@@ -24,24 +24,24 @@ mod reference;
 mod response;
 mod wrench;
 
+pub(in crate::simulation) use contact::ASKED;
 pub use contact::LocalContact;
 pub use met::{LocalBody, LocalTool};
 pub use reference::depth_below;
-pub use response::{LocalResponse, Others, evaluate};
+pub use response::{Guess, LocalResponse, Others, evaluate};
 pub use wrench::{Cells, takes_cells};
 
 use glam::{DMat3, DQuat, DVec3};
 
 use self::reference::Reference;
 use super::{Approach, Law};
+use crate::contact::Refusal;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FootPoint, SmoothSurface};
-use crate::contact::{Refusal, SurfaceQuery};
-use crate::mesh::Surface;
-use crate::simulation::body::{BodyDynamics, LocalSurface};
+use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
+use crate::simulation::body::LocalSurface;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
-use crate::simulation::tool::{LawKind, ToolModel};
+use crate::simulation::tool::LawKind;
 
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
 const JUMP: f64 = 2.0;
@@ -54,65 +54,85 @@ pub struct Local;
 const STRIDE: f64 = 0.25;
 
 /// The foot of a tool that comes to a place over the surface at rest: once the tool touches on its way, the foot is followed, so
-/// that it lies on the side that the tool has come from. And how far the tool reaches below the plane through it, m.
-fn arrival(approach: &Approach<'_>, local: &LocalSurface, place: DVec3) -> Option<(FootPoint, f64)> {
+/// that it lies on the side that the tool has come from. And how far the tool reaches below the plane through it, m. `None` where
+/// it is too far to reach it.
+fn arrival(
+    approach: &Approach<'_>,
+    local: &LocalSurface,
+    place: DVec3,
+    near: &mut Neighbourhood,
+) -> Option<(FootPoint, f64)> {
     let (gone, radius) = (approach.gone, approach.tool.radius);
     let strides = (gone.length() / (STRIDE * radius)).ceil();
     if strides > JUMP / STRIDE {
-        return first_foot(approach, local, place);
+        return first_foot(approach, local, place, near);
     }
     let mut touched: Option<FootPoint> = None;
     for left in (1..strides.max(1.0) as u32).rev() {
         let at = place - gone * (f64::from(left) / strides);
         touched = match touched {
-            Some(foot) => Some(follow(approach, local, at, &foot)?.0),
-            None => first_foot(approach, local, at).filter(|(_, depth)| *depth > 0.0).map(|(foot, _)| foot),
+            Some(foot) => Some(follow(approach, local, at, &foot, near)?.0),
+            None => first_foot(approach, local, at, near).filter(|(_, depth)| *depth > 0.0).map(|(foot, _)| foot),
         };
     }
     match touched {
-        Some(foot) => follow(approach, local, place, &foot),
-        None => first_foot(approach, local, place),
+        Some(foot) => follow(approach, local, place, &foot, near),
+        None => first_foot(approach, local, place, near),
     }
 }
 
 /// The foot followed from an earlier one, and the depth.
-fn follow(approach: &Approach<'_>, local: &LocalSurface, place: DVec3, from: &FootPoint) -> Option<(FootPoint, f64)> {
+fn follow(
+    approach: &Approach<'_>,
+    local: &LocalSurface,
+    place: DVec3,
+    from: &FootPoint,
+    near: &mut Neighbourhood,
+) -> Option<(FootPoint, f64)> {
     let (body, shape) = (approach.body, &approach.tool.shape);
-    place_near((&local.smooth, &body.loaded, &body.query), shape, (place, approach.orientation), from)
+    place_near((&local.smooth, body.drawn()), shape, (place, approach.orientation), from, near)
 }
 
 /// The foot of a tool at a place, followed from one near it, and how far the tool reaches below the plane through it, m.
 pub fn place_near(
-    met: (&SmoothSurface, &Surface, &SurfaceQuery),
+    (smooth, drawn): (&SmoothSurface, DrawnSurface<'_>),
     shape: &ToolShape,
     (place, orientation): (DVec3, DQuat),
     from: &FootPoint,
+    near: &mut Neighbourhood,
 ) -> Option<(FootPoint, f64)> {
     if let ToolShape::Sphere { radius } = *shape {
-        let (smooth, surface, query) = met;
-        let foot = smooth.foot(surface, query, place, (from.triangle, from.position))?;
+        let foot = smooth.foot(drawn, place, from, near)?;
         return Some((foot, radius - foot.distance));
     }
     let pose = (place, DMat3::from_quat(orientation));
-    let (foot, _) = Reference::find(met, shape, pose, from)?;
+    let (foot, _) = Reference::find((smooth, drawn), shape, pose, from, near)?;
     Some((foot, depth_below(shape, pose, &foot)))
 }
 
-/// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m.
-fn first_foot(approach: &Approach<'_>, local: &LocalSurface, place: DVec3) -> Option<(FootPoint, f64)> {
+/// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m. `None` where it
+/// is too far to reach it.
+fn first_foot(
+    approach: &Approach<'_>,
+    local: &LocalSurface,
+    place: DVec3,
+    near: &mut Neighbourhood,
+) -> Option<(FootPoint, f64)> {
     let (body, tool) = (approach.body, approach.tool);
-    let foot_of = |point| local.smooth.foot_anywhere(&body.loaded, &body.query, point);
-    if let ToolShape::Sphere { radius } = tool.shape {
-        let foot = foot_of(place)?;
-        return Some((foot, radius - foot.distance));
+    let (drawn, rotation) = (body.drawn(), DMat3::from_quat(approach.orientation));
+    let centre = place + rotation * tool.shape.centre();
+    let closest = body.closest(centre)?;
+    if local.smooth.surely_beyond(tool.shape.bounding_radius(), &closest) {
+        return None;
     }
-    let rotation = DMat3::from_quat(approach.orientation);
-    let from = foot_of(place + rotation * tool.shape.centre())?;
+    let from = local.smooth.foot_from(drawn, centre, &closest, near);
+    if let ToolShape::Sphere { radius } = tool.shape {
+        return Some((from, radius - from.distance));
+    }
     if from.distance > tool.shape.bounding_radius() {
         return Some((from, 0.0));
     }
-    let met = (&local.smooth, &body.loaded, &body.query);
-    let (foot, _) = Reference::find(met, &tool.shape, (place, rotation), &from)?;
+    let (foot, _) = Reference::find((&local.smooth, drawn), &tool.shape, (place, rotation), &from, near)?;
     Some((foot, depth_below(&tool.shape, (place, rotation), &foot)))
 }
 
@@ -121,11 +141,15 @@ impl Law for Local {
         &self,
         approach: &Approach<'_>,
         entry_depth: &mut f64,
-        _covering: &mut Covering,
+        covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };
-        let Some((foot, depth)) = arrival(approach, local, met) else { return Ok(None) };
+        covering.near.forget();
+        let Some((foot, depth)) = arrival(approach, local, met, &mut covering.near) else {
+            *entry_depth = 0.0;
+            return Ok(None);
+        };
         *entry_depth = entry_depth.min(depth.max(0.0));
         if depth <= *entry_depth {
             return Ok(None);
@@ -139,7 +163,7 @@ impl Law for Local {
             foot,
             part: 1.0,
             share: 1.0,
-            watched: foot.position,
+            asked: [foot.position; ASKED],
             ..LocalContact::default()
         };
         Ok(Some(Contact {
@@ -161,10 +185,6 @@ impl Law for Local {
         (local.tool, local.orientation) = (approach.position, approach.orientation);
         // Withdrawn, it may come in again as deep as it has been left.
         !approach.grab && !jumped
-    }
-
-    fn respond(&self, _tool: &ToolModel, dynamics: Option<&BodyDynamics>, _own: &DMat3) -> f64 {
-        dynamics.map_or(0.0, |dynamics| 1.0 / dynamics.coupling)
     }
 
     fn end(&self, contact: &Contact) -> bool {

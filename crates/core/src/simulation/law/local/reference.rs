@@ -16,10 +16,8 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::contact::SurfaceQuery;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FootPoint, SmoothSurface};
-use crate::mesh::Surface;
+use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
 use crate::tensor::outer;
 
 /// Newton's steps at most; two are usual.
@@ -46,13 +44,14 @@ pub struct Reference {
 impl Reference {
     /// The foot of the reference point of a tool at `place`, followed from an earlier one.
     pub fn find(
-        (smooth, surface, query): (&SmoothSurface, &Surface, &SurfaceQuery),
+        (smooth, drawn): (&SmoothSurface, DrawnSurface<'_>),
         shape: &ToolShape,
         (place, rotation): (DVec3, DMat3),
         from: &FootPoint,
+        near: &mut Neighbourhood,
     ) -> Option<(FootPoint, Self)> {
         let core = Core::new(shape, rotation);
-        let foot_of = |at: DVec3, from: &FootPoint| smooth.foot(surface, query, at, (from.triangle, from.position));
+        let mut foot_of = |at: DVec3, from: &FootPoint| smooth.foot(drawn, at, from, near);
         let settled = SETTLED * shape.bounding_radius();
         let mut at = place + core.offset(from.normal);
         let mut foot = foot_of(at, from)?;

@@ -4,12 +4,13 @@ use glam::{DMat3, DVec3};
 
 use super::LocalContact;
 use super::friction::{Answer, Friction};
-use super::met::{HalfSpace, Indentation, LocalBody, LocalTool};
+use super::met::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::reference::Reference;
 use super::wrench::{Cells, indent_shape};
-use crate::contact::local::indent_sphere;
+use crate::contact::local::{WidenedContact, Widening};
+use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, WIDENING, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint};
+use crate::contact::smooth::{FanWeights, FootPoint, Neighbourhood};
 use crate::simulation::rotation::rotation_vector;
 use crate::tensor::outer;
 
@@ -23,8 +24,9 @@ const STEEPEST: f64 = 0.5;
 pub struct Others {
     /// Derivative of `f^T sum_b C_ab f_b` by the place of the tool, N.
     pub slope: DVec3,
-    /// Of a body in motion the derivative of the surface's displacement `u_k` by the place, columns by `k`: it takes the place
-    /// of the compliance's, for `f . du(x)/dp'` at rest is `f^T (dC/dp') f / 2`.
+    /// Of a body in motion the derivative by the place of the surface's displacement `u_k` less what this contact itself does
+    /// at rest, columns by `k`. That part is `f^T (dC_reg/dp') f / 2`: taken from the displacements of nodes it would be the
+    /// same but for the patch's width and the modes left out, and slow closed paths near a rim gave out 0.4 % of their peak.
     pub moving: Option<DMat3>,
 }
 
@@ -54,31 +56,41 @@ struct Met {
     reference: Option<Reference>,
 }
 
-/// Answers to the tool at `place`; `force` is what is known of the force so far. `None` where nothing may be touched.
+/// Where an answer is asked for, and what is known of it so far.
+#[derive(Clone, Copy)]
+pub struct Guess<'a> {
+    /// Place of the tool over the surface at rest, m.
+    pub place: DVec3,
+    /// Force on the body, N.
+    pub force: DVec3,
+    /// The foot of a place near it.
+    pub foot: &'a FootPoint,
+}
+
+/// Answers to the tool at a place. `None` where nothing may be touched.
 pub fn evaluate(
     body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
-    (place, force): (DVec3, DVec3),
+    guess: Guess<'_>,
     others: Others,
     weights: &mut FanWeights,
     cells: Cells<'_>,
 ) -> Option<LocalResponse> {
-    let Met { foot, reference } = meet(body, tool, contact, place)?;
+    let Guess { place, force, .. } = guess;
+    let Met { foot, reference } = meet(body, tool, contact, guess, &mut weights.near)?;
     body.smooth.weigh(&foot, weights);
     if weights.touchable < 0.5 {
         return None;
     }
+    let fields = weights.blend(body.fields);
     // One that has just been found counts from where it is.
     let indentation = match &reference {
         _ if contact.found => Indentation::default(),
-        None => indent(body, tool, contact, &foot, weights),
-        Some(reference) => indent_shape(body, tool, contact, place, (&foot, reference), weights, cells),
+        None => indent(body, tool, contact, &foot, &fields),
+        Some(reference) => indent_shape(body, tool, contact, place, (&foot, reference), (weights, &fields), cells),
     };
-    let mut compliance = DMat3::ZERO;
-    for (fan, weight) in weights.iter() {
-        compliance += body.regular[fan] * (weight / body.scale);
-    }
+    let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
     let (normal, point) = (foot.normal, foot.position);
     // A matrix is the identity by default.
     let jacobian = DMat3::ZERO;
@@ -90,7 +102,7 @@ pub fn evaluate(
     let lever = indentation.lever;
     let rotation = rotation_vector(contact.turned, contact.orientation);
     let displacement = place - contact.relative + rotation.cross(lever);
-    let slope = slope(body, force, others, weights).clamp_length_max(STEEPEST * indentation.force);
+    let slope = slope(body, force, others, &fields).clamp_length_max(STEEPEST * indentation.force);
     let (slope, twist) = reference.map_or((slope, DVec3::ZERO), |reference| reference.by_pose(slope));
     let push = slope - indentation.gradient;
     let pressing = push.length();
@@ -112,35 +124,36 @@ pub fn evaluate(
     Some(response)
 }
 
-fn meet(body: LocalBody<'_>, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3) -> Option<Met> {
+fn meet(
+    body: LocalBody<'_>,
+    tool: LocalTool<'_>,
+    contact: &LocalContact,
+    guess: Guess<'_>,
+    near: &mut Neighbourhood,
+) -> Option<Met> {
     if let ToolShape::Sphere { .. } = tool.shape {
-        if contact.held {
-            return Some(Met { foot: contact.foot.held(place), reference: None });
-        }
-        let start = (contact.foot.triangle, contact.foot.position);
-        return Some(Met { foot: body.smooth.foot(body.surface, body.query, place, start)?, reference: None });
+        let foot = match contact.held {
+            true => contact.foot.held(guess.place),
+            false => body.smooth.foot(body.drawn, guess.place, guess.foot, near)?,
+        };
+        return Some(Met { foot, reference: None });
     }
-    let pose = (place, DMat3::from_quat(contact.orientation));
+    let pose = (guess.place, DMat3::from_quat(contact.orientation));
     let (foot, reference) = match contact.held {
         true => Reference::held(tool.shape, pose, &contact.foot)?,
-        false => Reference::find((body.smooth, body.surface, body.query), tool.shape, pose, &contact.foot)?,
+        false => Reference::find((body.smooth, body.drawn), tool.shape, pose, guess.foot, near)?,
     };
     Some(Met { foot, reference: Some(reference) })
 }
 
 /// What the change of the body's compliance, and the other contacts, add to the force on the tool, by the place of the foot's
-/// point. It follows from the force of the step before: they agree where the steps end.
-fn slope(body: LocalBody<'_>, force: DVec3, others: Others, weights: &FanWeights) -> DVec3 {
-    let mut slope = others.slope;
-    match others.moving {
-        Some(moving) => slope += moving * force,
-        None => {
-            for (fan, _, gradient) in weights.with_gradients() {
-                slope += gradient * (0.5 / body.scale * force.dot(body.regular[fan] * force));
-            }
-        }
-    }
-    slope
+/// point. It follows from the force that is guessed: they agree where the steps end.
+fn slope(body: LocalBody<'_>, force: DVec3, others: Others, fields: &Fields) -> DVec3 {
+    let [x, y, z] = force.to_array();
+    let products = [x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z];
+    let own: DVec3 = COMPLIANCE.zip(products).map(|(field, product)| fields.slope(field) * product).sum();
+    let moving = others.moving.map_or(DVec3::ZERO, |moving| moving * force);
+    others.slope + own * (0.5 / body.scale) + moving
 }
 
 /// Of a sphere.
@@ -149,13 +162,12 @@ fn indent(
     tool: LocalTool<'_>,
     contact: &LocalContact,
     foot: &FootPoint,
-    weights: &FanWeights,
+    fields: &Fields,
 ) -> Indentation {
     let depth = tool.radius - contact.entry - foot.distance;
-    let fans = body.smooth.fans();
-    let (mean, mean_slope) = weights.field(|fan| fans[fan].mean);
-    let (gauss, gauss_slope) = weights.field(|fan| fans[fan].gauss);
-    let half_space = HalfSpace::new(body, tool, weights, contact.part);
+    let [mean, gauss] = [MEAN, GAUSS].map(|field| fields.values[field]);
+    let [mean_slope, gauss_slope] = [MEAN, GAUSS].map(|field| fields.slope(field));
+    let half_space = HalfSpace::new(body, tool, fields, contact.part);
     let curved = 1.0 / tool.radius;
     let product = curved * curved + 2.0 * mean * curved + gauss;
     let product_slope = mean_slope * (2.0 * curved) + gauss_slope;
@@ -165,9 +177,13 @@ fn indent(
     let (bounded, share) = (0.5 * (product + root), 0.5 * (1.0 + product / root));
     let radius = 1.0 / bounded.sqrt();
     let radius_slope = product_slope * (-0.5 * radius * radius * radius * share);
-    let sphere = indent_sphere(depth, radius, half_space.modulus);
-    let gradient = radius_slope * sphere.energy_by_radius + half_space.slope * (sphere.energy / half_space.modulus)
-        - foot.normal * sphere.force;
+    let rate_slope = fields.slope(WIDENING) / body.scale;
+    let widening = Widening { rate: fields.values[WIDENING] / body.scale, reference: reference_area(tool.radius) };
+    let WidenedContact { sphere, energy_by_modulus, energy_by_rate } =
+        widening.indent(depth, radius, half_space.modulus);
+    let gradient =
+        radius_slope * sphere.energy_by_radius + half_space.slope * energy_by_modulus + rate_slope * energy_by_rate
+            - foot.normal * sphere.force;
     Indentation {
         force: sphere.force,
         radius: sphere.radius,

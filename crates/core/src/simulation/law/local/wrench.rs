@@ -13,7 +13,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::contact::LocalContact;
-use super::met::{HalfSpace, Indentation, LocalBody, LocalTool};
+use super::met::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::reference::Reference;
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
 use crate::contact::local::{EllipsoidProblem, OsculatingSurface, ToolPose};
@@ -56,11 +56,11 @@ pub fn indent_shape(
     contact: &LocalContact,
     place: DVec3,
     (foot, reference): (&FootPoint, &Reference),
-    weights: &FanWeights,
+    (weights, fields): (&FanWeights, &Fields),
     cells: Cells<'_>,
 ) -> Indentation {
     let fans = body.smooth.fans();
-    let half_space = HalfSpace::new(body, tool, weights, contact.part);
+    let half_space = HalfSpace::new(body, tool, fields, contact.part);
     let (surface, curvature) = osculating_surface(body, foot, weights);
     // What it began with counts as if the tool were not so deep.
     let position = place + foot.normal * contact.entry;
@@ -144,9 +144,10 @@ fn osculating_surface(body: LocalBody<'_>, foot: &FootPoint, weights: &FanWeight
 mod tests {
     use super::*;
     use crate::contact::local::effective_modulus;
-    use crate::contact::smooth::SmoothSurface;
-    use crate::contact::smooth::tests::ball;
-    use crate::contact::{Moduli, SurfaceQuery};
+    use crate::contact::regular::{PLANE_STRAIN, POISSON};
+    use crate::contact::smooth::tests::{ball, near};
+    use crate::contact::smooth::{DrawnSurface, SmoothSurface};
+    use crate::contact::{FanFields, SurfaceQuery};
     use crate::mesh::Surface;
 
     /// A ball of radius 1 whose modulus rises by a half from one pole to the other.
@@ -154,39 +155,40 @@ mod tests {
         surface: Surface,
         query: SurfaceQuery,
         smooth: SmoothSurface,
-        moduli: Moduli,
+        fields: Vec<FanFields>,
     }
 
     impl Ball {
         fn new() -> Self {
             let surface = ball(24);
-            let youngs = surface.positions.iter().map(|p| 1e4 * (1.0 + 0.25 * p.z)).collect();
-            let moduli = Moduli { youngs, poissons: vec![0.45; surface.positions.len()] };
             let query = SurfaceQuery::new(&surface).expect("triangles");
-            Self { smooth: SmoothSurface::new(&surface, |_| true), query, surface, moduli }
+            let smooth = SmoothSurface::new(&surface, |_| true);
+            let modulus = |z: f64| 1e4 * (1.0 + 0.25 * z) / (1.0 - 0.45 * 0.45);
+            let fields = smooth.fans().iter().map(|fan| {
+                let mut fields = FanFields::default();
+                (fields[PLANE_STRAIN], fields[POISSON]) = (modulus(fan.position.z), 0.45);
+                fields
+            });
+            Self { fields: fields.collect(), smooth, query, surface }
         }
 
         fn press(&self, shape: &ToolShape, place: DVec3, orientation: DQuat) -> Indentation {
-            let body = LocalBody {
-                surface: &self.surface,
-                query: &self.query,
-                smooth: &self.smooth,
-                moduli: &self.moduli,
-                regular: &[],
-                scale: 1.0,
-            };
+            let drawn = DrawnSurface { surface: &self.surface, query: &self.query };
+            let body = LocalBody { drawn, smooth: &self.smooth, fields: &self.fields, scale: 1.0 };
             let contact = LocalContact { orientation, entry: 0.003, part: 1.0, ..LocalContact::default() };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
             let rotation = DMat3::from_quat(orientation);
             let centre = place + rotation * shape.centre();
-            let from = self.smooth.foot_anywhere(&self.surface, &self.query, centre).expect("a foot");
-            let met = (&self.smooth, &self.surface, &self.query);
-            let (foot, reference) = Reference::find(met, shape, (place, rotation), &from).expect("a foot");
-            let mut weights = FanWeights::default();
+            let mut weights = FanWeights::new(near(&self.smooth));
+            let from = self.smooth.foot_anywhere(drawn, centre, &mut weights.near).expect("a foot");
+            let met = (&self.smooth, drawn);
+            let found = Reference::find(met, shape, (place, rotation), &from, &mut weights.near);
+            let (foot, reference) = found.expect("a foot");
             self.smooth.weigh(&foot, &mut weights);
+            let fields = weights.blend(&self.fields);
             let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
             let cells = Cells { state: &mut state, scratch: &mut scratch, resolution: Resolution::Medium };
-            indent_shape(body, tool, &contact, place, (&foot, &reference), &weights, cells)
+            indent_shape(body, tool, &contact, place, (&foot, &reference), (&weights, &fields), cells)
         }
     }
 

@@ -1,0 +1,146 @@
+//! A sphere on a half-space in which something is hidden not much deeper than the contact is wide.
+//!
+//! The regular part of the compliance is the mean of a smooth field over the pressure, so that it goes with the pressure's
+//! second moment: `C(a) = C(a_0) + kappa (A - a_0^2)` with the square `A` of the contact radius. `C(a_0)` is the body's; the
+//! rest is that of the local law. As Hertz has it, `A = (3 R F / 4 E*)^(2/3)`, and with the complementary energy
+//!
+//! ```text
+//! W(F) = kappa F^2 (A - a_0^2) / 2        d = d_sphere(F) + dW/dF,   dW/dF = kappa F (4/3 A - a_0^2)
+//! U(d) = U_sphere + F dW/dF - W           dU/d(theta) at constant d = dU_sphere/d(theta) - dW/d(theta) at constant F
+//! ```
+//!
+//! so that force, stiffness and the forces along a surface on which anything changes follow from one energy.
+
+use super::sphere::{SphereContact, indent_sphere};
+
+/// Newton's steps for the approach of the sphere alone. Three are usual.
+const MOST_STEPS: usize = 12;
+/// An approach that is right to this part stays.
+const SETTLED: f64 = 1e-13;
+
+/// How the regular compliance changes with the contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Widening {
+    /// `kappa`, 1/(N m).
+    pub rate: f64,
+    /// `a_0^2`, m^2.
+    pub reference: f64,
+}
+
+/// State of the sphere, and derivatives of its energy at constant approach.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WidenedContact {
+    /// Its energy and derivative by the radius are those of the whole.
+    pub sphere: SphereContact,
+    /// By `E*`, J/Pa.
+    pub energy_by_modulus: f64,
+    /// By `kappa`, J N m.
+    pub energy_by_rate: f64,
+}
+
+impl Widening {
+    /// A sphere of effective `radius` (m) that approaches a half-space of modulus `E*` (Pa) by `approach` (m).
+    pub fn indent(self, approach: f64, radius: f64, effective_modulus: f64) -> WidenedContact {
+        let whole = approach.max(0.0);
+        let mut own = whole;
+        let mut sphere = indent_sphere(own, radius, effective_modulus);
+        if self.rate == 0.0 {
+            // A body of one material: nothing hidden, here or beside.
+            let energy_by_modulus = sphere.energy / effective_modulus;
+            return WidenedContact { sphere, energy_by_modulus, energy_by_rate: 0.0 };
+        }
+        let mut growth = 1.0;
+        for _ in 0..MOST_STEPS {
+            let area = hertz_area(sphere.force, radius, effective_modulus);
+            let residual = own + self.rate * sphere.force * (4.0 / 3.0 * area - self.reference) - whole;
+            growth = 1.0 + sphere.stiffness * self.rate * (20.0 / 9.0 * area - self.reference);
+            if residual.abs() <= SETTLED * whole || sphere.force == 0.0 {
+                break;
+            }
+            own = (own - residual / growth).max(0.1 * own);
+            sphere = indent_sphere(own, radius, effective_modulus);
+        }
+        self.whole(sphere, growth, radius, effective_modulus)
+    }
+
+    /// What the sphere's state means for the whole; `growth` is the derivative of the approach by the sphere's own.
+    fn whole(self, sphere: SphereContact, growth: f64, radius: f64, effective_modulus: f64) -> WidenedContact {
+        let (force, area) = (sphere.force, hertz_area(sphere.force, radius, effective_modulus));
+        let wide = 0.5 * force * force * (area - self.reference);
+        let by_area = self.rate * force * force * area / 3.0;
+        WidenedContact {
+            sphere: SphereContact {
+                stiffness: sphere.stiffness / growth,
+                energy: sphere.energy + self.rate * (force * force * (4.0 / 3.0 * area - self.reference) - wide),
+                energy_by_radius: sphere.energy_by_radius - by_area / radius,
+                ..sphere
+            },
+            energy_by_modulus: (sphere.energy + by_area) / effective_modulus,
+            energy_by_rate: -wide,
+        }
+    }
+}
+
+/// Square of the radius of a Hertzian contact, m^2.
+fn hertz_area(force: f64, radius: f64, effective_modulus: f64) -> f64 {
+    (0.75 * radius * force / effective_modulus).cbrt().powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MODULUS: f64 = 6e3;
+    const RADIUS: f64 = 5e-3;
+
+    fn widenings() -> impl Iterator<Item = Widening> {
+        let unit = 1.0 / (MODULUS * RADIUS.powi(3));
+        [-0.11, 0.0, 0.3, 7.0]
+            .into_iter()
+            .map(move |rate| Widening { rate: rate * unit, reference: RADIUS * RADIUS / 4.0 })
+    }
+
+    /// `f'` by central differences.
+    fn slope(f: impl Fn(f64) -> f64, at: f64) -> f64 {
+        let step = 1e-5 * at.abs();
+        (f(at + step) - f(at - step)) / (2.0 * step)
+    }
+
+    #[test]
+    fn force_and_stiffness_are_derivatives_of_the_energy() {
+        for widening in widenings() {
+            for depth in [0.02, 0.1, 0.3, 0.8].map(|d| d * RADIUS) {
+                let at = |d: f64| widening.indent(d, RADIUS, MODULUS).sphere;
+                let found = at(depth);
+                assert!((slope(|d| at(d).energy, depth) / found.force - 1.0).abs() < 1e-6, "{widening:?} {depth}");
+                assert!((slope(|d| at(d).force, depth) / found.stiffness - 1.0).abs() < 1e-6, "{widening:?} {depth}");
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_by_radius_modulus_and_rate_are_those_of_the_energy() {
+        for widening in widenings() {
+            let depth = 0.3 * RADIUS;
+            let energy =
+                |rate, radius, modulus| Widening { rate, ..widening }.indent(depth, radius, modulus).sphere.energy;
+            let found = widening.indent(depth, RADIUS, MODULUS);
+            let close = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs().max(1e-3 * found.sphere.energy);
+            assert!(close(slope(|r| energy(widening.rate, r, MODULUS), RADIUS), found.sphere.energy_by_radius));
+            assert!(close(slope(|e| energy(widening.rate, RADIUS, e), MODULUS), found.energy_by_modulus));
+            if widening.rate != 0.0 {
+                assert!(close(slope(|k| energy(k, RADIUS, MODULUS), widening.rate), found.energy_by_rate));
+            }
+        }
+    }
+
+    /// The displacement of a sphere's centre is that of the half-space and `C(a) F`, as long as the radius is the reference's.
+    #[test]
+    fn at_the_reference_the_regular_part_is_that_of_the_body() {
+        let alone = indent_sphere(0.25 * RADIUS, RADIUS, MODULUS);
+        let area = hertz_area(alone.force, RADIUS, MODULUS);
+        let widening = Widening { rate: 0.5 / (MODULUS * RADIUS.powi(3)), reference: area };
+        let approach = 0.25 * RADIUS + widening.rate * alone.force * area / 3.0;
+        assert!((widening.indent(approach, RADIUS, MODULUS).sphere.force / alone.force - 1.0).abs() < 1e-12);
+    }
+}
