@@ -20,6 +20,8 @@ pub struct ToolState {
     pub entry_depth: [f64; MAX_BODIES],
     /// Where it was a tick ago, m, in the world; none where it was not in the scene.
     pub(super) before: Option<DVec3>,
+    /// Energy that contacts which fade have lost in this tick, J.
+    pub(super) freed: f64,
     /// Why no contact began where the tool reaches the body.
     pub refused: [Option<Refusal>; MAX_BODIES],
 }

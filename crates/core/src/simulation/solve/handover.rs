@@ -11,6 +11,7 @@ use glam::{DMat3, DVec3};
 
 use super::compliance::add_contact;
 use crate::contact::shape::ToolShape;
+use crate::contact::smooth::FootPoint;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
 use crate::simulation::law::{LocalResponse, depth_below};
@@ -36,6 +37,9 @@ const NEXT: f64 = 0.25;
 const SAME_SIDE: f64 = 0.3;
 /// Feet closer than this, over the tool's radius, are one.
 const ONE: f64 = 0.02;
+/// Two places of a tool closer than this, over its radius, are carried along as one the closer they are: nodes do not tell
+/// them apart.
+const JOINED: f64 = 0.5;
 
 /// What has been found for the contacts of a body.
 #[derive(Clone, Copy)]
@@ -73,7 +77,9 @@ pub fn hand_over(model: &Model, state: &mut State, found: Found<'_>, slots: &[us
         if contact.local.force == DVec3::ZERO {
             match contact.local.further {
                 true => state.contacts.clear(slot),
-                false => state.contacts.slots[slot].local.foot = response.foot,
+                false => {
+                    put_elsewhere(&model.tools[contact.tool], &mut state.contacts.slots[slot], &response.foot, place);
+                }
             }
             continue;
         }
@@ -99,6 +105,29 @@ fn hold(contact: &mut Contact) {
     (own.held, own.further, own.change) = (true, true, -1.0 / FADING);
 }
 
+/// Lets contacts fade for which no place has been found: those with the longest last steps. What takes their place begins from
+/// no force.
+pub fn hold_lost(state: &mut State, steps: &[DVec3], slots: &[usize]) {
+    let longest = steps.iter().map(|step| step.length()).fold(0.0, f64::max);
+    for (&slot, step) in slots.iter().zip(steps) {
+        let Contact { tool, body, local, .. } = state.contacts.slots[slot];
+        if step.length() < 0.5 * longest || local.held {
+            continue;
+        }
+        state.tools[tool].entry_depth[body] = f64::INFINITY;
+        match local.force == DVec3::ZERO {
+            true => state.contacts.clear(slot),
+            false => hold(&mut state.contacts.slots[slot]),
+        }
+    }
+}
+
+/// Part by which two places of one tool, so far apart, are carried along as one.
+pub fn joined(apart: f64, radius: f64) -> f64 {
+    let t = (apart / (JOINED * radius)).min(1.0);
+    1.0 - t * t * (3.0 - 2.0 * t)
+}
+
 /// Whether another contact of the same tool has the foot that this one has jumped to. One that fades there comes up again.
 fn is_known(model: &Model, state: &mut State, found: Found<'_>, slots: &[usize], a: usize) -> bool {
     let (own, foot) = (state.contacts.slots[slots[a]], &found.responses[a].foot);
@@ -108,7 +137,8 @@ fn is_known(model: &Model, state: &mut State, found: Found<'_>, slots: &[usize],
         let near = found.responses[b].foot.position.distance(foot.position) < one;
         if near && (other.tool, other.body) == (own.tool, own.body) {
             if other.local.held {
-                (other.local.held, other.local.change, other.local.foot) = (false, 1.0 / FADING, *foot);
+                (other.local.held, other.local.change) = (false, 1.0 / FADING);
+                put_elsewhere(&model.tools[own.tool], other, foot, found.places[b]);
             }
             return true;
         }
@@ -126,17 +156,20 @@ fn begin_next(
 ) {
     let tool = &model.tools[before.tool];
     let mut next = *before;
+    put_elsewhere(tool, &mut next, &response.foot, place);
     let own = &mut next.local;
-    let deeper = approach(tool, before, place) - {
-        own.foot = response.foot;
-        approach(tool, &Contact { local: *own, ..*before }, place)
-    };
-    own.entry -= deeper.min(0.0);
     (own.relative, own.advance, own.further) = (place, DVec3::ZERO, true);
     (own.part, own.change) = (LEAST_PART, 1.0 / FADING);
     (own.friction, own.force) = Default::default();
     next.force = DVec3::ZERO;
     add_contact(model, state, next, found.covering);
+}
+
+/// Gives a contact another foot. Its approach counts from where it was, if it is deeper there.
+fn put_elsewhere(tool: &ToolModel, contact: &mut Contact, foot: &FootPoint, place: DVec3) {
+    let before = approach(tool, contact, place);
+    contact.local.foot = *foot;
+    contact.local.entry += (approach(tool, contact, place) - before).max(0.0);
 }
 
 /// How far a tool at a place reaches below the plane through its contact's foot, m.
@@ -148,6 +181,31 @@ fn approach(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
     }
 }
 
+/// Changes the parts of the contacts that fade or come up by a tick. What a tool's contacts gain in energy by coming up is no more
+/// than what its others lose by fading: with an energy `part * Phi` at constant places, the stationary value is concave in the
+/// part, so that a gain is at most, and a loss at least, the change of the part times `Phi`.
+pub fn change_parts(state: &mut State, responses: &[LocalResponse], slots: &[usize]) {
+    for comes_up in [false, true] {
+        for (a, &slot) in slots.iter().enumerate() {
+            let Contact { mode, tool, local, .. } = state.contacts.slots[slot];
+            if mode == Mode::Free || local.change == 0.0 || (local.change > 0.0) != comes_up {
+                continue;
+            }
+            let whole = responses[a].indentation.energy / local.part;
+            let bound = if whole > 0.0 { state.tools[tool].freed / whole } else { f64::INFINITY };
+            let part = (local.part + local.change.min(bound)).clamp(LEAST_PART, 1.0);
+            state.tools[tool].freed += (local.part - part) * whole;
+            let own = &mut state.contacts.slots[slot].local;
+            own.part = part;
+            own.change = if own.part < 1.0 { own.change } else { 0.0 };
+        }
+    }
+    for &slot in slots {
+        let tool = state.contacts.slots[slot].tool;
+        state.tools[tool].freed = 0.0;
+    }
+}
+
 /// Takes a contact on by a tick; false where it is none any more.
 pub fn go_on(tool: &ToolModel, contact: &mut Contact) -> bool {
     let approach = approach(tool, contact, contact.local.relative);
@@ -155,10 +213,6 @@ pub fn go_on(tool: &ToolModel, contact: &mut Contact) -> bool {
     if own.found {
         (own.found, own.entry) = (false, (approach - own.came).max(0.0));
         return approach < DEEPEST * tool.radius;
-    }
-    if own.change != 0.0 {
-        own.part = (own.part + own.change).clamp(LEAST_PART, 1.0);
-        own.change = if own.part < 1.0 { own.change } else { 0.0 };
     }
     let touches = contact.force != DVec3::ZERO;
     let fades = own.held && (own.part <= LEAST_PART || !touches);

@@ -23,7 +23,7 @@ use crate::simulation::law::{
 };
 use crate::simulation::model::Model;
 use crate::simulation::solve::forces::dent_of;
-use crate::simulation::solve::handover::{Found, go_on, hand_over, has_jumped, join};
+use crate::simulation::solve::handover::{Found, change_parts, go_on, hand_over, has_jumped, hold_lost, join, joined};
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -36,8 +36,8 @@ pub const MOST_STEPS: usize = 16;
 const USUAL_STEPS: usize = 10;
 /// Longest step, over the tool's radius.
 const LONGEST: f64 = 0.5;
-/// Where the last step is longer than this, over the tool's radius, nothing has been found: contacts stay as they were a tick ago.
-const LOST: f64 = 0.02;
+/// Where the last step is longer than this, over the tool's radius, nothing has been found.
+const LOST: f64 = 0.005;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
@@ -49,9 +49,6 @@ const CELLS_LOOSER: f64 = 100.0;
 /// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
 /// longer one. A half-space under a sphere is strained far beyond what is linear there.
 const MOST_DEPTH: f64 = 1.6;
-/// Two places of a tool closer than this, over its radius, are carried along as one the closer they are: nodes do not tell
-/// them apart.
-const JOINED: f64 = 0.5;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
@@ -169,8 +166,16 @@ pub struct Memory<'a> {
     pub system: &'a mut System,
 }
 
-/// Forces of the contacts of a body under the local law. Where the foot of one has jumped they are found once more, with what
-/// takes its place.
+/// What has become of the method.
+enum Outcome {
+    Settled,
+    Lost,
+    /// A contact had to be let go.
+    LetGo,
+}
+
+/// Forces of the contacts of a body under the local law. Where the foot of one has jumped, or none was found, they are found once
+/// more, with what takes its place. Where that finds nothing either they stay as they were a tick ago.
 pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, body: usize, controls: &Controls) {
     for last in [false, true] {
         let mut slots = [0; MAX_CONTACTS];
@@ -180,8 +185,22 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
             count += 1;
         }
         let slots = &slots[..count];
-        if count == 0 || !settle(model, state, &mut memory, slots, body, controls) {
+        if count == 0 {
             return;
+        }
+        match settle(model, state, &mut memory, slots, body, controls) {
+            Outcome::Settled => {}
+            Outcome::LetGo => return,
+            Outcome::Lost if last => {
+                return slots.iter().for_each(|&slot| {
+                    let contact = &mut state.contacts.slots[slot];
+                    contact.force = contact.local.force;
+                });
+            }
+            Outcome::Lost => {
+                hold_lost(state, &memory.local.steps[..count], slots);
+                continue;
+            }
         }
         let (responses, places) = (&memory.local.responses, &memory.local.places);
         let found = Found { responses, places, covering: memory.covering };
@@ -192,7 +211,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
     }
 }
 
-/// Newton's method; false where nothing has been found, or a contact had to be let go.
+/// Newton's method.
 fn settle(
     model: &Model,
     state: &mut State,
@@ -200,7 +219,7 @@ fn settle(
     slots: &[usize],
     body: usize,
     controls: &Controls,
-) -> bool {
+) -> Outcome {
     let Memory { covering, local, system } = memory;
     local.turn_to(body);
     local.others[..slots.len()].fill(Others::default());
@@ -221,7 +240,7 @@ fn settle(
     let (most, looser) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, 1.0) };
     for step in 0..most {
         if !meet(model, state, local, slots, body, controls, step) {
-            return false;
+            return Outcome::LetGo;
         }
         let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
         let longest = advance(local, system, &deepest, slots.len());
@@ -237,14 +256,10 @@ fn settle(
         if step + 1 < most {
             local.go(slots.len());
         } else if !cells && longest > LOST * radius {
-            for &slot in slots {
-                let contact = &mut state.contacts.slots[slot];
-                contact.force = contact.local.force;
-            }
-            return false;
+            return Outcome::Lost;
         }
     }
-    true
+    Outcome::Settled
 }
 
 /// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, or on one at
@@ -361,7 +376,9 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
     for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
             let patches = &state.contacts.patches;
-            let joined = joined(model, state, local, (a, slot), (b, other));
+            let [tool, same] = [slot, other].map(|slot| state.contacts.slots[slot].tool);
+            let apart = local.responses[a].foot.position.distance(local.responses[b].foot.position);
+            let joined = if tool == same { joined(apart, model.tools[tool].radius) } else { 0.0 };
             let mean = (local.responses[a].compliance + local.responses[b].compliance) * 0.5;
             if state.bodies[body].motion.is_some() {
                 // The slope is that of the moving surface, whoever moves it.
@@ -377,7 +394,7 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
                 slope += gradient * (own.dot(of_node * force) / scale);
             }
             if joined > 0.0
-                && let Some(met) = local_body(model, state, state.contacts.slots[slot].tool, body)
+                && let Some(met) = local_body(model, state, tool, body)
             {
                 let mut shared = DVec3::ZERO;
                 for (fan, _, gradient) in local.weights[a].with_gradients() {
@@ -389,23 +406,6 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
             local.others[a].slope += slope;
         }
     }
-}
-
-/// Part by which two contacts are carried along as one: places of one tool that are close together.
-fn joined(
-    model: &Model,
-    state: &State,
-    local: &LocalScratch,
-    (a, own): (usize, usize),
-    (b, other): (usize, usize),
-) -> f64 {
-    let tool = state.contacts.slots[own].tool;
-    if state.contacts.slots[other].tool != tool {
-        return 0.0;
-    }
-    let apart = local.responses[a].foot.position.distance(local.responses[b].foot.position);
-    let t = (apart / (JOINED * model.tools[tool].radius)).min(1.0);
-    1.0 - t * t * (3.0 - 2.0 * t)
 }
 
 /// The nodes below a contact, as blended.
@@ -494,6 +494,7 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
             state.contacts.clear(slot);
         }
     }
+    change_parts(state, &local.responses, slots);
     join(model, state, slots);
 }
 

@@ -46,6 +46,10 @@ use crate::simulation::tool::LawKind;
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
 const JUMP: f64 = 2.0;
 
+/// A tool that begins to touch has come by no more than this, over the way that it has gone in the tick; smoothed surfaces are
+/// not quite the level sets of a distance.
+const WAY: f64 = 2.0;
+
 /// The law.
 pub struct Local;
 
@@ -151,6 +155,12 @@ impl Law for Local {
             return Ok(None);
         };
         *entry_depth = entry_depth.min(depth.max(0.0));
+        if let (ToolShape::Sphere { .. }, None) = (&approach.tool.shape, approach.motion)
+            && approach.gone != DVec3::ZERO
+        {
+            // A distance changes by no more than the way: where it seems to, the foot a tick ago was another one.
+            *entry_depth = entry_depth.max(depth - WAY * approach.gone.length());
+        }
         if depth <= *entry_depth {
             return Ok(None);
         }
