@@ -173,7 +173,7 @@ fn put_elsewhere(tool: &ToolModel, contact: &mut Contact, foot: &FootPoint, plac
 }
 
 /// How far a tool at a place reaches below the plane through its contact's foot, m.
-fn approach(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
+pub fn approach(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
     let foot = &contact.local.foot;
     match tool.shape {
         ToolShape::Sphere { radius } => radius - (place - foot.position).dot(foot.normal),

@@ -18,12 +18,12 @@ use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::{Covering, neighbourhood};
 use crate::simulation::input::Controls;
-use crate::simulation::law::{
-    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
-};
+use crate::simulation::law::{Cells, Guess, LocalBody, LocalResponse, LocalTool, Others, evaluate, takes_cells};
 use crate::simulation::model::Model;
 use crate::simulation::solve::forces::dent_of;
-use crate::simulation::solve::handover::{Found, change_parts, go_on, hand_over, has_jumped, hold_lost, join, joined};
+use crate::simulation::solve::handover::{
+    Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join, joined,
+};
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -37,7 +37,7 @@ const USUAL_STEPS: usize = 10;
 /// Longest step, over the tool's radius.
 const LONGEST: f64 = 0.5;
 /// Where the last step is longer than this, over the tool's radius, nothing has been found.
-const LOST: f64 = 0.005;
+const LOST: f64 = 5e-4;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
@@ -489,19 +489,11 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         own.stiffness = indentation.stiffness / (1.0 + along * indentation.stiffness);
         own.energy = indentation.energy + response.springs().energy();
         own.dissipated = response.friction.dissipated;
-        own.depth = depth(&model.tools[contact.tool].shape, own, &response.foot);
+        contact.local.depth = approach(&model.tools[tool], contact, contact.local.tool);
         if !go_on(&model.tools[tool], contact) {
             state.contacts.clear(slot);
         }
     }
     change_parts(state, &local.responses, slots);
     join(model, state, slots);
-}
-
-/// How far a tool reaches below the surface at rest, m.
-fn depth(shape: &ToolShape, contact: &LocalContact, foot: &FootPoint) -> f64 {
-    match *shape {
-        ToolShape::Sphere { radius } => radius - foot.normal.dot(contact.tool - foot.position),
-        _ => depth_below(shape, (contact.tool, DMat3::from_quat(contact.orientation)), foot),
-    }
 }
