@@ -37,7 +37,7 @@ const USUAL_STEPS: usize = 10;
 /// Longest step, over the tool's radius.
 const LONGEST: f64 = 0.5;
 /// Where the last step is longer than this, over the tool's radius, nothing has been found.
-const LOST: f64 = 5e-4;
+const LOST: f64 = 2e-3;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
