@@ -1,4 +1,4 @@
-"""Feel for a hard nodule in soft tissue: a fingertip slides over it at constant depth, and over the same tissue without.
+"""Feel for a hard nodule in soft tissue: a fingertip slides over it at constant depth, and over tissue without one.
 
 Usage: nodule.py [plot.png]
 """

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import heapq
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,16 +20,15 @@ from pathlib import Path
 import numpy as np
 
 from model_shapes import SHAPES, Field, Shape
-from palpate import _native
 from palpate.mesh import TetMesh
-from palpate.mesh.elements import FACES, unique_edges
+from palpate.mesh.child import run_limited
+from palpate.mesh.curve import curve
+from palpate.mesh.elements import FACES
 
 DATA = Path(__file__).resolve().parent.parent / "python" / "palpate" / "models" / "data"
 MILLIMETRE = 1e-3
 ROUNDS = 50  # of flips and smoothing; many more let vertices slide off thin parts
 MESHER_LIMIT = 120.0  # s
-# A curved element's least determinant in parts of its largest, in which straight ones have 1.
-LEAST_DETERMINANT = 0.2
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,8 @@ def make(name: str) -> TetMesh:
     graded = (replace(shape, size=lambda p, g=g: shape.size(p) ** g) for g in target.grading)
     mesh = best((surface(s, target.surface_nodes, target.samples) for s in graded), target)
     mesh = polish(mesh, shape.field)
-    mesh = curve(mesh, shape.field) if target.curved else mesh
+    if target.curved:
+        mesh = curve(mesh, lambda points: project(points / MILLIMETRE, shape.field, 1.0, 8) * MILLIMETRE)
     return TetMesh(mesh.nodes - [0, 0, mesh.nodes[:, 2].min()], mesh.tets)
 
 
@@ -317,10 +316,10 @@ def fill(vertices: np.ndarray, faces: np.ndarray, size: float) -> TetMesh | None
     with tempfile.TemporaryDirectory(prefix="palpate-models-") as folder:
         given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
         scaled = (vertices - origin) / extent
-        np.savez(given, vertices=scaled, faces=faces, size=size / extent, balls=np.zeros((0, 5)))
+        job = {"balls": np.empty((0, 5)), "points": np.empty((0, 4))}
+        np.savez(given, vertices=scaled, faces=faces, size=size / extent, **job)
         command = [sys.executable, "-m", "palpate.mesh.netgen_child", "keep", str(given), str(made)]
-        status = subprocess.run(command, stdout=subprocess.DEVNULL, timeout=MESHER_LIMIT, check=False).returncode
-        if status or not made.exists():
+        if run_limited(command, MESHER_LIMIT) != 0 or not made.exists():
             return None
         with np.load(made) as result:
             return TetMesh(result["nodes"] * extent + origin, result["tets"])
@@ -363,26 +362,6 @@ def smallest_angles(corners: np.ndarray) -> np.ndarray:
     a, b, c, d = (corners[..., k, :] for k in range(4))
     volume = np.einsum("...k,...k->...", np.cross(b - a, c - a), d - a)
     return np.where(volume > 0, angles, -1.0)
-
-
-def curve(mesh: TetMesh, field: Field) -> TetMesh:
-    """10-node tetrahedra, the middles of surface edges on the shape (mm), or as near as folds no element."""
-    edges, of_element = unique_edges(mesh.tets)
-    straight = mesh.nodes[edges].mean(axis=1)
-    ends = np.sort(mesh.surface_triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
-    outside = np.isin(edges @ [len(mesh.nodes), 1], ends @ [len(mesh.nodes), 1])
-    lengths = np.linalg.norm(np.diff(mesh.nodes[edges[outside]], axis=1)[:, 0], axis=1)
-    bulge = np.zeros_like(straight)
-    bulge[outside] = project(straight[outside] / MILLIMETRE, field, 1.0, 8) * MILLIMETRE - straight[outside]
-    bulge[outside] *= np.minimum(1, 0.2 * lengths / np.maximum(np.linalg.norm(bulge[outside], axis=1), 1e-9))[:, None]
-    tets = np.hstack([mesh.tets, len(mesh.nodes) + of_element]).astype(np.uint32)
-    while True:
-        nodes = np.vstack([mesh.nodes, straight + bulge])
-        low, high = _native.determinant_ranges(nodes, tets).reshape(-1, 2).T
-        bad = np.unique(of_element[low < LEAST_DETERMINANT * high])
-        if not bulge[bad].any():
-            return TetMesh(nodes, tets)
-        bulge[bad] = np.where(np.linalg.norm(bulge[bad], axis=1) > 1e-5, 0.7, 0.0)[:, None] * bulge[bad]
 
 
 def box(cells: tuple[int, int, int]) -> TetMesh:

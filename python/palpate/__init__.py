@@ -19,6 +19,8 @@ from palpate.errors import (
     SimulationError,
     StoreError,
     StoreWarning,
+    TouchWarning,
+    UnclearUnitError,
     UnitError,
     ViewerError,
 )
@@ -59,6 +61,8 @@ __all__ = [
     "SurfaceStress",
     "TetMesh",
     "Touch",
+    "TouchWarning",
+    "UnclearUnitError",
     "UnitError",
     "ViewerError",
     "models",

@@ -7,6 +7,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from palpate.leftovers import remove_leftovers
+
 
 @contextlib.contextmanager
 def written_beside(path: Path) -> Iterator[Path]:
@@ -18,6 +20,7 @@ def written_beside(path: Path) -> Iterator[Path]:
         From within the block, naming ``path`` (a full disk names nothing).
 
     """
+    remove_leftovers(path)
     partial = path.with_name(f".{os.getpid()}.{path.name}")
     try:
         yield partial

@@ -1,5 +1,9 @@
 """Exceptions of Palpate: one-line messages that say what is wrong, where, and what helps."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
 
 class Error(Exception):
     """Base of everything Palpate raises for a user's mistake or a broken input."""
@@ -29,6 +33,21 @@ class UnitError(Error):
     """An unknown unit, or a quantity that cannot be read."""
 
 
+class UnclearUnitError(UnitError):
+    """A file without a unit of length whose body would be of no likely size in metres.
+
+    Attributes
+    ----------
+    fitting
+        Units in which it would be, most common first.
+
+    """
+
+    def __init__(self, message: str, fitting: Sequence[str] = ()):
+        super().__init__(message)
+        self.fitting = tuple(fitting)
+
+
 class ViewerError(Error):
     """The browser viewer cannot be served, or was asked for something it cannot do."""
 
@@ -47,3 +66,7 @@ class LockingWarning(PalpateWarning):
 
 class StoreWarning(PalpateWarning):
     """Something in the way of a precomputed file was thrown away."""
+
+
+class TouchWarning(PalpateWarning):
+    """A touch landed on the surface far from the point that was asked for."""

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
+from numbers import Real
+
+import numpy as np
 
 from palpate.errors import UnitError
 
@@ -14,6 +18,9 @@ FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 ACCELERATION_UNITS = {"m/s2": 1.0, "m/s^2": 1.0}
 MEMORY_UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+
+# Characters of a wrong value that a message repeats.
+LONGEST_SHOWN = 60
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
@@ -27,17 +34,32 @@ def quantity(value: str | float, units: dict[str, float], kind: str) -> float:
         Not a quantity, or a unit that is not in ``units``; the message lists them.
 
     """
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value)
+    if isinstance(value, Real) and not isinstance(value, (bool, np.bool_)):
+        return to_float(value)
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
     if match is None:
-        raise UnitError(f"'{value}' is not a {kind}: write a number and one of {', '.join(units)}")
+        shown = f"'{value}'" if isinstance(value, str) else brief_repr(value)
+        raise UnitError(f"{shown} is not a {kind}: write a number and one of {', '.join(units)}")
     number, unit = float(match[1]), match[2]
     if unit == "":
         return number
     if unit not in units:
         raise UnitError(f"unknown unit '{unit}' in '{value}': a {kind} is given in {', '.join(units)}")
     return number * units[unit]
+
+
+def to_float(value: Real) -> float:
+    """Turn a number into a float; a whole number beyond the range of floats is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def brief_repr(value: object) -> str:
+    """Value as it is written in a message of one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def length(value: str | float) -> float:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from palpate.errors import Error
+from palpate.errors import Error, UnitError
+from palpate.units import brief_repr, to_float
+
+# Reads text with a unit, such as palpate.units.length.
+Reader = Callable[[Any], float]
 
 
-def three_numbers(values: Any, what: str, error: type[Error]) -> tuple[float, float, float]:
-    """Take three finite numbers; ``what`` names them in messages.
+def three_numbers(values: Any, what: str, error: type[Error], read: Reader | None = None) -> tuple[float, float, float]:
+    """Take three finite numbers; ``what`` names them in messages. With ``read`` each may be text with a unit.
 
     Raises
     ------
@@ -20,14 +24,18 @@ def three_numbers(values: Any, what: str, error: type[Error]) -> tuple[float, fl
         Of the class ``error``: anything else.
 
     """
-    x, y, z = three_components(values, what, error)
+    x, y, z = three_components(values, what, error, read)
     if x is None or y is None or z is None:
         raise error(f"{what} needs three numbers")
     return x, y, z
 
 
-def three_components(values: Any, what: str, error: type[Error]) -> tuple[float | None, float | None, float | None]:
+def three_components(
+    values: Any, what: str, error: type[Error], read: Reader | None = None
+) -> tuple[float | None, float | None, float | None]:
     """Take three components, each a finite number or None; ``what`` names them in messages.
+
+    With ``read`` each may be text with a unit.
 
     Raises
     ------
@@ -35,17 +43,38 @@ def three_components(values: Any, what: str, error: type[Error]) -> tuple[float 
         Of the class ``error``: anything else.
 
     """
-    if not isinstance(values, Iterable):
+    if isinstance(values, str) or not isinstance(values, Iterable):
         raise error(f"{what} needs three numbers")
-    given = list(values)
+    given = [_read(v, what, error, read) if read is not None and isinstance(v, str) else v for v in values]
     if not all(v is None or (isinstance(v, Real) and not isinstance(v, (bool, np.bool_))) for v in given):
         raise error(f"{what} needs three numbers")
     if len(given) != 3:
         raise error(f"{what} needs three numbers, got {len(given)}")
-    if not all(v is None or np.isfinite(v) for v in given):
+    x, y, z = (None if v is None else to_float(v) for v in given)
+    if not all(v is None or np.isfinite(v) for v in (x, y, z)):
         raise error(f"{what} has a number that is not finite")
-    x, y, z = (None if v is None else float(v) for v in given)
     return x, y, z
+
+
+def number(value: Any, what: str, error: type[Error]) -> float:
+    """Take a finite number; ``what`` names it in messages.
+
+    Raises
+    ------
+    Error
+        Of the class ``error``: anything else.
+
+    """
+    if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)) or not np.isfinite(to_float(value)):
+        raise error(f"{what} must be a finite number, got {brief_repr(value)}")
+    return to_float(value)
+
+
+def _read(text: str, what: str, error: type[Error], read: Reader) -> float:
+    try:
+        return read(text)
+    except UnitError as mistake:
+        raise error(f"{what}: {mistake}") from None
 
 
 def brief(values: Iterable[float]) -> str:

@@ -37,13 +37,14 @@ MARKS = [
 
 
 class Program:
-    """`palpate demo`, as a user starts it."""
+    """`palpate demo`, or another command with a page, as a user starts it; ``cache`` None is the user's own."""
 
-    def __init__(self, cache: Path, *arguments: str):
-        command = [sys.executable, "-m", "palpate", "demo", *arguments, "--port", "0", "--no-browser"]
-        environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
-        self.address = re.search(r"http://\S+", self.process.stdout.readline())[0]
+    def __init__(self, cache: Path | None, *arguments: str, command: str = "demo"):
+        words = [sys.executable, "-m", "palpate", command, *arguments, "--port", "0", "--no-browser"]
+        environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=environment)
+        told = (re.search(r"http://\S+", line) for line in self.process.stdout)
+        self.address = next(address[0] for address in told if address)
 
     def stop(self) -> int:
         """Exit status after Ctrl-C."""
@@ -54,9 +55,9 @@ class Program:
 
 
 @contextlib.contextmanager
-def opened(chromium, program):
+def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
     """The page with a scene on it; anything on its console is a failure."""
-    context = chromium.new_context(viewport={"width": 1280, "height": 720})
+    context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
     page = context.new_page()
     complaints = []
     page.on(
@@ -115,12 +116,12 @@ def settled_depth(page) -> float:
     raise AssertionError("the depth does not settle")
 
 
-def drag(page, start: tuple[float, float], end: tuple[float, float], steps: int = 20) -> None:
-    """Move the pointer that is down along a line."""
+def drag(page, start: tuple[float, float], end: tuple[float, float], steps: int = 20, pause: float = 0.01) -> None:
+    """Move the pointer that is down along a line, with a pause after each step, s."""
     for step in range(1, steps + 1):
         part = step / steps
         page.mouse.move(start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1]))
-        time.sleep(0.01)
+        time.sleep(pause)
 
 
 def settled_force(page) -> np.ndarray:

@@ -2,9 +2,19 @@
 // message. Buttons, keys and the pointer all go through here.
 
 import { RateLimit } from "./net/rate_limit";
-import type { ClientMessage, FrameMessage, Role, SceneMessage, SettingsMessage, TextMessage, Vec3 } from "./net/protocol";
+import type {
+  ClientMessage,
+  FrameMessage,
+  Quaternion,
+  Role,
+  SceneMessage,
+  SettingsMessage,
+  ShapeName,
+  TextMessage,
+  Vec3,
+} from "./net/protocol";
 import { drivenTool, inControl } from "./store";
-import type { Axis, Layer, Store } from "./store";
+import type { Axis, Layer, Posture, Store } from "./store";
 
 /** A slider dragged quickly sends no more often than this. */
 const SEND_INTERVAL_MS = 40;
@@ -12,6 +22,10 @@ const SEND_INTERVAL_MS = 40;
 const OWN_VALUE_MS = 400;
 /** More than so many notices hide the picture. */
 const NOTICES_MAX = 3;
+/** How a tool is held at first: a stylus lies on its side, the others stand upright. */
+const LYING: Posture = { tilt: 90, turn: 0 };
+const UPRIGHT: Posture = { tilt: 0, turn: 0 };
+export const TILT_MAX = 90;
 
 export class Control {
   private changedMs = -Infinity;
@@ -40,7 +54,9 @@ export class Control {
   /** A new scene: what was touched is let go, and choices that it does not offer are dropped. */
   takeScene(scene: SceneMessage): void {
     this.release();
-    const { field, strike, layers } = this.store.get();
+    const { field, strike, layers, scene: before, postures } = this.store.get();
+    const posture = ({ shape }: { shape: ShapeName }, tool: number) =>
+      shape === before?.tools[tool]?.shape ? postures[tool]! : shape === "capsule" ? LYING : UPRIGHT;
     const offered = scene.bodies[0]?.fields.some(({ name }) => name === field) ?? false;
     this.changedMs = -Infinity;
     this.store.update({
@@ -55,6 +71,7 @@ export class Control {
         time_scale: scene.motion?.time_scale ?? null,
       },
       frame: null,
+      postures: scene.tools.map(posture),
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,
       tab: scene.motion ? "motion" : "force",
@@ -130,8 +147,18 @@ export class Control {
 
   // What the tools do.
 
-  press(tool: number, position: Vec3, grab: boolean): void {
-    this.send({ type: "press", tool, position, grab });
+  /** Without an orientation the tool keeps the one that it has. */
+  press(tool: number, position: Vec3, grab: boolean, orientation: Quaternion | null): void {
+    this.send({ type: "press", tool, position, grab, ...(orientation && { orientation }) });
+  }
+
+  /** How the driven tool is held, or the one that the next press drives. */
+  hold(change: Partial<Posture>): void {
+    const state = this.store.get();
+    const tool = drivenTool(state) ?? 0;
+    const { tilt, turn } = { ...state.postures[tool]!, ...change };
+    const held = { tilt: Math.min(Math.max(tilt, 0), TILT_MAX), turn: turn - 360 * Math.round(turn / 360) };
+    this.store.update({ postures: state.postures.with(tool, held) });
   }
 
   /** The pointer was let go, or lost: its tool leaves the body, unless it may stay and was to. */

@@ -9,6 +9,7 @@ import type {
   SceneMessage,
   SettingsMessage,
   StatusMessage,
+  Vec3,
 } from "./net/protocol";
 
 export type Axis = "x" | "y" | "z";
@@ -24,6 +25,12 @@ export interface Pressing {
   depth: number;
 }
 
+/** How a tool is held on the surface that it touches, degrees: how far it leans from upright, and where to. */
+export interface Posture {
+  tilt: number;
+  turn: number;
+}
+
 export interface State {
   connection: ConnectionState;
   role: Role;
@@ -32,6 +39,8 @@ export interface State {
   models: Choice[];
   status: StatusMessage | null;
   scene: SceneMessage | null;
+  /** Sides of the box around each body at rest, in its own frame, m. */
+  sizes: readonly Vec3[];
   settings: SettingsMessage | null;
   /** The newest one that is drawn. */
   frame: FrameMessage | null;
@@ -53,6 +62,8 @@ export interface State {
   strike: boolean;
   impulse: number;
   pressing: Readonly<Pressing> | null;
+  /** Of each tool. */
+  postures: readonly Readonly<Posture>[];
   /** Tools that stay where they were left. */
   pinned: readonly number[];
   /** Whether the next press stays where it is let go. */
@@ -67,6 +78,7 @@ export function initialState(): State {
     models: [],
     status: null,
     scene: null,
+    sizes: [],
     settings: null,
     frame: null,
     notices: [],
@@ -80,6 +92,7 @@ export function initialState(): State {
     strike: false,
     impulse: 0,
     pressing: null,
+    postures: [],
     pinned: [],
     pinNext: false,
   };

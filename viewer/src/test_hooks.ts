@@ -19,6 +19,7 @@ export interface ViewerState {
   role: string;
   scene: string | null;
   /** Of the driven tool. */
+  shape: string | null;
   force: Vec3;
   forceMagnitude: number;
   limited: boolean;
@@ -78,6 +79,7 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     connected: state.connection === "open",
     role: state.role,
     scene: scene?.name ?? null,
+    shape: scene?.tools[drivenTool(state) ?? 0]?.shape ?? null,
     force,
     forceMagnitude: Math.hypot(...force),
     limited: driven?.limited ?? false,

@@ -8,6 +8,7 @@ import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
 import type { FrameData, SceneData } from "./net/protocol";
 import { Stage } from "./scene/stage";
+import { sidesOf } from "./scene/surface";
 import { Viewport } from "./scene/viewport";
 import { Store } from "./store";
 import { installTestHooks } from "./test_hooks";
@@ -21,6 +22,7 @@ import { Plots } from "./ui/plots";
 import { Readout } from "./ui/readout";
 import { SettingsPanel } from "./ui/settings_panel";
 import { Statistics } from "./ui/statistics";
+import { ToolPanel } from "./ui/tool_panel";
 
 /** The scene's own strike waits until the body has been seen at rest. */
 const FIRST_STRIKE_MS = 800;
@@ -59,6 +61,7 @@ export class Viewer {
     new Legend(store);
     new Panel(store, control, viewport);
     new SettingsPanel(store, control);
+    new ToolPanel(store, control);
     new MotionPanel(store, control);
     followNotices(store, control);
     installTestHooks({ store, stage: this.stage, pointer, statistics, history: this.plots.history });
@@ -81,11 +84,14 @@ export class Viewer {
   private takeScene(data: SceneData): void {
     // Frames of the scene before are not drawn any more, but the server still counts on an answer.
     this.frames.take();
+    const again = data.header.name === this.store.get().scene?.name;
     this.control.takeScene(data.header);
+    this.store.update({ sizes: data.bodies.map(({ nodes }) => sidesOf(nodes)) });
     this.stage.setScene(data);
     document.title = `${data.header.title} · Palpate`;
     window.clearTimeout(this.firstStrike);
-    if (!data.header.motion?.strike) return;
+    // Another tool on the same body is no reason to strike it.
+    if (again || !data.header.motion?.strike) return;
     this.firstStrike = window.setTimeout(() => this.control.repeatStrike(), FIRST_STRIKE_MS);
   }
 

@@ -209,6 +209,12 @@ impl GreenCore {
         Ok((force.to_array(), displacements.into_pyarray(py)))
     }
 
+    /// Whether a contact of this radius, m, can be weighed everywhere on the surface.
+    fn accepts_contact_radius(&self, py: Python<'_>, radius: f64) -> bool {
+        let surface = &self.green.surface;
+        py.detach(|| contact::PatchGeometry::new(surface).check_radius(surface, radius).is_ok())
+    }
+
     /// One entry of the operator.
     fn entry(&self, row: usize, column: usize) -> PyResult<f64> {
         if row < self.green.rows && column < 3 * self.green.touch.len() {

@@ -8,6 +8,7 @@ mod green;
 mod scene;
 mod simulation;
 mod strain;
+mod surface;
 
 use pyo3::prelude::*;
 
@@ -30,6 +31,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_class::<surface::SurfaceSearch>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;
     module.add_function(wrap_pyfunction!(strain::contact_patch, module)?)?;

@@ -203,11 +203,6 @@ impl SimulationCore {
         self.change(py, |settings| settings.watch = Some((body, node)))
     }
 
-    /// Whether contacts of this radius (m) can be weighed everywhere on the surfaces.
-    fn accepts_contact_radius(&self, py: Python<'_>, radius: f64) -> bool {
-        py.detach(|| self.model.check_contact_radius(radius).is_ok())
-    }
-
     /// The latest tick as a dictionary; None if the loop does not run.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let (model, tools) = (self.model.clone(), self.targets.len());

@@ -10,6 +10,7 @@ import scipy.sparse
 from palpate.body.assembly import element_arrays, mass_matrix, stiffness_matrix
 from palpate.body.loads import Loads
 from palpate.body.material import Material, material_rows, warn_of_locking
+from palpate.body.mechanism import find_mechanism
 from palpate.body.supports import Fixed, element_components, fixed_mask, rigid_constraint_rank
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
@@ -107,7 +108,8 @@ class Body:
         Raises
         ------
         BodyError
-            No support, nothing left free, or a part of the body that its supports leave free to move.
+            No support, nothing left free, or a part of the body that its supports, or hinges and balls between parts,
+            leave free to move; with its place.
 
         """
         if not self.fixed_mask.any():
@@ -120,7 +122,11 @@ class Body:
             rank = rigid_constraint_rank(self.mesh.nodes[members], self.fixed_mask[members])
             if rank < 6:
                 supports = "no support" if rank == 0 else f"supports that leave {6 - rank} rigid motions free"
+                place = ", ".join(f"{x:.4g}" for x in self.mesh.nodes[members[0]])
                 raise BodyError(
-                    f"the part of {len(members)} nodes around node {members[0]} has {supports}: "
+                    f"the part of {len(members)} nodes around node {members[0]} at ({place}) m has {supports}: "
                     "fix at least three of its nodes that are not in line"
                 )
+        mechanism = find_mechanism(self.mesh, self.fixed_mask)
+        if mechanism is not None:
+            raise BodyError(mechanism.told(self.mesh.nodes, len(self.mesh.nodes)))

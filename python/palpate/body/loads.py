@@ -12,19 +12,21 @@ from typing import Any
 
 import numpy as np
 
+from palpate import units
 from palpate.body.assembly import mass_matrix
 from palpate.body.selection import Selection, node_indices, selected_nodes
 from palpate.equality import ComparedByValue
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
 from palpate.mesh.shape_functions import surface_integrals
-from palpate.vectors import three_numbers
+from palpate.vectors import number, three_numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Loads(ComparedByValue):
     """Loads that act on a body at rest.
 
+    Numbers are SI, and any of them may be text with a unit, such as ``"200Pa"``.
     A part of the surface is named by node indices, an (n,) mask or a function of the (n, 3) positions; the faces all of
     whose corners are named carry the load.
 
@@ -43,6 +45,8 @@ class Loads(ComparedByValue):
     ------
     BodyError
         A number that is not finite, or a wrong length.
+    UnitError
+        Text that is no quantity.
 
     """
 
@@ -52,10 +56,18 @@ class Loads(ComparedByValue):
     forces: Mapping[int, Sequence[float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gravity", three_numbers(self.gravity, "gravity", BodyError))
-        pressure = [(where, _number(value, "pressure")) for where, value in self.pressure]
-        spread = [(where, three_numbers(force, "spread", BodyError)) for where, force in self.spread]
-        forces = {node: three_numbers(force, f"forces: node {node}", BodyError) for node, force in self.forces.items()}
+        gravity = three_numbers(self.gravity, "gravity", BodyError, units.acceleration)
+        object.__setattr__(self, "gravity", gravity)
+        pairs = _pairs(self.pressure, "pressure")
+        pressure = [(where, number(units.pressure(value), "pressure", BodyError)) for where, value in pairs]
+        pairs = _pairs(self.spread, "spread")
+        spread = [(where, three_numbers(force, "spread", BodyError, units.force)) for where, force in pairs]
+        if not isinstance(self.forces, Mapping):
+            raise BodyError("forces must map nodes to forces, such as {7: (0, 0, -1)}")
+        forces = {
+            node: three_numbers(force, f"forces: node {node}", BodyError, units.force)
+            for node, force in self.forces.items()
+        }
         object.__setattr__(self, "pressure", tuple(pressure))
         object.__setattr__(self, "spread", tuple(spread))
         object.__setattr__(self, "forces", forces)
@@ -105,7 +117,8 @@ def _faces_of(mesh: TetMesh, where: Selection, what: str) -> np.ndarray:
     return faces
 
 
-def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
-        raise BodyError(f"{what} must be a finite number, got {value!r}")
-    return float(value)
+def _pairs(given: Any, what: str) -> list[tuple[Selection, Any]]:
+    try:
+        return [(where, value) for where, value in given]
+    except (TypeError, ValueError):
+        raise BodyError(f"{what} takes pairs of a part of the surface and a load") from None

@@ -8,12 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate import units
 from palpate.errors import BodyError, LockingWarning
 from palpate.mesh import TetMesh
+from palpate.units import brief_repr
+from palpate.vectors import number
 
 # Largest Poisson's ratio without volumetric locking to speak of, by nodes an element: 4-node tetrahedra cannot keep
 # their volume without keeping their shape; 10-node ones can until the conditioning of K gives out.
 LOCKING = {4: 0.45, 10: 0.499}
+
+
+# Moduli beyond these, Pa, are no material's (the softest gels have 1, diamond 1e12), and their products with squares of
+# lengths leave the range of doubles and floats somewhere on the way to a force.
+SOFTEST, STIFFEST = 1e-6, 1e15
 
 
 @dataclass(frozen=True)
@@ -23,12 +31,19 @@ class Material:
     Parameters
     ----------
     youngs_modulus
-        Pa, positive.
+        Pa, positive, or text such as ``"10kPa"``.
     poissons_ratio
         In (-1, 0.5). Nearly incompressible materials make elements lock: 4-node tetrahedra above about 0.45, 10-node
         ones hardly; a :class:`palpate.LockingWarning` says so.
     density
-        kg/m^3.
+        kg/m^3, or text such as ``"1.2g/cm3"``.
+
+    Raises
+    ------
+    BodyError
+        A constant that no material has.
+    UnitError
+        Text that is no quantity.
 
     """
 
@@ -37,20 +52,34 @@ class Material:
     density: float = 1000.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.youngs_modulus) and self.youngs_modulus > 0):
-            raise BodyError(f"Young's modulus must be positive, got {self.youngs_modulus} Pa")
-        if not -1 < self.poissons_ratio < 0.5:
-            raise BodyError(f"Poisson's ratio must lie in (-1, 0.5), got {self.poissons_ratio}")
-        if not (np.isfinite(self.density) and self.density >= 0):
-            raise BodyError(f"density must not be negative, got {self.density} kg/m^3")
+        modulus, density = units.pressure(self.youngs_modulus), units.density(self.density)
+        ratio = number(self.poissons_ratio, "Poisson's ratio", BodyError)
+        if not modulus > 0:
+            raise BodyError(f"Young's modulus must be positive, got {modulus:g} Pa")
+        if not SOFTEST <= modulus <= STIFFEST:
+            raise BodyError(
+                f"Young's modulus must lie between {SOFTEST:g} and {STIFFEST:g} Pa, got {modulus:g} Pa: "
+                "a soft tissue has 1e3 to 1e5 Pa, rubber 1e6, steel 2e11"
+            )
+        if not -1 < ratio < 0.5:
+            raise BodyError(f"Poisson's ratio must lie in (-1, 0.5), got {ratio:g}")
+        if not (np.isfinite(density) and density >= 0):
+            raise BodyError(f"density must not be negative, got {density:g} kg/m^3")
+        for name, value in (("youngs_modulus", modulus), ("poissons_ratio", ratio), ("density", density)):
+            object.__setattr__(self, name, value)
 
 
 def material_rows(mesh: TetMesh, material: Material | Mapping[int | str, Material]) -> np.ndarray:
     """Young's modulus, Poisson's ratio and density of each element, (m, 3)."""
     if isinstance(material, Material):
         table = {int(region): material for region in np.unique(mesh.regions)}
-    else:
+    elif isinstance(material, Mapping):
         table = {_region_number(mesh, region): m for region, m in material.items()}
+    else:
+        raise BodyError(f"material must be a palpate.Material, or one for each region, got {brief_repr(material)}")
+    wrong = next((m for m in table.values() if not isinstance(m, Material)), None)
+    if wrong is not None:
+        raise BodyError(f"material of a region must be a palpate.Material, got {brief_repr(wrong)}")
     missing = sorted(set(np.unique(mesh.regions).tolist()) - set(table))
     if missing:
         names = {number: name for name, number in mesh.region_names.items()}

@@ -29,7 +29,8 @@ def parse(text: str) -> Callable[[np.ndarray], np.ndarray]:
     Raises
     ------
     BodyError
-        Anything that is not a comparison of x, y, z with numbers, joined by and, or, not; the message shows where.
+        Anything that is not a comparison of x, y, z with numbers, joined by and, or, not; the message shows where. From
+        the function: a division by zero.
 
     """
     if len(text) > MAX_LENGTH:
@@ -40,7 +41,18 @@ def parse(text: str) -> Callable[[np.ndarray], np.ndarray]:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise BodyError(f"cannot read the predicate '{text}': write for example 'z < 0.01 and x > 2cm'") from None
     _check(tree, text, plain.strip())
-    return lambda nodes: _truth(tree, np.asarray(nodes))
+
+    def holds(nodes: np.ndarray) -> np.ndarray:
+        try:
+            with np.errstate(divide="raise", invalid="raise", over="raise", under="ignore"):
+                return _truth(tree, np.asarray(nodes))
+        except (FloatingPointError, OverflowError) as error:
+            # numpy says "divide by zero", or "invalid value" for 0/0.
+            large = "flow" in str(error) or "large" in str(error)
+            what = "has a number that is too large" if large else "divides by zero"
+            raise BodyError(f"the predicate '{text}' {what}") from None
+
+    return holds
 
 
 def _refuse(node: ast.AST, text: str, plain: str) -> BodyError:
@@ -100,8 +112,7 @@ def _truth(node: ast.AST, nodes: np.ndarray) -> np.ndarray:
 
 def _number(node: ast.AST, nodes: np.ndarray, axis: int) -> np.ndarray | float:
     if isinstance(node, ast.BinOp):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return ARITHMETIC[type(node.op)](_number(node.left, nodes, axis), _number(node.right, nodes, axis))
+        return ARITHMETIC[type(node.op)](_number(node.left, nodes, axis), _number(node.right, nodes, axis))
     if isinstance(node, ast.UnaryOp):
         value = _number(node.operand, nodes, axis)
         return -value if isinstance(node.op, ast.USub) else value

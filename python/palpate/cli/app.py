@@ -4,31 +4,37 @@ from __future__ import annotations
 
 import sys
 import warnings
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from palpate.cli.bodies import ElementChoice, MaxSize, Repair, Unit, body_of, in_unit, is_surface, read_any
+from palpate.cli.completion import precisions, units
+
 if TYPE_CHECKING:
-    from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
 
 app = typer.Typer(
     help="Finite elements you can feel.", no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
 )
-cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
-app.add_typer(cache_app, name="cache")
 
 
-class Element(str, Enum):
-    """What --element takes."""
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
 
-    LINEAR = "linear"
-    QUADRATIC = "quadratic"
+        print(f"palpate {version('palpate')}")
+        raise typer.Exit
 
 
-Unit = Annotated[str, typer.Option(help="Unit of length of the file: m, cm, mm, um, in.")]
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Say which version this is.")
+    ] = False,
+) -> None:
+    """Finite elements you can feel."""
 
 
 def main() -> None:
@@ -61,9 +67,9 @@ def _complain(message: str) -> int:
 def mesh(
     surface: Annotated[Path, typer.Argument(help="Closed surface: STL, OBJ, PLY, OFF or GLB.")],
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
-    unit: Unit = "m",
-    max_size: Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")] = None,
-    repair: Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")] = False,
+    unit: Unit = None,
+    max_size: MaxSize = None,
+    repair: Repair = False,
     quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
 ) -> None:
     """Fill a closed surface with tetrahedra, of 4 nodes unless --quadratic: other programs and formats expect those.
@@ -72,11 +78,14 @@ def mesh(
 
     Example: palpate mesh scan.ply scan.vtu --unit mm --repair
     """
-    from palpate.mesh import tetrahedralize
+    from palpate.errors import MeshError
+    from palpate.input_file import require_writable
+    from palpate.mesh.tetrahedralize import tetrahedralize_with
     from palpate.units import length
 
-    made = tetrahedralize(surface, None if max_size is None else length(max_size), unit, repair=repair)
-    made = made.to_quadratic() if quadratic else made
+    require_writable(out, MeshError)
+    size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
+    made = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, repair=repair))
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
 
@@ -90,13 +99,14 @@ def precompute(
     density: Annotated[str, typer.Option(help="Density, for its weight, such as 1000kg/m3.")] = "1000kg/m3",
     gravity: Annotated[str | None, typer.Option(help="Let it sag under gravity, m/s^2, such as 0,0,-9.81.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
-    unit: Unit = "m",
-    precision: Annotated[str, typer.Option(help="Stored number format: f16, f32 or f64.")] = "f32",
+    unit: Unit = None,
+    precision: Annotated[
+        str, typer.Option(help="Stored number format: f16, f32 or f64.", autocompletion=precisions)
+    ] = "f32",
     touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
-    element: Annotated[
-        Element | None,
-        typer.Option(help="Tetrahedra with 4 or 10 nodes; default: quadratic for a surface, a volume mesh as it is."),
-    ] = None,
+    element: ElementChoice = None,
+    max_size: MaxSize = None,
+    repair: Repair = False,
     memory: Annotated[str | None, typer.Option(help="Peak memory allowed, such as 8GB.")] = None,
 ) -> None:
     """Solve the body once, so that any touch is answered in microseconds.
@@ -106,10 +116,14 @@ def precompute(
     import palpate
     from palpate import units
     from palpate.body import parse
+    from palpate.input_file import require_writable
 
+    if out is not None:
+        require_writable(out, palpate.StoreError)
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    body = _body(_read_any(mesh, unit, element), material, fix, loads)
+    made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
+    body = body_of(made, material, fix, loads)
     region = None
     if touch is not None:
         surface = body.mesh.surface_nodes
@@ -126,7 +140,9 @@ def touch(
     store: Annotated[Path, typer.Argument(help="A precomputed store.")],
     point: Annotated[str, typer.Option(help="Contact point, such as 10mm,0,35mm.")],
     press: Annotated[str, typer.Option(help="Displacement, such as 0,0,-3mm; '-' leaves a component free.")],
-    radius: Annotated[str, typer.Option(help="Contact radius, such as 5mm; 0 is a point.")] = "5mm",
+    radius: Annotated[
+        str | None, typer.Option(help="Contact radius, such as 5mm; 0 is a point; default: a sixteenth of the body.")
+    ] = None,
 ) -> None:
     """Press a patch of the surface and print the force.
 
@@ -135,21 +151,31 @@ def touch(
     import numpy as np
 
     import palpate
+    from palpate.mesh import size_text
+    from palpate.scene.default_radius import default_contact_radius
     from palpate.units import length
 
     green = palpate.GreensFunction.load(store)
     where = [length(v) for v in point.split(",")]
     how = [None if v.strip() == "-" else length(v) for v in press.split(",")]
-    answer = green.touch(where, how, length(radius))
+    reach = default_contact_radius(green) if radius is None else length(radius)
+    answer = green.touch(where, how, reach)
+    if answer.distance > 1e-6 * green.extents.max():
+        print(f"landed at {np.array2string(answer.point, precision=5)} m, {size_text([answer.distance])} off the point")
     size = np.linalg.norm(answer.displacements, axis=1)
     print(f"force on the body: {np.array2string(answer.force, precision=5)} N, {np.linalg.norm(answer.force):.5g} N")
     print(f"largest displacement: {1e3 * size.max():.4g} mm at node {green.surface_nodes[size.argmax()]}")
+    if radius is None:
+        print(f"contact radius: {1e3 * reach:.3g} mm, by default; --radius changes it")
 
 
 @app.command()
 def info(
-    file: Annotated[Path, typer.Argument(help="A store, a file of modes, a scene file, or a volume mesh.")],
-    unit: Unit = "m",
+    file: Annotated[Path, typer.Argument(help="A store, a file of modes, a scene file, a volume mesh, or a surface.")],
+    unit: Annotated[
+        str | None,
+        typer.Option(help="Unit of length; default: m, of a surface what fits its size.", autocompletion=units),
+    ] = None,
 ) -> None:
     """Say what a file holds.
 
@@ -172,9 +198,17 @@ def info(
         print(f"{file}: scene of {scene.name}")
         for name, value in scene.model_dump(by_alias=True, exclude_none=True).items():
             _print_entry(name, value)
+        if any(tool.radius is None or tool.contact_radius is None for tool in scene.tools):
+            print("  radii of tools that are not given: a sixteenth of the longest side of the body")
         print("  lengths in m, pressures in Pa, forces in N, times in s")
         return
-    made = palpate.TetMesh.read(file, unit)
+    if is_surface(file):
+        from palpate.cli.surfaces import print_surface
+
+        print_surface(file, unit)
+        return
+    # A size that needs asking about is what this command tells.
+    made = palpate.TetMesh.read(file, unit or "m")
     print(f"{file}: {_mesh_line(made)}")
     low, high = 1e3 * made.bounds
     print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * made.volume:.4g} cm3")
@@ -206,56 +240,13 @@ def models_command() -> None:
     print_models()
 
 
-@cache_app.command("list")
-def cache_list() -> None:
-    """List the precomputed files in the cache."""
-    from palpate.cache import cache_directory
-
-    files = sorted(cache_directory().glob("*.palpate"))
-    for file in files:
-        print(f"{file.stat().st_size / 1e6:9.1f} MB  {file}")
-    print(f"{len(files)} files, {sum(f.stat().st_size for f in files) / 1e6:.1f} MB in {cache_directory()}")
-
-
-@cache_app.command("clear")
-def cache_clear() -> None:
-    """Delete the precomputed files in the cache."""
-    from palpate.cache import cache_directory
-
-    files = sorted(cache_directory().glob("*.palpate*"))
-    for file in files:
-        file.unlink()
-    print(f"deleted {len(files)} files")
-
-
-def _read_any(path: Path, unit: str, element: Element | None) -> TetMesh:
-    from palpate.errors import MeshError
-    from palpate.mesh import TetMesh
-    from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, tetrahedralize_with
-
-    if path.suffix.lower() in SURFACE_ENDINGS:
-        return tetrahedralize_with("linear" if element == Element.LINEAR else "quadratic", path, None, unit)
-    mesh = TetMesh.read(path, unit)
-    if element == Element.LINEAR and mesh.is_quadratic:
-        raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or say quadratic")
-    return mesh.to_quadratic() if element == Element.QUADRATIC else mesh
-
-
-def _body(mesh: TetMesh, material: Material, fix: str, loads: Loads | None) -> Body:
-    import palpate
-    from palpate.body import parse
-
-    mask = parse(fix)(mesh.nodes)
-    if not mask.any():
-        low, high = mesh.bounds.round(4).tolist()
-        raise palpate.BodyError(f"no node satisfies --fix '{fix}': the body reaches from {low} to {high} m")
-    return palpate.Body(mesh, material=material, fixed=mask, loads=loads)
-
-
 def _mesh_line(mesh: TetMesh) -> str:
+    from palpate.mesh import size_text
+
     return (
-        f"{len(mesh.nodes)} nodes, {len(mesh.tets)} {'10-node ' if mesh.is_quadratic else ''}tetrahedra, "
-        f"{len(mesh.surface_nodes)} surface nodes, {len(mesh.surface_triangles)} triangles"
+        f"{size_text(mesh.bounds[1] - mesh.bounds[0])}, {len(mesh.nodes)} nodes, {len(mesh.tets)} "
+        f"{'10-node ' if mesh.is_quadratic else ''}tetrahedra, {len(mesh.surface_nodes)} surface nodes, "
+        f"{len(mesh.surface_triangles)} triangles"
     )
 
 
@@ -268,8 +259,11 @@ def _print_origin(description: dict[str, object], key: str) -> None:
 
 
 def _green_line(green) -> str:
+    from palpate.mesh import size_text
+
     size = green.path.stat().st_size / 1e6
     return (
-        f"Green's function, {len(green.touchable_nodes)} of {len(green.surface_nodes)} surface nodes touchable, "
-        f"{len(green.fixed_nodes)} nodes fixed, {green.precision}, {size:.1f} MB"
+        f"Green's function of a body of {size_text(green.extents)}, {len(green.touchable_nodes)} of "
+        f"{len(green.surface_nodes)} surface nodes touchable, {len(green.fixed_nodes)} nodes fixed, {green.precision}, "
+        f"{size:.1f} MB"
     )

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from palpate.cli.app import app
+from palpate.cli.bodies import ElementChoice, MaxSize, Repair
+from palpate.cli.completion import models, units
 
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
@@ -27,7 +29,7 @@ PORT = 8642
 
 @app.command()
 def demo(
-    model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.")] = "liver",
+    model: Annotated[str, typer.Argument(help="doll, kidney, liver or beam.", autocompletion=models)] = "liver",
     paper: Annotated[bool, typer.Option("--paper", help="The mesh in the size of the paper.")] = False,
     motion: Annotated[bool, typer.Option("--motion", help="The body moves: strike it, slow it, see modes.")] = False,
     impulse: Annotated[
@@ -50,8 +52,8 @@ def demo(
 
     Example: palpate demo beam --impulse --paper --out results
     """
-    from palpate import models
     from palpate.cli.impulse import SECONDS, impulse_history, impulse_scene
+    from palpate.models import NAMES
     from palpate.scene import model_scene
 
     def scene_of(name: str) -> Scene:
@@ -64,30 +66,48 @@ def demo(
     if headless is not None:
         _scripted(built, f"{model}-paper" if paper else model, headless, out or Path())
         return
-    _view(built, host, port, browser, models.NAMES, scene_of)
+    _view(built, host, port, browser, NAMES, scene_of)
 
 
 @app.command()
 def run(
-    file: Annotated[Path, typer.Argument(help="Scene file (.toml) or precomputed store (.palpate).")],
+    file: Annotated[Path, typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, or surface.")],
+    radius: Annotated[str | None, typer.Option(help="Radius of the tools; default: a sixteenth of the body.")] = None,
+    fix: Annotated[
+        str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest tenth.")
+    ] = None,
+    youngs_modulus: Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")] = None,
+    poissons_ratio: Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")] = None,
+    density: Annotated[str | None, typer.Option(help="Density, such as 1000kg/m3.")] = None,
+    unit: Annotated[
+        str | None,
+        typer.Option(help="Unit of length of a mesh; default: the one that fits its size.", autocompletion=units),
+    ] = None,
+    max_size: MaxSize = None,
+    element: ElementChoice = None,
+    repair: Repair = False,
     headless: Headless = None,
     out: Out = Path(),
     port: Port = PORT,
     host: Host = "127.0.0.1",
     browser: Browser = True,
 ) -> None:
-    """Run the 1 kHz force loop on a scene, in the browser.
+    """Run the 1 kHz force loop on a scene, a store, or a bare mesh or surface, in the browser.
 
+    Of a mesh, what is not given has a default, which is printed. Of a scene, options stand instead of what it says.
     With --headless it presses on the highest point by a script, and writes the log and a plot.
 
     Example: palpate run scene.toml
 
+    Example: palpate run organ.stl --unit mm --fix "z < min + 5mm" -E 10kPa --radius 8mm
+
     Example: palpate run scene.toml --headless 3 --out results
     """
-    from palpate.scene import Scene
+    from palpate.cli.run_file import RunOptions, built_from
 
-    scene = Scene.of_store(file) if file.suffix == ".palpate" else Scene.read(file)
-    built = _build(scene)
+    lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
+    material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
+    built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
     if headless is not None:
         _scripted(built, file.stem, headless, out)
         return
@@ -115,6 +135,15 @@ def _view(
     open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of), browser=browser)
 
 
+def _force_line(record: PressRecord, max_force: float) -> str:
+    """Tell the largest force on the device, and that of the body where the device's limit held it."""
+    force = (record.log["force"] ** 2).sum(axis=1).max() ** 0.5
+    line = f"{len(record.log)} ticks, largest force {force:.3f} N"
+    if force >= max_force * (1 - 1e-9) and record.force > max_force:
+        line += f", where it was limited ([device] max_force = {max_force:g}): the body's was {record.force:.3f} N"
+    return line
+
+
 def _strain_line(record: PressRecord, strain_limit: float) -> str:
     """Tell the largest strain, and what there is to say about it."""
     line = f"largest strain {100 * record.hardest.largest_strain:.1f} %"
@@ -132,10 +161,10 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     record = scripted_press(built, seconds)
     log, statistics = record.log, record.last.statistics
-    write_log(log, out / f"{name}.csv")
+    write_log(log, record.depth, record.strain, out / f"{name}.csv")
     plot_log(log, out / f"{name}.png", f"{name}: scripted press at 1 kHz")
     compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
-    print(f"{len(log)} ticks, largest force {(log['force'] ** 2).sum(axis=1).max() ** 0.5:.3f} N")
+    print(_force_line(record, built.scene.device.max_force))
     print(_strain_line(record, built.scene.view.strain_limit))
     print("us            p50      p99    p99.9      max")
     for title, row in (("computing", compute), ("wake-up", wakeup)):
@@ -143,3 +172,6 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
     if not all(statistics["realtime"]):
         print("palpate: note: the system granted no real-time priority or locked memory", file=sys.stderr)
+    if record.interrupted:
+        print("palpate: interrupted", file=sys.stderr)
+        raise typer.Exit(130)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,20 +16,83 @@ from palpate.simulation import Frame, Simulation
 POINTER_RATE = 120.0
 # How deep the script presses, as a part of the body's longest side: small strains.
 DEPTH = 0.03
+# Frames of a run of which the strain is computed, afterwards: it takes milliseconds of each.
+STRAIN_SAMPLES = 100
+# A tool that is limited at less than this part of the limit of strain has just begun to touch.
+AT_LIMIT = 0.9
 
 
 @dataclass(frozen=True)
 class PressRecord:
-    """Log of the 1 kHz loop, the frame that was pressed hardest, the last one, and whether the tool was limited."""
+    """What a scripted press leaves.
+
+    Attributes
+    ----------
+    log
+        Rows of the 1 kHz loop.
+    depth, strain
+        At each row: approach of tool and surface, m, and largest strain; between frames, of which there are 120 and
+        some tens a second, they are interpolated.
+    hardest, last
+        The frame with the largest force on the body, and the last one.
+    limited
+        Whether the limit of strain held the tool.
+    force
+        Largest on the body in any frame, N; the device's own is within its limits.
+    interrupted
+        Whether Ctrl-C ended it early.
+
+    """
 
     log: np.ndarray
+    depth: np.ndarray
+    strain: np.ndarray
     hardest: Frame
     last: Frame
     limited: bool
+    force: float
+    interrupted: bool
 
 
 def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
-    """Press for so many seconds, within the scene's limit of strain."""
+    """Press for so many seconds, within the scene's limit of strain, or until Ctrl-C."""
+    rest, depth = _target(built)
+    logs, depths, sampled = [], [], []
+    limited: list[Frame] = []
+    interrupted = False
+    with Simulation(built) as simulation:
+        hardest = simulation.frame()
+        start = time.monotonic()
+        try:
+            while (elapsed := time.monotonic() - start) < seconds:
+                phase = elapsed / seconds
+                push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
+                simulation.move(rest - [0, 0, push])
+                time.sleep(1.0 / POINTER_RATE)
+                logs.append(simulation.drain_log())
+                # The press is along a line: the largest force has the largest strain.
+                frame = simulation.frame()
+                depths.append((frame.time, _depth(frame)))
+                if STRAIN_SAMPLES * elapsed >= len(sampled) * seconds:
+                    sampled.append(frame)
+                hardest = max(hardest, frame, key=_force_on_body)
+                if frame.limited[0]:
+                    limited = [max(*limited, frame, key=_force_on_body)] if limited else [frame]
+        except KeyboardInterrupt:
+            interrupted = True
+        last = simulation.frame()
+        logs.append(simulation.drain_log())
+    log = np.concatenate(logs)
+    sampled = sorted([*sampled, hardest, last], key=lambda frame: frame.time)
+    strains = [(frame.time, frame.largest_strain) for frame in sampled]
+    columns = (_at_ticks(log["time"], depths), _at_ticks(log["time"], strains))
+    most = AT_LIMIT * built.scene.view.strain_limit
+    held = any(frame.largest_strain >= most for frame in limited)
+    return PressRecord(log, *columns, hardest, last, held, _force_on_body(hardest), interrupted)
+
+
+def _target(built: BuiltScene) -> tuple[np.ndarray, float]:
+    """Where the tool's origin rests when it just touches, m, and how deep it presses, m."""
     body = built.bodies[0]
     green, nodes = body.green, body.points_to_scene(body.green.surface_positions)
     free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
@@ -38,22 +102,26 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
     highest = free[nodes[free, 2] > nodes[free, 2].max() - 0.01 * size]
     middle = nodes[:, :2].mean(axis=0)
     top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
-    depth = DEPTH * size
-    rest = top + [0, 0, built.scene.tools[0].reach]
-    logs, limited = [], False
-    with Simulation(built) as simulation:
-        hardest = simulation.frame()
-        start = time.monotonic()
-        while (elapsed := time.monotonic() - start) < seconds:
-            phase = elapsed / seconds
-            push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
-            simulation.move(rest - [0, 0, push])
-            time.sleep(1.0 / POINTER_RATE)
-            logs.append(simulation.drain_log())
-            # The press is along a line: the largest force has the largest strain.
-            frame = simulation.frame()
-            limited |= bool(frame.limited[0])
-            hardest = max(hardest, frame, key=lambda frame: np.linalg.norm(frame.forces[0]))
-        last = simulation.frame()
-        logs.append(simulation.drain_log())
-    return PressRecord(np.concatenate(logs), hardest, last, limited)
+    return top + [0, 0, built.scene.tools[0].reach], DEPTH * size
+
+
+def _force_on_body(frame: Frame) -> float:
+    """Force of the contacts of the first tool, N, before the safety stage limits what its device puts out."""
+    forces = [contact.force for contact in frame.contacts if contact.tool == 0]
+    return float(np.linalg.norm(np.sum(forces, axis=0))) if forces else 0.0
+
+
+def _depth(frame: Frame) -> float:
+    """Approach of the first tool and the surface, m; of a tool that sticks to its patch how far that was pushed in."""
+    contact = next((contact for contact in frame.contacts if contact.tool == 0), None)
+    if contact is None:
+        return 0.0
+    return contact.depth or -float(contact.displacement @ contact.normal)
+
+
+def _at_ticks(time_of_ticks: np.ndarray, samples: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Values at the ticks from some (time, value)."""
+    if not samples:
+        return np.zeros_like(time_of_ticks)
+    times, values = np.transpose(samples)
+    return np.interp(time_of_ticks, times, values)

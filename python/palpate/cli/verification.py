@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from palpate.cli.app import app
+from palpate.cli.completion import checks
 
 if TYPE_CHECKING:
     from palpate.validation.verify import Benchmark, Check, Outcome
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
 
 @app.command()
 def verify(
-    names: Annotated[list[str] | None, typer.Argument(help="Benchmarks; all if none is named.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Benchmarks; all if none is named.", autocompletion=checks)
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the plots, as PNG.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:

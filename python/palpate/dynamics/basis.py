@@ -18,6 +18,7 @@ from palpate.body import Body, description
 from palpate.cache import cache_directory
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
+from palpate.leftovers import remove_leftovers
 from palpate.progress import narrated, progress_reporter
 
 # Up to so many free dofs the dense solver is quicker than Lanczos for most counts.
@@ -90,6 +91,7 @@ class ModalBasis:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file; an existing one is replaced only when the new one is complete."""
         shapes = self.shapes.reshape(-1, len(self))
+        remove_leftovers(Path(path))
         _native.save_basis(Path(path), self.key, json.dumps(self.description), self.eigenvalues, shapes)
 
     @classmethod

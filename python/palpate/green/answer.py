@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from palpate.equality import ComparedByValue
-from palpate.fields import Strained, StrainSource
+from palpate.fields import Result, ResultSource
 from palpate.vectors import brief
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Answer(ComparedByValue, Strained):
+class Answer(ComparedByValue, Result):
     """Solution of a changed boundary value problem. Compared by value, number by number; not hashable.
 
     Attributes
@@ -29,7 +29,10 @@ class Answer(ComparedByValue, Strained):
     displacements: np.ndarray
     forces: np.ndarray
     reactions: np.ndarray
-    _source: StrainSource = field(repr=False, compare=False)
+    _source: ResultSource = field(repr=False, compare=False)
+
+    def _at_surface_nodes(self) -> dict[str, np.ndarray]:
+        return {"force": self.forces}
 
     def __repr__(self) -> str:
         moved, force = (np.linalg.norm(field, axis=1).max() for field in (self.displacements, self.forces))
@@ -37,7 +40,7 @@ class Answer(ComparedByValue, Strained):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Touch(ComparedByValue, Strained):
+class Touch(ComparedByValue, Result):
     """Answer to a patch contact. Compared by value, number by number; not hashable.
 
     Attributes
@@ -46,13 +49,20 @@ class Touch(ComparedByValue, Strained):
         On the body (3,), N.
     displacements
         (s, 3) m; rows follow the surface nodes.
+    point
+        Where it landed (3,), m: the point of the unloaded surface closest to the one asked for.
+    distance
+        From the one to the other, m.
 
     """
 
     force: np.ndarray
     displacements: np.ndarray
-    _source: StrainSource = field(repr=False, compare=False)
+    point: np.ndarray
+    distance: float
+    _source: ResultSource = field(repr=False, compare=False)
 
     def __repr__(self) -> str:
         moved = np.linalg.norm(self.displacements, axis=1).max()
-        return f"Touch(force {brief(self.force)} N, largest displacement {1e3 * moved:.4g} mm)"
+        force = f"force {brief(self.force)} N at {brief(self.point)} m"
+        return f"Touch({force}, largest displacement {1e3 * moved:.4g} mm)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -12,14 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from palpate import _native
+from palpate import _native, units
 from palpate.body import Body, description, problem_arrays
-from palpate.errors import BodyError, StoreError
+from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
-from palpate.vectors import three_components, three_numbers
+from palpate.input_file import require_file
+from palpate.leftovers import remove_leftovers
+from palpate.mesh import size_text
+from palpate.vectors import Reader, brief, three_components, three_numbers
 
-Components = Sequence[float | None]
+# Numbers in SI, or text with a unit.
+Components = Sequence[float | str | None]
+
+# A touch that lands farther from its point than this part of the body's longest side was probably meant elsewhere.
+FAR = 0.05
 
 
 class GreensFunction:
@@ -97,12 +105,37 @@ class GreensFunction:
         """Displacements of the surface under the body's own loads, untouched, (s, 3) m; all answers start from them."""
         return self._core.free_displacements.reshape(-1, 3)
 
+    @property
+    def extents(self) -> np.ndarray:
+        """Sides of the body's bounding box (3,), m."""
+        return np.ptp(self.surface_positions, axis=0)
+
+    @cached_property
+    def _surface_search(self) -> _native.SurfaceSearch:
+        triangles = np.searchsorted(self.surface_nodes, self.surface_triangles)
+        return _native.SurfaceSearch(self.surface_positions, triangles.astype(np.uint32))
+
     @cached_property
     def strain_measure(self) -> StrainMeasure:
         """Measure of the largest strain of answers: by the elements of the body; of a bare store, by its surface."""
         if self.body is None:
             return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
         return ElementStrain(StressRecovery(self.body))
+
+    @cached_property
+    def stress_everywhere(self) -> StressRecovery:
+        """Recovery of stress and strain at all nodes of the body, inner ones too.
+
+        Raises
+        ------
+        BodyError
+            A bare store: it does not know the elements.
+
+        """
+        measure = self.strain_measure
+        if self.body is None or not isinstance(measure, ElementStrain):
+            raise BodyError("a bare store knows only the surface: stress needs the elements of the body")
+        return StressRecovery(self.body, np.arange(len(self.body.mesh.nodes)), measure.recovery.interior)
 
     @cached_property
     def native_strain_measure(self) -> _native.StrainMeasure:
@@ -116,6 +149,7 @@ class GreensFunction:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
+        remove_leftovers(Path(path))
         self._core.save(Path(path))
 
     @classmethod
@@ -136,8 +170,7 @@ class GreensFunction:
 
         """
         path = Path(path)
-        if not path.exists():
-            raise StoreError(f"{path}: no such file")
+        require_file(path, StoreError)
         green = cls(_native.GreenCore.load(path), body)
         if body is not None:
             touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
@@ -174,7 +207,8 @@ class GreensFunction:
             a force and a displacement on the same component; released supports that leave the body free to move.
 
         """
-        forced, placed = self._by_column(forces, "forces"), self._by_column(displacements, "displacements")
+        forced = self._by_column(forces, "forces", units.force)
+        placed = self._by_column(displacements, "displacements", units.length)
         freed = {column for node in release for column in self._released_columns(node)}
         known: dict[int, float] = {}
         switched: dict[int, float] = {}
@@ -193,25 +227,70 @@ class GreensFunction:
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
         return Answer(u, f, self._reactions(f, reactions), self)
 
-    def touch(self, point: Sequence[float], displacement: Components, radius: float = 0.0) -> Touch:
+    def touch(self, point: Sequence[float | str], displacement: Components, radius: float | str = 0.0) -> Touch:
         """Press a patch of the surface.
 
         Parameters
         ----------
         point
-            Contact point, m, on the unloaded body; the closest point of the surface is taken.
+            Contact point, m, on the unloaded body; the closest point of the surface is taken, and a
+            :class:`palpate.TouchWarning` tells if it is far off. Lengths may also be text with a unit, such as
+            ``"4cm"``.
         displacement
             Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
         radius
             Contact radius, m; 0 is a point contact.
 
+        Raises
+        ------
+        BodyError
+            A number that is not finite, a negative radius, or one that covers more nodes than a tick can weigh.
+        UnitError
+            Text that is no length.
+
         """
-        if not (np.isfinite(radius) and radius >= 0):
-            raise BodyError(f"the contact radius must not be negative, got {radius}")
-        target = three_numbers(point, "the touch point", BodyError)
-        wanted = three_components(displacement, "displacement", BodyError)
-        force, u = self._core.touch(target, wanted, float(radius))
-        return Touch(np.array(force), u.reshape(-1, 3), self)
+        reach = units.length(radius)
+        if not (np.isfinite(reach) and reach >= 0):
+            raise BodyError(f"the contact radius must not be negative, got {reach:g} m")
+        target = three_numbers(point, "the touch point", BodyError, units.length)
+        wanted = three_components(displacement, "displacement", BodyError, units.length)
+        try:
+            force, u = self._core.touch(target, wanted, reach)
+        except BodyError:
+            if self.accepts_contact_radius(reach):
+                raise
+            raise self._too_wide(reach) from None
+        landed = self._surface_search.closest(np.array([target]))
+        distance = float(np.linalg.norm(landed - target))
+        if distance > FAR * self.extents.max():
+            warnings.warn(
+                f"the touch landed at {brief(landed)} m, {size_text([distance])} from the point given: the body is "
+                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on",
+                TouchWarning,
+                stacklevel=2,
+            )
+        return Touch(np.array(force), u.reshape(-1, 3), landed, distance, self)
+
+    def _too_wide(self, radius: float) -> BodyError:
+        largest = 1e3 * self.largest_contact_radius(radius)
+        return BodyError(
+            f"a contact radius of {1e3 * radius:.4g} mm covers more nodes than a touch can weigh: give a radius of "
+            f"at most {largest:.3g} mm (--radius), or make the mesh coarser"
+        )
+
+    def accepts_contact_radius(self, radius: float) -> bool:
+        """Whether contacts of a radius, m, can be weighed everywhere on the surface."""
+        return self._core.accepts_contact_radius(float(radius))
+
+    def largest_contact_radius(self, limit: float) -> float:
+        """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
+        low, high = 0.0, limit
+        if self.accepts_contact_radius(high):
+            return high
+        while high - low > 0.01 * limit:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.accepts_contact_radius(middle) else (low, middle)
+        return low
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
         """`K u` at the fixed nodes; a free component carries the loads on it."""
@@ -225,12 +304,14 @@ class GreensFunction:
         reactions[rows, self.fixed_dofs % 3] = fixed_dof_forces
         return reactions
 
-    def _by_column(self, values: Mapping[int, Components] | None, argument: str) -> dict[int, float]:
+    def _by_column(self, values: Mapping[int, Components] | None, argument: str, read: Reader) -> dict[int, float]:
         """Given components by column of the operator."""
         columns = {}
+        if not isinstance(values, Mapping | None):
+            raise BodyError(f"{argument} must map nodes to three components, such as {{7: (None, None, -1e-3)}}")
         for node, components in (values or {}).items():
             first = self._column(node, argument)
-            for axis, value in enumerate(three_components(components, f"{argument}: node {node}", BodyError)):
+            for axis, value in enumerate(three_components(components, f"{argument}: node {node}", BodyError, read)):
                 if value is not None:
                     columns[first + axis] = value
         return columns

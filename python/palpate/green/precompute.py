@@ -14,10 +14,13 @@ import numpy as np
 from palpate import _native
 from palpate.body import Body, description, problem_arrays
 from palpate.cache import cache_directory
-from palpate.errors import StoreError, StoreWarning
+from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.function import GreensFunction
 from palpate.green.memory import allowed_memory
+from palpate.input_file import require_writable
+from palpate.leftovers import remove_leftovers
 from palpate.progress import progress_reporter
+from palpate.units import brief_repr
 
 
 def precompute(
@@ -58,6 +61,8 @@ def precompute(
         cannot be kept.
 
     """
+    if not isinstance(body, Body):
+        raise BodyError(f"precompute takes a palpate.Body, got {brief_repr(body)}")
     body.require_supported()
     problem = problem_arrays(body, touch)
     key = _native.GreenCore.content_key(problem, precision)
@@ -66,6 +71,8 @@ def precompute(
         target.parent.mkdir(parents=True, exist_ok=True)
     else:
         target = Path(path)
+        require_writable(target, StoreError)
+    remove_leftovers(target)
     if target.exists():
         with contextlib.suppress(StoreError):
             return GreensFunction(_native.GreenCore.load(target, key), body)

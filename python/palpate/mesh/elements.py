@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse
+from scipy.sparse.csgraph import connected_components
 
 from palpate.errors import MeshError
 
@@ -59,6 +61,16 @@ def unique_edges(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([keys // count, keys % count], axis=1), which.reshape(-1, 6)
 
 
+def _face_keys(corners: np.ndarray) -> np.ndarray:
+    """One number a face (k,) by its corners (k, 3) in any order.
+
+    Rows would be compared under the interpreter's lock, and five times as slowly.
+    """
+    ordered, count = np.sort(corners.astype(np.int64), axis=1), int(corners.max()) + 1
+    _, low = np.unique(ordered[:, 0] * count + ordered[:, 1], return_inverse=True)
+    return low * count + ordered[:, 2]
+
+
 def boundary_faces(tets: np.ndarray) -> np.ndarray:
     """Faces of one element only, outward, in the elements' order: (k, 3), or (k, 6) of 10-node elements.
 
@@ -70,12 +82,20 @@ def boundary_faces(tets: np.ndarray) -> np.ndarray:
     """
     of_element = FACES[tets.shape[1]]
     faces = tets[:, of_element].reshape(-1, of_element.shape[1])
-    ordered = np.sort(faces[:, :3].astype(np.int64), axis=1)
-    # One number a face: rows would be compared under the interpreter's lock, and five times as slowly.
-    _, low = np.unique(ordered[:, 0] * (int(tets.max()) + 1) + ordered[:, 1], return_inverse=True)
-    keys = low * (int(tets.max()) + 1) + ordered[:, 2]
-    _, first, inverse, counts = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
+    _, first, inverse, counts = np.unique(
+        _face_keys(faces[:, :3]), return_index=True, return_inverse=True, return_counts=True
+    )
     if counts.max() > 2:
         face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
         raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
     return faces[np.sort(first[counts == 1])]
+
+
+def face_parts(tets: np.ndarray) -> np.ndarray:
+    """Label of the part of elements connected by faces that each element belongs to, (m,)."""
+    keys = _face_keys(tets[:, FACES[4]].reshape(-1, 3))
+    order = np.argsort(keys)
+    same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
+    a, b = order[same] // 4, order[same + 1] // 4
+    graph = scipy.sparse.coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(tets), len(tets)))
+    return connected_components(graph, directed=False)[1]

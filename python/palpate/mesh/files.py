@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable, Mapping
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.atomic import written_beside
-from palpate.errors import MeshError
+from palpate.errors import MeshError, MeshWarning
+from palpate.input_file import require_file, require_writable
+from palpate.mesh.cells import CURVED, Block, shape_of, split
 from palpate.mesh.elements import boundary_faces
+from palpate.mesh.size import scale_of
 from palpate.units import length_scale
 
 if TYPE_CHECKING:
@@ -68,18 +73,16 @@ class Volume:
         return self.tets.shape[1] == 10
 
 
-def read_volume(path: Path, unit: str) -> Volume:
+def read_volume(path: Path, unit: str | None) -> Volume:
     """Read nodes, tetrahedra and regions of a file whose unit of length is ``unit``; nodes are in m."""
-    scale = length_scale(unit)
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise MeshError(f"{path}: the file is empty")
+    require_file(path, MeshError)
     if path.suffix == ".vol":
         volume = _read_netgen(path)
     else:
         volume = _tetrahedra(path, _read_meshio(path))
-    return replace(volume, nodes=volume.nodes * scale)
+    used = np.unique(volume.tets)
+    used = used[(used >= 0) & (used < len(volume.nodes))]
+    return replace(volume, nodes=volume.nodes * scale_of(str(path), volume.nodes[used], unit))
 
 
 def _read_meshio(path: Path) -> meshio.Mesh:
@@ -87,27 +90,112 @@ def _read_meshio(path: Path) -> meshio.Mesh:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    with path.open("rb") as file:
+        head = file.read(4)
+    if path.suffix == ".msh" and head == b"$NOD":
+        raise MeshError(
+            f"{path} has Gmsh's first format, which is not read: convert it with "
+            f"'gmsh {path.name} -save -format msh41 -o new.msh'"
+        )
     # meshio prints its complaints and may end the program; both become one error of ours.
     noise = io.StringIO()
     try:
-        with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
+        with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise), _no_cell_left_out(path):
             return meshio.read(path)
+    except MeshError:
+        raise
     except (Exception, SystemExit) as error:
         said = noise.getvalue().strip()
         reason = said if isinstance(error, SystemExit) and said else str(error).strip() or type(error).__name__
+        # meshio looks types of cells up by their name.
+        reason = f"unknown {reason}" if isinstance(error, KeyError) else reason
         reason = " ".join(reason.split())[:200]
         raise MeshError(f"{path}: cannot be read as a {path.suffix} file ({reason})") from None
 
 
+@contextlib.contextmanager
+def _no_cell_left_out(path: Path) -> Iterator[None]:
+    """Refuse cells of VTK types that meshio does not know: its two readers leave them out with a printed complaint."""
+    from meshio import _vtk_common
+    from meshio._mesh import topological_dimension
+    from meshio.vtk import _vtk_51
+    from meshio.vtu import _vtu
+
+    known = _vtk_common.vtk_to_meshio_type
+    read = [number for number, kind in known.items() if kind in topological_dimension]
+
+    def checked(connectivity: np.ndarray, offsets: np.ndarray, types: np.ndarray, data: dict) -> tuple:
+        unread = np.flatnonzero(~np.isin(types, read))
+        if unread.size:
+            number = int(types[unread[0]])
+            name = known.get(number, f"VTK {number}")
+            raise _unknown(path, name, int((types == number).sum()), int(unread[0]))
+        return _vtk_common.vtk_cells_from_data(connectivity, offsets, types, data)
+
+    try:
+        _vtk_51.vtk_cells_from_data = _vtu.vtk_cells_from_data = checked
+        yield
+    finally:
+        _vtk_51.vtk_cells_from_data = _vtu.vtk_cells_from_data = _vtk_common.vtk_cells_from_data
+
+
+def _unknown(path: Path, kind: str, count: int, first: int) -> MeshError:
+    return MeshError(
+        f"{path}: {count} cells are of type {kind}, which is not read (first: cell {first}): save them as tetrahedra, "
+        "hexahedra, wedges or pyramids"
+    )
+
+
 def _tetrahedra(path: Path, mesh: meshio.Mesh) -> Volume:
-    blocks = [i for i, cells in enumerate(mesh.cells) if cells.type in {"tetra", "tetra10"}]
+    blocks = _solid_blocks(path, mesh)
+    types = {mesh.cells[i].type for i in blocks}
     if not blocks:
         found = ", ".join(sorted({cells.type for cells in mesh.cells})) or "nothing"
         hint = "; make tetrahedra with 'palpate mesh'" if "triangle" in found else ""
         raise MeshError(f"{path}: holds no tetrahedra (found: {found}){hint}")
-    if len({mesh.cells[i].type for i in blocks}) > 1:
+    if types == {"tetra", "tetra10"}:
         raise MeshError(f"{path}: mixes 4-node and 10-node tetrahedra")
-    tets = np.concatenate([mesh.cells[i].data for i in blocks]).astype(np.int64)
+    nodes = np.asarray(mesh.points, dtype=np.float64)[:, :3]
+    if len(types) == 1 and types <= {"tetra", "tetra10"}:
+        tets = np.concatenate([mesh.cells[i].data for i in blocks]).astype(np.int64)
+        cells = np.arange(len(tets))
+    else:
+        tets, cells = _split(path, nodes, [(mesh.cells[i].type, mesh.cells[i].data, blocks[i]) for i in blocks])
+    regions, names = _regions(mesh, list(blocks))
+    return Volume(nodes, tets, regions[cells], names)
+
+
+def _solid_blocks(path: Path, mesh: meshio.Mesh) -> dict[int, int]:
+    """Find the runs of cells that have a volume, and the index of the first cell of each."""
+    blocks, first = {}, 0
+    for i, cells in enumerate(mesh.cells):
+        if cells.dim == 3:
+            if shape_of(cells.type) is None:
+                raise _unknown(path, cells.type, len(cells.data), first)
+            blocks[i] = first
+        first += len(cells.data)
+    return blocks
+
+
+def _split(path: Path, nodes: np.ndarray, blocks: list[Block]) -> tuple[np.ndarray, np.ndarray]:
+    """Tetrahedra of cells of any known kind, and for each its cell."""
+    try:
+        tets, cells = split(nodes, blocks)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+    counts = Counter()
+    for kind, connectivity, _ in blocks:
+        counts[kind] += len(connectivity)
+    given = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    straightened = "; edges are straight, their mid-side nodes dropped" if counts.keys() & CURVED.keys() else ""
+    warnings.warn(
+        f"{path}: cells ({given}) were split into {len(tets)} tetrahedra{straightened}", MeshWarning, stacklevel=5
+    )
+    return tets, cells
+
+
+def _regions(mesh: meshio.Mesh, blocks: list[int]) -> tuple[np.ndarray, dict[str, int]]:
+    """Label of each cell of these blocks, and the names of labels."""
     candidates = {
         name: np.concatenate([np.asarray(data[i]).ravel() for i in blocks])
         for name, data in mesh.cell_data.items()
@@ -115,11 +203,12 @@ def _tetrahedra(path: Path, mesh: meshio.Mesh) -> Volume:
     }
     named = [name for name in REGION_NAMES if name in candidates]
     chosen = named[0] if named else next(iter(candidates)) if len(candidates) == 1 else None
-    regions = np.zeros(len(tets), dtype=np.int64) if chosen is None else candidates[chosen].astype(np.int64)
+    count = sum(len(mesh.cells[i].data) for i in blocks)
+    regions = np.zeros(count, dtype=np.int64) if chosen is None else candidates[chosen].astype(np.int64)
     # Gmsh's physical names: the number of the group and its dimension.
     numbers = {name: np.asarray(value).ravel() for name, value in mesh.field_data.items()}
     names = {name: int(v[0]) for name, v in numbers.items() if chosen == "gmsh:physical" and len(v) == 2 and v[1] == 3}
-    return Volume(np.asarray(mesh.points, dtype=np.float64)[:, :3], tets, regions, names)
+    return regions, names
 
 
 def _read_netgen(path: Path) -> Volume:
@@ -130,10 +219,13 @@ def _read_netgen(path: Path) -> Volume:
         raise MeshError(f"{path}: holds no points and volume elements of a Netgen mesh")
     try:
         elements = _section(lines, heads["volumeelements"])
-        counts = {int(e[1]) for e in elements}
-        if len(counts) != 1 or not counts <= set(FROM_NETGEN):
-            raise MeshError(f"{path}: holds elements that are not 4-node or not 10-node tetrahedra")
-        count = counts.pop()
+        counts = np.array([int(e[1]) for e in elements])
+        others = np.flatnonzero(~np.isin(counts, list(FROM_NETGEN)))
+        if others.size:
+            raise _unknown(path, f"Netgen's with {counts[others[0]]} nodes", others.size, int(others[0]))
+        if len(np.unique(counts)) > 1:
+            raise MeshError(f"{path}: mixes 4-node and 10-node tetrahedra")
+        count = int(counts[0])
         nodes = np.array([[float(v) for v in row[:3]] for row in _section(lines, heads["points"])])
         tets = np.array([[int(v) - 1 for v in e[2 : 2 + count]] for e in elements])
         regions = np.array([int(e[0]) for e in elements])
@@ -156,6 +248,7 @@ def write_volume(mesh: Volume, path: Path, unit: str) -> None:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
+    require_writable(path, MeshError)
     if mesh.is_quadratic and path.suffix in LINEAR_ONLY:
         known = ", ".join(ending for ending in WRITERS if ending not in LINEAR_ONLY)
         raise MeshError(f"{path}: 10-node tetrahedra cannot be written to {path.suffix} files; use {known}")

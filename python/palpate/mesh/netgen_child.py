@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.mesh.child import end_with_parent
+
 if TYPE_CHECKING:
     from netgen.meshing import Mesh, MeshingParameters
 
@@ -25,12 +27,13 @@ def main(route: str, given: str, made: str) -> int:
     from netgen.meshing import MeshingParameters
 
     with np.load(given) as job:
-        vertices, faces, size, balls = job["vertices"], job["faces"], float(job["size"]), job["balls"]
+        vertices, faces, size = job["vertices"], job["faces"], float(job["size"])
+        small = np.vstack([job["points"], *(_ball_points(b[:3], b[3], b[4]) for b in job["balls"])])
     parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE)
-    if len(balls):
+    if len(small):
         # A file of sizes, for NETGEN forgets sizes given by RestrictH when it remeshes a surface.
         sizes = Path(given).with_suffix(".msz")
-        _write_sizes(sizes, balls)
+        _write_sizes(sizes, small)
         parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE, meshsizefilename=str(sizes))
     if route == "keep":
         mesh = _fill(vertices, faces, parameters)
@@ -47,10 +50,10 @@ def main(route: str, given: str, made: str) -> int:
     return 0
 
 
-def _write_sizes(path: Path, balls: np.ndarray) -> None:
-    """Points with a local size each, and no lines, in NETGEN's format."""
-    points = [(*p, size) for *c, radius, size in balls for p in _ball_points(np.array(c), radius, size)]
-    path.write_text("\n".join([str(len(points)), *(" ".join(map(repr, map(float, p))) for p in points), "0", ""]))
+def _write_sizes(path: Path, points: np.ndarray) -> None:
+    """Points with a local size each (k, 4), and no lines, in NETGEN's format."""
+    rows = (" ".join(map(repr, point)) for point in points.tolist())
+    path.write_text("\n".join([str(len(points)), *rows, "0", ""]))
 
 
 def _remesh(corners: np.ndarray, surface: Path, parameters: MeshingParameters) -> Mesh:
@@ -73,11 +76,12 @@ def _fill(vertices: np.ndarray, faces: np.ndarray, parameters: MeshingParameters
 
 
 def _ball_points(centre: np.ndarray, radius: float, spacing: float) -> np.ndarray:
-    """Points where the size is imposed: a grid through the ball, at most 21 to a side."""
+    """Points where the size is imposed, and the size (k, 4): a grid through the ball, at most 21 to a side."""
     steps = min(int(np.ceil(radius / spacing)), 10)
     axis = np.linspace(-radius, radius, 2 * steps + 1)
     grid = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
-    return centre + grid[np.linalg.norm(grid, axis=1) <= radius * (1 + 1e-9)]
+    inside = centre + grid[np.linalg.norm(grid, axis=1) <= radius * (1 + 1e-9)]
+    return np.column_stack([inside, np.full(len(inside), spacing)])
 
 
 def _write_stl(path: Path, corners: np.ndarray) -> None:
@@ -90,4 +94,5 @@ def _write_stl(path: Path, corners: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     sys.exit(main(*sys.argv[1:4]))

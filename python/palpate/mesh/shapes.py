@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate import units
 from palpate.errors import MeshError
 from palpate.vectors import three_numbers
 
@@ -94,10 +95,11 @@ def elements_inside(shape: Shape, nodes: np.ndarray, tets: np.ndarray) -> np.nda
 
 
 def _point(values: Any, what: str) -> np.ndarray:
-    return np.array(three_numbers(values, what, MeshError))
+    return np.array(three_numbers(values, what, MeshError, units.length))
 
 
-def _positive(value: float, what: str) -> float:
-    if not (np.isfinite(value) and value > 0):
-        raise MeshError(f"{what} must be positive, got {value}")
-    return float(value)
+def _positive(value: float | str, what: str) -> float:
+    size = units.length(value)
+    if not (np.isfinite(size) and size > 0):
+        raise MeshError(f"{what} must be positive, got {size:g} m")
+    return size

@@ -91,7 +91,8 @@ class TetMesh:
             return self
         edges, of_element = unique_edges(self.tets)
         nodes = np.vstack([self.nodes, self.nodes[edges].mean(axis=1)])
-        return TetMesh(nodes, np.hstack([self.tets, len(self.nodes) + of_element]), self.regions)
+        tets = np.hstack([self.tets, len(self.nodes) + of_element])
+        return TetMesh(nodes, tets, self.regions, self.region_names)
 
     @cached_property
     def surface_faces(self) -> np.ndarray:
@@ -139,18 +140,22 @@ class TetMesh:
         return 180.0 - np.degrees(np.arccos(np.clip(cosines[:, i, j], -1, 1))).max(axis=1)
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], unit: str = "m") -> TetMesh:
-        """Read a volume mesh; ``unit`` is the file's unit of length.
+    def read(cls, path: str | os.PathLike[str], unit: str | None = None) -> TetMesh:
+        """Read a volume mesh; ``unit`` is the file's unit of length, metres if None.
 
         Gmsh .msh, VTU, VTK, Abaqus .inp, TetGen .node/.ele, Netgen .vol and Medit .mesh are understood; 10-node
         tetrahedra in all but TetGen's and Medit's. Node order is the file's. Regions come from cell data ``region``,
         ``gmsh:physical`` or ``medit:ref``, else from the only integer cell array; their names from Gmsh's physical
-        names.
+        names. Hexahedra, wedges and pyramids are split into 4-node tetrahedra, and a :class:`palpate.MeshWarning` says
+        so; those with mid-side nodes by their corners.
 
         Raises
         ------
         MeshError
-            A file that is missing, not readable, or holds no tetrahedra.
+            A file that is missing, not readable, holds no solid cells, or cells of another kind.
+        UnclearUnitError
+            No unit is given, and in metres the body is below a millimetre or above three metres long; with a unit given
+            that is a warning.
 
         """
         volume = read_volume(Path(path), unit)

@@ -3,44 +3,39 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
 import sys
 import tempfile
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.errors import MeshError, MeshWarning
+from palpate.input_file import require_file
+from palpate.mesh.child import failure_of, run_limited
+from palpate.mesh.elements import face_parts
+from palpate.mesh.filling import PARTS, REPAIR_HINT, Ball, Element, Filling
+from palpate.mesh.size import scale_of
+from palpate.mesh.stl import load_stl
 from palpate.mesh.tetmesh import TetMesh
-from palpate.units import length_scale
+from palpate.units import length
 from palpate.vectors import three_numbers
 
 if TYPE_CHECKING:
     import trimesh
 
 SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-Ball = tuple[tuple[float, float, float], float, float]
-
-Element = Literal["linear", "quadratic"]  # with 4 and 10 nodes
-
-# Into so many parts the longest side is divided where no size is given. 10-node elements twice as large have as many
-# nodes as the 4-node ones, and a smaller error.
-PARTS = {"linear": 15.0, "quadratic": 7.5}
-
-# The mesh may cut corners of a curved surface, but not lose a part of it.
-VOLUME_TOLERANCE = 0.1
+# A part of a repaired body that is smaller than this share of the largest is none.
+CRUMB = 0.01
 TIME_LIMIT = 300.0  # s
-REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install palpate[repair]' and --repair"
 
 
 def tetrahedralize(
     surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | None = None,
-    unit: str = "m",
+    max_element_size: float | str | None = None,
+    unit: str | None = None,
     refine: Sequence[Ball] = (),
     *,
     repair: bool = False,
@@ -56,9 +51,11 @@ def tetrahedralize(
     surface
         STL, OBJ, PLY, OFF or GLB file, or a trimesh surface.
     max_element_size
-        Longest edge wanted, m; None: a fifteenth of the longest side.
+        Longest edge wanted, m or text such as ``"4mm"``; None: a fifteenth of the longest side, and where the surface
+        is curved so strongly or the body so thin that more than a hundredth of the volume would be lost, down to a
+        sixtieth. What is lost all the same, or by the size given, a :class:`palpate.MeshWarning` tells.
     unit
-        Unit of length of the surface.
+        Unit of length of the surface; None: metres.
     refine
         Finer balls: ``((x, y, z), radius, size)`` in m.
     repair
@@ -70,8 +67,11 @@ def tetrahedralize(
     Raises
     ------
     MeshError
-        A surface that cannot be filled, with what is wrong with it, or a mesher that crashed, hung or returned
-        nothing.
+        A surface that cannot be filled, with what is wrong with it, a mesher that crashed, hung or returned nothing, or
+        a mesh that loses more than a tenth of the volume.
+    UnclearUnitError
+        No unit is given, and in metres the body is below a millimetre or above three metres long; with a unit given
+        that is a warning.
 
     """
     return _fill(surface, max_element_size, "linear", unit, refine, repair, time_limit)
@@ -80,53 +80,62 @@ def tetrahedralize(
 def tetrahedralize_with(
     element: Element,
     surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | None = None,
-    unit: str = "m",
+    max_element_size: float | str | None = None,
+    unit: str | None = None,
     refine: Sequence[Ball] = (),
+    repair: bool = False,
 ) -> TetMesh:
-    """Fill a closed surface as :func:`tetrahedralize` does, with either element; None: a size that suits it."""
-    mesh = _fill(surface, max_element_size, element, unit, refine)
-    return mesh.to_quadratic() if element == "quadratic" else mesh
+    """Fill a closed surface as :func:`tetrahedralize` does, with either element; None: a size that suits it.
+
+    The mid-side nodes of 10-node elements lie on the surface, so these may be several times larger than a curve is wide
+    before they lose volume; those of a repaired surface are straight.
+    """
+    return _fill(surface, max_element_size, element, unit, refine, repair)
 
 
 def _fill(
     surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | None,
+    max_element_size: float | str | None,
     element: Element,
-    unit: str,
+    unit: str | None,
     refine: Sequence[Ball],
     repair: bool = False,
     time_limit: float = TIME_LIMIT,
 ) -> TetMesh:
-    """4-node tetrahedra, by default of the size that suits what they shall become."""
+    """Tetrahedra by NETGEN, or by fTetWild."""
     name, shape = _load(surface)
     shape = shape.copy()
-    shape.apply_scale(length_scale(unit))
+    shape.apply_scale(scale_of(name, shape.vertices, unit))
     if repair:
         _check_finite(name, shape)
     else:
         _check_surface(name, shape)
-    extent = float(np.ptp(shape.vertices, axis=0).max())
-    size = extent / PARTS[element] if max_element_size is None else float(max_element_size)
-    if not (np.isfinite(size) and size > 0):
+    size = None if max_element_size is None else length(max_element_size)
+    if size is not None and not (np.isfinite(size) and size > 0):
         raise MeshError(f"max_element_size must be positive, got {max_element_size}")
     for center, radius, ball_size in refine:
         three_numbers(center, "the centre of a ball in refine", MeshError)
         if not (np.isfinite([radius, ball_size]).all() and radius > 0 and ball_size > 0):
             raise MeshError("refine takes ((x, y, z), radius, size) with positive radius and size in metres")
-    if repair:
-        if refine:
-            raise MeshError("repair and refine do not go together: repair first, and mesh the result's surface again")
-        return _repaired(name, shape, size, extent, time_limit)
-    nodes, tets = _run_netgen(name, shape, size, extent, refine, time_limit)
-    mesh = TetMesh(nodes, tets)
-    loss = abs(mesh.volume / shape.volume - 1)
-    if loss > VOLUME_TOLERANCE:
-        raise MeshError(
-            f"{name}: the mesh has {mesh.volume:.3g} m3, the surface {shape.volume:.3g} m3: "
-            f"it probably intersects itself; {REPAIR_HINT}"
-        )
-    return mesh
+    if not repair:
+        return Filling(name, shape, element, size, refine, time_limit).mesh()
+    if refine:
+        raise MeshError("repair and refine do not go together: repair first, and mesh the result's surface again")
+    extent = float(np.ptp(shape.vertices, axis=0).max())
+    mesh = _repaired(name, shape, extent / PARTS[element] if size is None else size, extent, time_limit)
+    return mesh.to_quadratic() if element == "quadratic" else mesh
+
+
+def read_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
+    """Read a surface as it is, in its own unit.
+
+    Raises
+    ------
+    MeshError
+        A file that is missing or cannot be read.
+
+    """
+    return _load(path)[1]
 
 
 def closed_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
@@ -149,16 +158,13 @@ def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trime
     if isinstance(surface, trimesh.Trimesh):
         return "surface", surface
     path = Path(surface)
-    if not path.is_file():
-        raise MeshError(f"{path}: no such file")
-    if path.stat().st_size == 0:
-        raise MeshError(f"{path}: the file is empty")
+    require_file(path, MeshError)
     if path.suffix.lower() not in SURFACE_ENDINGS:
         raise MeshError(f"{path}: unknown surface format '{path.suffix}'; known are {', '.join(SURFACE_ENDINGS)}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            loaded = trimesh.load_mesh(path, process=False)
+            loaded = load_stl(path) if path.suffix.lower() == ".stl" else trimesh.load_mesh(path, process=False)
             shape = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
     except Exception as error:
         reason = " ".join(str(error).split())[:150]
@@ -198,6 +204,23 @@ def _check_finite(name: str, shape: trimesh.Trimesh) -> None:
         raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")
 
 
+def _without_crumbs(name: str, mesh: TetMesh) -> TetMesh:
+    """Drop what fTetWild leaves hanging on edges and vertices, or beside the body: parts without a face to the rest."""
+    labels = face_parts(mesh.tets)
+    volumes = np.bincount(labels, mesh.volumes)
+    kept = (volumes >= CRUMB * volumes.max())[labels]
+    if kept.all():
+        return mesh
+    warnings.warn(
+        f"{name}: {(~kept).sum()} tetrahedra that share no face with the rest, {mesh.volumes[~kept].sum():.2g} m3 of "
+        f"{mesh.volume:.3g} m3, were dropped",
+        MeshWarning,
+        stacklevel=3,
+    )
+    used = np.unique(mesh.tets[kept])
+    return TetMesh(mesh.nodes[used], np.searchsorted(used, mesh.tets[kept]), mesh.regions[kept])
+
+
 def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, time_limit: float) -> TetMesh:
     """Mesh by fTetWild, in a unit box as NETGEN's."""
     origin = shape.vertices.min(axis=0)
@@ -205,75 +228,17 @@ def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, tim
         given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
         np.savez(given, vertices=(shape.vertices - origin) / extent, faces=shape.faces, size=size / extent)
         command = [sys.executable, "-m", "palpate.mesh.tetwild_child", str(given), str(made)]
-        status = _run_limited(command, time_limit)
+        status = run_limited(command, time_limit)
         if status == 3:
-            raise MeshError("repairing needs pytetwild: pip install 'palpate[repair]'")
-        failure = _failure(status, time_limit)
+            raise MeshError("repairing needs pytetwild: pip install pytetwild pyvista")
+        failure = failure_of(status, time_limit)
         if failure is not None or not made.exists():
             raise MeshError(f"{name}: fTetWild {failure or 'returned no tetrahedra'}")
         with np.load(made) as result:
-            mesh = TetMesh(result["nodes"] * extent + origin, result["tets"])
+            mesh = _without_crumbs(name, TetMesh(result["nodes"] * extent + origin, result["tets"]))
     warnings.warn(
         f"{name}: the surface was rebuilt, within about {1e-3 * extent * 3**0.5:.2g} m of the given one",
         MeshWarning,
         stacklevel=3,
     )
     return mesh
-
-
-def _run_netgen(
-    name: str, shape: trimesh.Trimesh, size: float, extent: float, refine: Sequence[Ball], time_limit: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mesh in a unit box, for NETGEN's tolerances are absolute, and scale back."""
-    origin = shape.vertices.min(axis=0)
-    balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in refine]
-    vertices = (shape.vertices - origin) / extent
-    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
-        np.savez(
-            given,
-            vertices=vertices,
-            faces=shape.faces,
-            size=size / extent,
-            balls=np.array(balls).reshape(-1, 5),
-        )
-        # Even triangles are best; where NETGEN cannot make them, the surface as given may still be filled.
-        failures = []
-        for route in ("remesh", "keep"):
-            command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(given), str(made)]
-            failure = _failure(_run_limited(command, time_limit), time_limit)
-            if failure is None and made.exists():
-                with np.load(made) as result:
-                    return result["nodes"] * extent + origin, result["tets"]
-            failures.append(failure or "returned no tetrahedra")
-        raise MeshError(
-            f"{name}: NETGEN {failures[0]} when remeshing the surface, and {failures[1]} when keeping it; "
-            f"the surface probably intersects itself: {REPAIR_HINT}"
-        )
-
-
-def _failure(status: int | None, time_limit: float) -> str | None:
-    if status is None:
-        return f"did not finish in {time_limit:g} s and was stopped"
-    if status < 0:
-        return f"crashed ({signal.Signals(-status).name})"
-    return "returned no tetrahedra" if status else None
-
-
-def _run_limited(command: list[str], time_limit: float) -> int | None:
-    """Exit status of a child in a process group of its own; None if it ran out of time."""
-    process = subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    try:
-        return process.wait(time_limit)
-    except subprocess.TimeoutExpired:
-        return None
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.mesh.child import end_with_parent
+
 
 def main(given: str, made: str) -> int:
     """Mesh the triangles of ``given`` into ``made``."""
@@ -33,4 +35,5 @@ def main(given: str, made: str) -> int:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     sys.exit(main(*sys.argv[1:3]))

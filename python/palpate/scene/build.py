@@ -16,6 +16,7 @@ from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import tetrahedralize_with
+from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
@@ -71,10 +72,13 @@ class BuiltBody:
 
 @dataclass(frozen=True)
 class BuiltScene:
-    """A scene with its bodies."""
+    """A scene with its bodies; tools without a radius have one that follows them."""
 
     scene: SceneTables
     bodies: tuple[BuiltBody, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "scene", with_radii(self.scene, [body.green for body in self.bodies]))
 
     @classmethod
     def of(
@@ -167,6 +171,8 @@ class _Builder:
         fixed = supports.fixed
         if fixed is None and self._table.model is not None:
             return models.fixed(self._table.model, mesh)
+        if fixed is None:
+            raise SceneError(f"supports.fixed is missing: '{self._table.title}' needs nodes that are held")
         if isinstance(fixed, str):
             mask = parse(fixed)(mesh.nodes)
             if not np.any(mask):

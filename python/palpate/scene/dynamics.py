@@ -13,7 +13,7 @@ from palpate import _native
 from palpate.body import Body
 from palpate.dynamics import ModalBasis, modes, rayleigh_from_ratios
 from palpate.errors import SceneError
-from palpate.scene.table import Direction, Point, Stiffness, Table, Time
+from palpate.scene.table import Direction, Point, Stiffness, Table, Time, is_whole, one_of
 
 # All modes of so many free dofs are quick to compute and to step; larger bodies take the lowest ones.
 ALL_MODES_DOFS = 3000
@@ -23,6 +23,9 @@ SECOND_DAMPED_MODE = 10
 
 Ratio = Annotated[float, Field(ge=0, lt=1)]
 Factor = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+_COUNT = one_of("how many, such as 200, or 'all'", lambda v: v is None or v == "all" or is_whole(v, 1))
 
 
 class StrikeTable(Table):
@@ -45,7 +48,7 @@ class DynamicsTable(Table):
     dt: Annotated[Time, Field(ge=1e-4, le=1e-2)] = 1e-3
     delta: Annotated[float, Field(ge=0.5, allow_inf_nan=False)] = 0.6
     alpha: Factor | None = None
-    modes: Annotated[int, Field(gt=0)] | Literal["all"] | None = None
+    modes: Annotated[int | Literal["all"] | None, _COUNT] = None
     mass: Literal["consistent", "lumped"] = "consistent"
     damping_ratios: tuple[Ratio, Ratio] = (0.05, 0.05)
     rayleigh: tuple[Factor, Factor] | None = None

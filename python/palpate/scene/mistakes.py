@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from palpate.units import brief_repr
+
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
-UNION_MEMBERS = {"str", "int", "list[int]"}
+UNION_MEMBERS = {"str", "int", "list[int]", "bool"}
+# pydantic's words for kinds of values, as people say them.
+WORDS = {
+    "boolean": "true or false",
+    "integer": "a whole number",
+    "integer, got a number with a fractional part": "a whole number",
+    "list": "a list, such as [1, 2, 3]",
+    "number": "a number",
+    "string": "text in quotes",
+    "tuple": "a list of numbers",
+}
 # Keys of former versions, and what they are called now.
 RENAMED = {"view.hold_strain": "strain_limit"}
 
@@ -34,8 +46,33 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
         return f"{at}: {where} has too few entries"
     if first["type"] == "missing":
         return f"{at}: the key '{where}' is missing"
-    message = first["msg"].removeprefix("Value error, ")
-    return f"{at}: {where}: {message}" + ("" if first["type"] == "value_error" else f", got {first['input']!r}")
+    if first["type"] == "value_error":
+        return f"{at}: {where}: {first['msg'].removeprefix('Value error, ')}"
+    return f"{at}: {where}: {_expected(first, keys[-1])}, got {_got(first['input'])}"
+
+
+def _expected(mistake: Mapping[str, Any], key: str) -> str:
+    """Tell what should have been there, from pydantic's kind of mistake."""
+    kind, context = mistake["type"], mistake.get("ctx", {})
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"must be a table: write [{key}] on a line of its own, and its keys below it"
+    if kind == "too_short":
+        return f"needs at least {context['min_length']} {_entries(context['min_length'])}"
+    if kind == "too_long":
+        return f"takes at most {context['max_length']} {_entries(context['max_length'])}"
+    told = mistake["msg"].removeprefix("Input should be ").removeprefix("a valid ").split(", unable")[0]
+    return f"must be {WORDS.get(told, told)}"
+
+
+def _entries(count: int) -> str:
+    return "entry" if count == 1 else "entries"
+
+
+def _got(value: Any) -> str:
+    """Value as it stands in the file; of several entries their count."""
+    if isinstance(value, (list, tuple)) and any(isinstance(entry, Mapping) for entry in value):
+        return str(len(value))
+    return brief_repr(value)
 
 
 def located(path: Path, text: str, place: Place) -> str:

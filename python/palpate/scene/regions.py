@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -10,7 +10,7 @@ from pydantic import model_validator
 from palpate.body import Material
 from palpate.errors import MeshError
 from palpate.mesh import TetMesh, shapes
-from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table
+from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table, is_whole, one_of
 
 # The solid of each shape, and the keys that place it.
 SHAPES = {
@@ -20,6 +20,9 @@ SHAPES = {
     "half-space": (shapes.HalfSpace, ("point", "normal")),
 }
 PLACES = tuple(dict.fromkeys(key for _, keys in SHAPES.values() for key in keys))
+
+
+_REGION = one_of("the number or the name of a region", lambda v: v is None or isinstance(v, str) or is_whole(v))
 
 
 class MaterialTable(Table):
@@ -40,7 +43,7 @@ class RegionTable(Table):
     What it does not say of its material is that of ``[material]``. Later tables override earlier ones.
     """
 
-    mesh_region: int | str | None = None
+    mesh_region: Annotated[int | str | None, _REGION] = None
     shape: Literal["sphere", "box", "cylinder", "half-space"] | None = None
     center: Point | None = None
     radius: Length | None = None

@@ -6,10 +6,12 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from palpate.errors import SceneError
+from palpate.input_file import require_file
 from palpate.scene.build import BuiltScene, build
 from palpate.scene.mistakes import explain, located
 from palpate.scene.tables import BodyTable, SceneTables
@@ -27,6 +29,12 @@ class Scene(SceneTables):
     ``material``, ``region``, ``loads`` and ``dynamics`` of the scene are those of every body that has none of its own.
     """
 
+    def __init__(self, /, **tables: Any):
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            raise SceneError(explain(Path("Scene"), "", error, type(self))) from error
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Scene:
         """Read a scene file.
@@ -38,15 +46,16 @@ class Scene(SceneTables):
 
         """
         path = Path(path)
-        if not path.is_file():
-            raise SceneError(f"{path}: no such file")
+        require_file(path, SceneError)
         text = path.read_text(errors="replace")
         try:
             scene = cls(**tomllib.loads(text))
         except tomllib.TOMLDecodeError as error:
             raise SceneError(f"{path}: {error}") from None
-        except ValidationError as error:
-            raise SceneError(explain(path, text, error, cls)) from None
+        except SceneError as error:
+            if not isinstance(error.__cause__, ValidationError):
+                raise
+            raise SceneError(explain(path, text, error.__cause__, cls)) from None
         scene._source = (path, text)
         for rank in range(len(scene.bodies)):
             scene._check_tables(rank)

@@ -9,6 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from palpate import units
 from palpate.errors import Error
+from palpate.units import brief_repr
 
 
 def _quantity(read: Callable[[Any], float]) -> BeforeValidator:
@@ -39,6 +40,22 @@ Point = tuple[Coordinate, Coordinate, Coordinate]
 Direction = tuple[Number, Number, Number]
 Acceleration = tuple[_Acceleration, _Acceleration, _Acceleration]
 ForceVector = tuple[SignedForce, SignedForce, SignedForce]
+
+
+def one_of(what: str, allowed: Callable[[Any], bool]) -> BeforeValidator:
+    """Check a value that may be of several kinds: pydantic would explain every kind that it is not."""
+
+    def check(value: Any) -> Any:
+        if not allowed(value):
+            raise ValueError(f"give {what}; got {brief_repr(value)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def is_whole(value: Any, least: int = 0) -> bool:
+    """Whether a value is a whole number of at least ``least``."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= least
 
 
 class Table(BaseModel):

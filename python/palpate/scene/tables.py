@@ -13,7 +13,7 @@ from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
-from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time
+from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
 
 # As many as the force loop takes.
@@ -24,6 +24,12 @@ STRAIN_LIMIT = 0.3
 MOST_FRICTION = 10.0
 
 Quaternion = tuple[Number, Number, Number, Number]
+
+
+_NODES = one_of(
+    "a predicate, such as 'z < min + 5mm', or a list of node numbers",
+    lambda v: v is None or isinstance(v, str) or (isinstance(v, (list, tuple)) and all(map(is_whole, v))),
+)
 
 
 class RefineTable(Table):
@@ -37,7 +43,7 @@ class RefineTable(Table):
 class SupportsTable(Table):
     """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
 
-    fixed: str | list[int] | None = None
+    fixed: Annotated[str | list[int] | None, _NODES] = None
 
 
 class BodyTable(Table):
@@ -58,7 +64,7 @@ class BodyTable(Table):
     model: str | None = None
     store: str | None = None
     paper: bool = False
-    unit: str = "m"
+    unit: str | None = None
     max_element_size: Length | None = None
     element: Element | None = None
     refine: list[RefineTable] = Field(default_factory=list)
@@ -104,13 +110,13 @@ class ToolTable(ShapeTable):
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
     ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
     goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
-    names a ``contact_radius`` and no law is a patch, for only patches have one.
+    names a ``contact_radius`` and no law is a patch, for only patches have one; one that is not given follows the body.
     """
 
     contact: Literal["local", "patch", "node"] = "local"
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
     pad_youngs_modulus: Pressure | None = None
-    contact_radius: Radius = 5e-3
+    contact_radius: Radius | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -174,7 +180,7 @@ class SceneTables(Table):
             f"model {body.model}" if body.model else str(body.mesh or body.store) for body in self.bodies
         )
         moves = any(body.dynamics or self.dynamics for body in self.bodies)
-        radii = ", ".join(f"{1e3 * tool.radius:.4g} mm" for tool in self.tools)
+        radii = ", ".join("by the body" if t.radius is None else f"{1e3 * t.radius:.4g} mm" for t in self.tools)
         tools = f"tool of radius {radii}" if len(self.tools) == 1 else f"tools of radius {radii}"
         return f"{type(self).__name__}({bodies}{', in motion' if moves else ''}, {tools})"
 

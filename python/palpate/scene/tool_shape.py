@@ -32,11 +32,12 @@ class ShapeTable(Table):
     ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length``
     of the cylinder between its hemispheres), ``"punch"`` (``radius``, ``rounding`` of its rim), or the path of a closed
     surface file relative to the scene file, in ``unit``. Capsule and punch lie along z of the tool, their front towards
-    -z; its origin is the middle of the front hemisphere or of the face.
+    -z; its origin is the middle of the front hemisphere or of the face. A radius that is not given
+    follows the body.
     """
 
     shape: str = "sphere"
-    radius: Length = 5e-3
+    radius: Length | None = None
     semi_axes: tuple[Length, Length, Length] | None = None
     length: Length | None = None
     rounding: Length | None = None
@@ -55,14 +56,15 @@ class ShapeTable(Table):
             raise ValueError(f"a tool of shape '{name}' takes no '{key}'; it takes {', '.join(sorted(taken))}")
         for key in sorted(needed - self.model_fields_set):
             raise ValueError(f"a tool of shape '{name}' needs the key '{key}'")
-        if self.rounding is not None and self.rounding > self.radius:
+        if self.rounding is not None and self.radius is not None and self.rounding > self.radius:
             raise ValueError(f"rounding is {self.rounding:g} m, more than the radius of {self.radius:g} m")
         return self
 
     @property
     def reach(self) -> float:
         """From the tool's origin to its front along -z, m; of a surface file 0, for its origin may lie anywhere."""
-        fronts = {"sphere": self.radius, "capsule": self.radius, "ellipsoid": (self.semi_axes or (0.0,))[-1]}
+        radius = self.radius or 0.0
+        fronts = {"sphere": radius, "capsule": radius, "ellipsoid": (self.semi_axes or (0.0,))[-1]}
         return fronts.get(self.shape, 0.0)
 
     def shape_arguments(self, folder: Path) -> ShapeArguments:
@@ -74,14 +76,15 @@ class ShapeTable(Table):
             A file that is missing, cannot be read or holds no closed surface.
 
         """
+        radius = self.radius or 0.0
         if self.shape == "sphere":
-            return "sphere", (self.radius, 0.0, 0.0), [], []
+            return "sphere", (radius, 0.0, 0.0), [], []
         if self.shape == "ellipsoid" and self.semi_axes is not None:
             return "ellipsoid", self.semi_axes, [], []
         if self.shape == "capsule":
-            return "capsule", (self.radius, self.length or 0.0, 0.0), [], []
+            return "capsule", (radius, self.length or 0.0, 0.0), [], []
         if self.shape == "punch":
-            return "punch", (self.radius, self.rounding or ROUNDING * self.radius, 0.0), [], []
+            return "punch", (radius, self.rounding or ROUNDING * radius, 0.0), [], []
         surface = closed_surface(folder / self.shape)
         vertices = np.asarray(surface.vertices, dtype=float) * length_scale(self.unit)
         return "surface", (0.0, 0.0, 0.0), vertices.tolist(), np.asarray(surface.faces).tolist()

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
-from palpate.fields import Strained, StrainSource
+from palpate.fields import (
+    DeformedSurface,
+    Result,
+    ResultSource,
+    as_html,
+    as_pyvista,
+    draw,
+    placed,
+    together,
+    write_result,
+)
+from palpate.scene import BuiltBody
 from palpate.vectors import brief
+
+if TYPE_CHECKING:
+    import meshio
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +85,7 @@ class Contact(ComparedByValue):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BodyFrame(ComparedByValue, Strained):
+class BodyFrame(ComparedByValue, Result):
     """A body at the latest tick. Compared by value, number by number; not hashable.
 
     Attributes
@@ -82,7 +99,19 @@ class BodyFrame(ComparedByValue, Strained):
 
     displacements: np.ndarray
     energy: Energy | None
-    _source: StrainSource = field(compare=False)
+    _source: ResultSource = field(compare=False)
+    _place: BuiltBody = field(compare=False)
+    _stiffness_scale: float = field(default=1.0, compare=False)
+
+    def in_scene(self) -> meshio.Mesh:
+        """Give :meth:`to_meshio` where the body stands in the scene."""
+        return placed(self.to_meshio(), self._place.points_to_scene, self._place.vectors_to_scene)
+
+    def surface_in_scene(self) -> DeformedSurface:
+        """Surface to be drawn where the body stands in the scene."""
+        own, place = self.deformed_surface(), self._place
+        moved = place.vectors_to_scene(own.displacements)
+        return DeformedSurface(place.points_to_scene(own.positions), own.triangles, moved)
 
     def __repr__(self) -> str:
         largest = np.linalg.norm(self.displacements, axis=1).max(initial=0.0)
@@ -128,6 +157,50 @@ class Frame(ComparedByValue):
         forces = ", ".join(brief(force) for force in self.forces)
         contacts = f"{len(self.contacts)} contact{'' if len(self.contacts) == 1 else 's'}"
         return f"Frame({self.time:.3f} s, {contacts}, forces on the devices {forces} N)"
+
+    def to_meshio(self) -> meshio.Mesh:
+        """All bodies at rest in the scene with displacement, strain and stress at the nodes, as a mesh of meshio.
+
+        The data are those of :meth:`palpate.Touch.to_meshio`; ``body`` numbers the cells, and what a body from a bare
+        store does not know is NaN.
+        """
+        return together([body.in_scene() for body in self.bodies])
+
+    def to_pyvista(self) -> Any:
+        """Give the same as :meth:`to_meshio` as pyvista's unstructured grid.
+
+        Raises
+        ------
+        Error
+            pyvista is not installed.
+
+        """
+        return as_pyvista(self.to_meshio())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView; replaced only when complete.
+
+        Raises
+        ------
+        MeshError
+            Another ending, or no place for a file.
+
+        """
+        write_result(self.to_meshio(), path)
+
+    def plot(self, magnification: float = 1.0) -> Figure:
+        """Picture of the deformed surfaces, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
+
+        Parameters
+        ----------
+        magnification
+            Of the displacements that are drawn; the colours tell the true ones.
+
+        """
+        return draw([body.surface_in_scene() for body in self.bodies], magnification, repr(self))
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), [body.surface_in_scene() for body in self.bodies])
 
     @property
     def displacements(self) -> np.ndarray:

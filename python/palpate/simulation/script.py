@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from palpate import units
 from palpate.errors import SceneError
+from palpate.units import brief_repr
 from palpate.vectors import three_numbers
 
 # How far from one the length of an orientation may be.
@@ -23,7 +25,7 @@ def positions_of(positions: Any, tools: int) -> np.ndarray:
         Another shape, or more tools than the scene has.
 
     """
-    path = np.ascontiguousarray(positions, dtype=np.float64)
+    path = _array(positions, "positions")
     if path.ndim not in (2, 3) or path.shape[-1] != 3:
         raise SceneError(f"positions must have shape (ticks, 3) or (ticks, tools, 3), got {path.shape}")
     path = path[:, None] if path.ndim == 2 else path
@@ -44,7 +46,7 @@ def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
     shape = (*positions.shape[:2], 4)
     if orientations is None:
         return np.broadcast_to([1.0, 0.0, 0.0, 0.0], shape).copy()
-    turned = np.ascontiguousarray(orientations, dtype=np.float64)
+    turned = _array(orientations, "orientations")
     turned = turned[:, None] if turned.ndim == 2 else turned
     if turned.shape != shape:
         raise SceneError(f"orientations must have shape {shape}, as the positions, got {turned.shape}")
@@ -90,7 +92,7 @@ def for_all_tools(
 
 
 def strike_of(
-    point: Sequence[float], impulse: Sequence[float], duration: float = 0.0
+    point: Sequence[float | str], impulse: Sequence[float], duration: float | str = 0.0
 ) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
     """Point (m), impulse (N s) and duration (s) of a strike.
 
@@ -100,7 +102,15 @@ def strike_of(
         Numbers that are not finite, or a duration below zero.
 
     """
-    if not (np.isfinite(duration) and duration >= 0):
-        raise SceneError(f"a strike's duration must be a time of at least 0 s, got {duration}")
-    where = three_numbers(point, "a strike's point", SceneError)
-    return where, three_numbers(impulse, "a strike's impulse", SceneError), float(duration)
+    seconds = units.time(duration)
+    if not (np.isfinite(seconds) and seconds >= 0):
+        raise SceneError(f"a strike's duration must be a time of at least 0 s, got {seconds:g}")
+    where = three_numbers(point, "a strike's point", SceneError, units.length)
+    return where, three_numbers(impulse, "a strike's impulse", SceneError), seconds
+
+
+def _array(values: Any, what: str) -> np.ndarray:
+    try:
+        return np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise SceneError(f"{what} must be an array of numbers, got {brief_repr(values)}") from None

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from palpate import _native
+from palpate import _native, units
 from palpate.body import Body
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
-from palpate.scene import MOST_FRICTION, BodyMotion, BuiltScene, Scene
+from palpate.scene import BodyMotion, BuiltScene, Scene
+from palpate.simulation import settings
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.frame import BodyFrame, Contact, Frame
 from palpate.simulation.recording import LOG_DTYPE, Recording
@@ -127,7 +128,7 @@ class Simulation:
             No such tool, or numbers that are not finite.
 
         """
-        place = three_numbers(position, "a tool's position", SceneError)
+        place = three_numbers(position, "a tool's position", SceneError, units.length)
         moving = (0.0, 0.0, 0.0) if velocity is None else three_numbers(velocity, "a tool's velocity", SceneError)
         turned = self._targets[self._tool(tool)][1]
         if orientation is not None:
@@ -165,7 +166,7 @@ class Simulation:
         feet = self._core.feet(body, asked).reshape(-1, 7)
         return placed.points_to_scene(feet[:, :3]), placed.vectors_to_scene(feet[:, 3:6]), feet[:, 6]
 
-    def set_radius(self, contact_radius: float, tool: int | None = None) -> None:
+    def set_radius(self, contact_radius: float | str, tool: int | None = None) -> None:
         """Contact radius of contacts that begin from now on, m, of one tool or of all.
 
         Raises
@@ -175,9 +176,10 @@ class Simulation:
 
         """
         tools = range(len(self._radii)) if tool is None else [self._tool(tool)]
+        radius = settings.checked_radius(contact_radius)
         for changed in tools:
-            self._core.set_contact_radius(changed, float(contact_radius))
-            self._radii[changed] = float(contact_radius)
+            self._core.set_contact_radius(changed, radius)
+            self._radii[changed] = radius
 
     def set_friction(self, friction: float, tool: int | None = None) -> None:
         """Coulomb's coefficient of friction from now on, of one tool or of all; 0 slides freely.
@@ -188,12 +190,11 @@ class Simulation:
             A coefficient that is negative, or greater than 10.
 
         """
-        if not 0.0 <= friction <= MOST_FRICTION:
-            raise SceneError(f"friction must lie between 0 and {MOST_FRICTION:g}, got {friction}")
+        coefficient = settings.checked_friction(friction)
         tools = range(len(self._friction)) if tool is None else [self._tool(tool)]
         for changed in tools:
-            self._core.set_friction(changed, float(friction))
-            self._friction[changed] = float(friction)
+            self._core.set_friction(changed, coefficient)
+            self._friction[changed] = coefficient
 
     def friction_of(self, tool: int = 0) -> float:
         """Coulomb's coefficient of friction of a tool."""
@@ -210,13 +211,7 @@ class Simulation:
 
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
-        low, high = 0.0, limit
-        if self._core.accepts_contact_radius(high):
-            return high
-        while high - low > 0.01 * limit:
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self._core.accepts_contact_radius(middle) else (low, middle)
-        return low
+        return min(body.green.largest_contact_radius(limit) for body in self.bodies)
 
     def youngs_modulus_of(self, body: int = 0) -> float | None:
         """Young's modulus of a body now, Pa; None for one of several materials, with loads, or in motion."""
@@ -238,7 +233,7 @@ class Simulation:
         """Young's modulus of the first body now over that of its Green's function."""
         return self._scales[0]
 
-    def set_youngs_modulus(self, youngs_modulus: float, body: int = 0) -> None:
+    def set_youngs_modulus(self, youngs_modulus: float | str, body: int = 0) -> None:
         """Change the stiffness of a body of one material at rest, without loads, Pa: it only scales the compliance.
 
         Raises
@@ -252,9 +247,7 @@ class Simulation:
             raise SceneError(
                 "the body has several materials, or loads, or moves: its stiffness cannot be changed while running"
             )
-        if not (np.isfinite(youngs_modulus) and youngs_modulus > 0):
-            raise SceneError(f"Young's modulus must be positive, got {youngs_modulus} Pa")
-        self._scales[body] = youngs_modulus / reference
+        self._scales[body] = settings.checked_modulus(youngs_modulus) / reference
         self._core.set_stiffness_scale(body, self._scales[body])
 
     def set_strain_limit(self, strain_limit: float) -> None:
@@ -266,9 +259,7 @@ class Simulation:
             A limit below 0 or above 1.
 
         """
-        if not 0.0 <= strain_limit <= 1.0:
-            raise SceneError(f"the limit of strain must lie in [0, 1], got {strain_limit}")
-        self._strain_limit = float(strain_limit)
+        self._strain_limit = settings.checked_strain_limit(strain_limit)
         self._arm_strain_limit()
         self._core.set_strain_limit(self._strain_limit)
 
@@ -306,9 +297,7 @@ class Simulation:
 
         """
         self._moving_body("slow motion", None)
-        if not 0 < time_scale <= 1:
-            raise SceneError(f"the time scale must lie in (0, 1], got {time_scale}")
-        self._core.set_time_scale(float(time_scale))
+        self._core.set_time_scale(settings.checked_time_scale(time_scale))
 
     def watch(self, node: int, body: int = 0) -> None:
         """Log the displacement of a surface node (mesh index) from now on; at first it is the lowest one's.
@@ -342,8 +331,8 @@ class Simulation:
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         bodies = tuple(
-            BodyFrame(displacements.reshape(-1, 3), None if energy is None else Energy(*energy), body.green)
-            for body, (displacements, energy) in zip(self.bodies, raw["bodies"], strict=True)
+            BodyFrame(moved.reshape(-1, 3), None if energy is None else Energy(*energy), body.green, body, scale)
+            for body, (moved, energy), scale in zip(self.bodies, raw["bodies"], self._scales, strict=True)
         )
         tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "limited")]
         contacts = [self._contact(record) for record in raw["contacts"]]

@@ -19,7 +19,10 @@ def open_viewer(server: ViewerServer, *, browser: bool = True) -> None:
 async def _serve(server: ViewerServer, browser: bool) -> None:
     await server.start()
     try:
-        print(f"Palpate is at {server.address}", flush=True)
+        address, *others = server.addresses
+        print(f"Palpate is at {address}", flush=True)
+        for other in others:
+            print(f"from other machines at {other}", flush=True)
         print("Hold the left mouse button on the body to press, drag to slide. Ctrl-C here ends.", flush=True)
         if browser and _has_desktop():
             await asyncio.to_thread(webbrowser.open, server.address)

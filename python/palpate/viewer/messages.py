@@ -2,8 +2,8 @@
 
 A binary message is ``uint32`` header length, the header in UTF-8 padded with spaces so that the arrays start at a
 multiple of 8 bytes, then the arrays, little-endian, each at the offset after the header that its entry names. An array
-of one body is named ``<index of the body>/<what it is>`` and stands in the frame of that body; tools, forces and what
-clients send stand in that of the scene.
+of one body is named ``<index of the body>/<what it is>`` and stands in the frame of that body, one of a tool
+``tools/<index of the tool>/<what it is>``; poses of tools, forces and what clients send stand in that of the scene.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
+from palpate.units import to_float
 from palpate.vectors import three_numbers
 
-VERSION = 5
+VERSION = 6
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
@@ -73,7 +74,7 @@ def parse(text: str | bytes) -> dict[str, Any]:
 def number(message: Mapping[str, Any], key: str) -> float:
     """Take a finite number of a client's message."""
     value = message.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(to_float(value)):
         raise ViewerError(f"{message['type']}: {key} must be a finite number")
     return float(value)
 
@@ -94,6 +95,14 @@ def index(message: Mapping[str, Any], key: str, count: int) -> int:
 def vector(message: Mapping[str, Any], key: str) -> tuple[float, float, float]:
     """Three finite numbers of a client's message."""
     return three_numbers(message.get(key), f"{message['type']}: {key}", ViewerError)
+
+
+def quaternion(message: Mapping[str, Any], key: str) -> tuple[float, float, float, float]:
+    """Four finite numbers of a client's message; whether they are an orientation is asked where they are used."""
+    value, what = message.get(key), f"{message['type']}: {key}"
+    if not isinstance(value, list) or len(value) != 4:
+        raise ViewerError(f"{what} needs four numbers")
+    return (number({**message, key: value[0]}, key), *three_numbers(value[1:], what, ViewerError))
 
 
 def by_body(arrays: Sequence[Mapping[str, tuple[str, np.ndarray]]]) -> dict[str, tuple[str, np.ndarray]]:

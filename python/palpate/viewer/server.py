@@ -23,6 +23,7 @@ from palpate import __version__
 from palpate.errors import Error, SimulationError, ViewerError
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
+from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.pages import headers, host_is_ours, load_pages
 from palpate.viewer.session import Session, Wants, choices
@@ -106,9 +107,13 @@ class ViewerServer:
     @property
     def address(self) -> str:
         """What a person opens; the token stays in the browser, for fragments are never sent."""
-        shown = "127.0.0.1" if self.host in {"0.0.0.0", "::", ""} else self.host
-        name = f"[{shown}]" if ":" in shown else shown
-        return f"http://{name}:{self.port}/#token={self.token}"
+        return self.addresses[0]
+
+    @property
+    def addresses(self) -> list[str]:
+        """All that a person may open: a server bound to every address is reached from other machines too."""
+        names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
+        return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
 
     async def start(self) -> None:
         """Listen.
@@ -165,13 +170,12 @@ class ViewerServer:
 
     def _request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Serve the page, let the websocket through, refuse everything else."""
-        host = request.headers.get("Host")
-        if not host_is_ours(host, self.host, self.port):
+        host = _only(request.headers, "Host")
+        if host is None or not host_is_ours(host, self.host, self.port):
             return _answer(403, "text/plain", b"wrong Host\n", "")
-        assert host is not None
         path = request.path.partition("?")[0]
         if path == "/socket":
-            if request.headers.get("Origin") != f"http://{host}":
+            if _only(request.headers, "Origin") != f"http://{host}":
                 return _answer(403, "text/plain", b"wrong Origin\n", host)
             return None
         kind, content = self._pages.get(path, ("text/plain", b"not found\n"))
@@ -208,7 +212,7 @@ class ViewerServer:
         except (asyncio.TimeoutError, ConnectionClosed, ViewerError):
             hello = {}
         token = hello.get("token")
-        if not (isinstance(token, str) and secrets.compare_digest(token.encode(), self.token.encode())):
+        if not (isinstance(token, str) and secrets.compare_digest(_bytes(token), _bytes(self.token))):
             await connection.close(BAD_TOKEN, "wrong or missing token")
             return False
         if hello.get("version") != messages.VERSION:
@@ -306,29 +310,39 @@ class ViewerServer:
         """Switch to another model; the one shown goes on until the new one is ready."""
         if self._scene_of is None or name not in self._models:
             raise ViewerError(f"there is no model '{str(name)[:40]}'")
-        if self._building is not None:
-            raise ViewerError("another model is being prepared")
-        self._building = LongWork()
-        self._build_task = asyncio.create_task(self._switch(name, self._scene_of(name), self._building))
-
-    async def _reshape(self, message: dict[str, Any]) -> None:
-        """Give a tool another shape: another loop on the same bodies."""
-        if self._building is not None:
-            raise ViewerError("another model is being prepared")
-        session = await self._worker.call(self._session.reshaped, message)
-        if session is not None:
-            await self._worker.call(self._exchange, session)
-            await self._tell_all(await self._worker.call(session.settings))
-
-    async def _switch(self, name: str, scene: Scene, building: LongWork) -> None:
+        scene, building = self._scene_of(name), self._begin_building()
         solving = self._reporter(f"Solving the {name}", building)
         modes = self._reporter(f"Computing the modes of the {name}", building)
+        make = lambda: Session(scene.build(solving, modes))  # noqa: E731
+        self._build_task = asyncio.create_task(self._switch(f"Loading the {name}", make, self._exchange, building))
+
+    async def _reshape(self, message: dict[str, Any]) -> None:
+        """Give a tool another shape: another loop on the same bodies, while the one before goes on."""
+        before = self._session
+        built = await self._worker.call(before.reshaped, message)
+        if built is None:
+            return
+        make = lambda: Session(built, before.own_tools)  # noqa: E731
+        building = self._begin_building()
+        self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
+
+    def _begin_building(self) -> LongWork:
+        if self._building is not None:
+            raise ViewerError("wait until what is being prepared is ready, or cancel it")
+        self._building = LongWork()
+        return self._building
+
+    async def _switch(
+        self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: LongWork
+    ) -> None:
+        """Make a session beside the one that runs, and put it in its place."""
         try:
-            await self._tell_all({"type": "status", "text": f"Loading the {name}", "progress": None, "left_s": None})
+            await self._tell_all({"type": "status", "text": text, "progress": None, "left_s": None})
             await self._worker.call(self._session.release)
-            session = await building.run(lambda: Session(scene.build(solving, modes)), Session.close)
+            session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
-            await self._worker.call(self._exchange, session)
+            await self._worker.call(exchange, session)
+            await self._tell_all(await self._worker.call(session.settings))
         except Error as error:
             await self._tell_all({"type": "error", "text": str(error)})
         finally:
@@ -339,6 +353,10 @@ class ViewerServer:
         self._session.close()
         session.start()
         self._session = session
+
+    def _inherit(self, session: Session) -> None:
+        session.take_over(self._session)
+        self._exchange(session)
 
     def _reporter(self, text: str, work: LongWork) -> Callable[[int, int], None]:
         """Tell all pages how far a long work is, from any thread; it begins with the first call.
@@ -357,6 +375,17 @@ class ViewerServer:
             loop.call_soon_threadsafe(lambda: loop.create_task(self._tell_all(status)))
 
         return report
+
+
+def _only(headers: Headers, name: str) -> str | None:
+    """Value of a header that stands there once; None for none, or for several, of which a proxy may see another."""
+    values = headers.get_all(name)
+    return values[0] if len(values) == 1 else None
+
+
+def _bytes(token: str) -> bytes:
+    """Bytes of any text of JSON, half surrogate pairs too, which UTF-8 has no bytes for."""
+    return token.encode("utf-8", "surrogatepass")
 
 
 def _answer(status: int, kind: str, content: bytes, host: str) -> Response:

@@ -14,9 +14,10 @@ from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
-from palpate.viewer.messages import by_body, encode, index, number, vector, word
+from palpate.viewer.messages import by_body, encode, index, number, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.shown_body import ShownBody, titled
+from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices, with_shape
 
 # The contact radius slider ends at this part of the body's longest side.
 LARGEST_RADIUS = 0.12
@@ -25,8 +26,6 @@ REACH = 10.0
 # Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
 LOG_KEPT = 4000
 LOG_SENT = 64
-# Shapes of tools that the page can draw by their radius alone.
-DRAWN_SHAPES = ("sphere",)
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -46,12 +45,15 @@ class Session:
     ----------
     built
         Scene with its Green's function.
+    own_tools
+        Tools as the scene file has them, where the scene's have been given other shapes since.
 
     """
 
-    def __init__(self, built: BuiltScene):
+    def __init__(self, built: BuiltScene, own_tools: Sequence[ToolTable] | None = None):
         self.built = built
         scene = built.scene
+        self.own_tools = scene.tools if own_tools is None else own_tools
         self.simulation = Simulation(built)
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
@@ -93,7 +95,7 @@ class Session:
             "youngs_modulus": [self.simulation.youngs_modulus_of(body) for body in range(len(self._bodies))],
             "contact_radius": [self.simulation.contact_radius_of(tool) for tool in range(len(self._active))],
             "friction": [self.simulation.friction_of(tool) for tool in range(len(self._active))],
-            "shape": [tool.shape for tool in self.built.scene.tools],
+            "shape": [kind_of(tool) for tool in self.built.scene.tools],
             "strain_limit": self._strain_limit,
             "time_scale": None if self._moving is None else self._moving.time_scale,
         }
@@ -128,8 +130,8 @@ class Session:
             raise ViewerError(f"unknown message '{message['type'][:40]}'")
         return handler(message)
 
-    def reshaped(self, message: Mapping[str, Any]) -> Session | None:
-        """Session, not started, on the same bodies, a tool of which has the shape of a message; None if it has it.
+    def reshaped(self, message: Mapping[str, Any]) -> BuiltScene | None:
+        """Scene with the same bodies, a tool of which has the shape of a message; None if it has that now.
 
         Raises
         ------
@@ -138,17 +140,16 @@ class Session:
 
         """
         tool, name = index(message, "tool", len(self._active)), word(message, "name")
-        tools = list(self.built.scene.tools)
-        if name not in shapes_of(tools[tool]):
-            raise ViewerError(f"shape: a tool is no '{name}'; it may be {' or '.join(shapes_of(tools[tool]))}")
-        if name == tools[tool].shape:
+        scene, own = self.built.scene, self.own_tools[tool]
+        offered = [choice["name"] for choice in shape_choices(own)]
+        if name not in offered:
+            raise ViewerError(f"shape: this tool is no '{name}'; it may be {' or '.join(offered)}")
+        if name == kind_of(scene.tools[tool]):
             return None
-        tools[tool] = tools[tool].model_copy(update={"shape": name})
-        other = Session(replace(self.built, scene=self.built.scene.model_copy(update={"tools": tools})))
-        other._take_over(self)
-        return other
+        tools = [*scene.tools[:tool], with_shape(own, name, scene.folder), *scene.tools[tool + 1 :]]
+        return replace(self.built, scene=scene.model_copy(update={"tools": tools}))
 
-    def _take_over(self, other: Session) -> None:
+    def take_over(self, other: Session) -> None:
         """Set what the sliders of another session on the same bodies have set."""
         for rank in range(len(self._active)):
             self.simulation.set_radius(other.simulation.contact_radius_of(rank), rank)
@@ -158,11 +159,14 @@ class Session:
             if modulus is not None:
                 self.simulation.set_youngs_modulus(modulus, rank)
         self._set_strain_limit(other._strain_limit, {})
+        if self._moving is not None and other._moving is not None:
+            self._moving.set_time_scale(other._moving.time_scale)
 
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
         scene = self.built.scene
         view = scene.view
+        outlines = [outline(tool, scene.folder) for tool in scene.tools]
         header = {
             "type": "scene",
             "name": scene.name,
@@ -171,21 +175,19 @@ class Session:
             "strain_limit": self._strain_limit,
             "max_force": scene.device.max_force,
             "bodies": [body.header(self.simulation.youngs_modulus_of(i)) for i, body in enumerate(self._bodies)],
-            "tools": [self._tool_entry(tool) for tool in range(len(scene.tools))],
+            "tools": [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(outlines)],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
         }
-        return encode(header, by_body([body.arrays() for body in self._bodies]))
+        bodies, tools = by_body([body.arrays() for body in self._bodies]), by_tool([arrays for _, arrays in outlines])
+        return encode(header, {**bodies, **tools})
 
     def _tool_entry(self, tool: int) -> dict[str, Any]:
-        """Entry of the scene message."""
-        table = self.built.scene.tools[tool]
+        """Entry of the scene message, but for what its shape looks like."""
         return {
-            "shape": table.shape,
-            "shapes": choices(shapes_of(table)),
-            "contact": table.contact,
+            "shapes": shape_choices(self.own_tools[tool]),
+            "contact": self.built.scene.tools[tool].contact,
             "friction": self.simulation.friction_of(tool),
-            "radius": table.radius,
             "contact_radius": self.simulation.contact_radius_of(tool),
             "max_contact_radius": self._max_radii[tool],
         }
@@ -263,10 +265,11 @@ class Session:
             raise ViewerError("press: grab must be true or false")
         if np.abs(position - self._centre).max() > REACH * self.size:
             raise ViewerError("press: the position is far away from the body")
+        turned = quaternion(message, "orientation") if "orientation" in message else None
         if self._moving is not None:
             self._moving.end_mode()
             self._moving.struck_at = None
-        self.simulation.move(position.tolist(), tool=tool)
+        self.simulation.move(position.tolist(), tool=tool, orientation=turned)
         self.simulation.grab(grab, tool)
         self._active[tool] = True
         return False
@@ -402,11 +405,6 @@ def _thin(rows: np.ndarray, peaks: int | None = None) -> np.ndarray:
     if peaks is not None and stride > 1 and len(rows):
         thin[:, peaks] = np.maximum.reduceat(rows[:, peaks], np.arange(0, len(rows), stride))
     return thin
-
-
-def shapes_of(tool: ToolTable) -> tuple[str, ...]:
-    """Shapes that a tool may take in the page; one that the page does not draw stays what it is."""
-    return DRAWN_SHAPES if tool.shape in DRAWN_SHAPES else (tool.shape,)
 
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:

@@ -167,7 +167,7 @@ def test_loads_are_in_the_key_and_in_the_file(loaded, loaded_green, tmp_path):
     [
         ({"gravity": (0, 0)}, "gravity needs three numbers, got 2"),
         ({"gravity": (0, 0, np.nan)}, "gravity has a number that is not finite"),
-        ({"pressure": [([0], "much")]}, "pressure must be a finite number"),
+        ({"pressure": [([0], np.inf)]}, "pressure must be a finite number"),
         ({"pressure": [([0], 10.0)]}, "pressure: no face of the surface"),
         ({"spread": [([0, 10**6], (0, 0, 1))]}, "spread node 1000000 does not exist"),
         ({"forces": {10**6: (0, 0, 1)}}, "forces node 1000000 does not exist"),

@@ -5,28 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from command_line import refused, run
 
 import palpate
-
-
-def run(*arguments, cwd, **kwargs):
-    command = [sys.executable, "-c", "from palpate.cli import main; main()", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **kwargs)
-
-
-def refused(result, *words):
-    assert result.returncode == 2, result
-    lines = result.stderr.strip().splitlines()
-    assert len(lines) == 1, result.stderr
-    for word in words:
-        assert word in lines[0], lines[0]
 
 
 @pytest.fixture
@@ -57,8 +43,8 @@ def test_surface_to_force(ball, tmp_path):
 
 def test_cache_is_listed_and_cleared(ball, tmp_path):
     run("precompute", "ball.stl", "--unit", "mm", "--fix", "z < -2cm", cwd=tmp_path)
-    assert "1 files" in run("cache", "list", cwd=tmp_path).stdout
-    assert "deleted 1" in run("cache", "clear", cwd=tmp_path).stdout
+    assert "1 file, " in run("cache", "list", cwd=tmp_path).stdout
+    assert "deleted 1 file, " in run("cache", "clear", cwd=tmp_path).stdout
     assert "0 files" in run("cache", "list", cwd=tmp_path).stdout
 
 

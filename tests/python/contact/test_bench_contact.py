@@ -61,14 +61,15 @@ def test_forces_of_a_peer_that_takes_forces_are_interpolated_at_depths(monkeypat
 
 @pytest.mark.slow
 def test_the_contact_in_numpy_is_that_of_a_tick():
-    """Of a sphere that presses and then slides, within what a parabola and the slope of ``C_reg`` make of it."""
+    """Of a sphere that presses and then slides; the parabola is 1 % stiffer, and sticks as a whole before it slides."""
     body, green = contact_tick._plate((14, 14, 6))
     middle = contact_tick._middle(body)
     path = np.vstack([straight(middle + (0, 0, 2e-3), middle, 1e-4), straight(middle, middle + (5e-3, 0, 0), 1e-5)])
     forces = -loop_of(body, green, [sphere(contact_tick.RADIUS, contact_tick.FRICTION)]).run(path)
     own = numpy_contact(green, middle - (0, 0, contact_tick.RADIUS - contact_tick.DEPTH))
     found = np.array([own.tick(tool) for tool in path])
-    assert np.abs(found - forces).max() < 0.03 * np.abs(forces).max()
+    assert np.abs(found - forces)[:, 2].max() < 0.03 * np.abs(forces[:, 2]).max()
+    assert found[-1] == pytest.approx(forces[-1], abs=0.03 * abs(forces[-1, 2]))
     assert found[-1, 0] == pytest.approx(-contact_tick.FRICTION * found[-1, 2], rel=1e-9)
 
 

@@ -167,6 +167,26 @@ def undisturbed(tmp_path_factory):
     return path.read_bytes()
 
 
+def test_what_a_killed_process_was_writing_is_removed_by_the_next_one(tmp_path):
+    path = tmp_path / "a.palpate"
+    program = child_program((16, 12, 12), f"palpate.precompute(body, path={str(path)!r})")
+    child = subprocess.Popen([sys.executable, "-c", program])
+    beside = tmp_path / f"a.palpate.{child.pid}.new"
+    while not beside.exists() and child.poll() is None:
+        time.sleep(1e-3)
+    child.kill()
+    child.wait(60)
+    assert beside.exists() and not path.exists()
+    mine, other = tmp_path / f"a.palpate.{os.getppid()}.new", tmp_path / f"b.palpate.{child.pid}.new"
+    mine.write_bytes(b"of a process that runs")
+    other.write_bytes(b"of another store")
+    body = palpate.Body(
+        box_mesh(cells=(16, 12, 12)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9
+    )
+    palpate.precompute(body, path=path)
+    assert sorted(os.listdir(tmp_path)) == sorted(["a.palpate", mine.name, other.name])
+
+
 @pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
 def test_interrupted_precompute_resumes_to_the_same_bits(kill, undisturbed, tmp_path):
     path = tmp_path / "a.palpate"
@@ -174,6 +194,8 @@ def test_interrupted_precompute_resumes_to_the_same_bits(kill, undisturbed, tmp_
     program = child_program(
         (20, 15, 15),
         f"""
+# What starts tests in the background ignores SIGINT, and what is ignored is inherited.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def show(done, total):
     if done >= {at} * total:
         print("now", flush=True)

@@ -251,7 +251,7 @@ def test_unattached_part_is_named():
         np.vstack([mesh.nodes, mesh.nodes + [1, 0, 0]]), np.vstack([mesh.tets, mesh.tets + len(mesh.nodes)])
     )
     body = palpate.Body(two, material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
-    with pytest.raises(palpate.Error, match=f"around node {len(mesh.nodes)} has no support"):
+    with pytest.raises(palpate.Error, match=rf"around node {len(mesh.nodes)} at \(1, 0, 0\) m has no support"):
         palpate.precompute(body)
 
 

@@ -85,7 +85,7 @@ def test_models_stores_and_views(tmp_path):
             r"a\.toml:4: view.target.* has too few entries",
         ),
         ('[body]\nmodel = "doll"\n[view]\nfrom = [0, 0, 1]', r"a\.toml:4: unknown key 'view.from'; known are position"),
-        ("", r"a\.toml: the key 'body' is missing"),
+        ("", r"a\.toml: the file is empty"),
     ],
 )
 def test_mistakes_in_models_stores_and_views(tmp_path, text, message):

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from browser import MARKS, Program, drag, opened, press, settled_depth, settled_force, state, until
 
+import palpate
+
 pytestmark = MARKS
 
 
@@ -62,6 +64,14 @@ def test_a_press_is_felt_shown_and_released(page, capsys):
     frames, pointer = (moved[k] - before[k] for k in ("frames", "pointerEvents"))
     with capsys.disabled():
         print(f"\n  {frames / took:.0f} frames applied/s, {pointer / took:.0f} pointer events/s (software GL)")
+
+
+def test_the_size_of_the_body_is_told(page):
+    sides = np.ptp(palpate.models.load("liver", paper=True).nodes, axis=0)
+    text = page.get_by_test_id("legend-size").inner_text()
+    assert text.startswith("Body of ") and text.endswith(" mm")
+    told = [float(number) for number in text.removeprefix("Body of ").removesuffix(" mm").split(" × ")]
+    assert told == pytest.approx(1e3 * sides, rel=6e-4)
 
 
 RADIUS = 10e-3  # of the liver's tools

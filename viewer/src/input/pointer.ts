@@ -3,13 +3,14 @@
 import * as THREE from "three";
 
 import type { Control } from "../control";
+import type { Quaternion, ToolMessage } from "../net/protocol";
 import type { Pick } from "../scene/body_view";
 import type { Stage } from "../scene/stage";
 import type { Viewport } from "../scene/viewport";
 import { drivenTool, inControl } from "../store";
 import type { State, Store } from "../store";
-import { GrabGesture, PressGesture } from "./press_geometry";
-import type { CameraAxes, Gesture, Place, Sight } from "./press_geometry";
+import { GrabGesture, PressGesture, orientationOn } from "./press_geometry";
+import type { CameraAxes, Gesture, HeldTool, Place, Purpose, Sight } from "./press_geometry";
 
 /** So often the tool is told where to go while it moves; a mouse may report four times as often. */
 const SEND_INTERVAL_MS = 4;
@@ -23,6 +24,8 @@ const SECOND_BUTTON = 2;
 const CLICK_PX = 8;
 /** Larger bodies are not searched under every hovering pointer, it would slow the page. */
 const HOVER_TRIANGLES_MAX = 30_000;
+/** By which the tool turns for each pixel that the pointer goes with Alt. */
+const DEGREES_PER_PIXEL = 0.5;
 const ALL_PINNED = "All tools are pinned: Escape lets them go.";
 
 /** What one pointer does from when it goes down on a body. */
@@ -35,7 +38,7 @@ interface Drag {
   movedMs: number;
   timer: number;
   /** What was sent last. */
-  sent: THREE.Vector3 | null;
+  sent: { position: THREE.Vector3; orientation: THREE.Quaternion | null } | null;
 }
 
 export class Pointer {
@@ -82,6 +85,12 @@ export class Pointer {
     }
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => this.onWheel(event), { capture: true, passive: false });
+    // Let alone, Alt would lead out of the page to the browser's menu, and the tool would be let go.
+    for (const name of ["keydown", "keyup"] as const) {
+      window.addEventListener(name, (event) => {
+        if (event.key === "Alt" && this.drag) event.preventDefault();
+      });
+    }
     window.addEventListener("blur", () => this.control.letGo(false));
     document.addEventListener("visibilitychange", () => {
       if (document.hidden) this.control.letGo(false);
@@ -122,10 +131,12 @@ export class Pointer {
     const place: Place = [event.clientX, event.clientY];
     // Without another tool a dent that is still seen is the one that this tool has just left.
     const dent = pinned.length > 0 ? pick.dent : 0;
+    const sight = this.sight(pick);
+    const held = this.heldTool(tool, tools[tool]!, sight.axes);
     const gesture =
       grabWanted || wantsGrab(event)
-        ? new GrabGesture(pick.point, this.sight(pick), size, place)
-        : new PressGesture({ ...pick, dent }, this.sight(pick), size, tools[tool]!.radius, {
+        ? new GrabGesture(pick.point, sight, size, place, held.orientationOn(pick.normal))
+        : new PressGesture({ ...pick, dent }, sight, size, held, {
             pointer: place,
             aim: viewport.project(pick.drawn),
             straight: event.shiftKey,
@@ -166,9 +177,22 @@ export class Pointer {
     this.events += 1;
     // The first button was let go before the second one.
     if ((event.buttons & FIRST_BUTTON) === 0) return this.control.letGo(true);
+    const [right, down] = [event.clientX - drag.place[0], event.clientY - drag.place[1]];
     drag.place = [event.clientX, event.clientY];
     if (event.pointerType === "pen") drag.gesture.press(event.pressure);
-    drag.gesture.moveTo(drag.place, event.shiftKey || (event.buttons & SECOND_BUTTON) !== 0);
+    const purpose = this.purpose(event);
+    drag.gesture.moveTo(drag.place, purpose);
+    if (purpose === "stay") this.turnTool(drag.tool, right, down);
+  }
+
+  private purpose({ altKey, shiftKey, buttons }: PointerEvent): Purpose {
+    if (altKey && this.turns(this.drag!.tool) && !this.drag!.gesture.grab) return "stay";
+    return shiftKey || (buttons & SECOND_BUTTON) !== 0 ? "deepen" : "slide";
+  }
+
+  private turnTool(tool: number, right: number, down: number): void {
+    const { tilt, turn } = this.store.get().postures[tool]!;
+    this.control.hold({ turn: turn + DEGREES_PER_PIXEL * right, tilt: tilt + DEGREES_PER_PIXEL * down });
   }
 
   private onWheel(event: WheelEvent): void {
@@ -218,16 +242,30 @@ export class Pointer {
   }
 
   private send(drag: Drag): void {
-    const centre = drag.gesture.centre();
-    if (drag.sent?.equals(centre)) return;
-    drag.sent = centre;
-    this.control.press(drag.tool, centre.toArray(), drag.gesture.grab);
+    const [position, orientation] = [drag.gesture.position(), drag.gesture.orientation()];
+    const { sent } = drag;
+    if (sent?.position.equals(position) && (!orientation || sent.orientation?.equals(orientation))) return;
+    drag.sent = { position, orientation };
+    this.control.press(drag.tool, position.toArray(), drag.gesture.grab, orientation && wxyz(orientation));
   }
 
   private tellDepth(): void {
     if (!this.drag) return;
     const { tool, gesture } = this.drag;
     this.store.update({ pressing: { tool, grab: gesture.grab, depth: gesture.depth } });
+  }
+
+  private heldTool(tool: number, { radius }: ToolMessage, axes: CameraAxes): HeldTool {
+    return {
+      shape: this.stage.shapes[tool]!,
+      radius,
+      orientationOn: (normal) => (this.turns(tool) ? orientationOn(normal, axes, this.store.get().postures[tool]!) : null),
+    };
+  }
+
+  /** Whether it matters how a tool is turned. */
+  private turns(tool: number): boolean {
+    return this.store.get().scene?.tools[tool]?.shape !== "sphere";
   }
 
   /** What the pointer meets of a body, as the camera stands. */
@@ -246,6 +284,10 @@ export class Pointer {
     this.viewport.camera.matrixWorld.extractBasis(right, up, backward);
     return { right, up, forward: backward.negate() };
   }
+}
+
+function wxyz({ w, x, y, z }: THREE.Quaternion): Quaternion {
+  return [w, x, y, z];
 }
 
 /** Control, or the command key of a Mac. */

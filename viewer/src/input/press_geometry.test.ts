@@ -1,14 +1,17 @@
 import * as THREE from "three";
 import { describe, expect, it } from "vitest";
 
-import { GENTLE_DEPTH, GrabGesture, PEN_DEPTH, PressGesture, approach, centreAt, outline } from "./press_geometry";
-import type { CameraAxes, Place, Sight, Touched } from "./press_geometry";
+import { originAt, toolShape } from "../scene/tool_shape";
+import type { SurfaceSpot } from "../scene/tool_shape";
+import { GENTLE_DEPTH, GrabGesture, PEN_DEPTH, PressGesture, approach, orientationOn, outline } from "./press_geometry";
+import type { CameraAxes, HeldTool, Place, Sight } from "./press_geometry";
 
 const SIZE = 0.2;
 const RADIUS = 0.01;
 const METRES_PER_PIXEL = 2e-4;
 const MIDDLE: Place = [500, 400];
 const FRAME_S = 0.008;
+const NO_SURFACE = { vertices: new Float32Array(), triangles: new Uint32Array() };
 
 /** A camera that looks along y, right along x, up along z. */
 const axes: CameraAxes = {
@@ -19,7 +22,7 @@ const axes: CameraAxes = {
 
 /** A ball of 50 mm around the origin, seen from far away. */
 const BALL = 0.05;
-function onBall([x, y]: Place): Touched | null {
+function onBall([x, y]: Place): SurfaceSpot | null {
   const [right, up] = [(x - MIDDLE[0]) * METRES_PER_PIXEL, (MIDDLE[1] - y) * METRES_PER_PIXEL];
   const squared = BALL ** 2 - right ** 2 - up ** 2;
   if (squared < 0) return null;
@@ -28,8 +31,13 @@ function onBall([x, y]: Place): Touched | null {
 }
 const sight: Sight = { axes, metresPerPixel: METRES_PER_PIXEL, surfaceAt: onBall };
 
+const ball = toolShape({ shape: "sphere", lengths: [RADIUS, 0, 0] }, NO_SURFACE);
+const BALL_IN_HAND: HeldTool = { shape: ball, radius: RADIUS, orientationOn: () => null };
+/** Origin of the ball at a depth. */
+const centreAt = (spot: SurfaceSpot, depth: number) => originAt(ball, new THREE.Quaternion(), spot, depth);
+
 function pressOn(pointer: Place, { dent = 0, straight = false, aim = pointer } = {}): PressGesture {
-  return new PressGesture({ ...onBall(aim)!, dent }, sight, SIZE, RADIUS, { pointer, aim, straight });
+  return new PressGesture({ ...onBall(aim)!, dent }, sight, SIZE, BALL_IN_HAND, { pointer, aim, straight });
 }
 
 function settle(gesture: PressGesture, seconds = 3): PressGesture {
@@ -38,7 +46,7 @@ function settle(gesture: PressGesture, seconds = 3): PressGesture {
 }
 
 /** Depth of the tool below the ball, by the distance of its centre from that of the ball. */
-const depthIn = (gesture: PressGesture) => BALL + RADIUS - gesture.centre().length();
+const depthIn = (gesture: PressGesture) => BALL + RADIUS - gesture.position().length();
 
 describe("the depth", () => {
   it("follows its goal as the differential equation says", () => {
@@ -71,7 +79,7 @@ describe("a press", () => {
   it("begins where the tool just touches the point under the pointer", () => {
     for (const place of [MIDDLE, [600, 300]] as Place[]) {
       const gesture = pressOn(place);
-      expect(gesture.centre().distanceTo(centreAt(onBall(place)!, RADIUS, 0))).toBeLessThan(1e-15);
+      expect(gesture.position().distanceTo(centreAt(onBall(place)!, 0))).toBeLessThan(1e-15);
       expect(depthIn(gesture)).toBeCloseTo(0, 15);
     }
   });
@@ -100,26 +108,26 @@ describe("a press", () => {
   it("slides on the surface under the pointer at the same depth", () => {
     const gesture = settle(pressOn(MIDDLE));
     for (let step = 1; step <= 40; step++) {
-      gesture.moveTo([MIDDLE[0] + 5 * step, MIDDLE[1]], false);
+      gesture.moveTo([MIDDLE[0] + 5 * step, MIDDLE[1]], "slide");
       gesture.advance(FRAME_S);
       expect(depthIn(gesture)).toBeCloseTo(GENTLE_DEPTH * RADIUS, 12);
     }
     const there = onBall([700, 400])!;
-    expect(gesture.centre().distanceTo(centreAt(there, RADIUS, GENTLE_DEPTH * RADIUS))).toBeLessThan(1e-12);
+    expect(gesture.position().distanceTo(centreAt(there, GENTLE_DEPTH * RADIUS))).toBeLessThan(1e-12);
   });
 
   it("rolls off beside the body without a jump, and comes back", () => {
     const gesture = settle(pressOn(MIDDLE));
-    let [before, longest, shallowest] = [gesture.centre(), 0, Infinity];
+    let [before, longest, shallowest] = [gesture.position(), 0, Infinity];
     const place = (x: number) => {
-      gesture.moveTo([x, MIDDLE[1]], false);
+      gesture.moveTo([x, MIDDLE[1]], "slide");
       gesture.advance(FRAME_S);
-      longest = Math.max(longest, gesture.centre().distanceTo(before));
+      longest = Math.max(longest, gesture.position().distanceTo(before));
       shallowest = Math.min(shallowest, depthIn(gesture));
-      before = gesture.centre();
+      before = gesture.position();
     };
     for (let x = MIDDLE[0]; x <= 820; x += 2) place(x);
-    expect(gesture.centre().x).toBeCloseTo(BALL + RADIUS - GENTLE_DEPTH * RADIUS + 70 * METRES_PER_PIXEL, 4);
+    expect(gesture.position().x).toBeCloseTo(BALL + RADIUS - GENTLE_DEPTH * RADIUS + 70 * METRES_PER_PIXEL, 4);
     expect(shallowest).toBeLessThan(-0.005);
     for (let x = 820; x >= MIDDLE[0]; x -= 2) place(x);
     expect(depthIn(settle(gesture))).toBeCloseTo(GENTLE_DEPTH * RADIUS, 12);
@@ -128,11 +136,11 @@ describe("a press", () => {
 
   it("leaves at the outline, however far the pointer went at once", () => {
     const gesture = settle(pressOn(MIDDLE));
-    gesture.moveTo([900, MIDDLE[1]], false);
+    gesture.moveTo([900, MIDDLE[1]], "slide");
     settle(gesture);
     const edge = outline(MIDDLE, [900, MIDDLE[1]], (place) => onBall(place) !== null);
     expect(Math.abs(edge[0] - 750)).toBeLessThan(400 / 2 ** 8);
-    expect(gesture.centre().x).toBeCloseTo(0.4 * RADIUS + 0.2 * RADIUS + BALL + 150 * METRES_PER_PIXEL, 3);
+    expect(gesture.position().x).toBeCloseTo(0.4 * RADIUS + 0.2 * RADIUS + BALL + 150 * METRES_PER_PIXEL, 3);
   });
 
   it("goes straight in along the normal of the first point while only its depth is moved", () => {
@@ -140,14 +148,14 @@ describe("a press", () => {
     const { point, normal } = onBall(place)!;
     const gesture = pressOn(place, { straight: true });
     expect(depthIn(settle(gesture))).toBeCloseTo(0, 12);
-    gesture.moveTo([640, 420], true);
+    gesture.moveTo([640, 420], "deepen");
     settle(gesture);
     const deep = 0.25 * 100 * METRES_PER_PIXEL;
-    expect(gesture.centre().distanceTo(centreAt({ point, normal }, RADIUS, deep))).toBeLessThan(1e-12);
+    expect(gesture.position().distanceTo(centreAt({ point, normal }, deep))).toBeLessThan(1e-12);
     // Sliding goes on from the point it had, not from under the pointer.
-    gesture.moveTo([641, 420], false);
+    gesture.moveTo([641, 420], "slide");
     settle(gesture);
-    expect(gesture.centre().distanceTo(centreAt(onBall([601, 320])!, RADIUS, deep))).toBeLessThan(1e-12);
+    expect(gesture.position().distanceTo(centreAt(onBall([601, 320])!, deep))).toBeLessThan(1e-12);
   });
 
   it("goes by the wheel a tenth of the tool's radius a notch, and stops at its limits", () => {
@@ -189,22 +197,69 @@ describe("a press", () => {
 
 describe("a grab", () => {
   const held = new THREE.Vector3(0.01, 0.02, 0.03);
-  const grab = () => new GrabGesture(held, { axes, metresPerPixel: METRES_PER_PIXEL }, SIZE, MIDDLE);
+  const grab = () => new GrabGesture(held, { axes, metresPerPixel: METRES_PER_PIXEL }, SIZE, MIDDLE, null);
 
   it("holds the touched point itself and follows the pointer across the line of sight", () => {
     const gesture = grab();
-    expect(gesture.centre().distanceTo(held)).toBe(0);
+    expect(gesture.position().distanceTo(held)).toBe(0);
     gesture.moveTo([MIDDLE[0] + 30, MIDDLE[1] + 20]);
-    expect(gesture.centre().distanceTo(held.clone().add(new THREE.Vector3(0.006, 0, -0.004)))).toBeLessThan(1e-15);
+    expect(gesture.position().distanceTo(held.clone().add(new THREE.Vector3(0.006, 0, -0.004)))).toBeLessThan(1e-15);
     gesture.wheel(10);
     const away = held.clone().add(new THREE.Vector3(0.006, 0.004, -0.004));
-    expect(gesture.centre().distanceTo(away)).toBeLessThan(1e-15);
+    expect(gesture.position().distanceTo(away)).toBeLessThan(1e-15);
     expect(gesture.depth).toBeCloseTo(Math.hypot(0.006, 0.004, 0.004), 15);
   });
 
   it("pulls a quarter of the body at most, in the direction of the pointer", () => {
     const gesture = grab();
     gesture.moveTo([MIDDLE[0] + 1e5, MIDDLE[1]]);
-    expect(gesture.centre().distanceTo(held.clone().add(new THREE.Vector3(0.25 * SIZE, 0, 0)))).toBeLessThan(1e-15);
+    expect(gesture.position().distanceTo(held.clone().add(new THREE.Vector3(0.25 * SIZE, 0, 0)))).toBeLessThan(1e-15);
+  });
+});
+
+describe("a tool that is held at an angle", () => {
+  const upright = { tilt: 0, turn: 0 };
+  const z = new THREE.Vector3(0, 0, 1);
+
+  it("stands on the normal, and leans from it by the tilt, to where it is turned", () => {
+    for (const place of [MIDDLE, [600, 300], [380, 520]] as Place[]) {
+      const { normal } = onBall(place)!;
+      for (const tilt of [0, 30, 90]) {
+        for (const turn of [-120, 0, 45]) {
+          const axis = z.clone().applyQuaternion(orientationOn(normal, axes, { tilt, turn }));
+          expect(axis.dot(normal)).toBeCloseTo(Math.cos(THREE.MathUtils.degToRad(tilt)), 12);
+        }
+      }
+    }
+    // Where the surface faces the camera, right and up of the picture.
+    const { normal } = onBall(MIDDLE)!;
+    const lying = (turn: number) => z.clone().applyQuaternion(orientationOn(normal, axes, { tilt: 90, turn }));
+    expect(lying(0).distanceTo(axes.right)).toBeLessThan(1e-12);
+    expect(lying(90).distanceTo(axes.up)).toBeLessThan(1e-12);
+  });
+
+  it("slides at the same depth whichever way it leans, and follows the surface", () => {
+    const posture = { ...upright };
+    const capsule = toolShape({ shape: "capsule", lengths: [0.5 * RADIUS, 3 * RADIUS, 0] }, NO_SURFACE);
+    const tool: HeldTool = { shape: capsule, radius: RADIUS, orientationOn: (n) => orientationOn(n, axes, posture) };
+    const gesture = new PressGesture({ ...onBall(MIDDLE)!, dent: 0 }, sight, SIZE, tool, {
+      pointer: MIDDLE,
+      aim: MIDDLE,
+      straight: false,
+    });
+    for (const tilt of [0, 50, 90]) {
+      posture.tilt = tilt;
+      gesture.moveTo([MIDDLE[0] + tilt, MIDDLE[1] + 20], "slide");
+      settle(gesture);
+      const { normal, point } = onBall([MIDDLE[0] + tilt, MIDDLE[1] + 20])!;
+      const [place, turned] = [gesture.position(), gesture.orientation()!];
+      const heights = [0, 3 * RADIUS].map((along) => new THREE.Vector3(0, 0, along).applyQuaternion(turned).add(place));
+      const lowest = Math.min(...heights.map((end) => end.sub(point).dot(normal))) - 0.5 * RADIUS;
+      expect(lowest).toBeCloseTo(-GENTLE_DEPTH * RADIUS, 12);
+    }
+    const before = gesture.position();
+    gesture.moveTo([900, 900], "stay");
+    settle(gesture);
+    expect(gesture.position().distanceTo(before)).toBe(0);
   });
 });

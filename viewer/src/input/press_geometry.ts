@@ -1,7 +1,11 @@
-// From movements of the pointer to the centre of the tool. A press starts where the tool just touches; the tool then keeps
+// From movements of the pointer to the pose of the tool. A press starts where the tool just touches; the tool then keeps
 // on the surface under the pointer, and how deep it is has a goal of its own. Lengths in m, places of the window in pixels.
 
 import * as THREE from "three";
+
+import { originAt } from "../scene/tool_shape";
+import type { SurfaceSpot, ToolShape } from "../scene/tool_shape";
+import type { Posture } from "../store";
 
 /** Depth, over the tool's radius, that a button held down leads to; of a pen, at full pressure; and of a notch of the wheel. */
 export const GENTLE_DEPTH = 0.4;
@@ -35,10 +39,13 @@ export interface CameraAxes {
 /** A place of the window, in pixels. */
 export type Place = readonly [x: number, y: number];
 
-/** A point of the untouched surface, and the outward normal there. */
-export interface Touched {
-  point: THREE.Vector3;
-  normal: THREE.Vector3;
+/** A tool in the hand. */
+export interface HeldTool {
+  shape: ToolShape;
+  /** By which depths are measured. */
+  radius: number;
+  /** How it stands on a surface with this outward normal; null for a tool that looks the same from all sides. */
+  orientationOn(normal: THREE.Vector3): THREE.Quaternion | null;
 }
 
 /** What the pointer meets of the body that it presses. */
@@ -46,14 +53,17 @@ export interface Sight {
   axes: CameraAxes;
   metresPerPixel: number;
   /** The point of the untouched surface under a place of the window; null beside the body. */
-  surfaceAt(place: Place): Touched | null;
+  surfaceAt(place: Place): SurfaceSpot | null;
 }
+
+/** What a movement of the pointer is for. */
+export type Purpose = "slide" | "deepen" | "stay";
 
 /** What the pointer does with the body until it is let go. */
 export interface Gesture {
   readonly grab: boolean;
-  /** The pointer goes to a place; with `deepening` it only changes the depth, down is deeper. */
-  moveTo(place: Place, deepening: boolean): void;
+  /** The pointer goes to a place; to `deepen` it only changes the depth, down is deeper; to `stay` it does something else. */
+  moveTo(place: Place, to: Purpose): void;
   /** Away from the viewer is positive. */
   wheel(notches: number): void;
   /** From 0 to 1. */
@@ -62,8 +72,10 @@ export interface Gesture {
   hold(held: boolean): void;
   /** Lets time pass and tells whether the tool moves on. */
   advance(seconds: number): boolean;
-  /** Centre of the tool. */
-  centre(): THREE.Vector3;
+  /** Of the tool's origin. */
+  position(): THREE.Vector3;
+  /** null where the tool need not be turned. */
+  orientation(): THREE.Quaternion | null;
   /** Depth of a press, length of a pull, as the pointer has it now. */
   readonly depth: number;
 }
@@ -91,9 +103,19 @@ export function approach({ value, rate }: Following, goal: number, seconds: numb
   };
 }
 
-/** Centre of a sphere that is so deep below the tangent plane of a point of the surface. */
-export function centreAt({ point, normal }: Touched, radius: number, depth: number): THREE.Vector3 {
-  return point.clone().addScaledVector(normal, radius - depth);
+/**
+ * A tool that leans by `tilt` from the outward normal of a surface, towards a direction that is `turn` from the right of the
+ * picture. The frame of the camera, turned the shortest way until it looks along the normal, is where both are zero:
+ * nothing that is seen faces away, where there would be no shortest way.
+ */
+export function orientationOn(normal: THREE.Vector3, { right, up, forward }: CameraAxes, { tilt, turn }: Posture): THREE.Quaternion {
+  const backward = forward.clone().negate();
+  const camera = new THREE.Quaternion().setFromRotationMatrix(new THREE.Matrix4().makeBasis(right, up, backward));
+  const facing = new THREE.Quaternion().setFromUnitVectors(backward, normal).multiply(camera);
+  const [turned, tilted] = [new THREE.Quaternion(), new THREE.Quaternion()];
+  turned.setFromAxisAngle(new THREE.Vector3(0, 0, 1), THREE.MathUtils.degToRad(turn));
+  tilted.setFromAxisAngle(new THREE.Vector3(0, 1, 0), THREE.MathUtils.degToRad(tilt));
+  return facing.multiply(turned).multiply(tilted).normalize();
 }
 
 /** The last place that is still on the body, on the way from one that is to one beside it. */
@@ -120,9 +142,9 @@ export class PressGesture implements Gesture {
   private aim: Place;
   /** The last aim on the body, the surface there, and how far beside the body the tool is from it. */
   private onBody: Place;
-  private touched: Touched;
+  private touched: SurfaceSpot;
   private readonly beside = new THREE.Vector3();
-  /** Centre of the tool; it goes where the pointer wants it no faster than a hand. */
+  /** Origin of the tool; it goes where the pointer wants it no faster than a hand. */
   private readonly at: THREE.Vector3;
 
   /**
@@ -130,16 +152,16 @@ export class PressGesture implements Gesture {
    * to be told. `aim` is where the touched point is seen while nothing touches the body.
    */
   constructor(
-    first: Touched & { dent: number },
+    first: SurfaceSpot & { dent: number },
     private readonly sight: Sight,
     private readonly size: number,
-    private readonly radius: number,
+    private readonly tool: HeldTool,
     { pointer, aim, straight }: { pointer: Place; aim: Place; straight: boolean },
   ) {
     this.touched = { point: first.point.clone(), normal: first.normal.clone() };
     this.following = { value: first.dent, rate: 0 };
     this.dent = first.dent;
-    this.goal = this.dent + (straight ? 0 : GENTLE_DEPTH * radius);
+    this.goal = this.dent + (straight ? 0 : GENTLE_DEPTH * tool.radius);
     this.pointer = pointer;
     this.aim = this.onBody = aim;
     this.at = this.wanted();
@@ -149,20 +171,21 @@ export class PressGesture implements Gesture {
     return this.following.value;
   }
 
-  moveTo(place: Place, deepening: boolean): void {
+  moveTo(place: Place, to: Purpose): void {
     const [right, down] = [place[0] - this.pointer[0], place[1] - this.pointer[1]];
     this.pointer = place;
-    if (deepening) return this.deepen(DEPTH_PER_DRAG * this.sight.metresPerPixel * down);
+    if (to === "stay") return;
+    if (to === "deepen") return this.deepen(DEPTH_PER_DRAG * this.sight.metresPerPixel * down);
     this.aim = [this.aim[0] + right, this.aim[1] + down];
     this.slide();
   }
 
   wheel(notches: number): void {
-    this.deepen(notches * NOTCH_DEPTH * this.radius);
+    this.deepen(notches * NOTCH_DEPTH * this.tool.radius);
   }
 
   press(pressure: number): void {
-    this.goal = this.dent + pressure * PEN_DEPTH * this.radius;
+    this.goal = this.dent + pressure * PEN_DEPTH * this.tool.radius;
   }
 
   hold(held: boolean): void {
@@ -170,8 +193,8 @@ export class PressGesture implements Gesture {
   }
 
   advance(seconds: number): boolean {
-    const near = ARRIVED * this.radius;
-    this.following = approach(this.following, this.goal, seconds, DEPTH_LAG_S, DEPTH_SPEED_MAX * this.radius);
+    const near = ARRIVED * this.tool.radius;
+    this.following = approach(this.following, this.goal, seconds, DEPTH_LAG_S, DEPTH_SPEED_MAX * this.tool.radius);
     const deepened = Math.abs(this.goal - this.following.value) < near && Math.abs(this.following.rate) < near;
     if (deepened) this.following = { value: this.goal, rate: 0 };
     const [way, reach] = [this.wanted().sub(this.at), SPEED_MAX * this.size * seconds];
@@ -180,14 +203,18 @@ export class PressGesture implements Gesture {
     return !deepened || !arrived;
   }
 
-  centre(): THREE.Vector3 {
+  position(): THREE.Vector3 {
     return this.at.clone();
   }
 
+  orientation(): THREE.Quaternion | null {
+    return this.tool.orientationOn(this.touched.normal);
+  }
+
   private deepen(metres: number): void {
-    const room = this.heldAt === null ? Infinity : this.heldAt + HELD_ROOM * this.radius;
+    const room = this.heldAt === null ? Infinity : this.heldAt + HELD_ROOM * this.tool.radius;
     const deepest = Math.min(DEPTH_MAX * this.size, Math.max(room, this.goal));
-    this.goal = THREE.MathUtils.clamp(this.goal + metres, -LIFT_MAX * this.radius, deepest);
+    this.goal = THREE.MathUtils.clamp(this.goal + metres, -LIFT_MAX * this.tool.radius, deepest);
   }
 
   private slide(): void {
@@ -206,7 +233,8 @@ export class PressGesture implements Gesture {
   }
 
   private wanted(): THREE.Vector3 {
-    return centreAt(this.touched, this.radius, this.depth).add(this.beside);
+    const orientation = this.orientation() ?? new THREE.Quaternion();
+    return originAt(this.tool.shape, orientation, this.touched, this.depth).add(this.beside);
   }
 }
 
@@ -223,6 +251,7 @@ export class GrabGesture implements Gesture {
     private readonly sight: Omit<Sight, "surfaceAt">,
     private readonly size: number,
     private pointer: Place,
+    private readonly turned: THREE.Quaternion | null,
   ) {}
 
   get depth(): number {
@@ -251,8 +280,12 @@ export class GrabGesture implements Gesture {
     return false;
   }
 
-  // The tool takes hold where its centre is when the grab begins, so that is the touched point itself.
-  centre(): THREE.Vector3 {
+  // The tool takes hold where its origin is when the grab begins, so that is the touched point itself.
+  position(): THREE.Vector3 {
     return this.held.clone().add(this.pull);
+  }
+
+  orientation(): THREE.Quaternion | null {
+    return this.turned;
   }
 }

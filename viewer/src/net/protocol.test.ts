@@ -29,10 +29,11 @@ function encoded(header: object, data = new Uint8Array()): ArrayBuffer {
 
 /** Every array of a decoded message under its name in the message. */
 function arraysOf(data: SceneData | FrameData): Record<string, ArrayLike<number>> {
-  const bodies = data.bodies.map((body) => Object.entries(body as unknown as Record<string, ArrayLike<number>>));
-  const named = bodies.flatMap((arrays, i) => arrays.map(([name, array]) => [`${i}/${name}`, array] as const));
-  const rows = isScene(data) ? {} : { log: data.log, history: data.history };
-  return { ...Object.fromEntries(named), ...rows };
+  const named = (groups: object[], prefix: string) =>
+    groups.flatMap((arrays, i) => Object.entries(arrays).map(([name, array]) => [`${prefix}${i}/${name}`, array] as const));
+  const bodies = Object.fromEntries(named(data.bodies, "")) as Record<string, ArrayLike<number>>;
+  if (!isScene(data)) return { ...bodies, log: data.log, history: data.history };
+  return { ...bodies, ...(Object.fromEntries(named(data.tools, "tools/")) as Record<string, ArrayLike<number>>) };
 }
 
 describe("the golden messages, which Python writes", () => {

@@ -1,10 +1,10 @@
-// Messages of the websocket, version 5. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 6. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
-// is named "<index of the body>/<what it is>".
+// is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
-export const PROTOCOL_VERSION = 5;
+export const PROTOCOL_VERSION = 6;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -56,15 +56,20 @@ export interface BodyMessage {
   fields: Choice[];
 }
 
+export type ShapeName = "sphere" | "ellipsoid" | "capsule" | "punch" | "surface";
+
 export interface ToolMessage {
-  shape: string;
+  shape: ShapeName;
+  /** Radius of a sphere; semi-axes of an ellipsoid; radius of a capsule or punch, then length or rounding; else zeros. */
+  lengths: Vec3;
+  /** Half of its smallest extent. */
+  radius: number;
   /** The shapes that it may take. */
   shapes: Choice[];
   /** The law of its contacts: "local" slides and rubs, the others hold on to what they touch. */
   contact: "local" | "patch" | "node";
   /** Coefficient of friction. */
   friction: number;
-  radius: number;
   contact_radius: number;
   max_contact_radius: number;
 }
@@ -98,6 +103,12 @@ export interface BodyArrays {
   fixed_nodes: Uint32Array;
   /** Displacements of the surface under the body's own loads, a row for each surface node. */
   free: Float32Array;
+}
+
+/** Surface of a tool from a file, in its frame; empty for the other shapes. */
+export interface ToolArrays {
+  vertices: Float32Array;
+  triangles: Uint32Array;
 }
 
 export interface ToolFrame {
@@ -188,6 +199,7 @@ export interface PoseArrays {
 export interface SceneData {
   header: SceneMessage;
   bodies: BodyArrays[];
+  tools: ToolArrays[];
 }
 
 export interface FrameData {
@@ -206,7 +218,7 @@ export interface SettingsMessage {
   /** Of each tool. */
   contact_radius: number[];
   friction: number[];
-  shape: string[];
+  shape: ShapeName[];
   /** 0 for none. */
   strain_limit: number;
   time_scale: number | null;
@@ -229,7 +241,7 @@ export type TextMessage =
 
 export type ClientMessage =
   | { type: "hello"; token: string; version: number }
-  | { type: "press"; tool: number; position: Vec3; grab: boolean }
+  | { type: "press"; tool: number; position: Vec3; grab: boolean; orientation?: Quaternion }
   | { type: "release"; tool?: number }
   | { type: "set"; youngs_modulus: number; body: number }
   | { type: "set"; contact_radius: number; tool?: number }
@@ -256,6 +268,7 @@ const BODY_ARRAYS = {
   fixed_nodes: Uint32Array,
   free: Float32Array,
 };
+const TOOL_ARRAYS = { vertices: Float32Array, triangles: Uint32Array };
 const POSE_ARRAYS = { displacements: Float32Array, scalar: Uint8Array };
 
 interface ArrayEntry {
@@ -280,16 +293,20 @@ export function decodeText(text: string): TextMessage {
 /** Reads a scene or a frame; throws on a message that is neither, lacks an array, or is shorter than it says. */
 export function decodeBinary(buffer: ArrayBuffer): SceneData | FrameData {
   const { header, start } = readHeader(buffer);
-  const { type, bodies, arrays: entries } = header;
+  const { type, bodies, tools, arrays: entries } = header;
   if (type !== "scene" && type !== "frame") throw new Error("a binary message of an unknown type");
-  if (!Array.isArray(bodies) || !Array.isArray(header["tools"]) || !Array.isArray(entries)) {
+  if (!Array.isArray(bodies) || !Array.isArray(tools) || !Array.isArray(entries)) {
     throw new Error(`a ${type} without bodies, tools or arrays`);
   }
   const arrays = new Map<string, AnyArray>();
   for (const entry of entries as ArrayEntry[]) arrays.set(entry.name, viewArray(buffer, start, entry));
   delete header["arrays"];
   if (type === "scene") {
-    return { header: header as unknown as SceneMessage, bodies: bodies.map((_, i) => group(arrays, `${i}/`, BODY_ARRAYS)) };
+    return {
+      header: header as unknown as SceneMessage,
+      bodies: bodies.map((_, i) => group(arrays, `${i}/`, BODY_ARRAYS)),
+      tools: tools.map((_, i) => group(arrays, `tools/${i}/`, TOOL_ARRAYS)),
+    };
   }
   return {
     header: header as unknown as FrameMessage,

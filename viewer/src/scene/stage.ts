@@ -7,12 +7,15 @@ import type { Store } from "../store";
 import { BodyView } from "./body_view";
 import type { Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
+import { toolShape } from "./tool_shape";
+import type { ToolShape } from "./tool_shape";
 import { ToolView } from "./tool_view";
 import type { Viewport } from "./viewport";
 import { WatchedView } from "./watched_view";
 
 export class Stage {
   bodies: BodyView[] = [];
+  shapes: ToolShape[] = [];
   readonly bounds = new THREE.Box3();
   private tools: ToolView[] = [];
   private watched: { view: WatchedView; body: number } | null = null;
@@ -35,10 +38,11 @@ export class Stage {
     });
   }
 
-  setScene({ header, bodies }: SceneData): void {
+  setScene({ header, bodies, tools }: SceneData): void {
     this.dispose();
     this.bodies = header.bodies.map((body, i) => new BodyView(i, body, bodies[i]!, header.size));
-    this.tools = header.tools.map((tool) => new ToolView(header, tool, this.bodies));
+    this.shapes = header.tools.map((tool, i) => toolShape(tool, tools[i]!));
+    this.tools = header.tools.map((tool, i) => new ToolView(header, tool, this.shapes[i]!, this.bodies));
     for (const { group } of [...this.bodies, ...this.tools]) this.viewport.scene.add(group);
     for (const body of this.bodies) body.exaggerate(this.store.get().shownScale);
     const moving = header.motion && this.bodies[header.motion.body];

@@ -5,7 +5,7 @@ import type { BodyArrays, Vec3 } from "../net/protocol";
 import { closestSurfacePoint } from "./closest_point";
 import { arrowLength } from "./force_arrow";
 import { firstEntry } from "./ray_surface";
-import { Surface } from "./surface";
+import { Surface, sidesOf } from "./surface";
 
 /** A ball of triangles whose corners lie on the sphere of 50 mm. */
 const BALL = 0.05;
@@ -143,5 +143,12 @@ describe("a point of the surface between its nodes", () => {
     const two = surface.smoothPoint({ corners: other, weights });
     one.place.forEach((x, axis) => expect(two.place[axis]).toBeCloseTo(x, 12));
     one.normal.forEach((x, axis) => expect(two.normal[axis]).toBeCloseTo(x, 12));
+  });
+});
+
+describe("the box around points", () => {
+  it("has the sides of what they fill", () => {
+    const sides = sidesOf(new Float32Array([1, 2, 3, -1, 2.5, 3, 0, 4, 7]));
+    expect(sides).toEqual([2, 2, 4]);
   });
 });

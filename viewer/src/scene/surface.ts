@@ -178,3 +178,14 @@ function addScaled(normals: Float32Array, at: number, x: number, y: number, z: n
   normals[at + 1]! += y / over;
   normals[at + 2]! += z / over;
 }
+
+/** Sides of the box around points (n, 3). */
+export function sidesOf(points: Float32Array): Vec3 {
+  const low: Vec3 = [Infinity, Infinity, Infinity];
+  const high: Vec3 = [-Infinity, -Infinity, -Infinity];
+  points.forEach((value, i) => {
+    low[i % 3] = Math.min(low[i % 3]!, value);
+    high[i % 3] = Math.max(high[i % 3]!, value);
+  });
+  return [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+}

@@ -9,6 +9,8 @@ import { ForceArrow } from "./force_arrow";
 import { LimitView } from "./limit_view";
 import { PinView } from "./pin_view";
 import type { SurfacePoint } from "./surface";
+import { originAt } from "./tool_shape";
+import type { SurfaceSpot, ToolShape } from "./tool_shape";
 
 const RING_COLOR = 0xfff3d6;
 /** A contact smaller than this, over the size of the scene, is shown as a ring of this radius all the same. */
@@ -24,7 +26,7 @@ export interface ToolPose {
 
 export class ToolView {
   readonly group = new THREE.Group();
-  private readonly sphere: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
+  private readonly solid: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
   private readonly ring: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
   private readonly arrow: ForceArrow;
   private readonly limit: LimitView;
@@ -36,11 +38,12 @@ export class ToolView {
   constructor(
     private readonly scene: SceneMessage,
     private readonly tool: ToolMessage,
+    private readonly shape: ToolShape,
     private readonly bodies: readonly BodyView[],
   ) {
     const { size } = scene;
-    this.sphere = new THREE.Mesh(
-      new THREE.SphereGeometry(tool.radius, 40, 24),
+    this.solid = new THREE.Mesh(
+      shape.geometry(),
       // Of glass, so that the dent below it is seen.
       new THREE.MeshStandardMaterial({ color: 0xd5dbe3, roughness: 0.28, metalness: 0.15, transparent: true, opacity: 0.5 }),
     );
@@ -57,7 +60,7 @@ export class ToolView {
     this.arrow = new ForceArrow(size, scene.max_force);
     this.limit = new LimitView(tool.radius);
     this.pin = new PinView();
-    this.group.add(this.sphere, this.ring, this.arrow.group, this.limit.group, this.pin.sprite);
+    this.group.add(this.solid, this.ring, this.arrow.group, this.limit.group, this.pin.sprite);
     this.group.visible = false;
   }
 
@@ -71,16 +74,16 @@ export class ToolView {
     this.drawnState = state;
     const [w, x, y, z] = tool.orientation;
     this.group.visible = tool.active;
-    this.sphere.quaternion.set(x, y, z, w);
+    this.solid.quaternion.set(x, y, z, w);
     const shown = touched && shownAt(touched, offset);
     // A tool that slides is held by its force: it is drawn on the surface that gives no farther.
     const held = tool.limited && shown !== null && contact?.depth != null;
-    const place = held ? shown.point.clone().addScaledVector(shown.normal, this.tool.radius).toArray() : tool.position;
-    this.sphere.position.set(...place);
+    const place = held ? originAt(this.shape, this.solid.quaternion, shown, 0).toArray() : tool.position;
+    this.solid.position.set(...place);
     this.limit.update(place, tool.wanted);
     this.pin.sprite.visible = pinned;
     this.pin.sprite.position.set(...place);
-    this.arrow.update(place, this.tool.radius, tool.active ? tool.force : [0, 0, 0]);
+    this.arrow.update(this.pressedFrom(place, shown), this.tool.radius, tool.active ? tool.force : [0, 0, 0]);
     // Where displacements are drawn larger than they are, the tool goes with the surface that it touches.
     this.group.position.fromArray(offset);
     this.ring.visible = shown !== null;
@@ -100,7 +103,16 @@ export class ToolView {
     return { body, place: this.touched.place };
   }
 
-  private drawRing(contact: ContactMessage, { point, normal }: { point: THREE.Vector3; normal: THREE.Vector3 }): void {
+  /** A radius above the place of the tool that presses: of a sphere its centre, of a stylus on its side its middle. */
+  private pressedFrom(place: Vec3, shown: SurfaceSpot | null): Vec3 {
+    if (!shown) return place;
+    const turned = this.solid.quaternion;
+    const direction = shown.normal.clone().negate().applyQuaternion(turned.clone().invert());
+    const pressing = this.shape.footing(direction).applyQuaternion(turned);
+    return pressing.addScaledVector(shown.normal, this.tool.radius).add(new THREE.Vector3(...place)).toArray();
+  }
+
+  private drawRing(contact: ContactMessage, { point, normal }: SurfaceSpot): void {
     this.ring.position.copy(point);
     this.ring.quaternion.setFromUnitVectors(FORWARD, normal);
     this.ring.scale.setScalar(Math.max(contact.radius, RING_MIN * this.scene.size));
@@ -111,7 +123,7 @@ export class ToolView {
     this.limit.dispose();
     this.pin.dispose();
     this.arrow.dispose();
-    for (const mesh of [this.sphere, this.ring]) {
+    for (const mesh of [this.solid, this.ring]) {
       mesh.geometry.dispose();
       mesh.material.dispose();
     }
@@ -122,7 +134,7 @@ export class ToolView {
 function shownAt(
   { body, place }: { body: BodyView; place: SurfacePoint },
   offset: number[],
-): { point: THREE.Vector3; normal: THREE.Vector3 } {
+): SurfaceSpot {
   const { surface, placed } = body;
   const point = new THREE.Vector3(...surface.at(surface.shown, place)).applyMatrix4(placed.matrix);
   const normal = new THREE.Vector3(...surface.at(surface.shownNormals, place)).normalize();

@@ -5,7 +5,7 @@ import { ColorMap } from "../scene/color_map";
 import { tissueColor } from "../scene/field_material";
 import type { Store } from "../store";
 import { byId, setText } from "./dom";
-import { MINUS } from "./numbers";
+import { MINUS, sizeText } from "./numbers";
 
 /** Units that take over where the numbers would get long: from this value on, divided by the factor. */
 const LARGER_UNITS: Record<string, { unit: string; factor: number }[]> = {
@@ -23,6 +23,11 @@ export class Legend {
     store.subscribe(["scene", "body"], ({ scene, body }) => {
       this.tissue = tissueColor(scene?.bodies[body]?.name ?? "").getStyle();
       this.drawn = null;
+    });
+    store.subscribe(["sizes", "body"], ({ sizes, body }) => {
+      const sides = sizes[body];
+      byId("legend-size").hidden = !sides;
+      if (sides) setText(byId("legend-size"), `Body of ${sizeText(sides)}`);
     });
     store.subscribe(["layers"], ({ layers }) => {
       byId("legend-field").hidden = !layers.colors;

@@ -9,8 +9,9 @@ export function signed(value: number): string {
   return (value < 0 ? MINUS : "+") + text;
 }
 
-/** Three digits where the number has them: 0.42, 3.14, 12.5. */
+/** Two or three digits: 0.063, 0.42, 3.14, 12.5; what rounds to nothing is 0.00. */
 export function threeDigits(value: number): string {
+  if (value >= 0.0005 && value < 0.0995) return value.toFixed(3);
   return value.toFixed(value >= 9.995 ? 1 : 2);
 }
 
@@ -45,4 +46,17 @@ export function percent(part: number): string {
 /** A length in m, told in mm. */
 export function millimetres(metres: number): string {
   return `${(1000 * metres).toFixed(1)} mm`;
+}
+
+/** Sides of a body in m, told in the unit that suits the longest: 200 × 123.4 × 80 mm. */
+export function sizeText(sides: readonly number[]): string {
+  const largest = Math.max(...sides);
+  const [unit, scale] = largest < 1e-3 ? ["µm", 1e6] : largest > 3 ? ["m", 1] : ["mm", 1e3];
+  return `${sides.map((side) => Number((scale * side).toPrecision(4))).join(" × ")} ${unit}`;
+}
+
+/** An angle in degrees, with its sign. */
+export function degrees(angle: number): string {
+  const whole = Math.round(angle);
+  return `${whole < 0 ? MINUS : ""}${Math.abs(whole)}°`;
 }

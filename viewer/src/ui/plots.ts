@@ -64,7 +64,7 @@ export class Plots {
       press: createPlot("plot-press", deep, "force (N)", ["#ffb454"], upToPressed, trail),
       force: createPlot("plot-force", recent, "force (N)", ["#ffb454"], above(FORCE_SPAN_MIN)),
       compute: createPlot("plot-compute", recent, "per tick (µs)", ["#6fc3ff"], above(COMPUTE_SPAN_MIN)),
-      displacement: createPlot("plot-displacement", moved, "moved (mm)", ["#ff8f80", "#7ddc9a", "#6fc3ff"], around),
+      displacement: createPlot("plot-displacement", moved, "mm", ["#ff8f80", "#7ddc9a", "#6fc3ff"], around),
       energy: createPlot("plot-energy", moved, "energy (µJ)", ["#8d97a6", "#c9a2ff", "#6fc3ff", "#ffb454"], above(0)),
     };
     new ResizeObserver(() => this.resize()).observe(byId("plots"));

@@ -35,7 +35,9 @@ export class Readout {
     const tool = drivenTool(state);
     const driven = tool === null ? undefined : frame?.tools[tool];
     const force = driven?.force ?? [0, 0, 0];
-    setText(this.magnitude, threeDigits(Math.hypot(...force)));
+    const magnitude = threeDigits(Math.hypot(...force));
+    setText(this.magnitude, magnitude);
+    this.magnitude.classList.toggle("long", magnitude.length > 4);
     force.forEach((component, axis) => setText(this.components[axis]!, signed(component)));
     byId("pinned-line").hidden = pinned.length === 0;
     const others = pinned.map((other) => threeDigits(Math.hypot(...(frame?.tools[other]?.force ?? [0]))));

@@ -1,11 +1,10 @@
-// What is chosen from lists and by sliders: model, body, field, shape of the tool; stiffness, friction or contact radius, limit
-// of strain, and how large displacements are drawn.
+// What is chosen from lists and by sliders: model, body, field; stiffness, limit of strain, and how large displacements are
+// drawn. The tool has a panel of its own.
 
 import type { Control } from "../control";
-import { drivenTool } from "../store";
 import type { State, Store } from "../store";
 import { byId, setText } from "./dom";
-import { millimetres, pascals, percent } from "./numbers";
+import { pascals, percent } from "./numbers";
 
 /** The usual range of soft tissue, Pa; a body outside it gets a decade to each side of its own value. */
 const TISSUE: Range = [1e3, 100e3];
@@ -18,11 +17,8 @@ export class SettingsPanel {
   private readonly body = byId<HTMLSelectElement>("body");
   private readonly field = byId<HTMLSelectElement>("field");
   private readonly stiffness = byId<HTMLInputElement>("stiffness");
-  private readonly radius = byId<HTMLInputElement>("radius");
-  private readonly friction = byId<HTMLInputElement>("friction");
   private readonly strainLimit = byId<HTMLInputElement>("strain-limit");
   private readonly scale = byId<HTMLInputElement>("shown-scale");
-  private readonly shape = byId<HTMLSelectElement>("shape");
   private moduli: Range = TISSUE;
 
   constructor(store: Store, control: Control) {
@@ -30,11 +26,8 @@ export class SettingsPanel {
     this.body.onchange = () => control.chooseBody(this.body.selectedIndex);
     this.field.onchange = () => control.chooseField(this.field.value);
     this.stiffness.oninput = () => control.setStiffness(this.modulus());
-    this.radius.oninput = () => control.setContactRadius(this.radius.valueAsNumber);
-    this.friction.oninput = () => control.setFriction(this.friction.valueAsNumber);
     this.strainLimit.oninput = () => control.setStrainLimit(this.chosenStrainLimit());
     this.scale.oninput = () => control.showScaled(this.scale.valueAsNumber);
-    this.shape.onchange = () => control.chooseShape(this.shape.value);
     store.subscribe(["models"], ({ models }) => {
       byId("model-row").hidden = models.length === 0;
       this.model.replaceChildren(...models.map(({ name, title }) => new Option(title, name)));
@@ -46,7 +39,6 @@ export class SettingsPanel {
     store.subscribe(["scene"], (state) => this.listBodies(state));
     store.subscribe(["scene", "body", "field"], (state) => this.listFields(state));
     store.subscribe(["scene", "body", "settings"], (state) => this.showValues(state));
-    store.subscribe(["scene", "settings", "pinned", "pressing"], (state) => this.showTool(state));
     store.subscribe(["settings"], ({ settings }) => this.showStrainLimit(settings?.strain_limit ?? 0));
     store.subscribe(["shownScale"], ({ shownScale }) => {
       this.scale.valueAsNumber = shownScale;
@@ -86,30 +78,6 @@ export class SettingsPanel {
     byId("stiffness-field").title = modulus === null ? whyFixed(state) : "";
   }
 
-  /** Of the tool that is driven, or that the next press drives: its shape, and the friction or the patch of its contacts. */
-  private showTool(state: Readonly<State>): void {
-    const { scene, settings } = state;
-    const tool = drivenTool(state) ?? 0;
-    const header = scene?.tools[tool];
-    if (!header || !settings) return;
-    byId("friction-field").hidden = header.contact !== "local";
-    byId("radius-field").hidden = header.contact === "local";
-    const friction = settings.friction[tool] ?? 0;
-    this.friction.valueAsNumber = friction;
-    setText(byId("friction-value"), friction.toFixed(2));
-    const radius = settings.contact_radius[tool] ?? 0;
-    this.radius.max = String(header.max_contact_radius);
-    this.radius.step = String(header.max_contact_radius / 200);
-    this.radius.valueAsNumber = radius;
-    setText(byId("radius-value"), millimetres(radius));
-    byId("shape-row").hidden = header.shapes.length < 2;
-    const listed = [...this.shape.options].map(({ value }) => value);
-    if (listed.join() !== header.shapes.map(({ name }) => name).join()) {
-      this.shape.replaceChildren(...header.shapes.map(({ name, title }) => new Option(title, name)));
-    }
-    this.shape.value = settings.shape[tool] ?? header.shape;
-  }
-
   private showStrainLimit(limit: number): void {
     this.strainLimit.valueAsNumber = limit > 0 ? 100 * limit : STRAIN_OFF_PERCENT;
     setText(byId("strain-limit-value"), limit > 0 ? percent(limit) : "off");
@@ -128,8 +96,7 @@ export class SettingsPanel {
   private enable({ role, scene, body }: Readonly<State>): void {
     const watching = role !== "control";
     this.stiffness.disabled = watching || scene?.bodies[body]?.youngs_modulus == null;
-    for (const input of [this.radius, this.friction, this.strainLimit, this.shape]) input.disabled = watching;
-    this.model.disabled = watching;
+    this.strainLimit.disabled = this.model.disabled = watching;
   }
 }
 

@@ -24,8 +24,8 @@ RADIUS, DEPTH, FRICTION = 0.01, 1e-3, 0.3
 # Plates of 4-node tetrahedra, 5 mm between nodes, with ever more nodes on the surface; cells along each axis.
 PLATES = ((18, 18, 6), (40, 40, 4), (68, 68, 4), (94, 94, 4))
 SOLVES, TICKS, TIMES = 2000, 4000, 5
-# Radius of the patch that `C_reg` of a node is taken over: three spacings of nodes.
-WIDTH = 0.015
+# Radius of the patch that `C_reg` of a node is taken over: three mean lengths of the edges at it, m.
+WIDTH = 0.017
 MODES = 100
 # Orientations: as it is, and lying along y.
 UPRIGHT, LYING = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.5**0.5, 0.0, 0.0)

@@ -44,11 +44,11 @@ def plot_history(time: np.ndarray, displacements: np.ndarray, path: Path, title:
     write_figure(figure, path)
 
 
-def write_log(log: np.ndarray, path: Path) -> None:
-    """Write the 1 kHz log as CSV with units in the header; beside, then renamed."""
-    names = ("time_s", "x_m", "y_m", "z_m", "fx_N", "fy_N", "fz_N", "compute_us", "wakeup_us")
-    columns = [log["time"], *log["position"].T, *log["force"].T, log["compute_us"], log["wakeup_us"]]
-    write_columns(names, columns, path)
+def write_log(log: np.ndarray, depth: np.ndarray, strain: np.ndarray, path: Path) -> None:
+    """Write the 1 kHz log as CSV, with depth (m) and strain of each row; beside, then renamed."""
+    names = ("time_s", "x_m", "y_m", "z_m", "fx_N", "fy_N", "fz_N", "depth_m", "strain", "compute_us", "wakeup_us")
+    moved = [log["time"], *log["position"].T, *log["force"].T]
+    write_columns(names, [*moved, depth, strain, log["compute_us"], log["wakeup_us"]], path)
 
 
 def write_columns(names: Sequence[str], columns: Sequence[np.ndarray], path: Path) -> None:

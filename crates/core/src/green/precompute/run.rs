@@ -28,6 +28,7 @@ use crate::green::key::FORMAT_VERSION;
 use crate::green::numbers::Numbers;
 use crate::green::precision::Precision;
 use crate::green::store_writer::StoreWriter;
+use crate::solver::{condition, require_regular};
 use crate::{Error, Result};
 
 /// Told `(columns done, columns in all)` from any thread; `false` stops the computation.
@@ -203,6 +204,7 @@ fn solve<C: Number, T: Number>(
     if !missing.is_empty() || !problem.loads.is_empty() {
         let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
         let factor = symbolic.factorise(Par::rayon(0))?;
+        require_regular(condition(&factor, &stiffness, &problem.supports), &problem.mesh.nodes)?;
         go_on(0)?;
         response = free_response(system.stiffness, &factor, system.supports, &problem.loads, &layout.row_dofs)?;
         let operators = operators::<C>(&tree, factor.supernodal()?);

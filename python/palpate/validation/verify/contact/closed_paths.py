@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,6 +74,13 @@ class ClosedPaths:
         sunk = down * (clear + deepest) * (1 + 0.4 * closed(1)) - clear
         x = centres + np.concatenate([slide * closed(2), height - sunk], axis=-1)
         return cls(x, _quaternions(ROTATION * closed(3)))
+
+    def holding(self, orientation: tuple[float, float, float, float]) -> ClosedPaths:
+        """Return the same paths of tools that have this orientation, w x y z, where these have none."""
+        w, v = self.orientations[..., :1], self.orientations[..., 1:]
+        first, rest = orientation[0], np.array(orientation[1:])
+        scalar = w * first - (v @ rest)[..., None]
+        return replace(self, orientations=np.concatenate([scalar, w * rest + first * v + np.cross(v, rest)], axis=-1))
 
     def script(self) -> tuple[np.ndarray, np.ndarray]:
         """One script of all paths; a tick without tools ends each: (ticks, tools, 3), (ticks, tools, 4)."""

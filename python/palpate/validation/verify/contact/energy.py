@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,11 +68,26 @@ def closed_paths() -> Outcome:
     return Outcome(checks)
 
 
+@dataclass(frozen=True)
+class HeldTool:
+    """A tool's table without its friction, and how it is held: its origin ``height`` over its lowest point, m.
+
+    ``orientation`` is the one about which paths turn it, w x y z.
+    """
+
+    table: Mapping[str, Any]
+    height: float
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+SPHERE = HeldTool(sphere(RADIUS), RADIUS)
+
+
 class EnergyBench:
     """Loops over one block."""
 
-    def __init__(self, body: Body, count: int = 60):
-        self.body = body
+    def __init__(self, body: Body, tool: HeldTool = SPHERE, count: int = 60):
+        self.body, self.tool = body, tool
         self.green = green_of(body, touch=top_nodes(body))
         with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
             basis = modes(body, count, path=Path(folder) / "modes.palpate", progress=False)
@@ -80,7 +97,7 @@ class EnergyBench:
 
     def simulation(self, condition: Condition) -> Simulation:
         """Force loop for a condition."""
-        tools = [sphere(RADIUS, condition.friction)] * condition.tools
+        tools = [{**self.tool.table, "friction": condition.friction}] * condition.tools
         device = DEFAULT_DEVICE if condition.limited else None
         return loop_of(self.body, self.green, tools, device, self.motion if condition.moving else None)
 
@@ -90,9 +107,16 @@ class EnergyBench:
         middle = (low + high) / 2
         apart = 0.0 if condition.tools == 1 else SLIDE + RADIUS
         centres = np.array([[middle[0] + side * apart, middle[1], high[2]] for side in (-1, 1)[: condition.tools]])
-        return ClosedPaths.over(
-            centres, RADIUS, paths=count, ticks=TICKS, slide=SLIDE, depth=(5e-4, 3e-3), seed=CONDITIONS.index(condition)
+        paths = ClosedPaths.over(
+            centres,
+            self.tool.height,
+            paths=count,
+            ticks=TICKS,
+            slide=SLIDE,
+            depth=(5e-4, 3e-3),
+            seed=CONDITIONS.index(condition),
         )
+        return paths.holding(self.tool.orientation)
 
     def played(self, condition: Condition, paths: ClosedPaths) -> tuple[np.ndarray, np.ndarray]:
         """Return forces and torques (paths, ticks, tools, 3).

@@ -26,38 +26,11 @@ RESOLUTION, GROWTH, GROWTH_FAR, NEAR_CELLS = 7.0, 1.6, 2.3, 3
 
 
 @dataclass(frozen=True)
-class Nodule:
-    """A ball of another Young's modulus, Pa, in a block.
-
-    Depth of its centre and radius, m; ``aside`` is how far along x from under the tool its centre lies, m.
-    """
-
-    depth: float
-    radius: float
-    youngs_modulus: float
-    aside: float = 0.0
-
-    def elements(self, mesh: TetMesh, share: int) -> np.ndarray:
-        """Mask (m,) of elements of a mesh of one of ``share`` equal parts of the block, its top at z = 0.
-
-        Those with the closest centres, as many as have the volume of the ball: steps of a lattice would change it.
-        """
-        corners = mesh.nodes[mesh.tets[:, :4]]
-        volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-        order = np.argsort(np.linalg.norm(corners.mean(axis=1) - (self.aside, 0, -self.depth), axis=1), kind="stable")
-        volume = 4 / 3 * np.pi * self.radius**3 / share
-        inside = np.zeros(len(mesh.tets), dtype=bool)
-        inside[order[np.cumsum(volumes[order]) < volume]] = True
-        return inside
-
-
-@dataclass(frozen=True)
 class Block:
-    """A block on a table: widths along x and y, and its height, m; and what is hidden in it."""
+    """A block on a table: widths along x and y, and its height, m."""
 
     size: tuple[float, float, float] = (0.1, 0.1, 0.05)
     material: Material = SOFT
-    nodule: Nodule | None = None
 
     @property
     def plane_modulus(self) -> float:
@@ -92,7 +65,7 @@ class Block:
 
         """
         mesh, fixed, parts = self._mesh(reach, cell, beside, place)
-        body = self._body(mesh, fixed, parts)
+        body = quiet_body(mesh, self.material, fixed)
         top = np.abs(mesh.nodes[:, 2]) < 1e-9
         near = (np.abs(mesh.nodes[:, :2] - beside) < reach * (1 + 1e-9)).all(axis=1)
         problem = ContactProblem.on_top(green_of(body, touch=np.flatnonzero(top & near)), mesh)
@@ -100,17 +73,6 @@ class Block:
             Press(press.depth, parts * press.force, parts * press.area, press.pressures)
             for press in problem.press(gap, depths)
         ]
-
-    def _fine(self, reach: float) -> float:
-        """How far from the contact elements are small, m."""
-        return reach if self.nodule is None else max(reach, self.nodule.depth + self.nodule.radius, self.nodule.aside + self.nodule.radius)
-
-    def _body(self, mesh: TetMesh, fixed: np.ndarray, parts: int) -> Body:
-        if self.nodule is None:
-            return quiet_body(mesh, self.material, fixed)
-        labels = self.nodule.elements(mesh, parts).astype(np.int64)
-        hard = Material(self.nodule.youngs_modulus, self.material.poissons_ratio)
-        return quiet_body(TetMesh(mesh.nodes, mesh.tets, labels), {0: self.material, 1: hard}, fixed)
 
     def _mesh(
         self, reach: float, cell: float, beside: tuple[float, float], place: tuple[float, float] | None
@@ -122,9 +84,9 @@ class Block:
             middle = place is None or abs(place[axis] - width / 2) < 1e-12
             low = 0.0 if middle else -place[axis]
             high = width / 2 if middle else width - place[axis]
-            axes.append(graded(low, high, beside[axis], self._fine(reach), cell))
+            axes.append(graded(low, high, beside[axis], reach, cell))
             halves.append(middle)
-        down = -graded(0.0, self.size[2], 0.0, self._fine(reach), cell)[::-1]
+        down = -graded(0.0, self.size[2], 0.0, reach, cell)[::-1]
         mesh = mapped(lattice(*axes, down), quadratic=True)
         fixed = np.zeros(mesh.nodes.shape, dtype=bool)
         for axis in (axis for axis in range(2) if halves[axis]):

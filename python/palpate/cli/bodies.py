@@ -1,0 +1,125 @@
+"""Bodies from files of any kind, as the commands that solve them take them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.completion import units
+
+if TYPE_CHECKING:
+    from palpate.body import Body, Loads, Material
+    from palpate.mesh import TetMesh
+
+
+class Element(str, Enum):
+    """What --element takes."""
+
+    LINEAR = "linear"
+    QUADRATIC = "quadratic"
+
+
+Unit = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of length of the file: m, cm, mm, um, in; default: m, asked for if that is unlikely.",
+        autocompletion=units,
+    ),
+]
+MaxSize = Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")]
+Repair = Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")]
+ElementChoice = Annotated[
+    Element | None,
+    typer.Option(help="Tetrahedra with 4 or 10 nodes; default: quadratic for a surface, a volume mesh as it is."),
+]
+
+
+def is_surface(path: Path) -> bool:
+    """Whether the ending is that of a surface, which is yet to be filled."""
+    from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
+
+    return path.suffix.lower() in SURFACE_ENDINGS
+
+
+def read_any(
+    path: Path, unit: str | None, element: Element | None, max_size: str | None = None, repair: bool = False
+) -> TetMesh:
+    """Read a volume mesh, or fill a surface.
+
+    Raises
+    ------
+    MeshError
+        A file that cannot be read or filled, or one of 10-node tetrahedra where 4-node ones are asked for.
+
+    """
+    from palpate.errors import MeshError
+    from palpate.mesh import TetMesh
+    from palpate.mesh.tetrahedralize import tetrahedralize_with
+    from palpate.units import length
+
+    if is_surface(path):
+        size = None if max_size is None else length(max_size)
+        chosen = "linear" if element == Element.LINEAR else "quadratic"
+        return tetrahedralize_with(chosen, path, size, unit, repair=repair)
+    if max_size is not None or repair:
+        raise MeshError(f"{path} is a volume mesh: --max-size and --repair are for surfaces")
+    mesh = TetMesh.read(path, unit)
+    if element == Element.LINEAR and mesh.is_quadratic:
+        raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or say quadratic")
+    return mesh.to_quadratic() if element == Element.QUADRATIC else mesh
+
+
+def body_of(mesh: TetMesh, material: Material, fix: str, loads: Loads | None = None) -> Body:
+    """Body that is held where a predicate says.
+
+    Raises
+    ------
+    BodyError
+        A predicate that holds nowhere.
+
+    """
+    import palpate
+    from palpate.body import parse
+
+    mask = parse(fix)(mesh.nodes)
+    if not mask.any():
+        low, high = mesh.bounds.round(4).tolist()
+        raise palpate.BodyError(f"no node satisfies --fix '{fix}': the body reaches from {low} to {high} m")
+    return palpate.Body(mesh, material=material, fixed=mask, loads=loads)
+
+
+def likely_units(path: Path) -> list[str]:
+    """Tell the units that a file may be in: metres, or those of a size that hands can feel, the most common first."""
+    import numpy as np
+
+    from palpate.errors import UnclearUnitError
+    from palpate.mesh.files import read_volume
+    from palpate.mesh.size import scale_of
+    from palpate.mesh.tetrahedralize import read_surface
+
+    try:
+        if is_surface(path):
+            scale_of(str(path), np.asarray(read_surface(path).vertices), None)
+        else:
+            read_volume(path, None)
+    except UnclearUnitError as error:
+        return list(error.fitting) or ["m"]
+    return ["m"]
+
+
+def in_unit(unit: str | None, read: Callable[[str | None], TetMesh]) -> TetMesh:
+    """Read a file in its unit of length, asking for it on a terminal where it is not clear."""
+    from palpate.errors import UnclearUnitError
+
+    try:
+        return read(unit)
+    except UnclearUnitError as error:
+        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise
+        question = f"{error}\nUnit of length"
+        return read(typer.prompt(question, default=next(iter(error.fitting), "m"), err=True))

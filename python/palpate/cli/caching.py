@@ -1,0 +1,63 @@
+"""Commands on the precomputed files that are kept."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from palpate.cli.app import app
+
+cache_app = typer.Typer(help="Precomputed files kept for you.", no_args_is_help=True)
+app.add_typer(cache_app, name="cache")
+
+
+def _names(incomplete: str) -> list[str]:
+    from palpate.cache import cached_files
+
+    return [file.name for file in cached_files() if file.name.startswith(incomplete)]
+
+
+@cache_app.command("list")
+def cache_list() -> None:
+    """List the precomputed files in the cache: name, size, date, and what they are.
+
+    Example: palpate cache list
+    """
+    from datetime import datetime
+
+    from palpate.cache import cache_directory, cached_files
+
+    files = cached_files()
+    width = max((len(file.name) for file in files), default=0)
+    for file in files:
+        date = datetime.fromtimestamp(file.modified).strftime("%Y-%m-%d %H:%M")
+        print(f"{file.name:{width}}  {file.size / 1e6:9.1f} MB  {date}  {file.about}")
+    left = sum(file.leftover for file in files)
+    hint = f", {left} of them leftovers: 'palpate cache clear --leftovers' deletes those" if left else ""
+    print(f"{_counted(len(files))}, {sum(f.size for f in files) / 1e6:.1f} MB in {cache_directory()}{hint}")
+
+
+@cache_app.command("clear")
+def cache_clear(
+    name: Annotated[
+        str | None,
+        typer.Argument(help="Name of a file, or its beginning; all files without it.", autocompletion=_names),
+    ] = None,
+    leftovers: Annotated[bool, typer.Option("--leftovers", help="Only what killed processes left.")] = False,
+) -> None:
+    """Delete the precomputed files in the cache, or one of them.
+
+    Example: palpate cache clear 3f2a90
+    """
+    from palpate.cache import cached_files, chosen_files
+
+    files = cached_files() if name is None else chosen_files(name)
+    files = [file for file in files if file.leftover or not leftovers]
+    for file in files:
+        file.path.unlink(missing_ok=True)
+    print(f"deleted {_counted(len(files))}, {sum(f.size for f in files) / 1e6:.1f} MB")
+
+
+def _counted(count: int) -> str:
+    return f"{count} file" if count == 1 else f"{count} files"

@@ -1,0 +1,35 @@
+"""Words that the shell completes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def units(incomplete: str) -> list[str]:
+    """Units of length."""
+    from palpate.units import LENGTH_UNITS
+
+    return _beginning(LENGTH_UNITS, incomplete)
+
+
+def models(incomplete: str) -> list[str]:
+    """Built-in models."""
+    from palpate.models import NAMES
+
+    return _beginning(NAMES, incomplete)
+
+
+def precisions(incomplete: str) -> list[str]:
+    """List the number formats of a store."""
+    return _beginning(("f16", "f32", "f64"), incomplete)
+
+
+def checks(incomplete: str) -> list[tuple[str, str]]:
+    """Benchmarks with a known answer, and what they are."""
+    from palpate.validation.verify import BENCHMARKS
+
+    return [(name, known.title) for name, known in BENCHMARKS.items() if name.startswith(incomplete)]
+
+
+def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
+    return [word for word in words if word.startswith(incomplete)]

@@ -1,0 +1,172 @@
+"""What ``palpate run`` makes of a file: a scene, a store, or a bare mesh or surface with defaults that are told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.cli.bodies import Element, body_of, likely_units, read_any
+from palpate.errors import SceneError
+
+if TYPE_CHECKING:
+    from palpate.scene import BuiltScene, Scene
+
+# A bare body is held in this part of its height, from below.
+HELD_PART = 0.1
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of the command, as they were typed; None for one that was not."""
+
+    radius: str | None = None
+    fix: str | None = None
+    youngs_modulus: str | None = None
+    poissons_ratio: float | None = None
+    density: str | None = None
+    unit: str | None = None
+    max_size: str | None = None
+    element: Element | None = None
+    repair: bool = False
+
+    def refuse(self, file: Path, allowed: set[str], reason: str) -> None:
+        """Refuse options that the kind of file does not take.
+
+        Raises
+        ------
+        SceneError
+            The first of them, and why.
+
+        """
+        for field in fields(self):
+            if getattr(self, field.name) not in (None, False) and field.name not in allowed:
+                raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
+
+
+FLAGS = {
+    "radius": "--radius",
+    "fix": "--fix",
+    "fixed": "--fix",
+    "youngs_modulus": "-E",
+    "poissons_ratio": "--nu",
+    "density": "--density",
+    "unit": "--unit",
+    "max_size": "--max-size",
+    "element": "--element",
+    "repair": "--repair",
+}
+
+
+def built_from(file: Path, options: RunOptions) -> BuiltScene:
+    """Scene of a file, ready to run.
+
+    Raises
+    ------
+    Error
+        A file that cannot be read, filled or solved, or an option that does not belong to it.
+
+    """
+    from palpate.progress import narrated
+    from palpate.scene import Scene
+
+    if file.suffix == ".palpate":
+        options.refuse(file, {"radius"}, "a store carries its material and supports; 'palpate precompute' takes them")
+        scene = _with_options(Scene.of_store(file), options)
+    elif file.suffix == ".toml":
+        places = {"radius", "fix", "youngs_modulus", "poissons_ratio", "density"}
+        options.refuse(file, places, "it stands in the table [body] of the scene")
+        scene = _with_options(Scene.read(file), options)
+    else:
+        return _bare(file, options)
+    with narrated(f"preparing {scene.name}"):
+        return scene.build()
+
+
+def _with_options(scene: Scene, options: RunOptions) -> Scene:
+    """Scene in which what was typed stands instead of what was written, in the tables of its bodies too."""
+    names = ("youngs_modulus", "poissons_ratio", "density")
+    given = {name: value for name, value in asdict(options).items() if name in names and value is not None}
+    update: dict[str, Any] = {}
+    tables: dict[str, Mapping[str, Any]] = {}
+    if given:
+        tables["material"] = given
+    if options.fix is not None:
+        tables["supports"] = {"fixed": options.fix}
+    bodies = list(scene.bodies)
+    for name, values in tables.items():
+        update[name] = _changed(getattr(scene, name), values)
+        for rank, body in enumerate(bodies):
+            own = getattr(body, name)
+            if own is not None:
+                bodies[rank] = body.model_copy(update={name: _changed(own, values)})
+    if options.radius is not None:
+        update["tools"] = [tool.model_copy(update=_radii(tool, options.radius)) for tool in scene.tools]
+    return scene.model_copy(update={**update, "bodies": bodies})
+
+
+def _changed(table: Any, values: Mapping[str, Any]) -> Any:
+    """Table of the same kind with other values, as strictly checked as in a file."""
+    from pydantic import ValidationError
+
+    try:
+        return type(table)(**{**table.model_dump(exclude_unset=True), **values})
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+        raise SceneError(f"{FLAGS[str(first['loc'][0])]}: {said}") from None
+
+
+def _radii(tool: Any, radius: str) -> dict[str, float]:
+    from palpate.scene.tool_shape import KEYS
+    from palpate.units import length
+
+    if "radius" not in KEYS.get(tool.shape, (set(),))[0]:
+        raise SceneError(f"--radius: a tool of shape '{tool.shape}' has no radius")
+    value = length(radius)
+    if not (np.isfinite(value) and value > 0):
+        raise SceneError(f"--radius must be positive, got {radius}")
+    return {"radius": value, "contact_radius": value} if tool.contact != "local" else {"radius": value}
+
+
+def _bare(file: Path, options: RunOptions) -> BuiltScene:
+    """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
+    import palpate
+    from palpate import units
+    from palpate.mesh import size_text
+    from palpate.scene import BuiltScene, Scene
+
+    told = []
+    unit = options.unit
+    if unit is None:
+        unit, *others = likely_units(file)
+        told.append(f"unit {unit} (--unit{'; it may also be ' if others else ''}{' or '.join(others)})")
+    # A body that is of no likely size in any unit is asked about, not taken for one in metres.
+    known = None if options.unit is None and unit == "m" else unit
+    mesh = read_any(file, known, options.element, options.max_size, options.repair)
+    low, high = mesh.bounds
+    fix = options.fix
+    if fix is None:
+        fix = f"z < min + {1e3 * HELD_PART * (high[2] - low[2]):.3g}mm"
+        told.append(f"held where {fix} (--fix)")
+    typed = (options.youngs_modulus, options.poissons_ratio, options.density)
+    modulus, ratio, density = (
+        default if value is None else value for value, default in zip(typed, ("10kPa", 0.45, "1000kg/m3"), strict=True)
+    )
+    if options.youngs_modulus is None:
+        told.append(f"E = {modulus} (-E)")
+    if options.poissons_ratio is None:
+        told.append(f"Poisson's ratio {ratio} (--nu)")
+    material = palpate.Material(units.pressure(modulus), ratio, units.density(density))
+    body = body_of(mesh, material, fix)
+    green = palpate.precompute(body)
+    tables = {"material": asdict(material), "supports": {"fixed": fix}}
+    scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
+    built = BuiltScene.of(_with_options(scene, RunOptions(radius=options.radius)), body, green)
+    if options.radius is None:
+        told.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
+    print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(told)}" if told else ""))
+    return built

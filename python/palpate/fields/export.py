@@ -1,0 +1,141 @@
+"""Results for other programs: meshio meshes with displacement, strain and stress at the nodes, and their files.
+
+Tensors are written by their six components in the order of VTK: xx, yy, zz, xy, yz, xz.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.atomic import written_beside
+from palpate.errors import Error, MeshError
+from palpate.fields.principal import largest_magnitude
+from palpate.fields.stress import SurfaceStress
+from palpate.input_file import require_writable
+
+if TYPE_CHECKING:
+    import meshio
+
+FORMATS = {".vtu": "vtu", ".vtk": "vtk"}
+ROWS, COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+# meshio's name of a cell by its nodes.
+FACES, TETS = {3: "triangle", 6: "triangle6"}, {4: "tetra", 10: "tetra10"}
+
+
+def volume_mesh(
+    nodes: np.ndarray, tets: np.ndarray, displacements: np.ndarray, field: SurfaceStress, regions: np.ndarray
+) -> meshio.Mesh:
+    """Tetrahedra of a body with its displacement (m), strain and stress (Pa) at all nodes."""
+    import meshio
+
+    data = {
+        "displacement": displacements,
+        "strain": components(field.strain),
+        "stress": components(field.stress),
+        "largest_strain": largest_magnitude(field.strain),
+        "von_mises": field.von_mises,
+    }
+    return meshio.Mesh(nodes, [(TETS[tets.shape[1]], tets)], point_data=data, cell_data={"region": [regions]})
+
+
+def surface_mesh(
+    positions: np.ndarray, faces: np.ndarray, displacements: np.ndarray, strain: np.ndarray
+) -> meshio.Mesh:
+    """Surface of a body whose elements are not known, with its displacement (m) and largest strain."""
+    import meshio
+
+    data = {"displacement": displacements, "largest_strain": strain}
+    return meshio.Mesh(positions, [(FACES[faces.shape[1]], faces)], point_data=data)
+
+
+def components(tensors: np.ndarray) -> np.ndarray:
+    """Six components (n, 6) of symmetric tensors (n, 3, 3)."""
+    return tensors[:, ROWS, COLUMNS]
+
+
+def tensors(six: np.ndarray) -> np.ndarray:
+    """Symmetric tensors (n, 3, 3) of their six components (n, 6)."""
+    full = np.empty((len(six), 3, 3))
+    full[:, ROWS, COLUMNS] = full[:, COLUMNS, ROWS] = six
+    return full
+
+
+def placed(
+    mesh: meshio.Mesh, points: Callable[[np.ndarray], np.ndarray], vectors: Callable[[np.ndarray], np.ndarray]
+) -> meshio.Mesh:
+    """Mesh of a body's own frame in the scene, by what its frame does to points (n, 3) and to vectors."""
+    import meshio
+
+    data = dict(mesh.point_data)
+    for name in ("displacement", "force"):
+        if name in data:
+            data[name] = vectors(data[name])
+    for name in ("strain", "stress"):
+        if name in data:
+            turned = vectors(tensors(data[name]))  # each row turned, then each column
+            data[name] = components(vectors(turned.swapaxes(1, 2)))
+    return meshio.Mesh(points(mesh.points), mesh.cells, point_data=data, cell_data=mesh.cell_data)
+
+
+def together(meshes: Sequence[meshio.Mesh]) -> meshio.Mesh:
+    """Join meshes of several bodies, with the number of the body as data of cells; NaN where a body lacks data."""
+    import meshio
+
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    cells = [
+        (block.type, block.data + start) for mesh, start in zip(meshes, starts, strict=False) for block in mesh.cells
+    ]
+    bodies = [
+        np.full(len(block.data), body, dtype=np.int64) for body, mesh in enumerate(meshes) for block in mesh.cells
+    ]
+    names = dict.fromkeys(name for mesh in meshes for name in mesh.point_data)
+    data = {name: np.concatenate([_data(mesh, name, meshes) for mesh in meshes]) for name in names}
+    points = np.vstack([mesh.points for mesh in meshes])
+    return meshio.Mesh(points, cells, point_data=data, cell_data={"body": bodies})
+
+
+def _data(mesh: meshio.Mesh, name: str, meshes: Sequence[meshio.Mesh]) -> np.ndarray:
+    if name in mesh.point_data:
+        return mesh.point_data[name]
+    like = next(other.point_data[name] for other in meshes if name in other.point_data)
+    return np.full((len(mesh.points), *like.shape[1:]), np.nan)
+
+
+def write_result(mesh: meshio.Mesh, path: str | os.PathLike[str]) -> None:
+    """Write a result by the ending of its file; an existing file is replaced only when the new one is complete.
+
+    Raises
+    ------
+    MeshError
+        Another ending than .vtu or .vtk, or no place for a file.
+
+    """
+    import meshio
+
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise MeshError(f"{target}: a result is written as {' or '.join(FORMATS)}, got '{target.suffix}'")
+    require_writable(target, MeshError)
+    with written_beside(target) as partial:
+        meshio.write(partial, mesh, FORMATS[target.suffix.lower()])
+
+
+def as_pyvista(mesh: meshio.Mesh) -> Any:
+    """Turn a mesh into pyvista's unstructured grid.
+
+    Raises
+    ------
+    Error
+        pyvista is not installed.
+
+    """
+    try:
+        import pyvista
+    except ImportError:
+        raise Error("to_pyvista needs pyvista: pip install pyvista") from None
+    return pyvista.from_meshio(mesh)

@@ -1,0 +1,113 @@
+"""A deformed body as users take it further: files, other libraries, pictures."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from palpate.fields.export import as_pyvista, surface_mesh, volume_mesh, write_result
+from palpate.fields.picture import DeformedSurface, as_html, draw
+from palpate.fields.strain_measure import Strained, StrainSource
+from palpate.fields.stress import StressRecovery, SurfaceStress
+from palpate.fields.surface_strain import SurfaceStrain
+
+if TYPE_CHECKING:
+    import meshio
+    from matplotlib.figure import Figure
+
+    from palpate.body import Body
+
+
+class ResultSource(StrainSource, Protocol):
+    """What a deformed body belongs to: a Green's function."""
+
+    body: Body | None
+    surface_nodes: np.ndarray
+    surface_positions: np.ndarray
+    surface_faces: np.ndarray
+    surface_triangles: np.ndarray
+
+    @property
+    def stress_everywhere(self) -> StressRecovery:
+        """Recovery of stress and strain at all nodes of the body."""
+
+
+class Result(Strained):
+    """Displacements of a surface, with all that follows from them.
+
+    Of a body whose elements are known, files and meshes hold its tetrahedra with ``displacement`` (m), ``strain`` and
+    ``stress`` (Pa) by the components xx, yy, zz, xy, yz, xz, ``largest_strain`` (principal, in magnitude) and
+    ``von_mises`` (Pa) at all nodes; the inside is in equilibrium with the surface. A bare store knows the surface
+    alone: its faces with ``displacement`` and ``largest_strain``.
+    """
+
+    _source: ResultSource
+    # Young's modulus now over that of the source.
+    _stiffness_scale: float = 1.0
+
+    def to_meshio(self) -> meshio.Mesh:
+        """Body at rest with its displacement, strain and stress at the nodes, as a mesh of meshio."""
+        source = self._source
+        if source.body is None:
+            faces = np.searchsorted(source.surface_nodes, source.surface_faces)
+            strain = SurfaceStrain(source.surface_positions, faces).at_nodes(self.displacements)
+            made = surface_mesh(source.surface_positions, faces, self.displacements, strain)
+        else:
+            recovery, mesh = source.stress_everywhere, source.body.mesh
+            everywhere = recovery.interior.extend(self.displacements)
+            field = recovery.recover_inside(everywhere)
+            field = SurfaceStress(self._stiffness_scale * field.stress, field.strain)
+            made = volume_mesh(mesh.nodes, mesh.tets, everywhere, field, mesh.regions)
+        rows = source.surface_nodes if source.body is not None else slice(None)
+        for name, values in self._at_surface_nodes().items():
+            data = np.zeros((len(made.points), *values.shape[1:]))
+            data[rows] = values
+            made.point_data[name] = data
+        return made
+
+    def _at_surface_nodes(self) -> dict[str, np.ndarray]:
+        """Further data at the surface nodes, (s, ...), by name."""
+        return {}
+
+    def to_pyvista(self) -> Any:
+        """Give the same as :meth:`to_meshio` as pyvista's unstructured grid.
+
+        Raises
+        ------
+        Error
+            pyvista is not installed.
+
+        """
+        return as_pyvista(self.to_meshio())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView; replaced only when complete.
+
+        Raises
+        ------
+        MeshError
+            Another ending, or no place for a file.
+
+        """
+        write_result(self.to_meshio(), path)
+
+    def plot(self, magnification: float = 1.0) -> Figure:
+        """Picture of the deformed surface, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
+
+        Parameters
+        ----------
+        magnification
+            Of the displacements that are drawn; the colours tell the true ones.
+
+        """
+        return draw([self.deformed_surface()], magnification, repr(self))
+
+    def deformed_surface(self) -> DeformedSurface:
+        """Surface to be drawn."""
+        triangles = np.searchsorted(self._source.surface_nodes, self._source.surface_triangles)
+        return DeformedSurface(self._source.surface_positions, triangles, self.displacements)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), [self.deformed_surface()])

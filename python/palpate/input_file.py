@@ -1,0 +1,48 @@
+"""The one check of a file that is to be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from palpate.errors import Error
+
+
+def require_file(path: Path, error: type[Error]) -> None:
+    """Refuse what cannot be read as a file.
+
+    Raises
+    ------
+    Error
+        Of the class ``error``: nothing there, a folder, or an empty file.
+
+    """
+    if path.is_dir():
+        raise error(f"{path} is a folder: name a file in it")
+    if not path.exists():
+        near = _with_other_ending(path)
+        raise error(f"{path}: no such file" + (f"; there is {near.name}" if near else ""))
+    if path.is_file() and path.stat().st_size == 0:
+        raise error(f"{path}: the file is empty")
+
+
+def require_writable(path: Path, error: type[Error]) -> None:
+    """Refuse a place where no file can be put, before long work ends there.
+
+    Raises
+    ------
+    Error
+        Of the class ``error``: a folder of that name, or no folder to put it in.
+
+    """
+    if path.is_dir():
+        raise error(f"{path} is a folder: name a file in it, such as {path / 'body'}{path.suffix}")
+    if not path.absolute().parent.is_dir():
+        raise error(f"{path}: there is no folder {path.parent}; make it first")
+
+
+def _with_other_ending(path: Path) -> Path | None:
+    """Only file of the same name and another ending, or the same name in other letters."""
+    if not path.parent.is_dir():
+        return None
+    others = [other for other in path.parent.iterdir() if other.stem.lower() == path.stem.lower() and other.is_file()]
+    return others[0] if len(others) == 1 else None

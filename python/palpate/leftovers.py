@@ -1,0 +1,48 @@
+"""Files that a killed process was still writing: beside their place, named after it and the process.
+
+Files are written as ``<name>.<process>.new`` (stores), ``<name>.<process>.partial`` (what stands beside them) or
+``.<process>.<name>`` (everything else) and renamed when they are complete. A process that is killed leaves them, in
+full size; whoever writes there next removes them. Processes are those of this machine: what one in another container
+writes into the same folder looks like a leftover.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from pathlib import Path
+
+_NAMES = (re.compile(r"(?P<name>.+)\.(?P<process>\d+)\.(new|partial)"), re.compile(r"\.(?P<process>\d+)\.(?P<name>.+)"))
+
+
+def leftovers_in(folder: Path, name: str | None = None) -> list[Path]:
+    """Files in a folder that processes which are gone were writing; of a file ``name`` alone if it is given."""
+    if not folder.is_dir():
+        return []
+    return sorted(file for file in folder.iterdir() if _is_leftover(file, name))
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove what killed processes left of a file that is about to be written."""
+    for file in leftovers_in(path.parent, path.name):
+        with contextlib.suppress(OSError):
+            file.unlink()
+
+
+def _is_leftover(file: Path, name: str | None) -> bool:
+    match = next(filter(None, (pattern.fullmatch(file.name) for pattern in _NAMES)), None)
+    if match is None or name not in (None, match["name"]):
+        return False
+    return not _runs(int(match["process"]))
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        # Somebody else's process; or no process at all, and no file of ours.
+        return True
+    return True

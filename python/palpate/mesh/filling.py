@@ -1,0 +1,195 @@
+"""A checked surface filled by NETGEN, with elements as small as its shape needs."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from palpate import _native
+from palpate.errors import MeshError, MeshWarning
+from palpate.mesh.child import failure_of, run_limited
+from palpate.mesh.crossings import first_crossing
+from palpate.mesh.curve import curve
+from palpate.mesh.fit import Fit
+from palpate.mesh.tetmesh import TetMesh
+
+if TYPE_CHECKING:
+    import trimesh
+
+Ball = tuple[tuple[float, float, float], float, float]
+Element = Literal["linear", "quadratic"]  # with 4 and 10 nodes
+
+# Into so many parts the longest side is divided where no size is given. 10-node elements twice as large have as many
+# nodes as the 4-node ones, and a smaller error.
+PARTS = {"linear": 15.0, "quadratic": 7.5}
+# Where that is too coarse for the shape, elements become smaller by up to this factor, in so many attempts: all of them
+# where more than this share of the volume is lost, for such a mesh does not tell where.
+FINEST, ATTEMPTS, LOST = 4.0, 5, 0.05
+
+# Seconds for NETGEN to prove that a surface that intersects itself can be filled: mostly it hangs, or crashes.
+PATIENCE = 30.0
+
+# The mesh may cut corners of a curved surface, but not lose a part of it.
+VOLUME_TOLERANCE = 0.1
+REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install pytetwild pyvista' and --repair"
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """What is to be filled, and how.
+
+    Attributes
+    ----------
+    name
+        Of the surface in messages.
+    shape
+        The surface, m.
+    element
+        What it is filled with.
+    size
+        Longest edge wanted, m; None: chosen by the shape.
+    refine
+        Finer balls.
+    time_limit
+        Of the mesher, s, in all its runs.
+
+    """
+
+    name: str
+    shape: trimesh.Trimesh
+    element: Element
+    size: float | None
+    refine: Sequence[Ball]
+    time_limit: float
+
+    @property
+    def extent(self) -> float:
+        """Longest side, m."""
+        return float(np.ptp(self.shape.vertices, axis=0).max())
+
+    def mesh(self) -> TetMesh:
+        """Fill the surface.
+
+        Raises
+        ------
+        MeshError
+            A mesher that failed, or a mesh that loses a part of the body, and why.
+
+        """
+        size = self.extent / PARTS[self.element] if self.size is None else self.size
+        least = size / FINEST if self.size is None else size
+        found: tuple[TetMesh, Fit] | None = None
+        points, local = np.empty((0, 3)), np.empty(0)
+        patience = self.time_limit if self._crossing is None else min(self.time_limit, PATIENCE)
+        deadline = time.monotonic() + patience
+        for _ in range(ATTEMPTS):
+            made = self._tetrahedra(size, points, local, deadline)
+            fit = Fit.of(made, self.shape) if isinstance(made, TetMesh) else None
+            if fit is not None and (found is None or abs(fit.loss) < abs(found[1].loss)):
+                found = made, fit
+            late = time.monotonic() > deadline
+            if late or size <= least or (fit is not None and fit.is_good(size)):
+                break
+            if fit is None or abs(fit.loss) > LOST:
+                size, points, local = max(size / 2, least), np.empty((0, 3)), np.empty(0)
+                continue
+            before = np.full(len(fit.points), size) if len(local) == 0 else local
+            points, local = fit.points, fit.sizes(before, least)
+            if np.array_equal(before, local):
+                break
+        if found is None:
+            raise MeshError(f"{self.name}: {self._reason(size, made)}")
+        self._tell(*found, size)
+        return found[0]
+
+    def _tell(self, mesh: TetMesh, fit: Fit, size: float) -> None:
+        """Warn of what the mesh loses, or refuse it."""
+        if fit.is_good(size):
+            return
+        what = "the mesh" if self.size is None else f"with elements of {_length(size)} the mesh"
+        change = f"{'loses' if fit.loss > 0 else 'adds'} {100 * abs(fit.loss):.1f} % of the volume"
+        message = f"{self.name}: {what} {change} and lies up to {_length(fit.gaps.max())} off the surface"
+        smaller = f"elements of {_length(fit.size_for_good(min(size, _mean_edge(mesh))))} (--max-size) should do"
+        if abs(fit.loss) > VOLUME_TOLERANCE:
+            raise MeshError(f"{message}; {self._crossing or f'they are too large for it, {smaller}'}")
+        warnings.warn(f"{message}; {self._crossing or f'for less, {smaller}'}", MeshWarning, stacklevel=5)
+
+    def _reason(self, size: float, failures: str) -> str:
+        """Why no mesh was made."""
+        crossing = self._crossing
+        if crossing is not None:
+            return crossing
+        return (
+            f"NETGEN {failures} with elements of {_length(size)}, though the surface does not intersect itself: try "
+            f"elements of {_length(size / 2)}, or {REPAIR_HINT}"
+        )
+
+    @cached_property
+    def _crossing(self) -> str | None:
+        """Where the surface intersects itself, if it does."""
+        point = first_crossing(self.shape.vertices, self.shape.faces)
+        if point is None:
+            return None
+        place = ", ".join(f"{x:.4g}" for x in point)
+        return f"the surface intersects itself near ({place}) m; {REPAIR_HINT}"
+
+    def _tetrahedra(self, size: float, points: np.ndarray, local: np.ndarray, deadline: float) -> TetMesh | str:
+        """Elements of a size, smaller at points; or how the mesher failed."""
+        origin, extent = self.shape.vertices.min(axis=0), self.extent
+        smaller = local < size
+        # In a unit box, for NETGEN's tolerances are absolute.
+        job = {
+            "vertices": (self.shape.vertices - origin) / extent,
+            "faces": self.shape.faces,
+            "size": size / extent,
+            "balls": np.reshape(
+                [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.refine], (-1, 5)
+            ),
+            "points": np.column_stack([(points[smaller] - origin) / extent, local[smaller] / extent]),
+        }
+        made = self._run(job, deadline)
+        if isinstance(made, str):
+            return made
+        mesh = TetMesh(made[0] * extent + origin, made[1])
+        return curve(mesh, self._projected) if self.element == "quadratic" else mesh
+
+    def _run(self, job: dict[str, np.ndarray | float], deadline: float) -> tuple[np.ndarray, np.ndarray] | str:
+        """Nodes and tetrahedra, or how the mesher failed."""
+        with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
+            given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
+            np.savez(given, **job)
+            # Even triangles are best; where NETGEN cannot make them, the surface as given may still be filled.
+            failures = []
+            for route in ("remesh", "keep"):
+                command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(given), str(made)]
+                status = run_limited(command, max(deadline - time.monotonic(), 0.0))
+                failure = failure_of(status, self.time_limit)
+                if failure is None and made.exists():
+                    with np.load(made) as result:
+                        return result["nodes"], result["tets"]
+                failures.append(failure or "returned no tetrahedra")
+        return f"{failures[0]} when remeshing the surface, and {failures[1]} when keeping it,"
+
+    def _projected(self, points: np.ndarray) -> np.ndarray:
+        search = _native.SurfaceSearch(
+            np.ascontiguousarray(self.shape.vertices, dtype=np.float64), self.shape.faces.astype(np.uint32)
+        )
+        return search.closest(np.ascontiguousarray(points)).reshape(-1, 3)
+
+
+def _mean_edge(mesh: TetMesh) -> float:
+    corners = mesh.nodes[mesh.surface_faces[:, :3]]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+
+def _length(metres: float) -> str:
+    return f"{1e3 * metres:.3g} mm"

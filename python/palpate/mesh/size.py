@@ -1,0 +1,62 @@
+"""Size of a body, and whether the unit of length of its file was meant."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from palpate.errors import MeshWarning, UnclearUnitError
+from palpate.units import LENGTH_UNITS, length_scale
+
+# What is felt with a hand or a finger lies well within, m.
+LEAST_SIZE, MOST_SIZE = 1e-3, 3.0
+# Units that modelling programs write, most common first.
+COMMON_UNITS = ("mm", "cm", "m", "in", "um")
+
+
+def size_text(extents: Sequence[float] | np.ndarray) -> str:
+    """Write the sides of a body, m, in the unit that suits the longest: ``80 x 50 x 50 mm``."""
+    largest = float(np.max(extents))
+    unit = "um" if largest < LEAST_SIZE else "m" if largest > MOST_SIZE else "mm"
+    return f"{' x '.join(f'{side / LENGTH_UNITS[unit]:.4g}' for side in extents)} {unit}"
+
+
+def scale_of(name: str, positions: np.ndarray, unit: str | None) -> float:
+    """Metres in the unit of length of a file, which is metres if none is given.
+
+    Parameters
+    ----------
+    name
+        The file, in messages.
+    positions
+        (k, 3) in its unit.
+    unit
+        As the user gave it.
+
+    Raises
+    ------
+    UnitError
+        A unit that is not a length.
+    UnclearUnitError
+        No unit is given, and in metres the body is not between a millimetre and three metres long.
+
+    """
+    scale = length_scale("m" if unit is None else unit)
+    extents = np.ptp(positions, axis=0) if len(positions) else np.zeros(3)
+    longest = float(extents.max())
+    if not np.isfinite(longest) or longest <= 0 or LEAST_SIZE <= scale * longest <= MOST_SIZE:
+        return scale
+    size = size_text(scale * extents)
+    fitting = [u for u in COMMON_UNITS if LEAST_SIZE <= LENGTH_UNITS[u] * longest <= MOST_SIZE]
+    if unit is not None:
+        warnings.warn(f"{name}: the body is {size}; is its unit of length really {unit}?", MeshWarning, stacklevel=4)
+        return scale
+    choices = " or ".join(f"{u} ({size_text(LENGTH_UNITS[u] * extents)})" for u in fitting) or "any"
+    example = fitting[0] if fitting else "m"
+    raise UnclearUnitError(
+        f"{name}: in metres the body is {size}; which unit of length was meant, {choices}? Give it by --unit "
+        f"{example}, or unit = '{example}'",
+        fitting,
+    )

@@ -1,0 +1,59 @@
+"""Radii of tools for which a scene gives none: they follow the body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from palpate.errors import SceneError
+from palpate.green import GreensFunction
+from palpate.scene.tables import SceneTables, ToolTable
+from palpate.scene.tool_shape import KEYS
+
+# Of the longest side of a body: 5 mm on a block of 8 cm, 12 mm, a thumb, on a liver of 20 cm.
+PART_OF_BODY = 1 / 16
+
+
+def default_radius(green: GreensFunction) -> float:
+    """Radius of a tool that suits a body, m: a sixteenth of its longest side."""
+    return PART_OF_BODY * float(np.ptp(green.surface_positions, axis=0).max())
+
+
+def default_contact_radius(green: GreensFunction) -> float:
+    """Radius of a patch that suits a body, m: that of a tool, or the largest that its surface takes."""
+    return green.largest_contact_radius(default_radius(green))
+
+
+def with_radii(scene: SceneTables, greens: Sequence[GreensFunction]) -> SceneTables:
+    """Scene on these bodies whose tools all have their radii.
+
+    Raises
+    ------
+    SceneError
+        A contact radius that covers more nodes than a tick can weigh, or a rounding wider than the radius.
+
+    """
+    tools = [_with_radii(tool, greens) for tool in scene.tools]
+    return scene if tools == scene.tools else scene.model_copy(update={"tools": tools})
+
+
+def _with_radii(tool: ToolTable, greens: Sequence[GreensFunction]) -> ToolTable:
+    given = {}
+    if tool.radius is None and "radius" in KEYS.get(tool.shape, ({"radius"}, set()))[0]:
+        given["radius"] = min(default_radius(green) for green in greens)
+        if tool.rounding is not None and tool.rounding > given["radius"]:
+            raise SceneError(
+                f"tool.rounding is {tool.rounding:g} m, more than the radius of {given['radius']:.3g} m that follows "
+                "the body: give tool.radius"
+            )
+    if tool.contact_radius is None:
+        given["contact_radius"] = min(default_contact_radius(green) for green in greens)
+        return tool.model_copy(update=given)
+    if not all(green.accepts_contact_radius(tool.contact_radius) for green in greens):
+        largest = min(green.largest_contact_radius(tool.contact_radius) for green in greens)
+        raise SceneError(
+            f"tool.contact_radius = {1e3 * tool.contact_radius:.4g} mm covers more nodes of the surface than a tick "
+            f"can weigh: give at most {1e3 * largest:.3g} mm, or make the mesh coarser"
+        )
+    return tool.model_copy(update=given) if given else tool

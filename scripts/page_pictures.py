@@ -1,0 +1,140 @@
+"""Pictures of the page for the documents, each as a hand would come to it, in a real Chromium.
+
+Usage: python scripts/page_pictures.py [viewer] [two-fingers] [motion] [tools] [nodule] [--out docs/images]
+
+The page must be built (`make viewer`), and the machine be quiet: the timing of the loop is in the pictures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "python"))
+
+from browser import CHROMIUM, FLAGS, Program, drag, opened, press, settled_depth, settled_force, state, until  # noqa: E402
+from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
+
+# So long the page has stood before its picture, s: the plots show ten seconds.
+STANDS = 2.5
+
+
+@contextlib.contextmanager
+def page_of(
+    chromium: Browser, *arguments: str, command: str = "demo", size: tuple[int, int] = (1280, 720)
+) -> Iterator[Page]:
+    """Open the page of a program on the user's own cache; the hint is dismissed."""
+    program = Program(None, *arguments, command=command)
+    try:
+        with opened(chromium, program, size) as page:
+            page.locator("#hint-close").click()
+            yield page
+    finally:
+        program.stop()
+
+
+def choose(page: Page, test_id: str, name: str) -> None:
+    """Choose from a list, and wait until what takes long is done."""
+    page.get_by_test_id(test_id).select_option(name)
+    time.sleep(0.5)
+    page.get_by_test_id("status").wait_for(state="hidden", timeout=60_000)
+
+
+def take(page: Page, path: Path, contacts: int) -> None:
+    """Take a picture of what touches; a page so slow that the program has let its tools go shows nothing."""
+    page.screenshot(path=path)
+    found = state(page)["contacts"]
+    if found != contacts:
+        raise SystemExit(f"{path.name}: {found} tools touch in place of {contacts}: the machine is too busy")
+
+
+def viewer(chromium: Browser, out: Path) -> None:
+    """Press a finger on the liver, and show the stress around it."""
+    with page_of(chromium, "liver", size=(1280, 800)) as page:
+        choose(page, "field-select", "von_mises")
+        press(page, 2, place=(510, 250))
+        time.sleep(STANDS)
+        take(page, out / "viewer.png", 1)
+
+
+def two_fingers(chromium: Browser, out: Path) -> None:
+    """Pin one finger, and slide the other one beside it."""
+    with page_of(chromium, "liver", size=(1400, 850)) as page:
+        press(page, 2, place=(500, 300))
+        page.keyboard.press("n")
+        page.mouse.up()
+        press(page, place=(700, 330), contacts=2)
+        drag(page, (700, 330), (740, 360))
+        settled_force(page)
+        time.sleep(STANDS)
+        take(page, out / "two-fingers.png", 2)
+
+
+def motion(chromium: Browser, out: Path) -> None:
+    """Strike a beam, and show half a second of its own time."""
+    with page_of(chromium, "beam", "--impulse") as page:
+        until(page, lambda s: s["motion"]["struck_at"] is not None)
+        # Half a second, ten times slower, and what a busy machine needs.
+        time.sleep(8.0)
+        take(page, out / "motion.png", 0)
+
+
+def tools(chromium: Browser, out: Path) -> None:
+    """Lay a stylus on the kidney, and turn it by hand."""
+    with page_of(chromium, "kidney", size=(1280, 800)) as page:
+        choose(page, "shape-select", "capsule")
+        x, y = page.evaluate("window.palpate.pickPoint()")
+        press(page, 4, place=(x, y + 40))
+        page.keyboard.down("Alt")
+        drag(page, (x, y + 40), (x + 50, y + 30))
+        page.keyboard.up("Alt")
+        settled_force(page)
+        time.sleep(STANDS)
+        take(page, out / "tools.png", 1)
+
+
+def nodule(chromium: Browser, out: Path) -> None:
+    """Slide over the slab of `examples/nodule.toml` at constant depth: beside the nodule, and over it."""
+    with page_of(chromium, str(ROOT / "examples" / "nodule.toml"), command="run") as page:
+        # Along the top of the slab, through the middle, m.
+        beside, over = (page.evaluate("p => window.palpate.project(p)", [x, 0.04, 0.04]) for x in (0.016, 0.04))
+        press(page, place=beside)
+        settled_depth(page)
+        time.sleep(STANDS)
+        take(page, out / "nodule-beside.png", 1)
+        print(f"beside the nodule {state(page)['forceMagnitude']:.3f} N", end=", ")
+        drag(page, beside, over, 24, 0.1)
+        settled_force(page)
+        take(page, out / "nodule-over.png", 1)
+        print(f"over it {state(page)['forceMagnitude']:.3f} N")
+
+
+PICTURES: dict[str, Callable[[Browser, Path], None]] = {
+    "viewer": viewer,
+    "two-fingers": two_fingers,
+    "motion": motion,
+    "tools": tools,
+    "nodule": nodule,
+}
+
+
+def main() -> None:
+    """Take the pictures that are named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", choices=[*PICTURES, []], help="which (default: all)")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
+    given = parser.parse_args()
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        for name in given.names or PICTURES:
+            PICTURES[name](chromium, given.out)
+        chromium.close()
+
+
+if __name__ == "__main__":
+    main()
