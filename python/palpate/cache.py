@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import StoreError
-from palpate.leftovers import leftovers_in
+from palpate.leftovers import is_leftover
 
 # Ending of what a process is still writing.
 _WRITTEN = re.compile(r"\.\d+\.(new|partial)$")
@@ -84,7 +84,7 @@ def chosen_files(name: str) -> list[CachedFile]:
 
 def _entry(file: Path, folder: Path) -> CachedFile:
     stat = file.stat()
-    leftover = file in leftovers_in(file.parent)
+    leftover = is_leftover(file)
     relative = file.relative_to(folder).as_posix()
     head, dot, ending = relative.partition(".")
     name = f"{head[:12]}{dot}{ending}" if head and "/" not in relative else relative

@@ -16,21 +16,18 @@ from pathlib import Path
 _NAMES = (re.compile(r"(?P<name>.+)\.(?P<process>\d+)\.(new|partial)"), re.compile(r"\.(?P<process>\d+)\.(?P<name>.+)"))
 
 
-def leftovers_in(folder: Path, name: str | None = None) -> list[Path]:
-    """Files in a folder that processes which are gone were writing; of a file ``name`` alone if it is given."""
-    if not folder.is_dir():
-        return []
-    return sorted(file for file in folder.iterdir() if _is_leftover(file, name))
-
-
 def remove_leftovers(path: Path) -> None:
     """Remove what killed processes left of a file that is about to be written."""
-    for file in leftovers_in(path.parent, path.name):
-        with contextlib.suppress(OSError):
-            file.unlink()
+    if not path.parent.is_dir():
+        return
+    for file in path.parent.iterdir():
+        if is_leftover(file, path.name):
+            with contextlib.suppress(OSError):
+                file.unlink()
 
 
-def _is_leftover(file: Path, name: str | None) -> bool:
+def is_leftover(file: Path, name: str | None = None) -> bool:
+    """Whether a process that is gone was writing this file; of a file ``name`` alone if it is given."""
     match = next(filter(None, (pattern.fullmatch(file.name) for pattern in _NAMES)), None)
     if match is None or name not in (None, match["name"]):
         return False

@@ -125,11 +125,11 @@ def drag(page, start: tuple[float, float], end: tuple[float, float], steps: int 
 
 
 def settled_force(page) -> np.ndarray:
-    """Force once it stands still."""
+    """Force once it stands still, but for what the solution of pressure cells leaves open from tick to tick."""
     before = np.zeros(3)
     for _ in range(100):
         now = np.array(state(page)["force"])
-        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= 1e-6 * np.linalg.norm(now):
+        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= 1e-4 * np.linalg.norm(now):
             return now
         before = now
         time.sleep(0.3)

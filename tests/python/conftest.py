@@ -149,3 +149,12 @@ def chromium():
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def page(chromium, program):
+    """A page of the module's ``program``."""
+    from browser import opened
+
+    with opened(chromium, program) as page:
+        yield page

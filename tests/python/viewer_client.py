@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 
+import numpy as np
 from websockets.asyncio.client import connect
 
 from palpate.viewer import messages
@@ -67,11 +68,11 @@ async def page(server, *, token=None, origin=None):
 
 
 async def settled(client, condition=lambda header: True):
-    """Frame once the hand has arrived: the force stands still."""
-    force = None
+    """Frame once the hand has arrived: the force stands still but for what a tick leaves open, 1e-7 of it."""
+    force = [np.inf] * 3
     for _ in range(200):
         header, arrays = await client.receive("frame")
-        if header["contacts"] and header["tools"][0]["force"] == force and condition(header):
+        before, force = force, header["tools"][0]["force"]
+        if header["contacts"] and np.allclose(force, before, rtol=1e-5, atol=1e-7) and condition(header):
             return header, arrays
-        force = header["tools"][0]["force"]
     raise AssertionError(f"the force does not settle; the last frame was {header}")

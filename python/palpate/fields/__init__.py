@@ -1,9 +1,10 @@
 """Displacement, strain and stress of a body from the displacements of its surface."""
 
 from palpate.fields.element_strain import ElementStrain
-from palpate.fields.export import as_pyvista, placed, together, write_result
+from palpate.fields.export import placed, together
+from palpate.fields.exported import Exported
 from palpate.fields.interior import Interior
-from palpate.fields.picture import DeformedSurface, as_html, draw
+from palpate.fields.picture import DeformedSurface
 from palpate.fields.principal import extreme_values, largest_magnitude
 from palpate.fields.result import Result, ResultSource
 from palpate.fields.strain_measure import HONEST_STRAIN, Strained, StrainMeasure, StrainSource
@@ -14,6 +15,7 @@ __all__ = [
     "HONEST_STRAIN",
     "DeformedSurface",
     "ElementStrain",
+    "Exported",
     "Interior",
     "Result",
     "ResultSource",
@@ -23,12 +25,8 @@ __all__ = [
     "StressRecovery",
     "SurfaceStrain",
     "SurfaceStress",
-    "as_html",
-    "as_pyvista",
-    "draw",
     "extreme_values",
     "largest_magnitude",
     "placed",
     "together",
-    "write_result",
 ]

@@ -1,21 +1,20 @@
-"""A deformed body as users take it further: files, other libraries, pictures."""
+"""A deformed body: displacements of its surface, and what follows from them."""
 
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from palpate.fields.export import as_pyvista, surface_mesh, volume_mesh, write_result
-from palpate.fields.picture import DeformedSurface, as_html, draw
+from palpate.fields.export import surface_mesh, volume_mesh
+from palpate.fields.exported import Exported
+from palpate.fields.picture import DeformedSurface
 from palpate.fields.strain_measure import Strained, StrainSource
 from palpate.fields.stress import StressRecovery, SurfaceStress
 from palpate.fields.surface_strain import SurfaceStrain
 
 if TYPE_CHECKING:
     import meshio
-    from matplotlib.figure import Figure
 
     from palpate.body import Body
 
@@ -34,7 +33,7 @@ class ResultSource(StrainSource, Protocol):
         """Recovery of stress and strain at all nodes of the body."""
 
 
-class Result(Strained):
+class Result(Strained, Exported):
     """Displacements of a surface, with all that follows from them.
 
     Of a body whose elements are known, files and meshes hold its tetrahedra with ``displacement`` (m), ``strain`` and
@@ -71,43 +70,10 @@ class Result(Strained):
         """Further data at the surface nodes, (s, ...), by name."""
         return {}
 
-    def to_pyvista(self) -> Any:
-        """Give the same as :meth:`to_meshio` as pyvista's unstructured grid.
-
-        Raises
-        ------
-        Error
-            pyvista is not installed.
-
-        """
-        return as_pyvista(self.to_meshio())
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView; replaced only when complete.
-
-        Raises
-        ------
-        MeshError
-            Another ending, or no place for a file.
-
-        """
-        write_result(self.to_meshio(), path)
-
-    def plot(self, magnification: float = 1.0) -> Figure:
-        """Picture of the deformed surface, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
-
-        Parameters
-        ----------
-        magnification
-            Of the displacements that are drawn; the colours tell the true ones.
-
-        """
-        return draw([self.deformed_surface()], magnification, repr(self))
-
     def deformed_surface(self) -> DeformedSurface:
         """Surface to be drawn."""
         triangles = np.searchsorted(self._source.surface_nodes, self._source.surface_triangles)
         return DeformedSurface(self._source.surface_positions, triangles, self.displacements)
 
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), [self.deformed_surface()])
+    def _drawn_surfaces(self) -> list[DeformedSurface]:
+        return [self.deformed_surface()]

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
-from palpate.fields import (
-    DeformedSurface,
-    Result,
-    ResultSource,
-    as_html,
-    as_pyvista,
-    draw,
-    placed,
-    together,
-    write_result,
-)
+from palpate.fields import DeformedSurface, Exported, Result, ResultSource, placed, together
 from palpate.scene import BuiltBody
 from palpate.vectors import brief
 
 if TYPE_CHECKING:
     import meshio
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,7 +107,7 @@ class BodyFrame(ComparedByValue, Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Frame(ComparedByValue):
+class Frame(ComparedByValue, Exported):
     """The latest tick. Compared by value, number by number; not hashable.
 
     Attributes
@@ -166,41 +154,8 @@ class Frame(ComparedByValue):
         """
         return together([body.in_scene() for body in self.bodies])
 
-    def to_pyvista(self) -> Any:
-        """Give the same as :meth:`to_meshio` as pyvista's unstructured grid.
-
-        Raises
-        ------
-        Error
-            pyvista is not installed.
-
-        """
-        return as_pyvista(self.to_meshio())
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView; replaced only when complete.
-
-        Raises
-        ------
-        MeshError
-            Another ending, or no place for a file.
-
-        """
-        write_result(self.to_meshio(), path)
-
-    def plot(self, magnification: float = 1.0) -> Figure:
-        """Picture of the deformed surfaces, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
-
-        Parameters
-        ----------
-        magnification
-            Of the displacements that are drawn; the colours tell the true ones.
-
-        """
-        return draw([body.surface_in_scene() for body in self.bodies], magnification, repr(self))
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self), [body.surface_in_scene() for body in self.bodies])
+    def _drawn_surfaces(self) -> list[DeformedSurface]:
+        return [body.surface_in_scene() for body in self.bodies]
 
     @property
     def displacements(self) -> np.ndarray:

@@ -126,14 +126,14 @@ def test_the_verdict_is_that_of_the_rank(seed):
             body.require_supported()
 
 
-@pytest.mark.parametrize(("contrast", "regular"), [(1e6, True), (1e12, False)])
+@pytest.mark.parametrize(("contrast", "regular"), [(1e6, True), (1e11, False)])
 def test_a_stiff_half_on_a_soft_one_is_answered_or_refused_by_its_place(contrast, regular):
     """Beyond 1 / eps nothing is left of the soft half's digits in the sums with the stiff one's."""
     mesh = box_mesh(cells=(4, 2, 2)).with_regions({1: lambda p: p[:, 0] > 0.04})
     materials = {0: SOFT, 1: palpate.Material(10e3 * contrast, 0.3)}
     body = palpate.Body(mesh, material=materials, fixed=lambda p: p[:, 0] < 1e-9)
     if not regular:
-        with pytest.raises(palpate.BodyError, match=r"condition number \d+e1[4-6].*around node \d+ at .* materials"):
+        with pytest.raises(palpate.BodyError, match=r"condition number \d+e1[3-6].*around node \d+ at .* materials"):
             palpate.precompute(body, precision="f64", progress=False)
         return
     green = palpate.precompute(body, precision="f64", progress=False)

@@ -80,13 +80,13 @@ def test_hexahedra_of_every_format(tmp_path, ending, name):
     label = (np.arange(len(cells)) % 2).astype(np.int32)
     data = {"gmsh:physical": [label], "gmsh:geometrical": [label]} if ending == "msh" else {"region": [label]}
     data = {"medit:ref": [label]} if ending == "mesh" else {} if ending == "inp" else data
-    content = meshio.Mesh(nodes, [("hexahedron", cells)], cell_data=data)
+    content = meshio.Mesh(100 * nodes, [("hexahedron", cells)], cell_data=data)
     meshio.write(tmp_path / f"box.{ending}", content, file_format=name)
     with pytest.warns(palpate.MeshWarning, match=r"36 hexahedron\) were split into 216 tetrahedra"):
         mesh = palpate.TetMesh.read(tmp_path / f"box.{ending}", unit="cm")
-    assert mesh.volume == pytest.approx(SIZE.prod() * 1e-6, rel=1e-12)
+    assert mesh.volume == pytest.approx(SIZE.prod(), rel=1e-12)
     if name not in {"abaqus", "gmsh"}:  # no integer cell data; labels of Gmsh 4 are those of its geometry
-        assert mesh.volumes[mesh.regions == 1].sum() == pytest.approx(label.mean() * SIZE.prod() * 1e-6, rel=1e-12)
+        assert mesh.volumes[mesh.regions == 1].sum() == pytest.approx(label.mean() * SIZE.prod(), rel=1e-12)
 
 
 def test_second_order_hexahedra_are_taken_by_their_corners(tmp_path):

@@ -31,12 +31,6 @@ def struck(cache):
 
 
 @pytest.fixture
-def page(chromium, program):
-    with opened(chromium, program) as page:
-        yield page
-
-
-@pytest.fixture
 def moving_page(chromium, struck):
     with opened(chromium, struck) as page:
         yield page
@@ -231,8 +225,9 @@ def test_deformation_drawn_larger_is_marked(page):
     slide_to(page, "shown-scale", 5)
     assert banner.inner_text() == "Deformation drawn 5x" and "5x" in legend.inner_text()
     press(page)
-    # The pointer meets what is drawn: the tool slides by a little, and rubs; drawn is five times as much, felt is not.
-    assert np.linalg.norm(settled_force(page)) == pytest.approx(np.linalg.norm(true), rel=0.1)
+    # The pointer meets what is drawn: as the liver swings, the tool slides by 20 mm, and rubs. Drawn is five times as
+    # much, felt is not.
+    assert np.linalg.norm(settled_force(page)) == pytest.approx(np.linalg.norm(true), rel=0.3)
     page.mouse.up()
     slide_to(page, "shown-scale", 1)
     assert banner.is_hidden() and legend.is_hidden()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, drag, opened, press, settled_depth, settled_force, state, until
+from browser import MARKS, Program, drag, press, settled_depth, settled_force, state, until
 
 from palpate.vectors import rotated
 
@@ -16,12 +16,6 @@ def program(cache):
     started = Program(cache, "kidney", "--paper")
     yield started
     assert started.stop() == 0
-
-
-@pytest.fixture
-def page(chromium, program):
-    with opened(chromium, program) as page:
-        yield page
 
 
 def choose(page, shape: str) -> None:

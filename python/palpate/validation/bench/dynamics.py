@@ -156,7 +156,7 @@ def _tick_us(body: Body, motion: BodyMotion) -> tuple[float, float, float]:
     green = precompute(body, touch=near, progress=False)
     scene = Scene.of_store(green.path)
     simulation = Simulation(BuiltScene.of(scene, body, green, motion))
-    above = top + [0.0, 0.0, scene.tools[0].radius]
+    above = top + [0.0, 0.0, simulation.scene.tools[0].radius]
     press = above - np.linspace(0.0, 2e-3, TICKS)[:, None] * [0.0, 0.0, 1.0]
     tap = above + np.where(np.arange(TICKS) % 2, -1e-3, 1e-2)[:, None] * [0.0, 0.0, 1.0]
     ticks = [_per_call_us(lambda path=path: simulation.run(path), TICKS) for path in (press, tap)]

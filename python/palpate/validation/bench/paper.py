@@ -152,7 +152,7 @@ def _tick_times(green: GreensFunction, store: Path) -> tuple[float, float]:
     scene = Scene.of_store(store)
     simulation = Simulation(BuiltScene.of(scene, None, green))
     top = green.surface_positions[np.searchsorted(green.surface_nodes, _pressed_node(green))]
-    centre = top + [0.0, 0.0, scene.tools[0].radius]
+    centre = top + [0.0, 0.0, simulation.scene.tools[0].radius]
     depth = np.linspace(0.0, 2e-3, TICKS)
     path = centre - depth[:, None] * [0.0, 0.0, 1.0]
     simulation.run(path[:100])

@@ -272,7 +272,7 @@ fn free_displacement(model: &Model, state: &State, body: usize, slot: usize) -> 
 }
 
 /// On a body in motion each contact is met where it was a step ago, over a patch so wide that what the local law has less
-/// than the patch is monotonic even where the body is rigid within a step ([`RegularCompliance::widths`]).
+/// than the patch is monotonic even where the body is rigid within a step ([`WIDTH`]).
 fn follow_motion(
     model: &Model,
     state: &mut State,
