@@ -18,6 +18,10 @@ pub struct ToolState {
     /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
     /// the least reached since for one that was released inside, so that a force always starts from zero.
     pub entry_depth: [f64; MAX_BODIES],
+    /// Where it was a tick ago, m, in the world; none where it was not in the scene.
+    pub(super) before: Option<DVec3>,
+    /// Energy that contacts which fade have lost in this tick, J.
+    pub(super) freed: f64,
     /// Why no contact began where the tool reaches the body.
     pub refused: [Option<Refusal>; MAX_BODIES],
 }
