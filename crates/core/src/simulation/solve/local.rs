@@ -44,8 +44,9 @@ pub const MOST_CELL_STEPS: usize = 3;
 const SETTLED: f64 = 1e-7;
 /// A force that differs by less than this part from what was expected is found.
 const SAME: f64 = 1e-7;
-/// Both, over those above, where a tool takes pressure cells, which are found to about as much.
-const CELLS_LOOSER: f64 = 100.0;
+/// Both, over those above, where a tool takes pressure cells. They are found to 1e-6 of the depth, and the step that is left, of
+/// 1e-5 of the radius, bounds the error of the force; what it differs from the expected only tells that steps still go to and fro.
+const CELLS_LOOSER: [f64; 2] = [1e2, 1e4];
 /// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
 /// longer one. A half-space under a sphere is strained far beyond what is linear there.
 const MOST_DEPTH: f64 = 1.6;
@@ -237,7 +238,7 @@ fn settle(
         }
     }
     let cells = slots.iter().any(|&slot| takes_pressures(model, state, slot));
-    let (most, looser) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, 1.0) };
+    let (most, [looser, looser_force]) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, [1.0; 2]) };
     for step in 0..most {
         if !meet(model, state, local, slots, body, controls, step) {
             return Outcome::LetGo;
@@ -250,7 +251,7 @@ fn settle(
         }
         // What contacts do to each other is known from the first step on.
         let knows_others = step > 0 || slots.len() == 1;
-        if knows_others && longest < looser * SETTLED * radius && local.changed < looser * SAME {
+        if knows_others && longest < looser * SETTLED * radius && local.changed < looser_force * SAME {
             break;
         }
         if step + 1 < most {
