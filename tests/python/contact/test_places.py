@@ -11,6 +11,8 @@ from palpate.fields import Interior
 from palpate.scene import BuiltScene
 from palpate.validation.verify.contact import groove
 from palpate.validation.verify.contact.loop import loop_of, sphere
+from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
+from palpate.validation.verify.solution import green_of
 
 BARE = {"device": {"max_force": 1e3, "max_slew": 1e9, "ramp": 0, "max_stiffness": 1e9}, "view": {"strain_limit": 0}}
 ELLIPSOID = {"shape": "ellipsoid", "semi_axes": (0.008, 0.006, 0.005)}
@@ -60,6 +62,31 @@ def test_forces_of_two_places_balance_the_supports(grooved):
         nodal = (stiffness @ interior.extend(shape).ravel()).reshape(-1, 3)
         reaction = np.where(body.fixed_mask, nodal, 0.0).sum(axis=0)
         assert np.abs(reaction - force).max() <= 1e-9 * np.abs(played.forces).max()
+
+
+@pytest.mark.parametrize(
+    ("tool", "height"), [(sphere(0.01), 0.01), ({**ELLIPSOID, "contact": "local", "friction": 0.0}, 5e-3)]
+)
+def test_it_does_not_matter_which_of_two_tools_comes_first(tool, height):
+    """Without friction forces are the gradient of one energy: the place of the tools alone determines them."""
+    block = body_on_table(Block(), (8, 8, 4), quadratic=True)
+    simulation = loop_of(block, green_of(block, touch=top_nodes(block)), [tool] * 2)
+    low, high = block.mesh.bounds
+    ends = [
+        [*(low + high)[:2] / 2 + [aside, 0.0], high[2] + height - depth]
+        for aside, depth in ((-8e-3, 2e-3), (8e-3, 5e-4))
+    ]
+    way = np.linspace(3e-3, 0.0, 31)[:, None] * [0.0, 0.0, 1.0]
+    there, away = np.zeros_like(way), np.full_like(way, way[0])
+
+    def pressed(first: list, second: list) -> np.ndarray:
+        lifts = [np.concatenate(list(lift)) for lift in (first, second)]
+        return simulation.run(np.stack([end + lift for end, lift in zip(ends, lifts, strict=True)], axis=1))[-1]
+
+    together = pressed([away, way], [away, way])
+    assert together[1, 2] > 0
+    for other in (pressed([way, there], [away, way]), pressed([away, way], [way, there])):
+        assert np.abs(other - together).max() < 1e-5 * np.abs(together).max()
 
 
 @pytest.fixture(scope="module", params=[2e-3, 5e-3], ids=["2mm", "5mm"])

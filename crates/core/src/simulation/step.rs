@@ -6,7 +6,7 @@ use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::slip::slip;
-use super::state::State;
+use super::state::{Entry, State};
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, further, limit, solve, time};
 
@@ -49,7 +49,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         let law = law_of(law_now(tool_model.law, law_of_contact, said.grab));
         state.tools[tool].refused[body] = None;
         if !said.active || input.controls.reset || !said.pose.is_finite() {
-            state.tools[tool].entry_depth[body] = 0.0;
+            state.tools[tool].entry[body] = Entry::default();
             places.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
@@ -60,7 +60,8 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
             if law.update(&approach, &mut state.contacts.slots[slot]) {
                 lasts |= !state.contacts.slots[slot].local.held;
             } else {
-                state.tools[tool].entry_depth[body] = approach.depth();
+                let depth = approach.depth();
+                state.tools[tool].entry[body] = Entry { depth, reached: depth };
                 state.contacts.clear(slot);
             }
         }
@@ -73,7 +74,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                 continue;
             }
         }
-        match law.begin(&approach, &mut state.tools[tool].entry_depth[body], &mut scratch.covering) {
+        match law.begin(&approach, &mut state.tools[tool].entry[body], &mut scratch.covering) {
             Ok(Some(begun)) => {
                 if let Some(slot) = solve::add_contact(model, state, begun, &scratch.covering) {
                     limit::begin(model, state, slot, input.controls.strain_limit[body]);
@@ -152,12 +153,17 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, co
 fn remember(model: &Model, state: &mut State, contact: &Contact) {
     let (tool, body) = (contact.tool, contact.body);
     let moves = model.bodies[body].moves();
-    if contact.law == LawKind::Local || (!moves && !contact.pressed) {
+    let entry = &mut state.tools[tool].entry[body];
+    if contact.law == LawKind::Local {
+        entry.reached = contact.local.depth.max(0.0);
+        return;
+    }
+    if !moves && !contact.pressed {
         return;
     }
     let position = contact.anchor + contact.wanted;
     let motion = state.bodies[body].motion.as_ref();
-    state.tools[tool].entry_depth[body] = Approach::at(model, motion, tool, body, position).depth();
+    state.tools[tool].entry[body].depth = Approach::at(model, motion, tool, body, position).depth();
 }
 
 fn answer(model: &Model, state: &State) -> Output {

@@ -23,6 +23,7 @@ use super::covering::Covering;
 use super::input::Input;
 use super::model::Model;
 use super::motion::Motion;
+use super::state::Entry;
 use super::tool::{LawKind, ToolModel};
 use crate::contact::shape::ToolShape;
 use crate::contact::{Refusal, SurfacePoint};
@@ -41,7 +42,7 @@ pub fn law_of(kind: LawKind) -> &'static dyn Law {
 
 /// What a contact law says, in the order of a tick.
 pub trait Law: Sync {
-    /// For a tool without a contact: begins one where it reaches the body, with its patch in `covering`. `entry_depth` is what
+    /// For a tool without a contact: begins one where it reaches the body, with its patch in `covering`. `entry` is what
     /// the tool remembers of this body.
     ///
     /// # Errors
@@ -49,7 +50,7 @@ pub trait Law: Sync {
     fn begin(
         &self,
         approach: &Approach<'_>,
-        entry_depth: &mut f64,
+        entry: &mut Entry,
         covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal>;
 

@@ -93,7 +93,7 @@ pub fn hand_over(model: &Model, state: &mut State, found: Found<'_>, slots: &[us
             begin_next(model, state, found, &contact, (response, place));
         } else {
             // Another one begins from no force.
-            state.tools[contact.tool].entry_depth[contact.body] = f64::INFINITY;
+            state.tools[contact.tool].entry[contact.body].depth = f64::INFINITY;
         }
     }
     any
@@ -114,7 +114,7 @@ pub fn hold_lost(state: &mut State, steps: &[DVec3], slots: &[usize]) {
         if step.length() < 0.5 * longest || local.held {
             continue;
         }
-        state.tools[tool].entry_depth[body] = f64::INFINITY;
+        state.tools[tool].entry[body].depth = f64::INFINITY;
         match local.force == DVec3::ZERO {
             true => state.contacts.clear(slot),
             false => hold(&mut state.contacts.slots[slot]),

@@ -462,7 +462,7 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         let contact = &state.contacts.slots[slot];
         let tool = contact.tool;
         if has_jumped(model, contact, response, local.places[a]) {
-            state.tools[tool].entry_depth[body] = f64::INFINITY;
+            state.tools[tool].entry[body].depth = f64::INFINITY;
             state.contacts.clear(slot);
             continue;
         }

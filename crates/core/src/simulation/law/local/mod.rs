@@ -41,6 +41,7 @@ use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurfa
 use crate::simulation::body::LocalSurface;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
+use crate::simulation::state::Entry;
 use crate::simulation::tool::LawKind;
 
 /// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
@@ -144,24 +145,25 @@ impl Law for Local {
     fn begin(
         &self,
         approach: &Approach<'_>,
-        entry_depth: &mut f64,
+        entry: &mut Entry,
         covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };
         covering.near.forget();
         let Some((foot, depth)) = arrival(approach, local, met, &mut covering.near) else {
-            *entry_depth = 0.0;
+            *entry = Entry::default();
             return Ok(None);
         };
-        *entry_depth = entry_depth.min(depth.max(0.0));
+        let before = std::mem::replace(&mut entry.reached, depth.max(0.0));
+        entry.depth = entry.depth.min(entry.reached);
         if let (ToolShape::Sphere { .. }, None) = (&approach.tool.shape, approach.motion)
             && approach.gone != DVec3::ZERO
         {
             // A distance changes by no more than the way: where it seems to, the foot a tick ago was another one.
-            *entry_depth = entry_depth.max(depth - WAY * approach.gone.length());
+            entry.depth = entry.depth.max(depth - before - WAY * approach.gone.length());
         }
-        if depth <= *entry_depth {
+        if depth <= entry.depth {
             return Ok(None);
         }
         let local = LocalContact {
@@ -169,7 +171,7 @@ impl Law for Local {
             orientation: approach.orientation,
             relative: met,
             turned: approach.orientation,
-            entry: *entry_depth,
+            entry: entry.depth,
             foot,
             part: 1.0,
             share: 1.0,
