@@ -23,6 +23,7 @@ export class Legend {
   private readonly max = byId<HTMLInputElement>("legend-max");
   private drawn: ColorMap | null = null;
   private field: FieldMessage | null = null;
+  private told = "";
 
   constructor(private readonly store: Store, private readonly control: Control) {
     byId("legend-lock").onclick = () => this.toggleLock();
@@ -30,6 +31,8 @@ export class Legend {
     this.max.onchange = () => this.takeMax();
     this.max.onkeydown = ({ key }) => {
       if (key === "Escape") this.max.value = "";
+      // What is shown is written anew.
+      this.told = "";
       if (key === "Enter" || key === "Escape") this.max.blur();
     };
     store.subscribe(["sizes", "body"], ({ sizes, body }) => {
@@ -55,6 +58,10 @@ export class Legend {
   }
 
   private show(field: FieldMessage, locked: boolean): void {
+    // At rest, as in most frames, nothing is written: the browser would lay out again.
+    const told = JSON.stringify([field, locked]);
+    if (told === this.told) return;
+    this.told = told;
     this.drawBar(field.signed ? ColorMap.diverging : ColorMap.sequential);
     const { unit, factor } = unitOf(field);
     const max = field.max / factor;
