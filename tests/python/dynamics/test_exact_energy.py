@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from conftest import box_mesh
@@ -35,7 +37,7 @@ def integrated(body, dt):
     rows = np.searchsorted(free, 3 * corner(body) + np.arange(3))
     ends = np.vstack([np.zeros(3), forces_at_ends()])
     state, seen = np.zeros(2 * size + 2), [np.zeros(3)]
-    for first, last in zip(ends[:-1], ends[1:], strict=True):
+    for first, last in pairwise(ends):
 
         def slope(t, state, first=first, last=last):
             u, v = state[:size], state[size : 2 * size]
@@ -73,7 +75,6 @@ def test_exact_modes_keep_their_energy(body, modes, rayleigh):
     energy = motion.energy
     assert energy.total + energy.dissipated == pytest.approx(energy.work, rel=1e-12)
     assert energy.dissipated == 0 if rayleigh == (0.0, 0.0) else energy.dissipated > 0.1 * energy.work
-    before = energy.total
     motion.step(count=1)  # the force falls to zero
     before = motion.energy.total
     motion.step(count=5000)

@@ -148,8 +148,8 @@ def test_a_strike_excites_each_mode_by_its_share(tmp_path):
         np.full((1500, 3), np.nan), strikes=[(tick, simulation.body.mesh.nodes[struck], impulse)], watch=nodes
     )
     omega = 2 * np.pi * basis.frequencies
-    # The force is held through the tick's step and the next, by delta = 0.6 and what is left of it: a mode hears each dulled by
-    # sinc(omega dt / 2).
+    # The force is held through the tick's step and the next, by delta = 0.6 and what is left of it: a mode hears each
+    # dulled by sinc(omega dt / 2).
     share = basis.shapes[struck].T @ impulse / omega * np.sinc(omega * dt / 2 / np.pi)
     t = played.time - played.time[tick]
     after = t > 1.5 * dt
