@@ -106,10 +106,11 @@ impl Account {
     }
 }
 
-/// Which contact of the body a slot has.
+/// Which contact of the body a slot has. One that waits without a force is none yet.
 fn begun(contacts: &Contacts, body: usize, slot: usize) -> Option<u64> {
     let contact = &contacts.slots[slot];
-    (contact.mode != Mode::Free && contact.body == body).then_some(contact.serial >> REVISIONS)
+    let touches = contact.mode != Mode::Free && contact.body == body && contact.force != DVec3::ZERO;
+    touches.then_some(contact.serial >> REVISIONS)
 }
 
 /// What spring and indentation of a contact hold, J.
