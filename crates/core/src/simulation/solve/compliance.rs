@@ -21,9 +21,6 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, covering: &
         if let Some(pressures) = pressures.get_mut(slot) {
             *pressures = PressureState::default();
         }
-        if let Some(motion) = &mut bodies[body].motion {
-            motion.begin_contact(slot);
-        }
         return Some(slot);
     }
     if let Err(refusal) = contacts.patches[slot].admit(green, &covering.candidate) {

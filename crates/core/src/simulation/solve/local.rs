@@ -299,7 +299,7 @@ fn follow_motion(
             contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
-        motion.leave_out_static(&dynamics.modes, slot, contacts.slots[slot].force);
+        motion.leave_out_static(&dynamics.modes, contacts, slot);
         let mut moving = DMat3::ZERO;
         for (fan, _, gradient) in weights.with_gradients() {
             let moved = motion.remaining_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
