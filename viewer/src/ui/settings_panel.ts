@@ -16,7 +16,7 @@ const STRAIN_BOUNDS: Range = [0.05, 0.5];
 const STRAIN_OFF_PERCENT = 51;
 /** Moduli that may be typed, Pa: those that the program takes. */
 const MODULI: Range = [1e-6, 1e15];
-export const PASCALS = { Pa: 1, kPa: 1e3, MPa: 1e6, GPa: 1e9 };
+const PASCALS = { Pa: 1, kPa: 1e3, MPa: 1e6, GPa: 1e9 };
 
 /** In the list of fields, before what is no field. */
 const GROUPED = "by-";
