@@ -1,6 +1,6 @@
 """Pictures of the page for the documents, each as a hand would come to it, in a real Chromium.
 
-Usage: python scripts/page_pictures.py [viewer] [two-fingers] [motion] [tools] [nodule] [--out docs/images]
+Usage: python scripts/page_pictures.py [NAME ...] [--out docs/images], each NAME one of those at the end of this file.
 
 The page must be built (`make viewer`), and the machine be quiet: the timing of the loop is in the pictures.
 """
@@ -17,7 +17,19 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
 
-from browser import CHROMIUM, FLAGS, Program, drag, opened, press, settled_depth, settled_force, state, until  # noqa: E402
+from browser import (  # noqa: E402
+    CHROMIUM,
+    FLAGS,
+    STILL_CELLS,
+    Program,
+    drag,
+    opened,
+    press,
+    settled_depth,
+    settled_force,
+    state,
+    until,
+)
 from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
 
 # So long the page has stood before its picture, s: the plots show ten seconds.
@@ -32,6 +44,7 @@ def page_of(
     program = Program(None, *arguments, command=command)
     try:
         with opened(chromium, program, size) as page:
+            page.emulate_media(color_scheme="dark")
             page.locator("#hint-close").click()
             yield page
     finally:
@@ -93,9 +106,31 @@ def tools(chromium: Browser, out: Path) -> None:
         page.keyboard.down("Alt")
         drag(page, (x, y + 40), (x + 50, y + 30))
         page.keyboard.up("Alt")
-        settled_force(page)
+        settled_force(page, STILL_CELLS)
         time.sleep(STANDS)
         take(page, out / "tools.png", 1)
+
+
+def cut(chromium: Browser, out: Path) -> None:
+    """Cut the liver open under a finger, and show the stress inside."""
+    with page_of(chromium, "liver", size=(1280, 800)) as page:
+        choose(page, "field-select", "von_mises")
+        page.keyboard.press("x")
+        page.keyboard.press("w")
+        time.sleep(STANDS)
+        press(page, 4)
+        time.sleep(STANDS)
+        take(page, out / "cut.png", 1)
+
+
+def regions(chromium: Browser, out: Path) -> None:
+    """Cut the slab of `examples/nodule.toml` open through its nodule, in the colours of its regions."""
+    with page_of(chromium, str(ROOT / "examples" / "nodule.toml"), command="run") as page:
+        page.get_by_test_id("field-select").select_option(label="Region")
+        page.keyboard.press("x")
+        page.keyboard.press("w")
+        time.sleep(STANDS)
+        take(page, out / "regions.png", 0)
 
 
 def nodule(chromium: Browser, out: Path) -> None:
@@ -119,6 +154,8 @@ PICTURES: dict[str, Callable[[Browser, Path], None]] = {
     "two-fingers": two_fingers,
     "motion": motion,
     "tools": tools,
+    "cut": cut,
+    "regions": regions,
     "nodule": nodule,
 }
 

@@ -1,10 +1,16 @@
-import { beforeEach, describe, expect, it } from "vitest";
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 
-import { Control } from "./control";
+import { Control, NO_INSIDE } from "./control";
 import type { ClientMessage, FrameMessage, SceneMessage } from "./net/protocol";
 import { Store } from "./store";
 
-const body = { youngs_modulus: 1e4, tets: 1, fields: [{ name: "displacement", title: "Displacement" }] };
+const region = (youngs_modulus: number) => ({ title: "Part", youngs_modulus, poissons_ratio: 0.45, density: 1000 });
+const body = {
+  youngs_modulus: 1e4,
+  tets: 1,
+  fields: ["displacement", "strain"].map((name) => ({ name, title: name })),
+  regions: [region(1e4), region(2e4)],
+};
 const tool = { radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01, friction: 0.3, shape: "sphere" };
 
 function scene(tools: number): SceneMessage {
@@ -81,5 +87,76 @@ describe("tools that are pinned", () => {
       end();
       expect(store.get().pinned).toEqual([]);
     }
+  });
+});
+
+describe("what is shown", () => {
+  let store: Store;
+  let sent: ClientMessage[];
+  let control: Control;
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    vi.stubGlobal("window", globalThis);
+    store = new Store();
+    sent = [];
+    control = new Control(store, (message) => sent.push(message));
+    store.update({ connection: "open", role: "control" });
+    control.takeScene({ ...scene(2), name: "block" });
+  });
+
+  afterEach(() => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
+
+  it("goes from field to field, and on to regions and materials", () => {
+    const seen = Array.from({ length: 4 }, () => {
+      control.nextField();
+      const { coloring, field } = store.get();
+      return coloring === "field" ? field : coloring;
+    });
+    expect(seen).toEqual(["strain", "region", "material", "displacement"]);
+  });
+
+  it("ends where it was locked, each field by itself, until the lock or the scene goes", () => {
+    control.lockRange("strain", 5);
+    control.chooseField("displacement");
+    control.chooseField("strain");
+    expect(sent).toEqual([
+      { type: "field", name: "strain", max: 5 },
+      { type: "field", name: "displacement" },
+      { type: "field", name: "strain", max: 5 },
+    ]);
+    control.tellWishes();
+    expect(sent.at(-1)).toEqual({ type: "field", name: "strain", max: 5 });
+    control.takeScene({ ...scene(1), name: "block" });
+    expect(store.get().ranges).toEqual({ strain: 5 });
+    control.takeScene({ ...scene(1), name: "another" });
+    expect(store.get().ranges).toEqual({});
+    expect(sent.at(-1)).toEqual({ type: "field", name: "strain" });
+  });
+
+  it("is reset with all that was on its way", () => {
+    control.setFriction(0.5);
+    control.setFriction(0.9);
+    control.hold({ tilt: 30 });
+    control.showScaled(4);
+    control.reset();
+    vi.runAllTimers();
+    expect(sent).toEqual([{ type: "set", friction: 0.5, tool: 0 }, { type: "reset" }]);
+    expect(store.get()).toMatchObject({ shownScale: 1, postures: [{ tilt: 0, turn: 0 }, { tilt: 0, turn: 0 }] });
+    // The answer counts, however short a time after the slider was moved it comes.
+    const { settings } = store.get();
+    control.takeText({ ...settings!, friction: [0.3, 0.3] });
+    expect(store.get().settings?.friction).toEqual([0.3, 0.3]);
+  });
+
+  it("says why a store is not cut open", () => {
+    control.takeScene({ ...scene(1), bodies: [{ ...body, tets: 0, regions: [] }] } as unknown as SceneMessage);
+    control.toggleLayer("cutaway");
+    expect(store.get().layers.cutaway).toBe(false);
+    expect(store.get().notices).toEqual([NO_INSIDE]);
+    expect(sent).toEqual([]);
   });
 });

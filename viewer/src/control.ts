@@ -13,8 +13,9 @@ import type {
   TextMessage,
   Vec3,
 } from "./net/protocol";
+import { groupings } from "./regions";
 import { drivenTool, inControl } from "./store";
-import type { Axis, Layer, Posture, Store } from "./store";
+import type { Axis, Layer, Posture, Store, Theme } from "./store";
 
 /** A slider dragged quickly sends no more often than this. */
 const SEND_INTERVAL_MS = 40;
@@ -26,6 +27,9 @@ const NOTICES_MAX = 3;
 const LYING: Posture = { tilt: 90, turn: 0 };
 const UPRIGHT: Posture = { tilt: 0, turn: 0 };
 export const TILT_MAX = 90;
+/** Why a body from a store is not cut open. */
+export const NO_INSIDE =
+  "A store holds the surface of a body only: what is inside is not in the file. Open the scene or the mesh that it was made from to cut it open.";
 
 export class Control {
   private changedMs = -Infinity;
@@ -54,9 +58,9 @@ export class Control {
   /** A new scene: what was touched is let go, and choices that it does not offer are dropped. */
   takeScene(scene: SceneMessage): void {
     this.release();
-    const { field, strike, layers, scene: before, postures } = this.store.get();
+    const { field, strike, layers, scene: before, postures, coloring, ranges } = this.store.get();
     const posture = ({ shape }: { shape: ShapeName }, tool: number) =>
-      shape === before?.tools[tool]?.shape ? postures[tool]! : shape === "capsule" ? LYING : UPRIGHT;
+      shape === before?.tools[tool]?.shape ? postures[tool]! : firstPosture(shape);
     const offered = scene.bodies[0]?.fields.some(({ name }) => name === field) ?? false;
     this.changedMs = -Infinity;
     this.store.update({
@@ -74,12 +78,15 @@ export class Control {
       postures: scene.tools.map(posture),
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,
+      coloring: coloring !== "field" && groupings(scene).includes(coloring) ? coloring : "field",
+      ranges: before?.name === scene.name ? ranges : {},
       tab: scene.motion ? "motion" : "force",
       strike: strike && scene.motion !== null,
       impulse: scene.motion?.impulse ?? 0,
     });
     // A bare store has no tetrahedra to be shown.
     if (layers.cutaway && !hasInside(scene)) this.toggleLayer("cutaway");
+    if (this.store.get().ranges !== ranges && field !== null) this.tellField(field);
   }
 
   /** A pinned tool that has left the scene, by a fault or another way, is pinned no more. */
@@ -93,7 +100,7 @@ export class Control {
   tellWishes(): void {
     const { layers, field } = this.store.get();
     if (layers.cutaway) this.send({ type: "cutaway", on: true });
-    if (field !== null) this.send({ type: "field", name: field });
+    if (field !== null) this.tellField(field);
   }
 
   notice(text: string): void {
@@ -111,7 +118,7 @@ export class Control {
     const { layers, scene } = this.store.get();
     const on = !layers[layer];
     if (layer === "cutaway") {
-      if (on && !(scene && hasInside(scene))) return;
+      if (on && !(scene && hasInside(scene))) return this.notice(NO_INSIDE);
       this.send({ type: "cutaway", on });
     }
     this.store.update({ layers: { ...layers, [layer]: on } });
@@ -128,17 +135,40 @@ export class Control {
   /** A field that is chosen wants to be seen. */
   chooseField(field: string): void {
     const { layers } = this.store.get();
-    this.store.update({ field, layers: { ...layers, colors: true } });
-    this.send({ type: "field", name: field });
+    this.store.update({ field, coloring: "field", layers: { ...layers, colors: true } });
+    this.tellField(field);
   }
 
-  /** The next field of the body, after the last one the first. */
+  /** Colours by region or by material. */
+  chooseGrouping(coloring: "region" | "material"): void {
+    const { layers } = this.store.get();
+    this.store.update({ coloring, layers: { ...layers, colors: true } });
+  }
+
+  /** The next field of the body, then its regions and materials, after the last one the first. */
   nextField(): void {
-    const { scene, body, field } = this.store.get();
+    const { scene, body, field, coloring } = this.store.get();
     const fields = scene?.bodies[body]?.fields ?? [];
     if (fields.length === 0) return;
-    const at = Math.max(0, fields.findIndex(({ name }) => name === field));
-    this.chooseField(fields[(at + 1) % fields.length]!.name);
+    const groups = groupings(scene);
+    const at =
+      coloring === "field"
+        ? Math.max(0, fields.findIndex(({ name }) => name === field))
+        : fields.length + groups.indexOf(coloring);
+    const next = (at + 1) % (fields.length + groups.length);
+    if (next < fields.length) this.chooseField(fields[next]!.name);
+    else this.chooseGrouping(groups[next - fields.length]!);
+  }
+
+  /** Ends the colours of a field at a value, in its unit; null lets them follow its largest one. */
+  lockRange(field: string, max: number | null): void {
+    const others = Object.entries(this.store.get().ranges).filter(([name]) => name !== field);
+    this.store.update({ field, ranges: Object.fromEntries(max === null ? others : [...others, [field, max]]) });
+    this.tellField(field);
+  }
+
+  chooseTheme(theme: Theme): void {
+    this.store.update({ theme });
   }
 
   chooseBody(body: number): void {
@@ -275,13 +305,29 @@ export class Control {
     this.send({ type: "cancel" });
   }
 
+  /** Lets go, clears a fault, and puts all sliders back to what they were at first. */
   reset(): void {
     this.release();
-    if (inControl(this.store.get())) this.send({ type: "reset" });
+    const { scene } = this.store.get();
+    if (!inControl(this.store.get()) || !scene) return;
+    // A value that was on its way would come after this, and one that was just chosen would hide the answer.
+    for (const { limit } of this.limits.values()) limit.cancel();
+    this.changedMs = -Infinity;
+    this.store.update({
+      postures: scene.tools.map(({ shape }) => firstPosture(shape)),
+      impulse: scene.motion?.impulse ?? 0,
+      shownScale: 1,
+    });
+    this.send({ type: "reset" });
   }
 
   private pin(tool: number): void {
     this.store.update({ pressing: null, pinned: [...this.store.get().pinned, tool], pinNext: false });
+  }
+
+  private tellField(name: string): void {
+    const max = this.store.get().ranges[name];
+    this.send({ type: "field", name, ...(max !== undefined && { max }) });
   }
 
   private takeRole(role: Role): void {
@@ -304,6 +350,11 @@ export class Control {
     this.limits.set(name, waiting);
     waiting.limit.request();
   }
+}
+
+/** How a tool of a shape is held at first. */
+export function firstPosture(shape: ShapeName): Posture {
+  return shape === "capsule" ? LYING : UPRIGHT;
 }
 
 /** Whether any body can be cut open. */

@@ -14,9 +14,14 @@ import type {
 
 export type Axis = "x" | "y" | "z";
 export type Layer = "colors" | "wireframe" | "supports" | "cutaway" | "plots";
+/** What the bodies are coloured by. */
+export type Coloring = "field" | "region" | "material";
+export type Theme = "dark" | "light";
 export type Tab = "motion" | "force" | "loop" | "modes";
 /** Displacements may be drawn so many times as large as they are. */
 export const SHOWN_SCALE_MAX = 10;
+/** A cut takes away this share of the extent at first. */
+export const CUT_SHARE = 0.5;
 
 /** The tool that the pointer drives, with the depth of a press or the length of a pull that the pointer wants, m. */
 export interface Pressing {
@@ -53,6 +58,10 @@ export interface State {
   shownScale: number;
   /** Name of the field in colours; null until one is chosen. */
   field: string | null;
+  coloring: Coloring;
+  /** Where the colours of a field end, in its unit, by its name; a field that is not here follows its largest value. */
+  ranges: Readonly<Record<string, number>>;
+  theme: Theme;
   /** The body that stiffness and legend belong to. */
   body: number;
   tab: Tab;
@@ -83,9 +92,12 @@ export function initialState(): State {
     frame: null,
     notices: [],
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
-    cut: { axis: "y", share: 0.5 },
+    cut: { axis: "y", share: CUT_SHARE },
     shownScale: 1,
     field: null,
+    coloring: "field",
+    ranges: {},
+    theme: "dark",
     body: 0,
     tab: "force",
     grab: false,

@@ -45,6 +45,8 @@ declare global {
     palpate: {
       state(): ViewerState;
       project(point: Vec3): [number, number];
+      /** Unit vector towards the viewer, and the distance from what is looked at, m. */
+      view(): { towards: Vec3; distance: number; target: Vec3 };
       pickPoint(body?: number): [number, number] | null;
     };
   }
@@ -63,6 +65,14 @@ export function installTestHooks(parts: Parts): void {
   window.palpate = {
     state: () => viewerState(parts),
     project: (point) => stage.viewport.project(new THREE.Vector3(...point)),
+    view: () => {
+      const { camera, controls } = stage.viewport;
+      return {
+        towards: stage.viewport.towardsViewer().toArray(),
+        distance: camera.position.distanceTo(controls.target),
+        target: controls.target.toArray(),
+      };
+    },
     pickPoint: (body = 0) => {
       const view = stage.bodies[body];
       return view ? pickPoint(stage, view, body) : null;

@@ -3,6 +3,7 @@
 import { Control } from "./control";
 import { Pointer } from "./input/pointer";
 import { listenToKeys } from "./input/keyboard";
+import { TouchPan } from "./input/touch_pan";
 import { Connection } from "./net/connection";
 import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
@@ -13,6 +14,7 @@ import { Viewport } from "./scene/viewport";
 import { Store } from "./store";
 import { installTestHooks } from "./test_hooks";
 import { byId } from "./ui/dom";
+import { fillHelp, toggleHelp } from "./ui/help";
 import { showHint } from "./ui/hint";
 import { Legend } from "./ui/legend";
 import { MotionPanel } from "./ui/motion_panel";
@@ -20,8 +22,10 @@ import { followNotices } from "./ui/notices";
 import { Panel } from "./ui/panel";
 import { Plots } from "./ui/plots";
 import { Readout } from "./ui/readout";
+import { ScaleView } from "./ui/scale_view";
 import { SettingsPanel } from "./ui/settings_panel";
 import { Statistics } from "./ui/statistics";
+import { followTheme } from "./ui/theme";
 import { ToolPanel } from "./ui/tool_panel";
 
 /** The scene's own strike waits until the body has been seen at rest. */
@@ -54,11 +58,15 @@ export class Viewer {
     );
     this.stage = new Stage(viewport, store);
     const pointer = new Pointer(this.stage, store, control);
-    listenToKeys(control, viewport);
+    new TouchPan(viewport);
+    listenToKeys(control, viewport, toggleHelp);
+    // Before what reads its colours.
+    followTheme(store, control);
     this.plots = new Plots(store);
     const statistics = new Statistics(store);
     new Readout(store);
-    new Legend(store);
+    new Legend(store, control);
+    new ScaleView(viewport, store);
     new Panel(store, control, viewport);
     new SettingsPanel(store, control);
     new ToolPanel(store, control);
@@ -69,6 +77,7 @@ export class Viewer {
 
   start(): void {
     showHint();
+    fillHelp();
     this.connection.open();
   }
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -132,13 +133,20 @@ class _Builder:
         if table.adds_middles:
             mesh = mesh.to_quadratic()
         base: MaterialTable = self._own("material")[0]
-        labels, materials = np.zeros(len(mesh.tets), dtype=np.int64), {0: base.material()}
         regions, where = self._own("region")
+        labels, of_file = _file_regions(mesh, len(regions))
+        names: dict[str, int] = {}
+        materials = {label: base.material() for label in np.unique(labels).tolist()}
         for rank, region in enumerate(regions):
             with self._blaming([*where, rank]):
                 labels[region.elements(mesh)] = rank + 1
                 materials[rank + 1] = region.material(base)
-        mesh = TetMesh(mesh.nodes, mesh.tets, labels)
+                names[_unused(region.title, names)] = rank + 1
+        # What tables have claimed as a whole is left out.
+        for name, label in of_file.items():
+            if label in labels:
+                names[_unused(name, names)] = label
+        mesh = TetMesh(mesh.nodes, mesh.tets, labels, names)
         loads, where = self._own("loads")
         body = Body(mesh, material=materials, fixed=self._fixed(mesh), loads=together(loads))
         for rank, load in enumerate(loads):
@@ -188,3 +196,24 @@ class _Builder:
             mask[mesh.tets[:, 4:][between]] = True
             return mask
         return fixed
+
+
+def _file_regions(mesh: TetMesh, tables: int) -> tuple[np.ndarray, dict[str, int]]:
+    """Labels (m,) of a file's regions, and their names, beside those from 1 on for the tables of a scene.
+
+    The first region has the label 0, and no name where it is the only one.
+    """
+    numbers, ranks = np.unique(mesh.regions, return_inverse=True)
+    labels = np.where(ranks == 0, 0, tables + ranks).ravel().astype(np.int64)
+    if len(numbers) == 1:
+        return labels, {}
+    named = {number: name for name, number in mesh.region_names.items()}
+    labels_of = [0, *range(tables + 1, tables + len(numbers))]
+    titles = [named.get(number, f"region {number}") for number in numbers.tolist()]
+    return labels, dict(zip(titles, labels_of, strict=True))
+
+
+def _unused(name: str, names: Mapping[str, int]) -> str:
+    """Return a name that is not among those given, with a number behind it where it must."""
+    candidates = (name if count == 1 else f"{name} {count}" for count in itertools.count(1))
+    return next(candidate for candidate in candidates if candidate not in names)

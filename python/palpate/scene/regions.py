@@ -72,6 +72,13 @@ class RegionTable(Table):
             self.solid()
         return self
 
+    @property
+    def title(self) -> str:
+        """What the region is called: as in the mesh file, or by its shape."""
+        if isinstance(self.mesh_region, int):
+            return f"region {self.mesh_region}"
+        return self.mesh_region or str(self.shape)
+
     def solid(self) -> shapes.Shape:
         """Solid of a shape."""
         kind, keys = SHAPES[str(self.shape)]

@@ -88,16 +88,23 @@ class Fields:
             return pose.once("largest", lambda: self._measure.largest(displacements))
         return float(largest_magnitude(self._stress(pose).strain).max())
 
-    def picture(self, name: str, displacements: np.ndarray, interior: bool) -> Picture:
-        """Field of a pose; a name that this body does not offer gives the first field."""
+    def picture(self, name: str, displacements: np.ndarray, interior: bool, full_scale: float | None = None) -> Picture:
+        """Field of a pose, up to a value that is given in its unit, or to its largest one.
+
+        A name that this body does not offer gives the first field, and that its own range.
+        """
         field = next((f for f in self.offered if f.name == name), self.offered[0])
+        full_scale = full_scale if field.name == name else None
         inside = interior and self._recovery is not None
         pose = self._of(displacements)
         shown = self._extended(pose) if inside else displacements
         values = self._values(field, pose, shown, inside)
-        largest = self._range(field, float(np.abs(values).max()))
-        scaled = 127.5 + 127.5 * values / largest if field.signed else 255.0 * values / largest
-        header = {"name": field.name, "title": field.title, "unit": field.unit, "max": largest, "signed": field.signed}
+        largest = float(np.abs(values).max())
+        followed = self._range(field, largest)
+        end = followed if full_scale is None else full_scale
+        scaled = 127.5 + 127.5 * values / end if field.signed else 255.0 * values / end
+        told = {"name": field.name, "title": field.title, "unit": field.unit, "signed": field.signed}
+        header = {**told, "max": end, "largest": largest}
         return Picture(header, shown, np.rint(np.clip(scaled, 0.0, 255.0)), inside)
 
     def _values(self, field: Field, pose: _Pose, displacements: np.ndarray, inside: bool) -> np.ndarray:

@@ -19,7 +19,7 @@ from palpate.errors import ViewerError
 from palpate.units import to_float
 from palpate.vectors import three_numbers
 
-VERSION = 6
+VERSION = 7
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
@@ -77,6 +77,16 @@ def number(message: Mapping[str, Any], key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(to_float(value)):
         raise ViewerError(f"{message['type']}: {key} must be a finite number")
     return float(value)
+
+
+def positive_or_none(message: Mapping[str, Any], key: str) -> float | None:
+    """Take a positive number of a client's message; None where it gives none, or null."""
+    if message.get(key) is None:
+        return None
+    value = number(message, key)
+    if value <= 0.0:
+        raise ViewerError(f"{message['type']}: {key} must be a positive number")
+    return value
 
 
 def whole(message: Mapping[str, Any], key: str, low: int, high: int) -> int:

@@ -238,7 +238,8 @@ class ViewerServer:
             elif message["type"] == "cutaway":
                 client.wants = replace(client.wants, cutaway=message.get("on") is True)
             elif message["type"] == "field":
-                client.wants = replace(client.wants, field=messages.word(message, "name"))
+                name, full_scale = messages.word(message, "name"), messages.positive_or_none(message, "max")
+                client.wants = replace(client.wants, field=name, full_scale=full_scale)
             elif client is not self._controller:
                 raise ViewerError("another viewer has control; this one watches")
             else:

@@ -32,9 +32,10 @@ FRAME_AGE = 0.008
 
 @dataclass(frozen=True)
 class Wants:
-    """What a client looks at: a field by name, and whether it sees the inside."""
+    """What a client looks at: a field by name, the value at which its colours end, and whether it sees the inside."""
 
     field: str = ""
+    full_scale: float | None = None
     cutaway: bool = False
 
 
@@ -98,6 +99,17 @@ class Session:
             "shape": [kind_of(tool) for tool in self.built.scene.tools],
             "strain_limit": self._strain_limit,
             "time_scale": None if self._moving is None else self._moving.time_scale,
+        }
+
+    def _defaults(self) -> dict[str, Any]:
+        """Return what the sliders go back to: the values of the scene."""
+        tools, moduli = self.built.scene.tools, [body.green.youngs_modulus for body in self.built.bodies]
+        changeable = [self.simulation.youngs_modulus_of(body) is not None for body in range(len(moduli))]
+        return {
+            "youngs_modulus": [e if able else None for e, able in zip(moduli, changeable, strict=True)],
+            "contact_radius": [tool.contact_radius for tool in tools],
+            "friction": [tool.friction for tool in tools],
+            "strain_limit": self.built.scene.view.strain_limit,
         }
 
     def release(self, tool: int | None = None) -> None:
@@ -173,6 +185,7 @@ class Session:
             "title": titled(scene.name),
             "size": self.size,
             "strain_limit": self._strain_limit,
+            "defaults": self._defaults(),
             "max_force": scene.device.max_force,
             "bodies": [body.header(self.simulation.youngs_modulus_of(i)) for i, body in enumerate(self._bodies)],
             "tools": [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(outlines)],
@@ -197,7 +210,7 @@ class Session:
         frame = self._latest()
         poses = [self._pose(frame, body) for body in range(len(self._bodies))]
         pairs = list(zip(self._bodies, poses, strict=True))
-        pictures = [body.fields.picture(wants.field, pose, wants.cutaway) for body, pose in pairs]
+        pictures = [body.fields.picture(wants.field, pose, wants.cutaway, wants.full_scale) for body, pose in pairs]
         strains = [body.fields.largest_strain(pose) for body, pose in pairs]
         log, moved = self._log.since(log_seen[0]), self._history.since(log_seen[1])
         header = {
@@ -322,13 +335,14 @@ class Session:
 
     def _reset(self, _message: Mapping[str, Any]) -> bool:
         self.release()
-        for rank, tool in enumerate(self.built.scene.tools):
-            self.simulation.set_radius(tool.contact_radius, rank)
-            self.simulation.set_friction(tool.friction, rank)
-        self._set_strain_limit(self.built.scene.view.strain_limit, {})
-        for rank in range(len(self._bodies)):
-            if self.simulation.youngs_modulus_of(rank) is not None:
-                self.simulation.set_youngs_modulus(self.built.bodies[rank].green.youngs_modulus, rank)
+        defaults = self._defaults()
+        for rank in range(len(self._active)):
+            self.simulation.set_radius(defaults["contact_radius"][rank], rank)
+            self.simulation.set_friction(defaults["friction"][rank], rank)
+        self._set_strain_limit(defaults["strain_limit"], {})
+        for rank, modulus in enumerate(defaults["youngs_modulus"]):
+            if modulus is not None:
+                self.simulation.set_youngs_modulus(modulus, rank)
         if self._moving is not None:
             self._moving.end_mode()
         self.simulation.reset()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.body import Body
 from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltBody
 from palpate.viewer.fields import Fields
@@ -46,6 +47,7 @@ class ShownBody:
             "position": list(self.built.position),
             "orientation": list(self.built.orientation),
             "fields": [{"name": field.name, "title": field.title} for field in self.fields.offered],
+            "regions": [] if body is None else regions_of(body)[0],
         }
 
     def arrays(self) -> dict[str, tuple[str, np.ndarray]]:
@@ -53,18 +55,35 @@ class ShownBody:
         green, body = self.built.green, self.built.body
         if body is None:
             nodes, tets = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4))
+            regions = np.zeros(0)
             nodes[green.surface_nodes] = green.surface_positions
             fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)
         else:
             nodes, tets, fixed = body.mesh.nodes, drawing_tets(body.mesh.tets), green.fixed_nodes
+            regions = np.repeat(regions_of(body)[1], len(tets) // len(body.mesh.tets))
         return {
             "nodes": ("f4", nodes),
             "tets": ("u4", tets),
+            "tet_regions": ("u4", regions),
             "surface_triangles": ("u4", green.surface_triangles),
             "surface_nodes": ("u4", green.surface_nodes),
             "fixed_nodes": ("u4", fixed),
             "free": ("f4", green.free_displacements),
         }
+
+
+def regions_of(body: Body) -> tuple[list[dict[str, Any]], np.ndarray]:
+    """Return the entries of the scene message for a body's regions, and which of them each element (m,) is in."""
+    mesh = body.mesh
+    labels, first, ranks = np.unique(mesh.regions, return_index=True, return_inverse=True)
+    names = {label: name for name, label in mesh.region_names.items()}
+    entries = []
+    for label, element in zip(labels.tolist(), first, strict=True):
+        modulus, ratio, density = body.element_materials[element].tolist()
+        unnamed = "Rest of the body" if label == 0 else f"Region {label}"
+        title = titled(names[label]) if label in names else unnamed
+        entries.append({"title": title, "youngs_modulus": modulus, "poissons_ratio": ratio, "density": density})
+    return entries, ranks.ravel()
 
 
 def titled(name: str) -> str:

@@ -175,7 +175,7 @@ def slide_to(page, name: str, value: float) -> None:
 
 def test_a_press_is_held_at_the_chosen_strain(page):
     notice, strain = page.get_by_test_id("limit-notice"), page.get_by_test_id("strain-value")
-    assert page.locator("#strain-limit-value").inner_text() == "30 %"
+    assert page.locator("#strain-limit-value").input_value() == "30 %"
     assert notice.is_hidden()
     slide_to(page, "strain-limit", 10)
     press(page, 15)
@@ -189,12 +189,12 @@ def test_a_press_is_held_at_the_chosen_strain(page):
     assert settled_depth(page) < deep + 0.51 * RADIUS
     assert np.linalg.norm(settled_force(page) - first) < 0.1 * np.linalg.norm(first)
     slide_to(page, "strain-limit", 51)
-    assert page.locator("#strain-limit-value").inner_text() == "off"
+    assert page.locator("#strain-limit-value").input_value() == "off"
     until(page, lambda s: not s["limited"] and s["strain"] > 0.13)
     assert page.locator("#strain-warning").is_visible() and notice.is_hidden()
     page.mouse.up()
     page.locator("#reset").click()
-    until(page, lambda _: page.locator("#strain-limit-value").inner_text() == "30 %")
+    until(page, lambda _: page.locator("#strain-limit-value").input_value() == "30 %")
 
 
 def test_friction_bounds_the_force_along_the_surface(page):
@@ -203,7 +203,7 @@ def test_friction_bounds_the_force_along_the_surface(page):
     forces = []
     for friction in (0, 1):
         slide_to(page, "friction", friction)
-        assert page.locator("#friction-value").inner_text() == f"{friction:.2f}"
+        assert page.locator("#friction-value").input_value() == f"{friction:.2f}"
         press(page, place=(x, y + 60))
         drag(page, (x, y + 60), (x + 40, y + 60), 20)
         forces.append(settled_force(page))
@@ -213,21 +213,23 @@ def test_friction_bounds_the_force_along_the_surface(page):
     along = forces[1] - (forces[1] @ normal) * normal
     assert np.linalg.norm(along) > 0.1 * np.linalg.norm(forces[1])
     page.locator("#reset").click()
-    until(page, lambda _: page.locator("#friction-value").inner_text() == "0.30")
+    until(page, lambda _: page.locator("#friction-value").input_value() == "0.30")
 
 
 def test_deformation_drawn_larger_is_marked(page):
     banner, legend = page.get_by_test_id("scale-banner"), page.get_by_test_id("legend-scale")
     assert banner.is_hidden() and legend.is_hidden()
     press(page)
-    true = settled_force(page)
+    true, place = settled_force(page), state(page)["tools"][0]["position"]
     page.mouse.up()
+    # Until the dent is gone, another place of the body is on top: five times as deep it is where the finger was.
+    until(page, lambda s: s["contacts"] == 0 and s["strain"] < 1e-6)
     slide_to(page, "shown-scale", 5)
     assert banner.inner_text() == "Deformation drawn 5x" and "5x" in legend.inner_text()
     press(page)
-    # The pointer meets what is drawn: as the liver swings, the tool slides by 20 mm, and rubs. Drawn is five times as
-    # much, felt is not.
-    assert np.linalg.norm(settled_force(page)) == pytest.approx(np.linalg.norm(true), rel=0.3)
+    # Drawn is five times as much, felt is not.
+    assert np.linalg.norm(settled_force(page)) == pytest.approx(np.linalg.norm(true), rel=0.1)
+    assert state(page)["tools"][0]["position"] == pytest.approx(place, abs=1e-4)
     page.mouse.up()
     slide_to(page, "shown-scale", 1)
     assert banner.is_hidden() and legend.is_hidden()
@@ -265,12 +267,12 @@ def test_stiffness_scales_the_force_at_once(page):
     slider = page.get_by_test_id("stiffness")
     press(page)
     soft = settled_force(page)
-    value = page.locator("#stiffness-value").inner_text()
+    value = page.locator("#stiffness-value").input_value()
     modulus = float(value.split()[0])
     slider.evaluate("e => { e.value = Number(e.value) + 0.15; e.dispatchEvent(new Event('input', {bubbles: true})); }")
     until(page, lambda s: abs(s["forceMagnitude"] / np.linalg.norm(soft) - 1) > 0.2)
     stiff = settled_force(page)
-    now = float(page.locator("#stiffness-value").inner_text().split()[0])
+    now = float(page.locator("#stiffness-value").input_value().split()[0])
     assert np.linalg.norm(stiff) / np.linalg.norm(soft) == pytest.approx(now / modulus, rel=0.03)
     page.mouse.up()
     page.locator("#reset").click()
@@ -293,16 +295,6 @@ def test_cut_away_and_another_model(page):
     page.locator("#show-cutaway").click()
     page.get_by_test_id("model-select").select_option("liver")
     until(page, lambda s: s["scene"] == "liver", 60)
-
-
-def test_a_screenshot_is_a_picture(page, tmp_path):
-    from PIL import Image
-
-    with page.expect_download() as download:
-        page.locator("#screenshot").click()
-    download.value.save_as(tmp_path / "shot.png")
-    pixels = np.asarray(Image.open(tmp_path / "shot.png").convert("RGB"), dtype=float)
-    assert pixels.std() > 5
 
 
 def swings(page, seconds: float) -> tuple[np.ndarray, np.ndarray]:

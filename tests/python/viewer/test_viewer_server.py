@@ -78,6 +78,12 @@ def test_sliders_act_at_once_and_are_told_to_all(built):
             await client.say(type="set", body=0, youngs_modulus=20e3)
             settings, _ = await watcher.receive("settings")
             assert settings["youngs_modulus"][0] == 20e3
+            # Who comes now is told what it is, and what Reset leads to.
+            async with page(server) as late:
+                scene, _ = await late.receive("scene")
+                assert scene["bodies"][0]["youngs_modulus"] == 20e3
+                assert scene["defaults"]["youngs_modulus"] == [pytest.approx(10e3)]
+                assert scene["defaults"]["friction"] == [0.3] and scene["defaults"]["strain_limit"] == 0.3
             await client.say(type="set", body=0, youngs_modulus=-1)
             error, _ = await client.receive("error")
             assert "positive" in error["text"]
@@ -229,6 +235,8 @@ def test_host_header(host, bound, ours):
         '{"type": "set", "strain_limit": null}',
         '{"type": "set", "contact_radius": 0.004, "tool": 1}',
         '{"type": "set", "youngs_modulus": 1e4}',
+        '{"type": "field", "name": "displacement", "max": 0}',
+        '{"type": "field", "name": "displacement", "max": "1 mm"}',
         '{"type": "set", "youngs_modulus": 1e4, "body": 1}',
         '{"type": "set", "body": 0, "tool": 0}',
         '{"type": "set", "token": 1}',

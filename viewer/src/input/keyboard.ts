@@ -3,7 +3,24 @@
 import type { Control } from "../control";
 import type { Viewport } from "../scene/viewport";
 
-export function listenToKeys(control: Control, viewport: Viewport): void {
+/** Keys and what they do, in the order in which the help tells of them. */
+export const KEYS: readonly (readonly [key: string, what: string])[] = [
+  ["r", "reset: let go, clear a fault, put all sliders back"],
+  ["n", "pin the finger, or let pinned ones go"],
+  ["Escape", "let all fingers go, end a mode"],
+  ["g", "grab instead of pressing"],
+  ["k", "a click strikes, on a body in motion"],
+  ["f", "the next field in colours"],
+  ["c", "colours"],
+  ["w", "wire frame of the shape at rest"],
+  ["s", "supported nodes"],
+  ["x", "cut open"],
+  ["p", "plots"],
+  ["v", "look from the front again"],
+  ["?", "this help"],
+];
+
+export function listenToKeys(control: Control, viewport: Viewport, toggleHelp: () => void): void {
   const actions: Record<string, () => void> = {
     r: () => control.reset(),
     v: () => viewport.reframe(),
@@ -16,18 +33,26 @@ export function listenToKeys(control: Control, viewport: Viewport): void {
     g: () => control.toggleGrab(),
     k: () => control.toggleStrike(),
     n: () => control.togglePin(),
+    "?": toggleHelp,
     Escape: () => {
       control.release();
       control.showMode(0);
     },
   };
   window.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-    // A list of models takes letters itself.
-    if (event.target instanceof HTMLSelectElement) return;
-    const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || takesKeys(event.target)) return;
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    // Over the help only the key that ends it.
+    if (document.querySelector("dialog[open]") && key !== "?") return;
+    const action = actions[key];
     if (!action) return;
     event.preventDefault();
     action();
   });
+}
+
+/** Lists choose by letters, and what is typed into a field is text. */
+function takesKeys(target: EventTarget | null): boolean {
+  if (target instanceof HTMLInputElement) return target.type === "text";
+  return target instanceof HTMLSelectElement;
 }

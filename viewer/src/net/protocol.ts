@@ -1,10 +1,10 @@
-// Messages of the websocket, version 6. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 7. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
-export const PROTOCOL_VERSION = 6;
+export const PROTOCOL_VERSION = 7;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -32,6 +32,8 @@ export interface SceneMessage {
   size: number;
   /** A tool is held where a body would be strained more; 0 for never. */
   strain_limit: number;
+  /** What the settings are reset to. */
+  defaults: Pick<SettingsMessage, "youngs_modulus" | "contact_radius" | "friction" | "strain_limit">;
   /** Of every tool. */
   max_force: number;
   bodies: BodyMessage[];
@@ -54,6 +56,16 @@ export interface BodyMessage {
   position: Vec3;
   orientation: Quaternion;
   fields: Choice[];
+  /** Empty for a bare store. */
+  regions: RegionMessage[];
+}
+
+/** A part of a body with one material: Pa, kg/m^3. */
+export interface RegionMessage {
+  title: string;
+  youngs_modulus: number;
+  poissons_ratio: number;
+  density: number;
 }
 
 export type ShapeName = "sphere" | "ellipsoid" | "capsule" | "punch" | "surface";
@@ -98,6 +110,8 @@ export interface MotionScene {
 export interface BodyArrays {
   nodes: Float32Array;
   tets: Uint32Array;
+  /** Of each tetrahedron, among the body's regions. */
+  tet_regions: Uint32Array;
   surface_triangles: Uint32Array;
   surface_nodes: Uint32Array;
   fixed_nodes: Uint32Array;
@@ -144,13 +158,17 @@ export interface ContactMessage {
   slipping: boolean;
 }
 
-/** What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa. */
+/**
+ * What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa; what is beyond it
+ * is at the end. `largest` is the largest magnitude in the frame.
+ */
 export interface FieldMessage {
   name: string;
   title: string;
   unit: "mm" | "%" | "Pa";
-  max: number;
   signed: boolean;
+  max: number;
+  largest: number;
 }
 
 /** A mode shape that is drawn in place of the motion, counted from 1; amplitude is its largest displacement. */
@@ -256,13 +274,14 @@ export type ClientMessage =
   | { type: "model"; name: string }
   | { type: "cancel" }
   | { type: "cutaway"; on: boolean }
-  | { type: "field"; name: string }
+  | { type: "field"; name: string; max?: number }
   | { type: "ack"; frame: number };
 
 const TEXT_TYPES = ["welcome", "role", "settings", "status", "error"];
 const BODY_ARRAYS = {
   nodes: Float32Array,
   tets: Uint32Array,
+  tet_regions: Uint32Array,
   surface_triangles: Uint32Array,
   surface_nodes: Uint32Array,
   fixed_nodes: Uint32Array,

@@ -1,14 +1,17 @@
-// Everything drawn of a body, where it stands in the scene: solid or cut-away, rest wire frame, supports, and the shadow.
+// Everything drawn of a body, where it stands in the scene: solid, face of a cut, rest wire frame, supports, and the shadow.
 
 import * as THREE from "three";
 
 import type { BodyArrays, BodyMessage, PoseArrays, Vec3 } from "../net/protocol";
-import type { Layer } from "../store";
+import type { Layer, Theme } from "../store";
 import { ColorMap } from "./color_map";
-import { CutawayView } from "./cutaway_view";
-import { tissueColor } from "./field_material";
+import { faceOwners } from "./face_owners";
+import { FIELD, REGION, tissueColor } from "./field_material";
+import type { FieldUniforms, TISSUE } from "./field_material";
 import { createGroundShadow } from "./ground_shadow";
 import { firstEntry } from "./ray_surface";
+import { regionTexture } from "./region_texture";
+import { SectionView } from "./section_view";
 import { SolidView } from "./solid_view";
 import { SupportsView } from "./supports_view";
 import { Surface } from "./surface";
@@ -49,6 +52,12 @@ export interface Pose {
   showsMode: boolean;
 }
 
+/** Colour of the wire frame, seen against the backdrop as against the body, and how dark the shadow is. */
+const LOOKS: Record<Theme, { wire: number; shadow: number }> = {
+  dark: { wire: 0xf2f5fa, shadow: 1 },
+  light: { wire: 0x1d2733, shadow: 0.4 },
+};
+
 export class BodyView {
   readonly group = new THREE.Group();
   /** In the frame of the body. */
@@ -57,16 +66,18 @@ export class BodyView {
   /** At rest, in the scene. */
   readonly restInScene: Float32Array;
   readonly bounds = new THREE.Box3();
-  private readonly uniforms = { colorMap: { value: ColorMap.sequential.texture }, fieldShown: { value: 1 } };
+  private readonly uniforms: FieldUniforms;
   private readonly solid: SolidView;
   /** The solid as picking sees it: where a ray leaves the body tells what it has passed. */
   private readonly bothSides: THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
   private readonly wireframe: WireframeView;
   private readonly supports: SupportsView;
   private readonly shadow: THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial>;
-  /** Made on first use: a large mesh has many tetrahedra, and most people never cut. */
-  private cutaway: CutawayView | null = null;
-  private cutawayShown = false;
+  /** Made on first use: most people never cut. */
+  private section: SectionView | null = null;
+  private cutShown = false;
+  /** In the frame of the body, at rest. */
+  private readonly plane = { normal: new THREE.Vector3(0, 0, 1), offset: Infinity };
   private drawn: Pose | null = null;
   private touched = false;
   /** Displacements are drawn so many times. */
@@ -79,6 +90,12 @@ export class BodyView {
     private readonly arrays: BodyArrays,
     size: number,
   ) {
+    const tissue = tissueColor(header.name);
+    this.uniforms = {
+      colorMap: { value: ColorMap.sequential.texture },
+      regionColors: { value: regionTexture([tissue]) },
+      coloring: { value: FIELD },
+    };
     const [w, x, y, z] = header.orientation;
     this.placed.position.set(...header.position);
     this.placed.quaternion.set(x, y, z, w);
@@ -86,7 +103,7 @@ export class BodyView {
     this.surface = new Surface(arrays);
     this.restInScene = transformed(this.surface.rest, this.placed.matrix);
     this.bounds.setFromArray(this.restInScene);
-    this.solid = new SolidView(this.surface, tissueColor(header.name), size, this.uniforms);
+    this.solid = new SolidView(this.surface, tissue, size, this.uniforms, regionsOfTriangles(header, arrays));
     this.bothSides = new THREE.Mesh(this.solid.mesh.geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
     this.bothSides.matrixWorld.copy(this.placed.matrix);
     this.wireframe = new WireframeView(this.surface);
@@ -97,19 +114,30 @@ export class BodyView {
   }
 
   show(layers: Readonly<Record<Layer, boolean>>): void {
-    this.uniforms.fieldShown.value = layers.colors ? 1 : 0;
     this.wireframe.lines.visible = layers.wireframe;
     this.supports.markers.visible = layers.supports;
     // A body from a bare store has no inside.
-    this.cutawayShown = layers.cutaway && this.arrays.tets.length > 0;
-    this.solid.mesh.visible = !this.cutawayShown;
-    if (this.cutawayShown && !this.cutaway) {
-      this.cutaway = new CutawayView(this.arrays, tissueColor(this.header.name), this.uniforms);
-      this.placed.add(this.cutaway.mesh);
+    this.cutShown = layers.cutaway && this.arrays.tets.length > 0;
+    if (this.cutShown && !this.section) {
+      this.section = new SectionView(this.arrays, tissueColor(this.header.name), this.uniforms);
+      this.placed.add(this.section.mesh);
     }
-    if (this.cutaway) this.cutaway.mesh.visible = this.cutawayShown;
+    if (this.section) this.section.mesh.visible = this.cutShown;
+    this.applyCut();
     // What is shown from now on has not seen the frames before.
     this.drawn = null;
+  }
+
+  /** Colours of tissue, of the field, or of regions, one for each; a body that tells of none keeps that of its tissue. */
+  color(coloring: typeof TISSUE | typeof FIELD | THREE.Color[]): void {
+    const { regionColors, coloring: shown } = this.uniforms;
+    if (typeof coloring === "number") {
+      shown.value = coloring;
+      return;
+    }
+    regionColors.value.dispose();
+    regionColors.value = regionTexture(coloring.length > 0 ? coloring : [tissueColor(this.header.name)]);
+    shown.value = REGION;
   }
 
   /** Draws displacements times a scale from the next pose on. */
@@ -121,7 +149,15 @@ export class BodyView {
   /** Removes what lies beyond a plane of the scene, at rest. */
   cut(plane: THREE.Plane): void {
     const { normal, constant } = plane.clone().applyMatrix4(this.placed.matrix.clone().invert());
-    this.cutaway?.setPlane(normal, -constant);
+    this.plane.normal.copy(normal);
+    this.plane.offset = -constant;
+    this.applyCut();
+  }
+
+  setTheme(theme: Theme): void {
+    const { wire, shadow } = LOOKS[theme];
+    this.wireframe.lines.material.color.set(wire);
+    this.shadow.material.opacity = shadow;
   }
 
   /** Moves to a pose and tells whether the picture changes; one that belongs to another mesh is left out. */
@@ -142,21 +178,19 @@ export class BodyView {
     // A mode shape is only shown: a tool meets the body at rest.
     if (pose.showsMode) this.surface.settle();
     else if (!pose.touched) this.surface.keepAsUntouched();
-    this.solid.update(scalar);
-    if (this.cutawayShown) {
-      this.cutaway?.displaceAll(displacements, scalar, pose.interior ? null : arrays.surface_nodes, scale);
-    }
+    this.solid.update(pose.interior ? this.ofSurface(scalar) : scalar);
+    // Until the server has heard that the inside is seen, frames are without it.
+    if (this.cutShown && pose.interior) this.section?.displace({ displacements, scalar, scale });
     return true;
   }
 
   /** The point of the surface that is seen along a ray of the scene; null beside the body. */
   pick(raycaster: THREE.Raycaster): Hit | null {
-    const cutaway = this.cutawayShown ? this.cutaway : null;
     const direction = raycaster.ray.direction.clone().applyQuaternion(this.placed.quaternion.clone().invert());
     for (const { faceIndex, face, barycoord, point, distance } of raycaster.intersectObject(this.bothSides, false)) {
       if (faceIndex == null || !face || !barycoord) continue;
       const entering = face.normal.dot(direction) < 0;
-      const removed = cutaway?.removes(faceIndex) ?? false;
+      const removed = this.removes(faceIndex, barycoord.toArray());
       // A ray that comes out of what is left, and went in where the surface is gone, met a face of the cut between.
       if (!entering && !removed) return { distance, pick: null };
       if (!entering || removed) continue;
@@ -169,8 +203,7 @@ export class BodyView {
   untouchedAlong({ ray }: THREE.Raycaster): UntouchedPoint | null {
     const { surface, placed } = this;
     const { origin, direction } = ray.clone().applyMatrix4(placed.matrix.clone().invert());
-    const cutaway = this.cutawayShown ? this.cutaway : null;
-    const skips = (triangle: number) => cutaway?.removes(triangle) ?? false;
+    const skips = (triangle: number, weights: Vec3) => this.removes(triangle, weights);
     const hit = firstEntry(this.untouchedDrawn, surface.triangles, origin.toArray(), direction.toArray(), skips);
     return hit && this.untouchedAt({ corners: surface.cornersOf(hit.triangle), weights: hit.weights });
   }
@@ -188,10 +221,31 @@ export class BodyView {
     this.bothSides.material.dispose();
     this.wireframe.dispose();
     this.supports.dispose();
-    this.cutaway?.dispose();
+    this.section?.dispose();
+    this.uniforms.regionColors.value.dispose();
     this.shadow.material.map?.dispose();
     this.shadow.material.dispose();
     this.shadow.geometry.dispose();
+  }
+
+  private applyCut(): void {
+    const { normal, offset } = this.plane;
+    this.solid.cut(this.cutShown ? this.plane : null);
+    this.supports.cut(this.cutShown ? this.plane : null);
+    if (this.cutShown) this.section?.setPlane(normal, offset);
+  }
+
+  /** Whether a point of a triangle of the surface is cut away. */
+  private removes(triangle: number, weights: Vec3): boolean {
+    if (!this.cutShown) return false;
+    const [x, y, z] = this.surface.at(this.surface.rest, { corners: this.surface.cornersOf(triangle), weights });
+    const { normal, offset } = this.plane;
+    return normal.x * x + normal.y * y + normal.z * z > offset;
+  }
+
+  /** Values of all nodes, at those of the surface. */
+  private ofSurface(scalar: Uint8Array): Uint8Array {
+    return Uint8Array.from(this.arrays.surface_nodes, (node) => scalar[node]!);
   }
 
   private pickAt(shown: THREE.Vector3, triangle: number, weights: Vec3): Pick {
@@ -222,6 +276,13 @@ export class BodyView {
   private get untouchedDrawn(): Float32Array {
     return this.scale === 1 ? this.surface.untouched : this.surface.untouchedAsShown(this.scale);
   }
+}
+
+/** The region behind each triangle of the surface. */
+function regionsOfTriangles({ regions }: BodyMessage, arrays: BodyArrays): (triangle: number) => number {
+  if (regions.length < 2) return () => 0;
+  const owners = faceOwners(arrays);
+  return (triangle) => arrays.tet_regions[owners[triangle]!]!;
 }
 
 function transformed(points: Float32Array, matrix: THREE.Matrix4): Float32Array {

@@ -3,7 +3,7 @@
 import type { BodyArrays } from "../net/protocol";
 
 /** Faces of a positively oriented tetrahedron, outward. */
-export const TET_FACES = [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2];
+const TET_FACES = [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2];
 
 /** Tetrahedron of each triangle of the surface, as a row of `tets`. */
 export function faceOwners({ nodes, tets, surface_triangles, surface_nodes }: BodyArrays): Uint32Array {

@@ -1,12 +1,26 @@
-// Tissue, or the colour field over it: one lit material whose base colour is exchanged in the shader.
+// Tissue, the colours of a field, or those of regions: one lit material whose base colour is exchanged in the shader, and
+// that is not drawn where the body is cut away.
 
 import * as THREE from "three";
 
-/** Shared by the solid and the cut-away, so that one switch turns both. */
+/** What the base colour is taken from. */
+export const TISSUE = 0;
+export const FIELD = 1;
+export const REGION = 2;
+
+/** Shared by the solid and the face of a cut, so that one switch turns both. */
 export interface FieldUniforms {
   colorMap: { value: THREE.DataTexture };
-  /** 1 shows the field, 0 the tissue. */
-  fieldShown: { value: number };
+  regionColors: { value: THREE.DataTexture };
+  coloring: { value: typeof TISSUE | typeof FIELD | typeof REGION };
+}
+
+/** What lies beyond normal . x = w, at rest, is not drawn: the normal, and w. */
+export type CutUniform = { value: THREE.Vector4 };
+
+/** A plane that has everything on its near side. */
+export function noCut(): CutUniform {
+  return { value: new THREE.Vector4(0, 0, 0, 1) };
 }
 
 /** Base colours of tissue by a word in the model's name; anything else looks like silicone. */
@@ -26,42 +40,60 @@ export function tissueColor(name: string): THREE.Color {
   return new THREE.Color(found ? found[1] : SILICONE);
 }
 
-const FRAGMENT_HEAD = /* glsl */ `
-uniform sampler2D colorMap;
-uniform float fieldShown;
+/**
+ * Attributes: value of the field, brightness of the tissue, rank of the region, place at rest. The place is linear over a
+ * triangle, so the edge of what is drawn is that of the plane.
+ */
+const VERTEX_HEAD = /* glsl */ `
+attribute float scalar;
+attribute float shade;
+attribute float region;
+attribute vec3 rest;
+uniform vec4 cutPlane;
 varying float vField;
 varying float vShade;
+varying float vRegion;
+varying float vBeyond;
+`;
+const VERTEX_BEGIN = /* glsl */ `
+vec3 transformed = vec3(position);
+vField = scalar;
+vShade = shade;
+vRegion = region;
+vBeyond = dot(rest, cutPlane.xyz) - cutPlane.w;
 `;
 
-// vShade varies the tissue a little, so that shape can be read where light alone would leave it flat. The map's alpha
-// fades the field in from the tissue at its low end, and the legend shows the same.
+const FRAGMENT_HEAD = /* glsl */ `
+uniform sampler2D colorMap;
+uniform sampler2D regionColors;
+uniform int coloring;
+varying float vField;
+varying float vShade;
+varying float vRegion;
+varying float vBeyond;
+`;
+
+// Whole pixels are discarded, with all of their samples: one more of the skin is kept, or a gap would open to the face of the
+// cut. vShade varies the tissue a little, so that shape can be read where light alone would leave it flat.
 const FRAGMENT_COLOR = /* glsl */ `
-vec4 fieldColor = texture2D(colorMap, vec2(vField, 0.5));
-diffuseColor.rgb = mix(diffuseColor.rgb * vShade, fieldColor.rgb, fieldColor.a * fieldShown);
+if (vBeyond > fwidth(vBeyond)) discard;
+if (coloring == ${TISSUE}) diffuseColor.rgb *= vShade;
+else if (coloring == ${FIELD}) diffuseColor.rgb = texture2D(colorMap, vec2(vField, 0.5)).rgb;
+else diffuseColor.rgb = texelFetch(regionColors, ivec2(int(vRegion + 0.5), 0), 0).rgb;
 `;
-
-/** Vertex code of a material: declarations, and what stands in place of three's `begin_vertex`. */
-export interface VertexCode {
-  head: string;
-  begin: string;
-}
 
 export function createFieldMaterial(
   parameters: THREE.MeshPhysicalMaterialParameters,
-  uniforms: FieldUniforms & Record<string, THREE.IUniform>,
-  vertex: VertexCode,
+  uniforms: FieldUniforms,
+  cutPlane = noCut(),
 ): THREE.MeshPhysicalMaterial {
   const material = new THREE.MeshPhysicalMaterial(parameters);
   material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, uniforms);
-    shader.vertexShader =
-      `varying float vField;\nvarying float vShade;\n${vertex.head}\n` +
-      shader.vertexShader.replace("#include <begin_vertex>", vertex.begin);
+    Object.assign(shader.uniforms, uniforms, { cutPlane });
+    shader.vertexShader = VERTEX_HEAD + shader.vertexShader.replace("#include <begin_vertex>", VERTEX_BEGIN);
     shader.fragmentShader =
       FRAGMENT_HEAD +
       shader.fragmentShader.replace("#include <color_fragment>", `#include <color_fragment>\n${FRAGMENT_COLOR}`);
   };
-  // three reuses a compiled program for equal keys; the vertex code tells ours apart.
-  material.customProgramCacheKey = () => vertex.head + vertex.begin;
   return material;
 }

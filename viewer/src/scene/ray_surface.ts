@@ -12,15 +12,15 @@ export interface RayHit {
 /**
  * The first triangle that a ray meets from outside, by the cut of Möller and Trumbore (1997); null where there is none.
  *
- * positions (s, 3) and triangles (k, 3), counter-clockwise seen from outside; `skips` leaves triangles out. The direction need
- * not be of length one: distances are in its length.
+ * positions (s, 3) and triangles (k, 3), counter-clockwise seen from outside; `skips` leaves points of triangles out. The
+ * direction need not be of length one: distances are in its length.
  */
 export function firstEntry(
   positions: Float32Array,
   triangles: Uint32Array,
   origin: Vec3,
   direction: Vec3,
-  skips: (triangle: number) => boolean = () => false,
+  skips: (triangle: number, weights: Vec3) => boolean = () => false,
 ): RayHit | null {
   const [ox, oy, oz] = origin;
   const [dx, dy, dz] = direction;
@@ -43,9 +43,10 @@ export function firstEntry(
     const third = dx * qx + dy * qy + dz * qz;
     if (third < 0 || second + third > determinant) continue;
     const distance = (vx * qx + vy * qy + vz * qz) / determinant;
-    if (distance < 0 || (best && distance >= best.distance) || skips(t / 3)) continue;
+    if (distance < 0 || (best && distance >= best.distance)) continue;
     const [w1, w2] = [second / determinant, third / determinant];
-    best = { triangle: t / 3, weights: [1 - w1 - w2, w1, w2], distance };
+    const weights: Vec3 = [1 - w1 - w2, w1, w2];
+    if (!skips(t / 3, weights)) best = { triangle: t / 3, weights, distance };
   }
   return best;
 }

@@ -1,31 +1,46 @@
-// The deformed solid, with the colour field over it.
+// The deformed solid, with the colours of a field or of its regions over it, less what is cut away.
 
 import * as THREE from "three";
 
-import { createFieldMaterial } from "./field_material";
-import type { FieldUniforms } from "./field_material";
+import { createFieldMaterial, noCut } from "./field_material";
+import type { CutUniform, FieldUniforms } from "./field_material";
 import { SHOWN_SCALE_MAX } from "../store";
+import { splitAtSeams } from "./region_seams";
+import type { Seams } from "./region_seams";
 import type { Surface } from "./surface";
 
-const VERTEX = {
-  head: "attribute float scalar;\nattribute float shade;",
-  begin: "vec3 transformed = vec3(position);\nvField = scalar;\nvShade = shade;",
-};
-
 export class SolidView {
+  /** Its triangles are those of the surface, in their order. */
   readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshPhysicalMaterial>;
+  private readonly seams: Seams;
   private readonly scalar: THREE.BufferAttribute;
+  private readonly position: THREE.BufferAttribute;
+  private readonly normal: THREE.BufferAttribute;
+  private readonly cutPlane: CutUniform = noCut();
 
-  constructor(private readonly surface: Surface, color: THREE.Color, size: number, uniforms: FieldUniforms) {
+  constructor(
+    private readonly surface: Surface,
+    color: THREE.Color,
+    size: number,
+    uniforms: FieldUniforms,
+    regionOf: (triangle: number) => number,
+  ) {
     const geometry = new THREE.BufferGeometry();
+    this.seams = splitAtSeams(surface.triangles, regionOf, surface.count);
+    const { rows, regions, triangles } = this.seams;
     const dynamic = (array: THREE.TypedArray, itemSize: number, normalized = false) =>
       new THREE.BufferAttribute(array, itemSize, normalized).setUsage(THREE.DynamicDrawUsage);
-    this.scalar = dynamic(new Uint8Array(surface.count), 1, true);
-    geometry.setIndex(new THREE.BufferAttribute(surface.triangles, 1));
-    geometry.setAttribute("position", dynamic(surface.shown, 3));
-    geometry.setAttribute("normal", dynamic(surface.shownNormals, 3));
+    const rest = gathered(surface.rest, rows, 3);
+    this.scalar = dynamic(new Uint8Array(rows.length), 1, true);
+    this.position = dynamic(rest.slice(), 3);
+    this.normal = dynamic(gathered(surface.shownNormals, rows, 3), 3);
+    geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    geometry.setAttribute("position", this.position);
+    geometry.setAttribute("normal", this.normal);
     geometry.setAttribute("scalar", this.scalar);
-    geometry.setAttribute("shade", new THREE.BufferAttribute(mottle(surface.rest, size), 1));
+    geometry.setAttribute("region", new THREE.BufferAttribute(regions, 1));
+    geometry.setAttribute("rest", new THREE.BufferAttribute(rest, 3));
+    geometry.setAttribute("shade", new THREE.BufferAttribute(mottle(rest, size), 1));
     geometry.computeBoundingSphere();
     // Room for the largest deformation as it may be drawn, so that the sphere that picking consults never goes stale.
     geometry.boundingSphere!.radius += (SHOWN_SCALE_MAX * size) / 2;
@@ -40,8 +55,8 @@ export class SolidView {
         polygonOffsetFactor: 1,
         polygonOffsetUnits: 1,
       },
-      { ...uniforms },
-      VERTEX,
+      uniforms,
+      this.cutPlane,
     );
     this.mesh = new THREE.Mesh(geometry, material);
     this.mesh.frustumCulled = false;
@@ -49,16 +64,35 @@ export class SolidView {
 
   /** Call after the surface was displaced. */
   update(scalar: Uint8Array): void {
-    if (scalar.length === this.surface.count) (this.scalar.array as Uint8Array).set(scalar);
-    this.scalar.needsUpdate = true;
-    this.mesh.geometry.getAttribute("position").needsUpdate = true;
-    this.mesh.geometry.getAttribute("normal").needsUpdate = true;
+    const { surface, seams } = this;
+    if (scalar.length === surface.count) gather(scalar, seams.rows, 1, this.scalar.array as Uint8Array);
+    gather(surface.shown, seams.rows, 3, this.position.array as Float32Array);
+    gather(surface.shownNormals, seams.rows, 3, this.normal.array as Float32Array);
+    for (const attribute of [this.scalar, this.position, this.normal]) attribute.needsUpdate = true;
+  }
+
+  /** Leaves out what lies beyond a plane at rest; all is drawn without one. */
+  cut(plane: { normal: THREE.Vector3; offset: number } | null): void {
+    const { normal, offset } = plane ?? { normal: new THREE.Vector3(), offset: 1 };
+    this.cutPlane.value.set(...normal.toArray(), offset);
   }
 
   dispose(): void {
     this.mesh.geometry.dispose();
     this.mesh.material.dispose();
   }
+}
+
+/** Rows of an array with a number of columns, one after the other. */
+function gather<T extends Float32Array | Uint8Array>(from: T, rows: Uint32Array, columns: number, into: T): T {
+  for (let i = 0; i < rows.length; i++) {
+    for (let k = 0; k < columns; k++) into[columns * i + k] = from[columns * rows[i]! + k]!;
+  }
+  return into;
+}
+
+function gathered(from: Float32Array, rows: Uint32Array, columns: number): Float32Array {
+  return gather(from, rows, columns, new Float32Array(columns * rows.length));
 }
 
 /** Brightness of the tissue at each node: slow waves with no common period, within 8 %. */

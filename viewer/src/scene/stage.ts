@@ -3,10 +3,12 @@
 import * as THREE from "three";
 
 import type { FrameData, FrameMessage, SceneData } from "../net/protocol";
-import type { Store } from "../store";
+import { grouped } from "../regions";
+import type { Store, Theme } from "../store";
 import { BodyView } from "./body_view";
 import type { Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
+import { FIELD, TISSUE } from "./field_material";
 import { toolShape } from "./tool_shape";
 import type { ToolShape } from "./tool_shape";
 import { ToolView } from "./tool_view";
@@ -28,6 +30,8 @@ export class Stage {
       opened = layers.cutaway;
       this.show();
     });
+    store.subscribe(["coloring", "layers"], () => this.color());
+    store.subscribe(["theme"], ({ theme }) => this.setTheme(theme));
     store.subscribe(["cut"], () => this.cut());
     // Drawn with the next frame.
     store.subscribe(["shownScale"], ({ shownScale }) => {
@@ -45,6 +49,8 @@ export class Stage {
     this.tools = header.tools.map((tool, i) => new ToolView(header, tool, this.shapes[i]!, this.bodies));
     for (const { group } of [...this.bodies, ...this.tools]) this.viewport.scene.add(group);
     for (const body of this.bodies) body.exaggerate(this.store.get().shownScale);
+    this.color();
+    this.setTheme(this.store.get().theme);
     const moving = header.motion && this.bodies[header.motion.body];
     if (header.motion && moving) {
       this.watched = { view: new WatchedView(moving.surface, header.size), body: header.motion.body };
@@ -106,6 +112,23 @@ export class Stage {
     const { layers } = this.store.get();
     for (const body of this.bodies) body.show(layers);
     this.cut();
+  }
+
+  /** Regions and materials have the same colours in all bodies. */
+  private color(): void {
+    const { layers, coloring, scene } = this.store.get();
+    const grouping = scene && coloring !== "field" ? grouped(scene, coloring) : null;
+    this.bodies.forEach((body, i) => {
+      if (!layers.colors) body.color(TISSUE);
+      else if (!grouping) body.color(FIELD);
+      else body.color((grouping.of[i] ?? []).map((group) => new THREE.Color(grouping.groups[group]!.color)));
+    });
+    this.viewport.invalidate();
+  }
+
+  private setTheme(theme: Theme): void {
+    for (const body of this.bodies) body.setTheme(theme);
+    this.viewport.invalidate();
   }
 
   private faceCut(): void {

@@ -11,16 +11,27 @@ const MARKER_SIZE = 0.009;
 export class SupportsView {
   readonly markers: THREE.InstancedMesh<THREE.OctahedronGeometry, THREE.MeshStandardMaterial>;
 
-  constructor(arrays: BodyArrays, size: number) {
+  constructor(private readonly arrays: BodyArrays, size: number) {
     const geometry = new THREE.OctahedronGeometry(MARKER_SIZE * size);
     const material = new THREE.MeshStandardMaterial({ color: SUPPORT_COLOR, roughness: 0.5, flatShading: true });
     this.markers = new THREE.InstancedMesh(geometry, material, arrays.fixed_nodes.length);
-    const matrix = new THREE.Matrix4();
-    arrays.fixed_nodes.forEach((node, i) => {
-      const [x, y, z] = arrays.nodes.subarray(3 * node, 3 * node + 3);
-      this.markers.setMatrixAt(i, matrix.makeTranslation(x!, y!, z!));
-    });
     this.markers.frustumCulled = false;
+    this.cut(null);
+  }
+
+  /** Leaves out those beyond a plane at rest. */
+  cut(plane: { normal: THREE.Vector3; offset: number } | null): void {
+    const { nodes, fixed_nodes } = this.arrays;
+    const [matrix, place] = [new THREE.Matrix4(), new THREE.Vector3()];
+    let count = 0;
+    for (const node of fixed_nodes) {
+      place.fromArray(nodes, 3 * node);
+      if (plane && place.dot(plane.normal) > plane.offset) continue;
+      this.markers.setMatrixAt(count, matrix.makeTranslation(place));
+      count += 1;
+    }
+    this.markers.count = count;
+    this.markers.instanceMatrix.needsUpdate = true;
   }
 
   dispose(): void {

@@ -126,7 +126,7 @@ export class Surface {
  * Unit normals of the nodes: each triangle's cross product over the squares of the two edges at the corner (Max 1999),
  * exact where the nodes lie on a sphere. Weights by area are off by degrees where triangles differ in shape.
  */
-function vertexNormals(positions: Float32Array, triangles: Uint32Array, normals: Float32Array): void {
+export function vertexNormals(positions: Float32Array, triangles: Uint32Array, normals: Float32Array): void {
   normals.fill(0);
   for (let t = 0; t < triangles.length; t += 3) {
     const a = 3 * triangles[t]!;

@@ -21,9 +21,12 @@ export class Viewport {
   readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.001, 10);
   readonly controls: OrbitControls;
   private readonly renderer: THREE.WebGLRenderer;
+  private readonly viewListeners: (() => void)[] = [];
   private dirty = true;
   private framed: { points: Float32Array; scene: SceneMessage } | null = null;
   private region: Region = { left: 0, top: 0, width: 1, height: 1 };
+  /** Of the picture that the region is a part of, CSS pixels. */
+  private pictureHeight = 1;
 
   /** Bodies are framed beside the overlays; beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
   constructor(
@@ -38,7 +41,9 @@ export class Viewport {
     this.addLights();
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.mouseButtons = { LEFT: THREE.MOUSE.ROTATE, MIDDLE: THREE.MOUSE.PAN, RIGHT: THREE.MOUSE.ROTATE };
-    this.controls.addEventListener("change", () => this.invalidate());
+    // One finger presses wherever it meets a body, so two must do for all of the rest, but for moving: three do that.
+    this.controls.touches = { ONE: THREE.TOUCH.ROTATE, TWO: THREE.TOUCH.DOLLY_ROTATE };
+    this.controls.addEventListener("change", () => this.changeView());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
     this.renderer.setAnimationLoop(() => this.tick());
@@ -71,7 +76,7 @@ export class Viewport {
     this.controls.minDistance = 0.1 * size;
     this.controls.maxDistance = 15 * size;
     this.controls.update();
-    this.invalidate();
+    this.changeView();
   }
 
   reframe(): void {
@@ -111,22 +116,21 @@ export class Viewport {
     return (2 * depth * Math.tan(THREE.MathUtils.degToRad(FIELD_OF_VIEW_DEG) / 2)) / this.canvas.clientHeight;
   }
 
-  /** The picture as PNG. Drawn anew first: the browser may clear what it has shown. */
-  toPng(): Promise<Blob | null> {
-    const background = backdrop();
-    this.scene.background = background;
+  /** Draws at once. */
+  render(): void {
     this.renderer.render(this.scene, this.camera);
-    this.scene.background = null;
-    background.dispose();
-    this.invalidate();
-    return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
+  }
+
+  /** Calls a listener whenever the bodies are seen from elsewhere, or larger, or smaller. */
+  onView(listener: () => void): void {
+    this.viewListeners.push(listener);
   }
 
   private tick(): void {
     if (this.beforeDraw()) this.dirty = true;
     if (this.dirty) {
       this.dirty = false;
-      this.renderer.render(this.scene, this.camera);
+      this.render();
     }
     this.afterDraw();
   }
@@ -145,8 +149,13 @@ export class Viewport {
     if (fitBefore > 0) {
       this.camera.position.sub(target).multiplyScalar(this.fitHere() / fitBefore).add(target);
     }
-    this.renderer.render(this.scene, this.camera);
+    this.render();
+    this.changeView();
+  }
+
+  private changeView(): void {
     this.invalidate();
+    for (const listener of this.viewListeners) listener();
   }
 
   private fitHere(): number {
@@ -156,15 +165,16 @@ export class Viewport {
   private fit(target: THREE.Vector3, towardsViewer: THREE.Vector3): number {
     if (!this.framed) return 0;
     const { points, scene } = this.framed;
-    const { camera, region, canvas } = this;
+    const { camera, region, pictureHeight } = this;
     const room = 2 * Math.max(0, ...scene.tools.map(({ radius }) => radius));
-    return fitDistance(points, target, towardsViewer, camera, room, region, canvas.clientHeight);
+    return fitDistance(points, target, towardsViewer, camera, room, region, pictureHeight);
   }
 
   /** What the camera looks at stands in the middle of the region that nothing is written over. */
   private centreInFreeRegion(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.region = freeRegion(this.canvas, this.overlays);
+    this.pictureHeight = height;
     const { left, top } = this.region;
     const [x, y] = [left + this.region.width / 2 - width / 2, top + this.region.height / 2 - height / 2];
     this.camera.setViewOffset(width, height, -x, -y, width, height);
@@ -192,19 +202,4 @@ function drawsInSoftware(): boolean {
   const name = String(probe.getParameter(probe.RENDERER));
   probe.getExtension("WEBGL_lose_context")?.loseContext();
   return SOFTWARE_DRIVER.test(name);
-}
-
-/** For pictures that are saved: dark, and a little lighter in the middle, as the style of the page has it. */
-function backdrop(): THREE.CanvasTexture {
-  const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = 256;
-  const context = canvas.getContext("2d")!;
-  const gradient = context.createRadialGradient(128, 112, 10, 128, 128, 190);
-  gradient.addColorStop(0, "#343b46");
-  gradient.addColorStop(1, "#171a20");
-  context.fillStyle = gradient;
-  context.fillRect(0, 0, 256, 256);
-  const texture = new THREE.CanvasTexture(canvas);
-  texture.colorSpace = THREE.SRGBColorSpace;
-  return texture;
 }

@@ -11,7 +11,7 @@ export class WireframeView {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(surface.rest, 3));
     geometry.setIndex(new THREE.BufferAttribute(uniqueEdges(surface.triangles), 1));
-    const material = new THREE.LineBasicMaterial({ color: 0xf2f5fa, transparent: true, opacity: 0.24, depthWrite: false });
+    const material = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.24, depthWrite: false });
     this.lines = new THREE.LineSegments(geometry, material);
     this.lines.frustumCulled = false;
   }

@@ -1,26 +1,15 @@
 // The line that tells what the mouse does, until it is dismissed.
 
 import { byId } from "./dom";
+import { keep, readKept } from "./kept";
 
-const KEY = "palpate-hint-dismissed";
+const KEY = "hint-dismissed";
 
 export function showHint(): void {
   const hint = byId("hint");
-  hint.hidden = readDismissed();
+  hint.hidden = readKept(KEY) === "1";
   byId("hint-close").onclick = () => {
     hint.hidden = true;
-    try {
-      localStorage.setItem(KEY, "1");
-    } catch {
-      // A browser that keeps nothing shows the hint again next time.
-    }
+    keep(KEY, "1");
   };
-}
-
-function readDismissed(): boolean {
-  try {
-    return localStorage.getItem(KEY) === "1";
-  } catch {
-    return false;
-  }
 }

@@ -1,11 +1,13 @@
-// The legend of what is drawn: the field's name, unit and range, and keys of the other things.
+// The legend of what is drawn: a field's name, unit and range, or regions and materials; and keys of the other things.
 
+import type { Control } from "../control";
 import type { FieldMessage } from "../net/protocol";
+import { grouped } from "../regions";
+import type { Group } from "../regions";
 import { ColorMap } from "../scene/color_map";
-import { tissueColor } from "../scene/field_material";
-import type { Store } from "../store";
-import { byId, setText } from "./dom";
-import { MINUS, sizeText } from "./numbers";
+import type { State, Store } from "../store";
+import { byId, press, setText } from "./dom";
+import { MINUS, parseQuantity, pascals, sizeText } from "./numbers";
 
 /** Units that take over where the numbers would get long: from this value on, divided by the factor. */
 const LARGER_UNITS: Record<string, { unit: string; factor: number }[]> = {
@@ -14,51 +16,135 @@ const LARGER_UNITS: Record<string, { unit: string; factor: number }[]> = {
     { unit: "kPa", factor: 1e3 },
   ],
 };
+/** More regions than these would cover the picture. */
+const GROUPS_MAX = 8;
 
 export class Legend {
-  private tissue = "";
+  private readonly max = byId<HTMLInputElement>("legend-max");
   private drawn: ColorMap | null = null;
+  private field: FieldMessage | null = null;
+  private told = "";
 
-  constructor(store: Store) {
-    store.subscribe(["scene", "body"], ({ scene, body }) => {
-      this.tissue = tissueColor(scene?.bodies[body]?.name ?? "").getStyle();
-      this.drawn = null;
-    });
+  constructor(private readonly store: Store, private readonly control: Control) {
+    byId("legend-lock").onclick = () => this.toggleLock();
+    this.max.onfocus = () => this.max.select();
+    this.max.onchange = () => this.takeMax();
+    this.max.onkeydown = ({ key }) => {
+      if (key === "Escape") this.max.value = "";
+      // What is shown is written anew.
+      this.told = "";
+      if (key === "Enter" || key === "Escape") this.max.blur();
+    };
     store.subscribe(["sizes", "body"], ({ sizes, body }) => {
       const sides = sizes[body];
       byId("legend-size").hidden = !sides;
       if (sides) setText(byId("legend-size"), `Body of ${sizeText(sides)}`);
     });
-    store.subscribe(["layers"], ({ layers }) => {
-      byId("legend-field").hidden = !layers.colors;
+    store.subscribe(["layers", "coloring"], ({ layers, coloring }) => {
+      byId("legend-field").hidden = !layers.colors || coloring !== "field";
+      byId("legend-groups").hidden = !layers.colors || coloring === "field";
       byId("legend-supports").hidden = !layers.supports;
       byId("legend-wireframe").hidden = !layers.wireframe;
     });
+    store.subscribe(["scene", "coloring", "settings"], (state) => this.listGroups(state));
     store.subscribe(["shownScale"], ({ shownScale }) => {
       byId("legend-scale").hidden = shownScale === 1;
       setText(byId("legend-scale-text"), `Deformation drawn ${shownScale}x, colours and numbers true`);
     });
-    store.subscribe(["frame", "body"], ({ frame, body }) => {
-      const field = frame?.fields[body];
-      if (field) this.show(field);
+    store.subscribe(["frame", "body", "ranges"], ({ frame, body, ranges }) => {
+      this.field = frame?.fields[body] ?? null;
+      if (this.field) this.show(this.field, this.field.name in ranges);
     });
   }
 
-  private show(field: FieldMessage): void {
+  private show(field: FieldMessage, locked: boolean): void {
+    // At rest, as in most frames, nothing is written: the browser would lay out again.
+    const told = JSON.stringify([field, locked]);
+    if (told === this.told) return;
+    this.told = told;
     this.drawBar(field.signed ? ColorMap.diverging : ColorMap.sequential);
-    const larger = LARGER_UNITS[field.unit]?.find(({ factor }) => field.max >= factor);
-    const max = field.max / (larger?.factor ?? 1);
+    const { unit, factor } = unitOf(field);
+    const max = field.max / factor;
+    const text = (value: number) => value.toFixed(max >= 100 ? 0 : max >= 10 ? 1 : max >= 0.1 ? 2 : 3);
     setText(byId("legend-name"), field.title);
-    setText(byId("legend-unit"), larger?.unit ?? field.unit);
-    const text = (value: number) => value.toFixed(max >= 100 ? 0 : max >= 10 ? 1 : 2);
+    setText(byId("legend-unit"), unit);
     setText(byId("legend-min"), field.signed ? MINUS + text(max) : "0");
     setText(byId("legend-middle"), field.signed ? "0" : text(max / 2));
-    setText(byId("legend-max"), (field.signed ? "+" : "") + text(max));
+    if (document.activeElement !== this.max) this.max.value = (field.signed ? "+" : "") + text(max);
+    press("legend-lock", locked);
+    byId("legend-lock").title = locked ? "Let the range follow the largest value again" : "Keep this range";
+    byId("legend-largest").hidden = !locked;
+    setText(byId("legend-largest"), `Range locked; largest now ${text(field.largest / factor)}`);
   }
 
   private drawBar(map: ColorMap): void {
     if (this.drawn === map) return;
     this.drawn = map;
-    byId("legend-bar").style.background = map.css(this.tissue);
+    const bar = byId<HTMLCanvasElement>("legend-bar");
+    const context = bar.getContext("2d")!;
+    const gradient = context.createLinearGradient(0, 0, bar.width, 0);
+    map.stops().forEach((color, i, { length }) => gradient.addColorStop(i / (length - 1), color));
+    context.fillStyle = gradient;
+    context.fillRect(0, 0, bar.width, bar.height);
   }
+
+  /** Keeps the range as it is, rounded up; or lets it go. */
+  private toggleLock(): void {
+    const { field } = this;
+    if (!field) return;
+    const locked = field.name in this.store.get().ranges;
+    this.control.lockRange(field.name, locked ? null : roundedUp(field.max));
+  }
+
+  /** A number that is typed locks the range there. */
+  private takeMax(): void {
+    const { field } = this;
+    if (!field) return;
+    const { unit, factor } = unitOf(field);
+    const units = { [unit]: factor, ...Object.fromEntries((LARGER_UNITS[field.unit] ?? []).map((one) => [one.unit, one.factor])), [field.unit]: 1 };
+    const typed = this.max.value;
+    if (typed.trim() === "") return;
+    const value = parseQuantity(typed, units, unit);
+    if (value !== null && value > 0) this.control.lockRange(field.name, value);
+    else this.control.notice(`Range: '${typed}' is not a positive number in ${Object.keys(units).join(" or ")}`);
+  }
+
+  private listGroups(state: Readonly<State>): void {
+    const { scene, coloring } = state;
+    if (!scene || coloring === "field") return;
+    const { groups } = grouped(scene, coloring);
+    const shown = groups.length > GROUPS_MAX ? groups.slice(0, GROUPS_MAX - 1) : groups;
+    const entries = shown.map((group) => entry(group.color, titleOf(group, state)));
+    if (shown.length < groups.length) entries.push(entry(null, `and ${groups.length - shown.length} more`));
+    byId("legend-groups").replaceChildren(...entries);
+  }
+}
+
+function unitOf({ unit, max }: FieldMessage): { unit: string; factor: number } {
+  return LARGER_UNITS[unit]?.find(({ factor }) => max >= factor) ?? { unit, factor: 1 };
+}
+
+/** To two digits, and no less. */
+function roundedUp(value: number): number {
+  const step = 10 ** (Math.floor(Math.log10(value)) - 1);
+  return Number((Math.ceil(value / step - 1e-6) * step).toPrecision(2));
+}
+
+/** A region by its name, a material by its numbers; a stiffness that was changed while running is told as it is. */
+function titleOf({ body, region }: Group, { scene, coloring, settings }: Readonly<State>): string {
+  const modulus = settings?.youngs_modulus[body] ?? region.youngs_modulus;
+  if (coloring === "material") return `${pascals(modulus)}, ν ${region.poissons_ratio}, ${region.density} kg/m³`;
+  const { title, regions } = scene!.bodies[body]!;
+  if (scene!.bodies.length === 1) return region.title;
+  return regions.length === 1 ? title : `${title}: ${region.title}`;
+}
+
+function entry(color: string | null, title: string): HTMLElement {
+  const row = document.createElement("p");
+  row.className = "legend-key";
+  const swatch = document.createElement("span");
+  swatch.className = "key key-group";
+  if (color) swatch.style.backgroundColor = color;
+  row.append(swatch, title);
+  return row;
 }

@@ -5,6 +5,7 @@ import type { ModeMessage, MotionScene } from "../net/protocol";
 import type { Store, Tab } from "../store";
 import { byId, press, setText } from "./dom";
 import { hertz, newtonSeconds } from "./numbers";
+import { Slider } from "./slider";
 
 /** The slider begins at this part of the strongest impulse. */
 const WEAKEST = 1e-3;
@@ -16,14 +17,14 @@ const TIME_SCALES: [id: string, scale: number][] = [
 const TABS: Tab[] = ["motion", "force", "loop", "modes"];
 
 export class MotionPanel {
-  private readonly impulseSlider = byId<HTMLInputElement>("impulse");
+  private readonly impulse: Slider;
   private readonly modeList = byId("mode-list");
 
   constructor(private readonly store: Store, private readonly control: Control) {
     byId("strike").onclick = () => control.toggleStrike();
     byId("repeat").onclick = () => control.repeatStrike();
     byId("mode-close").onclick = () => control.showMode(0);
-    this.impulseSlider.oninput = () => store.update({ impulse: this.chosenImpulse() });
+    this.impulse = impulseSlider(store, control);
     for (const [id, scale] of TIME_SCALES) byId(id).onclick = () => control.setTimeScale(scale);
     for (const tab of TABS) byId(`tab-${tab}`).onclick = () => store.update({ tab });
     this.follow();
@@ -32,7 +33,9 @@ export class MotionPanel {
   private follow(): void {
     const { store } = this;
     store.subscribe(["scene"], ({ scene }) => this.setMotion(scene?.motion ?? null));
-    store.subscribe(["impulse"], ({ impulse }) => setText(byId("impulse-value"), newtonSeconds(impulse)));
+    store.subscribe(["scene", "impulse"], ({ scene, impulse }) => {
+      if (scene?.motion) this.impulse.show(impulse);
+    });
     store.subscribe(["strike"], ({ strike }) => press("strike", strike));
     store.subscribe(["settings"], ({ settings }) => {
       const chosen = settings?.time_scale ?? null;
@@ -56,7 +59,7 @@ export class MotionPanel {
       const watching = role !== "control";
       const buttons = [...byId("motion").querySelectorAll("button"), ...this.modeList.querySelectorAll("button")];
       for (const button of [...buttons, byId<HTMLButtonElement>("mode-close")]) button.disabled = watching;
-      this.impulseSlider.disabled = watching;
+      this.impulse.disabled = watching;
     });
   }
 
@@ -64,7 +67,6 @@ export class MotionPanel {
     for (const id of ["motion", "tab-motion", "tab-modes", "hint-strike"]) byId(id).hidden = !motion;
     byId("repeat").hidden = !motion?.strike;
     if (!motion) return;
-    this.impulseSlider.valueAsNumber = 1 - Math.log(motion.impulse / motion.max_impulse) / Math.log(WEAKEST);
     setText(byId("mode-count"), `the first ${motion.frequencies.length} of ${motion.modes}`);
     this.modeList.replaceChildren(...motion.frequencies.map((frequency, i) => this.modeButton(i + 1, frequency)));
   }
@@ -81,11 +83,6 @@ export class MotionPanel {
     setText(byId("mode-detail"), `${mode.shown_hz} Hz here, swing ${swing}`);
   }
 
-  private chosenImpulse(): number {
-    const strongest = this.store.get().scene?.motion?.max_impulse ?? 0;
-    return strongest * WEAKEST ** (1 - this.impulseSlider.valueAsNumber);
-  }
-
   private modeButton(number: number, frequency: number): HTMLButtonElement {
     const button = document.createElement("button");
     button.type = "button";
@@ -97,4 +94,22 @@ export class MotionPanel {
     button.onclick = () => this.control.showMode(number);
     return button;
   }
+}
+
+function impulseSlider(store: Store, control: Control): Slider {
+  const strongest = () => store.get().scene?.motion?.max_impulse ?? 0;
+  return new Slider({
+    id: "impulse",
+    name: "Impulse of a strike",
+    format: newtonSeconds,
+    units: { "N s": 1, "mN s": 1e-3, "µN s": 1e-6 },
+    scale: {
+      toTrack: (impulse) => 1 - Math.log(impulse / strongest()) / Math.log(WEAKEST),
+      fromTrack: (place) => strongest() * WEAKEST ** (1 - place),
+    },
+    bounds: () => [WEAKEST * strongest(), strongest()],
+    fallback: () => store.get().scene?.motion?.impulse ?? null,
+    choose: (impulse) => store.update({ impulse }),
+    complain: (text) => control.notice(text),
+  });
 }

@@ -48,6 +48,12 @@ export function millimetres(metres: number): string {
   return `${(1000 * metres).toFixed(1)} mm`;
 }
 
+/** A round length in m, in the unit that suits it. */
+export function lengthText(metres: number): string {
+  const [unit, scale] = metres < 0.9995e-3 ? ["µm", 1e6] : metres >= 0.9995 ? ["m", 1] : ["mm", 1e3];
+  return `${Number((scale * metres).toPrecision(3))} ${unit}`;
+}
+
 /** Sides of a body in m, told in the unit that suits the longest: 200 × 123.4 × 80 mm. */
 export function sizeText(sides: readonly number[]): string {
   const largest = Math.max(...sides);
@@ -59,4 +65,20 @@ export function sizeText(sides: readonly number[]): string {
 export function degrees(angle: number): string {
   const whole = Math.round(angle);
   return `${whole < 0 ? MINUS : ""}${Math.abs(whole)}°`;
+}
+
+const NUMBER = /^\s*([+\-\u2212]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?)\s*(.*?)\s*$/iu;
+
+/**
+ * A number that was typed, with one of the units behind it, or with the usual one if there is none; null where it is no
+ * such number. A comma is a decimal point.
+ */
+export function parseQuantity(text: string, units: Readonly<Record<string, number>>, usual: string): number | null {
+  const found = NUMBER.exec(text);
+  if (!found) return null;
+  const [, digits, unit] = found as unknown as [string, string, string];
+  const value = Number(digits.replace(MINUS, "-").replace(",", "."));
+  const factor = (name: string) => units[name] ?? Object.entries(units).find(([u]) => u.toLowerCase() === name.toLowerCase())?.[1];
+  const scale = unit === "" ? (factor(usual) ?? 1) : factor(unit);
+  return scale === undefined || !Number.isFinite(value) ? null : scale * value;
 }

@@ -1,22 +1,33 @@
 // The buttons: what is shown, how the pointer touches, and what is done at once.
 
 import type { Control } from "../control";
-import { hasInside } from "../control";
+import { NO_INSIDE, hasInside } from "../control";
 import type { Viewport } from "../scene/viewport";
-import { inControl } from "../store";
+import { CUT_SHARE, inControl } from "../store";
 import type { Axis, Layer, Store } from "../store";
 import { byId, press, setText } from "./dom";
-import { download } from "./screenshot";
+import { download, takePicture } from "./screenshot";
+import { Slider } from "./slider";
 
 const LAYERS: Layer[] = ["colors", "wireframe", "supports", "cutaway", "plots"];
 const AXES: Axis[] = ["x", "y", "z"];
 
 export class Panel {
+  private readonly share: Slider;
+
   constructor(private readonly store: Store, private readonly control: Control, viewport: Viewport) {
     for (const layer of LAYERS) byId(`show-${layer}`).onclick = () => control.toggleLayer(layer);
     for (const axis of AXES) byId(`cut-${axis}`).onclick = () => control.cutAcross(axis);
-    const share = byId<HTMLInputElement>("cut-share");
-    share.oninput = () => control.cutShare(share.valueAsNumber);
+    this.share = new Slider({
+      id: "cut-share",
+      name: "Cut",
+      format: (share) => `${Math.round(100 * share)} %`,
+      units: { "%": 0.01 },
+      usual: "%",
+      fallback: () => CUT_SHARE,
+      choose: (share) => control.cutShare(share),
+      complain: (text) => control.notice(text),
+    });
     byId("grab").onclick = () => control.toggleGrab();
     byId("pin").onclick = () => control.togglePin();
     byId("unpin").onclick = () => control.release();
@@ -24,7 +35,8 @@ export class Panel {
     byId("fault-reset").onclick = () => control.reset();
     byId("reset-view").onclick = () => viewport.reframe();
     byId("screenshot").onclick = () => void this.saveScreenshot(viewport);
-    byId("sheet-toggle").onclick = () => toggleSheet();
+    followSheet(viewport);
+    leaveLists();
     this.follow();
   }
 
@@ -37,6 +49,7 @@ export class Panel {
     });
     store.subscribe(["cut"], ({ cut }) => {
       for (const axis of AXES) press(`cut-${axis}`, axis === cut.axis);
+      this.share.show(cut.share);
     });
     store.subscribe(["grab"], ({ grab }) => press("grab", grab));
     store.subscribe(["pinned", "pinNext"], ({ pinned, pinNext }) => press("pin", pinNext || pinned.length > 0));
@@ -47,7 +60,14 @@ export class Panel {
       byId<HTMLButtonElement>("unpin").disabled = nothing || !inControl(state);
     });
     store.subscribe(["scene"], ({ scene }) => {
-      byId<HTMLButtonElement>("show-cutaway").disabled = !scene || !hasInside(scene);
+      // A finger sees no hints: pressed all the same, the button says why.
+      const able = scene !== null && hasInside(scene);
+      byId("show-cutaway").setAttribute("aria-disabled", String(!able));
+      byId("show-cutaway").title = able ? "Cut open (x)" : NO_INSIDE;
+      const whole = able ? scene.bodies.filter(({ tets }) => tets === 0) : [];
+      byId("cut-whole").hidden = whole.length === 0;
+      byId("cut-whole").title = NO_INSIDE;
+      setText(byId("cut-whole"), `From a store, so whole: ${whole.map(({ title }) => title).join(", ")}`);
       const several = (scene?.tools.length ?? 0) > 1;
       byId("fingers").hidden = !several;
       byId("hint-pin").hidden = !several;
@@ -55,16 +75,36 @@ export class Panel {
   }
 
   private async saveScreenshot(viewport: Viewport): Promise<void> {
-    const picture = await viewport.toPng();
+    const picture = await takePicture(viewport);
     if (picture) download(picture, this.store.get().scene?.name ?? "empty");
     else this.control.notice("The browser could not save the picture.");
   }
 }
 
-/** On a small screen the controls are a sheet that can be folded away. */
-function toggleSheet(): void {
-  const folded = byId("panel").classList.toggle("folded");
-  const button = byId("sheet-toggle");
-  button.setAttribute("aria-expanded", String(!folded));
-  setText(button, folded ? "Show" : "Hide");
+/** On a small screen the controls are a sheet that covers nothing, a part of the picture, or most of it. */
+function followSheet(viewport: Viewport): void {
+  const [panel, fold, tall] = [byId("panel"), byId("sheet-toggle"), byId("sheet-tall")];
+  const show = (state: "folded" | "half" | "tall") => {
+    panel.classList.toggle("folded", state === "folded");
+    panel.classList.toggle("tall", state === "tall");
+    fold.setAttribute("aria-expanded", String(state !== "folded"));
+    setText(fold, state === "folded" ? "Show" : "Hide");
+    tall.hidden = state === "folded";
+    setText(tall, state === "tall" ? "Less" : "More");
+    viewport.invalidate();
+  };
+  fold.onclick = () => show(panel.classList.contains("folded") ? "half" : "folded");
+  tall.onclick = () => show(panel.classList.contains("tall") ? "half" : "tall");
+}
+
+/** A list that was used by a pointer gives the keys back: the next letter would choose from it. */
+function leaveLists(): void {
+  for (const list of document.querySelectorAll("select")) {
+    let byPointer = false;
+    list.addEventListener("pointerdown", () => (byPointer = true));
+    list.addEventListener("keydown", () => (byPointer = false));
+    list.addEventListener("change", () => {
+      if (byPointer) list.blur();
+    });
+  }
 }

@@ -4,12 +4,15 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 import { byId } from "./dom";
+import { themeColor } from "./theme";
 
 export const HEIGHT_PX = 112;
 // Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
 const FONT = "11px system-ui, sans-serif";
-const TEXT_COLOR = "#9aa5b4";
-const GRID = { stroke: "#2a303a", width: 1 };
+const TEXT_COLOR = () => themeColor("--muted");
+const GRID = { stroke: () => themeColor("--grid"), width: 1 };
+/** A colour of style.css, in the theme of the moment. */
+export type LineColor = `--${string}`;
 
 /** What lies along the plot: its range now, what is written below, and whether uPlot chooses round numbers or fifths are told. */
 export interface Along {
@@ -21,7 +24,7 @@ export interface Along {
 /** A line that may turn back, drawn over a plot: its points now, along and up, in the plot's units. */
 export type Trail = () => { along: readonly number[]; up: readonly number[] };
 
-export function createPlot(id: string, along: Along, label: string, colors: string[], range: uPlot.Scale.Range, trail?: Trail): uPlot {
+export function createPlot(id: string, along: Along, label: string, colors: LineColor[], range: uPlot.Scale.Range, trail?: Trail): uPlot {
   const box = byId(id);
   const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
   const fifths = {
@@ -39,10 +42,10 @@ export function createPlot(id: string, along: Along, label: string, colors: stri
       { ...axis, size: 17, label: along.label(), labelSize: 13, labelGap: 0, ...(along.round ? { space: 30 } : fifths) },
       { ...axis, size: 38, space: 20, label, labelSize: 14, labelGap: 0 },
     ],
-    series: [{}, ...colors.map((stroke) => ({ stroke, width: 1.25, points: { show: false } }))],
+    series: [{}, ...colors.map((color) => ({ stroke: () => themeColor(color), width: 1.25, points: { show: false } }))],
     hooks: {
       drawClear: [(plot) => void (plot.axes[0]!.label = along.label())],
-      draw: trail ? [(plot) => drawTrail(plot, trail, colors[0]!)] : [],
+      draw: trail ? [(plot) => drawTrail(plot, trail, themeColor(colors[0]!))] : [],
     },
   };
   const nothing = [[], ...colors.map(() => [])] as unknown as uPlot.AlignedData;

@@ -61,11 +61,11 @@ export class Plots {
     const upToPressed = (): [number, number] => [0, Math.max(FORCE_SPAN_MIN, 1.15 * this.press.extent().force)];
     const trail = () => ({ along: this.press.depth, up: this.press.force });
     this.plots = {
-      press: createPlot("plot-press", deep, "force (N)", ["#ffb454"], upToPressed, trail),
-      force: createPlot("plot-force", recent, "force (N)", ["#ffb454"], above(FORCE_SPAN_MIN)),
-      compute: createPlot("plot-compute", recent, "per tick (µs)", ["#6fc3ff"], above(COMPUTE_SPAN_MIN)),
-      displacement: createPlot("plot-displacement", moved, "mm", ["#ff8f80", "#7ddc9a", "#6fc3ff"], around),
-      energy: createPlot("plot-energy", moved, "energy (µJ)", ["#8d97a6", "#c9a2ff", "#6fc3ff", "#ffb454"], above(0)),
+      press: createPlot("plot-press", deep, "force (N)", ["--force"], upToPressed, trail),
+      force: createPlot("plot-force", recent, "force (N)", ["--force"], above(FORCE_SPAN_MIN)),
+      compute: createPlot("plot-compute", recent, "per tick (µs)", ["--line-blue"], above(COMPUTE_SPAN_MIN)),
+      displacement: createPlot("plot-displacement", moved, "mm", ["--line-red", "--line-green", "--line-blue"], around),
+      energy: createPlot("plot-energy", moved, "energy (µJ)", ["--line-grey", "--line-violet", "--line-blue", "--force"], above(0)),
     };
     new ResizeObserver(() => this.resize()).observe(byId("plots"));
     this.follow(store);
@@ -94,6 +94,9 @@ export class Plots {
       for (const one of ["force", "loop", "motion"]) byId(`plots-${one}`).hidden = tab !== one;
       this.resize();
       this.refresh(true);
+    });
+    store.subscribe(["theme"], () => {
+      for (const plot of Object.values(this.plots)) plot.redraw();
     });
     store.subscribe(["scene", "pressing", "pinned"], (state) => (this.driven = drivenTool(state)));
     store.subscribe(["frame"], ({ frame, scene }) => {

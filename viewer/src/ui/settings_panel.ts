@@ -2,32 +2,50 @@
 // drawn. The tool has a panel of its own.
 
 import type { Control } from "../control";
+import { groupings } from "../regions";
 import type { State, Store } from "../store";
 import { byId, setText } from "./dom";
 import { pascals, percent } from "./numbers";
+import { Slider } from "./slider";
 
 /** The usual range of soft tissue, Pa; a body outside it gets a decade to each side of its own value. */
 const TISSUE: Range = [1e3, 100e3];
 type Range = [low: number, high: number];
 /** The slider of the strain at which tools are held goes from 5 % to 50 %; its last step is off. */
+const STRAIN_BOUNDS: Range = [0.05, 0.5];
 const STRAIN_OFF_PERCENT = 51;
+/** Moduli that may be typed, Pa: those that the program takes. */
+const MODULI: Range = [1e-6, 1e15];
+const PASCALS = { Pa: 1, kPa: 1e3, MPa: 1e6, GPa: 1e9 };
+
+/** In the list of fields, before what is no field. */
+const GROUPED = "by-";
+const GROUPING_TITLES = { region: "Region", material: "Material" };
 
 export class SettingsPanel {
   private readonly model = byId<HTMLSelectElement>("model");
   private readonly body = byId<HTMLSelectElement>("body");
   private readonly field = byId<HTMLSelectElement>("field");
-  private readonly stiffness = byId<HTMLInputElement>("stiffness");
-  private readonly strainLimit = byId<HTMLInputElement>("strain-limit");
-  private readonly scale = byId<HTMLInputElement>("shown-scale");
+  private readonly stiffness: Slider;
+  private readonly strainLimit: Slider;
+  private readonly scale: Slider;
   private moduli: Range = TISSUE;
 
   constructor(store: Store, control: Control) {
     this.model.onchange = () => control.chooseModel(this.model.value);
     this.body.onchange = () => control.chooseBody(this.body.selectedIndex);
-    this.field.onchange = () => control.chooseField(this.field.value);
-    this.stiffness.oninput = () => control.setStiffness(this.modulus());
-    this.strainLimit.oninput = () => control.setStrainLimit(this.chosenStrainLimit());
-    this.scale.oninput = () => control.showScaled(this.scale.valueAsNumber);
+    this.field.onchange = () => this.chooseColors(control);
+    this.stiffness = this.stiffnessSlider(store, control);
+    this.strainLimit = strainSlider(store, control);
+    this.scale = new Slider({
+      id: "shown-scale",
+      name: "Deformation",
+      format: (value) => `${value}x`,
+      units: { x: 1 },
+      fallback: () => 1,
+      choose: (value) => control.showScaled(value),
+      complain: (text) => control.notice(text),
+    });
     store.subscribe(["models"], ({ models }) => {
       byId("model-row").hidden = models.length === 0;
       this.model.replaceChildren(...models.map(({ name, title }) => new Option(title, name)));
@@ -37,12 +55,11 @@ export class SettingsPanel {
       if (scene && !status?.text) this.model.value = scene.name;
     });
     store.subscribe(["scene"], (state) => this.listBodies(state));
-    store.subscribe(["scene", "body", "field"], (state) => this.listFields(state));
+    store.subscribe(["scene", "body", "field", "coloring"], (state) => this.listFields(state));
     store.subscribe(["scene", "body", "settings"], (state) => this.showValues(state));
-    store.subscribe(["settings"], ({ settings }) => this.showStrainLimit(settings?.strain_limit ?? 0));
+    store.subscribe(["scene", "settings"], ({ settings }) => this.strainLimit.show(settings?.strain_limit ?? 0));
     store.subscribe(["shownScale"], ({ shownScale }) => {
-      this.scale.valueAsNumber = shownScale;
-      setText(byId("shown-scale-value"), `${shownScale}x`);
+      this.scale.show(shownScale);
       byId("shown-scale-value").classList.toggle("warn", shownScale !== 1);
       byId("scale-banner").hidden = shownScale === 1;
       setText(byId("scale-banner"), `Deformation drawn ${shownScale}x`);
@@ -57,40 +74,54 @@ export class SettingsPanel {
     this.body.selectedIndex = body;
   }
 
-  private listFields({ scene, body, field }: Readonly<State>): void {
+  /** Fields of the body, and what else may be told apart by colours. */
+  private listFields({ scene, body, field, coloring }: Readonly<State>): void {
     const fields = scene?.bodies[body]?.fields ?? [];
+    const groups = groupings(scene);
+    const offered = [...fields, ...groups.map((by) => ({ name: GROUPED + by, title: GROUPING_TITLES[by] }))];
     const listed = [...this.field.options].map(({ value }) => value);
-    if (listed.join() !== fields.map(({ name }) => name).join()) {
-      this.field.replaceChildren(...fields.map(({ name, title }) => new Option(title, name)));
+    if (listed.join() !== offered.map(({ name }) => name).join()) {
+      this.field.replaceChildren(...offered.map(({ name, title }) => new Option(title, name)));
     }
     const shown = fields.find(({ name }) => name === field) ?? fields[0];
-    if (shown) this.field.value = shown.name;
+    if (coloring !== "field") this.field.value = GROUPED + coloring;
+    else if (shown) this.field.value = shown.name;
+  }
+
+  private chooseColors(control: Control): void {
+    const { value } = this.field;
+    const grouping = (["region", "material"] as const).find((by) => value === GROUPED + by);
+    if (grouping) control.chooseGrouping(grouping);
+    else control.chooseField(value);
   }
 
   private showValues(state: Readonly<State>): void {
     const { scene, body, settings } = state;
     if (!scene || !settings) return;
-    this.moduli = rangeOf(scene.bodies[body]?.youngs_modulus ?? null);
+    this.moduli = rangeOf(scene.defaults.youngs_modulus[body] ?? null);
     const modulus = settings.youngs_modulus[body] ?? null;
-    const [low, high] = this.moduli;
-    if (modulus !== null) this.stiffness.valueAsNumber = Math.log(modulus / low) / Math.log(high / low);
-    setText(byId("stiffness-value"), modulus === null ? fixedModulus(state) : pascals(modulus));
+    this.stiffness.show(modulus ?? this.moduli[0], modulus === null ? fixedModulus(state) : null);
     byId("stiffness-field").title = modulus === null ? whyFixed(state) : "";
   }
 
-  private showStrainLimit(limit: number): void {
-    this.strainLimit.valueAsNumber = limit > 0 ? 100 * limit : STRAIN_OFF_PERCENT;
-    setText(byId("strain-limit-value"), limit > 0 ? percent(limit) : "off");
-  }
-
-  private chosenStrainLimit(): number {
-    const chosen = this.strainLimit.valueAsNumber;
-    return chosen >= STRAIN_OFF_PERCENT ? 0 : chosen / 100;
-  }
-
-  private modulus(): number {
-    const [low, high] = this.moduli;
-    return low * (high / low) ** this.stiffness.valueAsNumber;
+  private stiffnessSlider(store: Store, control: Control): Slider {
+    return new Slider({
+      id: "stiffness",
+      name: "Stiffness",
+      format: pascals,
+      units: PASCALS,
+      scale: {
+        toTrack: (modulus) => Math.log(modulus / this.moduli[0]) / Math.log(this.moduli[1] / this.moduli[0]),
+        fromTrack: (place) => this.moduli[0] * (this.moduli[1] / this.moduli[0]) ** place,
+      },
+      bounds: () => MODULI,
+      fallback: () => {
+        const { scene, body } = store.get();
+        return scene?.defaults.youngs_modulus[body] ?? null;
+      },
+      choose: (modulus) => control.setStiffness(modulus),
+      complain: (text) => control.notice(text),
+    });
   }
 
   private enable({ role, scene, body }: Readonly<State>): void {
@@ -98,6 +129,25 @@ export class SettingsPanel {
     this.stiffness.disabled = watching || scene?.bodies[body]?.youngs_modulus == null;
     this.strainLimit.disabled = this.model.disabled = watching;
   }
+}
+
+function strainSlider(store: Store, control: Control): Slider {
+  return new Slider({
+    id: "strain-limit",
+    name: "Hold at strain",
+    format: (limit) => (limit > 0 ? percent(limit) : "off"),
+    units: { "%": 0.01 },
+    usual: "%",
+    words: { off: 0 },
+    scale: {
+      toTrack: (limit) => (limit > 0 ? 100 * limit : STRAIN_OFF_PERCENT),
+      fromTrack: (place) => (place >= STRAIN_OFF_PERCENT ? 0 : place / 100),
+    },
+    bounds: () => STRAIN_BOUNDS,
+    fallback: () => store.get().scene?.defaults.strain_limit ?? null,
+    choose: (limit) => control.setStrainLimit(limit),
+    complain: (text) => control.notice(text),
+  });
 }
 
 function rangeOf(modulus: number | null): Range {

@@ -1,27 +1,53 @@
 // The tool that is driven, or that the next press drives: its shape and how it is held, and the friction or the patch of its
 // contacts.
 
-import { TILT_MAX } from "../control";
+import { TILT_MAX, firstPosture } from "../control";
 import type { Control } from "../control";
 import { drivenTool } from "../store";
 import type { State, Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId } from "./dom";
 import { degrees, millimetres } from "./numbers";
+import { Slider } from "./slider";
+
+const DEGREES = { "°": 1, deg: 1 };
 
 export class ToolPanel {
   private readonly shape = byId<HTMLSelectElement>("shape");
-  private readonly tilt = byId<HTMLInputElement>("tilt");
-  private readonly turn = byId<HTMLInputElement>("turn");
-  private readonly friction = byId<HTMLInputElement>("friction");
-  private readonly radius = byId<HTMLInputElement>("radius");
+  private readonly tilt: Slider;
+  private readonly turn: Slider;
+  private readonly friction: Slider;
+  private readonly radius: Slider;
 
   constructor(store: Store, control: Control) {
-    this.tilt.max = String(TILT_MAX);
+    byId<HTMLInputElement>("tilt").max = String(TILT_MAX);
     this.shape.onchange = () => control.chooseShape(this.shape.value);
-    this.tilt.oninput = () => control.hold({ tilt: this.tilt.valueAsNumber });
-    this.turn.oninput = () => control.hold({ turn: this.turn.valueAsNumber });
-    this.friction.oninput = () => control.setFriction(this.friction.valueAsNumber);
-    this.radius.oninput = () => control.setContactRadius(this.radius.valueAsNumber);
+    const driven = () => drivenTool(store.get()) ?? 0;
+    const complain = (text: string) => control.notice(text);
+    const posture = () => {
+      const header = store.get().scene?.tools[driven()];
+      return header ? firstPosture(header.shape) : null;
+    };
+    const angle = { format: degrees, units: DEGREES, usual: "°", complain };
+    this.tilt = new Slider({ ...angle, id: "tilt", name: "Tilt", fallback: () => posture()?.tilt ?? null, choose: (tilt) => control.hold({ tilt }) });
+    this.turn = new Slider({ ...angle, id: "turn", name: "Turn", fallback: () => posture()?.turn ?? null, choose: (turn) => control.hold({ turn }) });
+    this.friction = new Slider({
+      id: "friction",
+      name: "Friction",
+      format: (value) => value.toFixed(2),
+      fallback: () => store.get().scene?.defaults.friction[driven()] ?? null,
+      choose: (value) => control.setFriction(value),
+      complain,
+    });
+    this.radius = new Slider({
+      id: "radius",
+      name: "Patch",
+      format: millimetres,
+      units: { mm: 1e-3, cm: 1e-2, m: 1 },
+      usual: "mm",
+      fallback: () => store.get().scene?.defaults.contact_radius[driven()] ?? null,
+      choose: (value) => control.setContactRadius(value),
+      complain,
+    });
     store.subscribe(["scene", "settings", "pinned", "pressing"], (state) => this.showContact(state));
     store.subscribe(["scene", "settings", "pinned", "pressing", "status"], (state) => this.showShape(state));
     store.subscribe(["scene", "postures", "pinned", "pressing"], (state) => this.showPosture(state));
@@ -50,10 +76,8 @@ export class ToolPanel {
     const [header, posture] = [state.scene?.tools[tool], state.postures[tool]];
     for (const id of ["tilt-field", "turn-field", "hint-turn"]) byId(id).hidden = !header || header.shape === "sphere";
     if (!posture) return;
-    this.tilt.valueAsNumber = posture.tilt;
-    this.turn.valueAsNumber = posture.turn;
-    setText(byId("tilt-value"), degrees(posture.tilt));
-    setText(byId("turn-value"), degrees(posture.turn));
+    this.tilt.show(posture.tilt);
+    this.turn.show(posture.turn);
   }
 
   private showContact(state: Readonly<State>): void {
@@ -62,13 +86,9 @@ export class ToolPanel {
     if (!header || !settings) return;
     byId("friction-field").hidden = header.contact !== "local";
     byId("radius-field").hidden = header.contact === "local";
-    const friction = settings.friction[tool] ?? 0;
-    this.friction.valueAsNumber = friction;
-    setText(byId("friction-value"), friction.toFixed(2));
-    const radius = settings.contact_radius[tool] ?? 0;
-    this.radius.max = String(header.max_contact_radius);
-    this.radius.step = String(header.max_contact_radius / 200);
-    this.radius.valueAsNumber = radius;
-    setText(byId("radius-value"), millimetres(radius));
+    this.friction.show(settings.friction[tool] ?? 0);
+    this.radius.input.max = String(header.max_contact_radius);
+    this.radius.input.step = String(header.max_contact_radius / 200);
+    this.radius.show(settings.contact_radius[tool] ?? 0);
   }
 }
