@@ -10,6 +10,9 @@
 //! and a released one is pushed by its own share of `F`. Without loads this
 //! is equations 3.8-3.10 of Jun, Choi and Cho with `C = -E^T Psi E`, written without the term that cancels on `S`.
 
+mod error;
+
+use error::{Noise, relative_error};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
 
@@ -28,6 +31,9 @@ pub struct Answer {
     pub forces: Vec<f64>,
     /// `K u` at the fixed dofs, N, in their order.
     pub reactions: Vec<f64>,
+    /// Estimated error: of the forces relative to the largest force, or of the displacements relative to the largest
+    /// displacement, whichever is larger.
+    pub error: f64,
 }
 
 /// Solves the changed problem.
@@ -42,12 +48,15 @@ pub struct Answer {
 pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize, f64)]) -> Result<Answer> {
     green.require_intact()?;
     let mut response = if green.loads.is_empty() { vec![0.0; green.rows] } else { green.free_response.clone() };
+    let mut noise = Noise::new(green);
     for &(column, value) in known {
-        green.add_column(column, value, &mut response);
+        noise.add_column(column, value, &mut response);
     }
-    let unknown = capacitance_solve(green, switched, &response)?;
+    let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
+    let capacitance = switched_square(green, &rows);
+    let unknown = capacitance_solve(green, switched, &capacitance, &response)?;
     for (&(column, _), &q) in switched.iter().zip(&unknown) {
-        green.add_column(column, q, &mut response);
+        noise.add_column(column, q, &mut response);
     }
 
     // Sort knowns and unknowns into displacements and forces, row by row.
@@ -72,26 +81,38 @@ pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize,
         displacements[row] = u;
         forces[row] = f;
     }
+    let columns: Vec<usize> = switched.iter().map(|&(column, _)| column).collect();
+    let (of_unknown, mut errors) = noise.errors(&columns, &capacitance);
+    let mut is_force = green.row_is_fixed.clone();
+    for (&row, error) in rows.iter().zip(of_unknown) {
+        // What was unknown there is known now, and the other way round.
+        (errors[row], is_force[row]) = (error, !is_force[row]);
+    }
+    let error = relative_error(&errors, &is_force, &displacements, &forces);
     let reactions = green.fixed_rows.iter().map(|&row| forces[row as usize]).collect();
     displacements.truncate(surface);
     forces.truncate(surface);
-    Ok(Answer { displacements, forces, reactions })
+    Ok(Answer { displacements, forces, reactions, error })
 }
 
 /// `Psi_SS^-1 [ vb_S - response_S ]`. Symmetric positive definite if only free dofs are prescribed; with released
 /// supports the coupling blocks are skew, and LU serves.
-fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response: &[f64]) -> Result<Vec<f64>> {
+fn capacitance_solve(
+    green: &GreensFunction,
+    switched: &[(usize, f64)],
+    capacitance: &Mat<f64>,
+    response: &[f64],
+) -> Result<Vec<f64>> {
     if switched.is_empty() {
         return Ok(Vec::new());
     }
     let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
     let n = rows.len();
-    let capacitance = switched_square(green, &rows);
     // A released support answers to its share of the reference loads besides the force given.
     let wanted = |i: usize| switched[i].1 + if green.row_is_fixed[rows[i]] { green.load_on_row(rows[i]) } else { 0.0 };
     let residual = Mat::from_fn(n, 1, |i, _| wanted(i) - response[rows[i]]);
     let unknown = if rows.iter().any(|&row| green.row_is_fixed[row]) {
-        solve_released(&capacitance, &residual, green.precision().unit_roundoff().max(COMPUTED_ERROR))?
+        solve_released(capacitance, &residual, green.precision().unit_roundoff().max(COMPUTED_ERROR))?
     } else {
         match capacitance.llt(Side::Lower) {
             Ok(factor) => factor.solve(&residual),

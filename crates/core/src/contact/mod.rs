@@ -18,7 +18,7 @@ mod touchable;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
-pub use compliance::{smallest_eigenvalue, touch};
+pub use compliance::{Touch, smallest_eigenvalue, touch};
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
 pub use refusal::Refusal;
