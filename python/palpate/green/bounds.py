@@ -32,22 +32,23 @@ def check_error(error: float, precision: str, what: str, stacklevel: int) -> Non
     # Not a number is refused, too.
     if not error <= REFUSED:
         size = error_text(error) if error < 1 else "all of it"
-        raise PrecisionError(
-            f"{what} may be wrong by {size}, more than the {error_text(REFUSED)} allowed: {remedy(precision)}"
-        )
+        bound = f"more than the {error_text(REFUSED)} allowed"
+        raise PrecisionError(f"{what} may be wrong by {size}, {bound}: {remedy(error, precision)}")
     if error > WARNED:
-        message = f"{what} may be wrong by {error_text(error)}: {remedy(precision)}"
+        message = f"{what} may be wrong by {error_text(error)}: {remedy(error, precision)}"
         warnings.warn(message, PrecisionWarning, stacklevel=stacklevel + 1)
 
 
-def remedy(precision: str) -> str:
+def remedy(error: float, precision: str) -> str:
     """Say why a format is not enough, and what is."""
     if precision == "f64":
         return (
             "parts of this body differ too much in stiffness for double precision; bring materials closer together, "
             "prescribe fewer neighbouring nodes, or fix more of the body"
         )
+    # Single precision rounds to 1/256 of what sixteen bits do.
+    better = "f32" if precision == "f16" and error < 256 * CHOSEN else "f64"
     return (
-        f"parts of this body, or the nodes prescribed, differ too much in stiffness for {precision}; "
-        "compute the store with --precision f64 (precision='f64')"
+        f"the parts of this body, or the nodes prescribed, differ too much in stiffness for {precision}; "
+        f"compute the store with --precision {better} (precision='{better}')"
     )

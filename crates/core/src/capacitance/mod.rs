@@ -43,8 +43,8 @@ pub struct Answer {
 /// released support, N). Columns are those of [`GreensFunction`].
 ///
 /// # Errors
-/// A capacitance matrix that is singular to working precision: too much was released, or the store's precision does not
-/// carry that many neighbouring constraints.
+/// A capacitance matrix that is singular to working precision: [`Error::Singular`], too much was released, or
+/// [`Error::Precision`], the store does not carry that many neighbouring constraints.
 pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize, f64)]) -> Result<Answer> {
     green.require_intact()?;
     let mut response = if green.loads.is_empty() { vec![0.0; green.rows] } else { green.free_response.clone() };
@@ -121,7 +121,14 @@ fn capacitance_solve(
         }
     };
     let unknown: Vec<f64> = (0..n).map(|i| unknown[(i, 0)]).collect();
-    if unknown.iter().all(|q| q.is_finite()) { Ok(unknown) } else { Err(floating()) }
+    if unknown.iter().all(|q| q.is_finite()) {
+        return Ok(unknown);
+    }
+    let precision = green.precision().name();
+    Err(Error::Precision(format!(
+        "the answer has no digit that is right: compliances of the prescribed nodes are the same in {precision}; prescribe \
+         fewer neighbouring nodes, or compute the store with --precision f64 (precision='f64')"
+    )))
 }
 
 /// `Psi_SS`, cut out of the blocks between the nodes of the rows `S`.

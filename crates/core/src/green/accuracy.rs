@@ -25,7 +25,6 @@
 
 use glam::{DMat3, DVec3};
 
-use super::function::GreensFunction;
 use super::precision::Precision;
 
 /// Standard deviations of the noise of rounding that are stated. Rounding is even within half a unit, whose largest
@@ -103,17 +102,6 @@ pub struct PressedError {
     pub force: f64,
     /// Of the displacement of any row, over its magnitude, sqrt(J).
     pub elsewhere: f64,
-}
-
-impl PressedError {
-    /// Relative to the largest force, N, or to the largest displacement, whichever is larger.
-    pub fn relative(&self, green: &GreensFunction, largest_force: f64, displacements: &[f64]) -> f64 {
-        let free = (0..displacements.len()).filter(|&row| !green.row_is_fixed[row]);
-        let magnitude = free.map(|row| green.magnitude(row)).fold(0.0, f64::max);
-        let moved = displacements.iter().fold(0.0f64, |m, u| m.max(u.abs()));
-        let ratio = |error: f64, of: f64| if error > 0.0 { error / of } else { 0.0 };
-        ratio(self.force, largest_force).max(ratio(magnitude * self.elsewhere, moved))
-    }
 }
 
 impl Pressed {
