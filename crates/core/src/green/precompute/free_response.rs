@@ -25,6 +25,8 @@ pub struct FreeResponse {
     pub values: Vec<f64>,
     /// Before the correction, which bounds what is left.
     pub error: f64,
+    /// Its energy norm, sqrt(J).
+    pub size: f64,
 }
 
 /// `v` on the rows `row_dofs` for the loads (N, all dofs); empty if there are none.
@@ -57,6 +59,7 @@ pub fn free_response(
     solve(&mut correction);
     let energy: f64 = residual.iter().zip(&correction).map(|(r, e)| r * e).sum();
     free.iter_mut().zip(&correction).for_each(|(u, e)| *u += e);
+    let work: f64 = supports.free.iter().zip(&free).map(|(&dof, u)| loads[dof as usize] * u).sum();
     let displacement = |dof: u32| match supports.free_rank[dof as usize] {
         u32::MAX => 0.0,
         rank => free[rank as usize],
@@ -68,7 +71,8 @@ pub fn free_response(
             displacement(dof)
         }
     };
-    Ok(FreeResponse { values: row_dofs.iter().map(of_row).collect(), error: energy.abs().sqrt() })
+    let values = row_dofs.iter().map(of_row).collect();
+    Ok(FreeResponse { values, error: energy.abs().sqrt(), size: work.abs().sqrt() })
 }
 
 /// `residual -= K_NN x` for a vector on the free dofs.

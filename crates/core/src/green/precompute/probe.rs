@@ -36,7 +36,7 @@ pub struct Patch {
 pub struct Probe {
     patches: Vec<Patch>,
     /// Error of the factor's own columns: `|w_j| / s_j`.
-    factor_error: f64,
+    pub factor_error: f64,
 }
 
 impl Probe {
