@@ -218,6 +218,14 @@ def test_the_body_chooses_its_precision_and_says_so(tmp_path, capfd):
     assert "estimated error: " in touched.stdout
 
 
+def test_where_only_supports_may_be_touched_single_precision_is_taken(block, tmp_path):
+    held = np.intersect1d(block.mesh.surface_nodes, block.fixed_nodes)
+    green = palpate.precompute(block, touch=held, path=tmp_path / "held.palpate", progress=False)
+    assert green.precision == "f32"
+    moved = green.solve(displacements={int(n): (1e-3, 0, 0) for n in held})
+    assert np.abs(moved.displacements - [1e-3, 0, 0]).max() <= 1e-3 * moved.error < 1e-6
+
+
 @pytest.mark.parametrize("length", [30, 100])
 def test_a_named_precision_that_is_too_low_is_told_when_it_is_computed_and_when_a_loop_is_built(length, tmp_path):
     with pytest.warns(palpate.PrecisionWarning, match="touches of this body may be wrong by .*--precision f"):

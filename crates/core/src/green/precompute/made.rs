@@ -169,6 +169,10 @@ impl Measuring<'_> {
     fn chosen(&self, mut tree: Tree, bound: f64, candidates: &[Precision]) -> Result<Measured> {
         let within = |accuracy: Accuracy| accuracy.touch.max(accuracy.stamp) <= bound;
         let &[.., best] = candidates else { return self.named(tree, Precision::F64) };
+        if self.probe.is_empty() && candidates.contains(&Precision::F32) {
+            // Nothing gives where it may be touched: nothing to measure a format by.
+            return self.named(tree, Precision::F32);
+        }
         if best == Precision::F16 {
             return self.single(tree);
         }

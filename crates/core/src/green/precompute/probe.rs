@@ -56,6 +56,11 @@ impl Probe {
         probe
     }
 
+    /// Whether there is no patch: only supports may be touched.
+    pub fn is_empty(&self) -> bool {
+        self.patches.is_empty()
+    }
+
     /// `Psi` between the dofs of every patch as the sweeps compute it.
     pub fn squares<C: Number>(&self, system: &System<'_>, sweep: &Sweep<C>) -> Squares {
         let mut scratch = Scratch::new(&sweep.tree, WIDTH);
