@@ -44,9 +44,10 @@ viewer: $(PAGE)
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)
 
+# Two processes: much of the time goes into waiting for browsers, meshers and servers.
 test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace --exclude palpate-python
-	$(BIN)/python -m pytest --quiet $(ARGS)
+	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile $(ARGS)
 
 lint: $(VENV)/.installed viewer/node_modules/.checks
 	cargo fmt --all --check

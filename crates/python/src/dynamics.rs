@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use faer::{MatMut, Par};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::dynamics::{
-    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Lanes, ModalModel, ModalScratch, ModalState,
-    Newmark, Rayleigh, Solver, basis_key as core_basis_key, exact_step, partition,
+    Basis, Direct, DirectScratch, DirectState, Energy, EnergyAccount, Integration, Lanes, ModalModel, ModalScratch,
+    ModalState, Newmark, Rayleigh, Solver, basis_key as core_basis_key, partition,
 };
 use palpate_core::fem::SymmetricCsc;
 use palpate_core::solver::Factor;
@@ -161,10 +161,11 @@ impl ModalMotion {
         let (q, v) = (displacements.as_slice()?, velocities.as_slice()?);
         let build = || -> Result<Self> {
             let (newmark, rayleigh) = scheme(arguments)?;
-            let step = |k, c| if exact { exact_step(k, c, newmark.dt) } else { newmark.mode_step(k, c) };
-            let model = ModalModel::new(k, shapes, &rayleigh, newmark.dt, step)?;
+            let linear = Integration::ExactLinear { dt: newmark.dt };
+            let integration = if exact { linear } else { Integration::Newmark(newmark) };
+            let model = ModalModel::new(k, shapes, &rayleigh, integration)?;
             let state = model.state_from(q, v)?;
-            let (scratch, account) = (model.scratch(), EnergyAccount::new(&state));
+            let (scratch, account) = (model.scratch(), EnergyAccount::new(&model, &state));
             Ok(Self { model, state, scratch, account })
         };
         py.detach(build).map_err(|e| to_python(py, e))

@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::{SurfaceShape, ToolShape};
-use palpate_core::dynamics::{Energy, ModalModel, exact_step};
+use palpate_core::dynamics::{Energy, Integration, ModalModel};
 use palpate_core::simulation::{
     BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel, contact_size,
 };
@@ -71,9 +71,10 @@ impl BodyParts {
             body = body.with_moduli(moduli)?;
         }
         let Some((eigenvalues, shapes, arguments, exact, coupling)) = self.modes else { return Ok(body) };
-        let ((newmark, rayleigh), dt) = (scheme(arguments)?, arguments.0);
-        let step = |k, c| if exact { exact_step(k, c, dt) } else { newmark.mode_step(k, c) };
-        let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, dt, step)?;
+        let (newmark, rayleigh) = scheme(arguments)?;
+        let held = Integration::ExactHeld { dt: newmark.dt, weight: newmark.delta };
+        let integration = if exact { held } else { Integration::Newmark(newmark) };
+        let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, integration)?;
         body.with_dynamics(BodyDynamics::new(modes, coupling)?)
     }
 }

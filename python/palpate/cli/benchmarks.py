@@ -71,17 +71,15 @@ def _print_contact(results: ContactResults) -> None:
 
     from palpate.validation.bench.contact import DEPTHS
 
-    table = Table(title="Force over that of the direct solution, and half its range over the places of an element")
-    table.add_column("", no_wrap=True)
-    table.add_column("elements", no_wrap=True)
-    for depth in DEPTHS:
-        table.add_column(f"{1e3 * depth:g} mm", justify="right", no_wrap=True)
-    table.add_column("step [us]", justify="right")
-    table.add_row("direct solution", "resolved", *(f"{1e3 * force:.1f} mN" for force in results.truth), "")
+    table = Table(title="Force over that of the direct solution; half its range over the places of an element")
+    table.add_column("depth", no_wrap=True)
+    table.add_column("direct", justify="right", no_wrap=True)
     for row in results.rows:
-        ratios, spread = row.means / results.truth, 100 * row.spread
-        cells = (f"{ratio:.2f} +-{part:.2g} %" for ratio, part in zip(ratios, spread, strict=True))
-        table.add_row(row.method, row.mesh, *cells, "" if row.step_us is None else f"{row.step_us:.1f}")
+        table.add_column(f"{row.method}\n{row.mesh}", justify="right")
+    for i, (depth, force) in enumerate(zip(DEPTHS, results.truth, strict=True)):
+        cells = (f"{row.means[i] / force:.2f}\n+-{100 * row.spread[i]:.2g} %" for row in results.rows)
+        table.add_row(f"{1e3 * depth:g} mm", f"{1e3 * force:.1f} mN", *cells)
+    table.add_row("step", "", *("" if row.step_us is None else f"{row.step_us:.1f} us" for row in results.rows))
     Console().print(table)
     ticks = Table(
         title="A tick of a sliding sphere, and numpy: three equations, the whole contact; us", title_justify="left"

@@ -183,7 +183,11 @@ class Newmark:
 
     @property
     def energy(self) -> Energy:
-        """Energies now, and what went in and out since the start."""
+        """Energies now, and what went in and out since the start.
+
+        Forces do the work of a step with the mean `(1 - delta) F0 + delta F1`, damping takes its part at the mean
+        velocity; of ``"exponential"`` both are exact integrals.
+        """
         kinetic, strain, dissipated, work = self._motion.energies()
         # The part left out follows the load statically: its strain energy is the work done on it.
         stored = 0.5 * float(self._forces @ self._left_out())

@@ -37,9 +37,10 @@ class StrikeTable(Table):
 
 
 class DynamicsTable(Table):
-    """Motion by modes: Newmark's scheme, or the exact step of each mode.
+    """Motion by modes: Newmark's scheme, or the exact step of each mode under forces held within it.
 
-    ``delta`` above 1/2 damps what is too fast for the time step; ``alpha`` is ``(delta + 1/2)^2 / 4`` unless given.
+    ``delta`` above 1/2 damps what is too fast for the time step, of exact modes in contact only: it is the weight of
+    a step's new force. ``alpha`` is ``(delta + 1/2)^2 / 4`` unless given; exact modes have none.
     ``damping_ratios`` are those of the first and the tenth mode; or ``rayleigh`` gives the factors
     of mass and stiffness. ``strike`` is the one that the viewer gives when its page opens.
     """

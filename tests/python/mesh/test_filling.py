@@ -32,8 +32,10 @@ def told_loss(said) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("element", ["linear", "quadratic"])
-@pytest.mark.parametrize("name", ["torus", "cup", "knot", "bracket"])
+@pytest.mark.parametrize(
+    ("name", "element"),
+    [("torus", "quadratic"), ("cup", "linear"), ("cup", "quadratic"), ("knot", "quadratic"), ("bracket", "linear")],
+)
 def test_hard_shapes_fill_at_the_default_size(name, element):
     shape = getattr(surfaces, name)()
     with warnings.catch_warnings(record=True) as said:
@@ -42,7 +44,8 @@ def test_hard_shapes_fill_at_the_default_size(name, element):
     loss, told = 1 - mesh.volume / shape.volume, told_loss(said)
     assert abs(loss) <= 0.01 or told == pytest.approx(loss, abs=0.001)
     assert abs(loss) <= 0.02
-    # No part of the surface is missing: all of it lies within a fraction of a small element of the mesh's.
+    # No part of the surface is missing. Chords of 4-node elements across a hole of the bracket, of 7 mm in radius, lie
+    # 0.5 mm off its rim, which is 0.9 % of the size.
     assert distances(mesh, np.asarray(shape.vertices)).max() < 0.01 * np.ptp(shape.vertices, axis=0).max()
     assert len(mesh.surface_nodes) < 8000
 
@@ -131,7 +134,10 @@ def test_a_mesher_ends_with_whoever_started_it(tmp_path, end):
         child += "end_with_parent(); Path('child').write_text(str(os.getpid())); time.sleep(100)"
         run_limited([sys.executable, "-c", child], 100)
     """
-    parent = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)], cwd=tmp_path, stderr=subprocess.DEVNULL)
+    # A program started in the background of a shell ignores interrupts, and so do its children.
+    heeded = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program = [sys.executable, "-c", heeded + textwrap.dedent(code)]
+    parent = subprocess.Popen(program, cwd=tmp_path, stderr=subprocess.DEVNULL)
     while not ((tmp_path / "child").exists() and (tmp_path / "child").read_text()):
         time.sleep(0.05)
         assert parent.poll() is None

@@ -156,7 +156,7 @@ impl Direct {
         let free = || self.supports.free.iter().map(|&dof| dof as usize);
         let mut work = 0.0;
         for i in free() {
-            work -= 0.5 * (force[i] + state.force[i]) * state.u[i];
+            work -= (state.force[i] + delta * (force[i] - state.force[i])) * state.u[i];
             scratch.mean_velocity[i] = 0.5 * state.v[i];
             state.u[i] += dt * state.v[i] + dt * dt * (0.5 - alpha) * state.a[i];
             state.v[i] += dt * (1.0 - delta) * state.a[i];
@@ -170,7 +170,7 @@ impl Direct {
             state.a[i] = a;
             state.u[i] += alpha * dt * dt * a;
             state.v[i] += delta * dt * a;
-            work += 0.5 * (force[i] + state.force[i]) * state.u[i];
+            work += (state.force[i] + delta * (force[i] - state.force[i])) * state.u[i];
             scratch.mean_velocity[i] += 0.5 * state.v[i];
         }
         state.work += work;

@@ -7,12 +7,14 @@
 //! ```
 //!
 //! `direct` solves this on all dofs. `K`, `M` and `B` share eigenvectors, so `modal` carries the same motion by one
-//! recurrence of two numbers a mode: the same answer with all modes, and the cost of the modes kept with fewer.
+//! recurrence of two numbers a mode: the same answer with all modes, and the cost of the modes kept with fewer. There each
+//! mode may take its exact step instead (`exponential`).
 
 #[cfg(feature = "offline")]
 mod direct;
 mod energy;
 mod exponential;
+mod integration;
 mod modal;
 mod scheme;
 mod store;
@@ -20,7 +22,7 @@ mod store;
 #[cfg(feature = "offline")]
 pub use direct::{Direct, DirectScratch, DirectState, Solver, partition};
 pub use energy::Energy;
-pub use exponential::exact_step;
+pub use integration::Integration;
 pub use modal::{
     EnergyAccount, LANES, Lanes, LoadedPatch, ModalModel, ModalScratch, ModalState, PredictedState, Projection,
     StepEnergy,

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::MAX_CONTACTS;
 use super::law::{ASKED, LocalContact};
 use super::tool::LawKind;
+use super::{MAX_CONTACTS, MAX_FURTHER};
 use crate::contact::TouchPatch;
 
 /// What a contact does.
@@ -64,6 +64,11 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// Whether it is a place beside another one that its tool is near and does not press.
+    pub(super) fn waits(&self) -> bool {
+        self.local.further && self.force == DVec3::ZERO
+    }
+
     /// Place at which its strain was asked for under a serial, m.
     pub(super) fn asked_at(&self, serial: u64) -> DVec3 {
         self.local.asked[serial as usize % ASKED]
@@ -83,12 +88,16 @@ impl Contact {
 pub struct Contacts {
     pub(super) slots: [Contact; MAX_CONTACTS],
     pub(super) patches: Vec<TouchPatch>,
+    /// A bit for each slot that is not empty.
+    used: u32,
     pub(super) begun: u64,
 }
 
+const _: () = assert!(MAX_CONTACTS <= u32::BITS as usize);
+
 impl Default for Contacts {
     fn default() -> Self {
-        Self { slots: Default::default(), patches: vec![TouchPatch::default(); MAX_CONTACTS], begun: 0 }
+        Self { slots: Default::default(), patches: vec![TouchPatch::default(); MAX_CONTACTS], used: 0, begun: 0 }
     }
 }
 
@@ -102,44 +111,59 @@ impl Contacts {
         self.begun << REVISIONS
     }
 
-    /// The contacts and their patches.
+    /// The contacts that touch, and their patches.
     pub fn iter(&self) -> impl Iterator<Item = (&Contact, &TouchPatch)> {
-        self.slots.iter().zip(&self.patches).filter(|(contact, _)| contact.mode != Mode::Free)
+        self.used().map(|slot| (&self.slots[slot], &self.patches[slot])).filter(|(contact, _)| !contact.waits())
+    }
+
+    /// Slots that are not empty.
+    fn used(&self) -> impl Iterator<Item = usize> + use<> {
+        let mut left = self.used;
+        std::iter::from_fn(move || {
+            let slot = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            (slot < MAX_CONTACTS).then_some(slot)
+        })
     }
 
     /// Slots of the contacts of a body.
     pub(super) fn on(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
-        (0..MAX_CONTACTS).filter(move |&slot| self.slots[slot].mode != Mode::Free && self.slots[slot].body == body)
+        self.used().filter(move |&slot| self.slots[slot].body == body)
     }
 
-    /// Slot of the contact of a tool with a body.
-    pub(super) fn of(&self, tool: usize, body: usize) -> Option<usize> {
-        self.on(body).find(|&slot| self.slots[slot].tool == tool)
+    /// Slots of the contacts of a tool with a body.
+    pub(super) fn of(&self, tool: usize, body: usize) -> impl Iterator<Item = usize> + '_ {
+        self.on(body).filter(move |&slot| self.slots[slot].tool == tool)
     }
 
-    /// An empty slot.
-    pub(super) fn empty(&self) -> Option<usize> {
-        (0..MAX_CONTACTS).find(|&slot| self.slots[slot].mode == Mode::Free)
+    /// An empty slot; the last ones are for further places, so that the first place of a tool finds one.
+    pub(super) fn empty(&self, further: bool) -> Option<usize> {
+        let first = if further { MAX_CONTACTS - MAX_FURTHER } else { 0 };
+        (first..MAX_CONTACTS).find(|&slot| self.slots[slot].mode == Mode::Free)
+    }
+
+    /// Fills a slot.
+    pub(super) fn put(&mut self, slot: usize, contact: Contact) {
+        self.slots[slot] = contact;
+        self.used |= 1 << slot;
     }
 
     /// Empties a slot.
     pub(super) fn clear(&mut self, slot: usize) {
         self.slots[slot] = Contact::default();
+        self.used &= !(1 << slot);
     }
 
     /// Copies the contacts that there are; nothing is allocated.
     pub(super) fn copy_from(&mut self, other: &Contacts) {
         self.begun = other.begun;
-        for slot in 0..MAX_CONTACTS {
-            let empty = |contact: &Contact| contact.mode == Mode::Free;
-            // Empty slots are all alike.
-            if empty(&self.slots[slot]) && empty(&other.slots[slot]) {
-                continue;
-            }
-            self.slots[slot] = other.slots[slot];
-            if !empty(&other.slots[slot]) {
-                self.patches[slot].copy_from(&other.patches[slot]);
-            }
+        for slot in self.used().filter(|slot| other.used & 1 << slot == 0) {
+            self.slots[slot] = Contact::default();
         }
+        for slot in other.used() {
+            self.slots[slot] = other.slots[slot];
+            self.patches[slot].copy_from(&other.patches[slot]);
+        }
+        self.used = other.used;
     }
 }

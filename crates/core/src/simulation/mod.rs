@@ -11,6 +11,7 @@ mod body;
 mod contacts;
 mod covering;
 mod energy;
+mod further;
 mod input;
 mod law;
 mod limit;
@@ -44,5 +45,9 @@ pub use tool::{LawKind, ToolModel, contact_size};
 pub const MAX_TOOLS: usize = 4;
 /// Most bodies a simulation may have.
 pub const MAX_BODIES: usize = 4;
-/// Most contacts at once: each tool may touch each body.
-pub const MAX_CONTACTS: usize = MAX_TOOLS * MAX_BODIES;
+/// Most places at which a tool may touch a body at once.
+pub const MAX_PLACES: usize = 3;
+/// Most contacts at once: each tool may touch each body, and some of them at further places.
+pub const MAX_CONTACTS: usize = MAX_TOOLS * MAX_BODIES + MAX_FURTHER;
+/// Most contacts at further places, and contacts that fade, of all tools together.
+const MAX_FURTHER: usize = 8;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::body::BodyModel;
 use super::tool::{LawKind, ToolModel};
 use super::{MAX_BODIES, MAX_TOOLS};
-use crate::contact::{CompliantBody, RegularCompliance};
+use crate::contact::{CompliantBody, Hollows, RegularCompliance};
 use crate::{Error, Result};
 
 /// Bodies and tools.
@@ -16,6 +16,8 @@ pub struct Model {
     pub tools: Vec<ToolModel>,
     /// For each tool under the local law and each body what the tool meets beyond the half-space.
     pub(super) regular: Vec<Vec<Option<Arc<RegularCompliance>>>>,
+    /// For the same where the tool may touch at several places.
+    pub(super) hollows: Vec<Vec<Hollows>>,
 }
 
 impl Model {
@@ -48,7 +50,12 @@ impl Model {
             };
             regular.push(of_tool);
         }
-        Ok(Self { bodies, tools, regular })
+        let hollows_of = |tool: &ToolModel, body: &BodyModel| match (&body.local, tool.law) {
+            (Some(local), LawKind::Local) => Hollows::new(&local.smooth, tool.shape.bounding_radius()),
+            _ => Hollows::default(),
+        };
+        let hollows = tools.iter().map(|tool| bodies.iter().map(|body| hollows_of(tool, body)).collect()).collect();
+        Ok(Self { bodies, tools, regular, hollows })
     }
 
     /// Refuses a contact radius that some body cannot take.

@@ -32,7 +32,7 @@ pub struct Motion {
     residual: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
     /// The node that is watched.
     watched: Projection,
-    /// Free motion less what one contact does to the body at rest, and its modal force.
+    /// Motion less what one contact does to the body at rest, and a modal force.
     remainder: [Vec<Lanes>; 2],
     /// A strike that is under way.
     pub(super) strike: StrikeInProgress,
@@ -64,10 +64,7 @@ impl Motion {
 
     /// Brings the body to rest. A step is made due, for contacts begin and end only within steps.
     pub(super) fn rest(&mut self, modes: &ModalModel) {
-        let PredictedState { q, v, free_q, free_v } = &mut self.predicted;
-        for x in [q, v, free_q, free_v] {
-            x.fill(Lanes::default());
-        }
+        self.predicted.rest();
         self.free = Default::default();
         self.strike.end();
         self.account = Account::default();
@@ -125,7 +122,6 @@ impl Motion {
             self.compliance[slot][other] = symmetric;
             self.compliance[other][slot] = symmetric.transpose();
         }
-        self.account.forget(slot);
     }
 
     /// Displacement of a surface node at the end of the next step if no force acts, m.
@@ -141,11 +137,20 @@ impl Motion {
         self.free[slot] = self.projections[slot].read(modes, &self.predicted.free_q);
     }
 
-    /// Takes the free motion less what `force` on the patch in a slot, N, does to the modes at rest.
-    pub(super) fn leave_out_static(&mut self, modes: &ModalModel, slot: usize, force: DVec3) {
+    /// Takes the motion at the end of the step as it is under the forces of the last one, less what that in a slot does to the
+    /// modes at rest. Of the free motion alone, a body at rest would have what its forces do within a step left out, and a
+    /// press would settle at an inclination that depends on the scheme.
+    pub(super) fn leave_out_static(&mut self, modes: &ModalModel, contacts: &Contacts, slot: usize) {
         let [remainder, load] = &mut self.remainder;
         remainder.copy_from_slice(&self.predicted.free_q);
-        self.projections[slot].take_static_by(modes, force, remainder, load);
+        load.fill(Lanes::default());
+        for other in contacts.on(contacts.slots[slot].body) {
+            self.projections[other].add_force(modes, contacts.slots[other].force, load);
+        }
+        modes.add_step(load, remainder);
+        load.fill(Lanes::default());
+        self.projections[slot].add_force(modes, -contacts.slots[slot].force, load);
+        modes.add_static(load, remainder);
     }
 
     /// Displacement of a surface node in what [`Motion::leave_out_static`] took, m.
@@ -165,12 +170,8 @@ impl Motion {
     pub(super) fn keep_residual(&mut self, modes: &ModalModel, slot: usize, regular: &DMat3) {
         let own = &self.projections[slot];
         self.residual[slot] = [DMat3::ZERO; MAX_CONTACTS];
+        self.residual.iter_mut().for_each(|row| row[slot] = DMat3::ZERO);
         self.residual[slot][slot] = *regular - own.static_compliance(modes, own);
-    }
-
-    /// A contact begins whose patch will slide.
-    pub(super) fn begin_contact(&mut self, slot: usize) {
-        self.account.forget(slot);
     }
 
     /// Compliance of one step between the patches in two slots, m/N.
@@ -194,9 +195,19 @@ impl Motion {
         self.strike.begin(modes, &self.predicted.q, patch, impulse, duration);
     }
 
+    /// Force of a contact on the body at the end of the last step, N; none for one that begins.
+    pub(super) fn last_force(&self, contacts: &Contacts, slot: usize) -> DVec3 {
+        match self.account.changes(contacts, contacts.slots[slot].body, slot) {
+            true => DVec3::ZERO,
+            false => self.account.last_force(slot),
+        }
+    }
+
     /// Ends the step by the forces of contacts and strike, predicts the next, and keeps account of the energy.
     pub(super) fn advance(&mut self, modes: &ModalModel, coupling: f64, contacts: &Contacts, body: usize) {
         self.strike.advance();
+        let changed = std::array::from_fn(|slot| self.account.changes(contacts, body, slot));
+        let before = self.patches(modes, &changed, |account, other| account.last_force(other));
         // The strike comes behind the contacts: the array is filled with it.
         let mut loaded = [self.strike.loaded(); MAX_CONTACTS + 1];
         let mut slots = [0; MAX_CONTACTS];
@@ -206,14 +217,36 @@ impl Motion {
             slots[count] = slot;
             count += 1;
         }
+        let slots = &slots[..count];
         let with_strike = count + usize::from(self.strike.force() != DVec3::ZERO);
         let step = modes.advance(&mut self.predicted, &mut loaded[..with_strike]);
-        for (&slot, patch) in slots[..count].iter().zip(&loaded) {
+        for (&slot, patch) in slots.iter().zip(&loaded) {
             self.free[slot] = patch.free;
         }
+        let force = |slot: usize| if slots.contains(&slot) { contacts.slots[slot].force } else { DVec3::ZERO };
+        let after = self.patches(modes, &changed, |_, other| force(other));
+        let moved = std::array::from_fn(|slot| after[slot] - before[slot]);
+        let weight = modes.integration.weight();
         self.account.book_step(&step);
-        self.account.book_contacts(contacts, &slots[..count], coupling, &self.residual);
-        self.account.book_work(contacts, body);
+        self.account.book_contacts(contacts, slots, coupling, &self.residual);
+        self.account.book_work((contacts, body), (coupling, weight), &self.residual, &moved);
         self.account.energy.work += self.strike.work(modes, &self.predicted.q);
+    }
+
+    /// Mean displacements of some patches, m, without what their own forces do beyond the modes.
+    fn patches(
+        &self,
+        modes: &ModalModel,
+        which: &[bool; MAX_CONTACTS],
+        force: impl Fn(&Account, usize) -> DVec3,
+    ) -> [DVec3; MAX_CONTACTS] {
+        std::array::from_fn(|slot| {
+            if !which[slot] {
+                return DVec3::ZERO;
+            }
+            let others = (0..MAX_CONTACTS).filter(|&other| other != slot);
+            let beyond: DVec3 = others.map(|other| self.residual[slot][other] * force(&self.account, other)).sum();
+            self.projections[slot].read(modes, &self.predicted.q) + beyond
+        })
     }
 }

@@ -23,7 +23,9 @@
 //! there is any into it. That is what sticking there means; it slips only after its force has once been within the cone.
 //!
 //! A slip only takes energy out. With the tool where it is the contacts hold `s (|t| + t(s) . e) / 2` less, and `t(s) . e` is
-//! kept from turning negative. A contact within its cone keeps every bit.
+//! kept from turning negative. On a body in motion it takes the mean force of the step along the slip, `(1 - w) t0 + w t(s)`
+//! (`energy`): where the force has just turned round, `t(s) . e` is kept above `-(1 - w) t0 . e / w`. A contact within its cone
+//! keeps every bit.
 
 use glam::DVec3;
 
@@ -86,7 +88,9 @@ fn sweep(model: &Model, state: &mut State, system: &mut System, body: usize) -> 
             pressing: (force.pressing - after.pressing) / trial,
             tangential: (force.tangential - after.tangential) / trial,
         };
-        let length = slip_length(&force, &rate, direction, coefficient);
+        let most =
+            (force.tangential.length() - kept(model, state, slot, direction)).max(0.0) / rate.tangential.dot(direction);
+        let length = slip_length(&force, &rate, coefficient, most);
         shift(&mut state.contacts.slots[slot], direction * (length - trial));
         contact_forces(model, state, system, body);
         slipped = true;
@@ -122,13 +126,21 @@ impl Parts {
     }
 }
 
-/// Length of the slip along `direction` that ends on the cone, at most that which takes the tangential force along it to zero.
-fn slip_length(force: &Parts, rate: &Parts, direction: DVec3, coefficient: f64) -> f64 {
+/// Tangential force along the slip that it leaves at least, N: on a body in motion what makes the mean of the step none.
+fn kept(model: &Model, state: &State, slot: usize, direction: DVec3) -> f64 {
+    let body = state.contacts.slots[slot].body;
+    let (Some(motion), Some(dynamics)) = (&state.bodies[body].motion, &model.bodies[body].dynamics) else { return 0.0 };
+    let weight = dynamics.modes.integration.weight();
+    let before = motion.last_force(&state.contacts, slot).dot(direction);
+    (-before * (1.0 - weight) / weight).max(0.0)
+}
+
+/// Length of the slip that ends on the cone, at most `most`.
+fn slip_length(force: &Parts, rate: &Parts, coefficient: f64, most: f64) -> f64 {
     let squared = coefficient * coefficient;
     let a = rate.tangential.length_squared() - squared * rate.pressing * rate.pressing;
     let b = force.tangential.dot(rate.tangential) - squared * force.pressing * rate.pressing;
     let c = force.tangential.length_squared() - squared * force.pressing * force.pressing;
-    let most = force.tangential.length() / rate.tangential.dot(direction);
     // a s^2 - 2 b s + c = 0 with c > 0: the form without a difference of like numbers, for either sign of a.
     let discriminant = b * b - a * c;
     let root = c / (b + discriminant.sqrt());

@@ -12,12 +12,25 @@ use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 use crate::contact::Refusal;
 use crate::contact::local::cells::PressureState;
 
+/// How deep a tool is in the untouched surface of a body without a contact.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Entry {
+    /// Depth at which the next contact begins, m: zero for a tool that came from outside, and the least reached since for one
+    /// that was released inside, so that a force always starts from zero.
+    pub depth: f64,
+    /// Depth a tick ago, m, zero outside: a tool may be there without a force, in a dent that others have made.
+    pub reached: f64,
+}
+
 /// What a tool remembers of each body it does not touch.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ToolState {
-    /// Penetration of the untouched surface at which the next contact begins, m: zero for a tool that came from outside, and
-    /// the least reached since for one that was released inside, so that a force always starts from zero.
-    pub entry_depth: [f64; MAX_BODIES],
+    /// How deep it is in each.
+    pub entry: [Entry; MAX_BODIES],
+    /// Where it was a tick ago, m, in the world; none where it was not in the scene.
+    pub(super) before: Option<DVec3>,
+    /// Energy that contacts which fade have lost in this tick, J.
+    pub(super) freed: f64,
     /// Why no contact began where the tool reaches the body.
     pub refused: [Option<Refusal>; MAX_BODIES],
 }

@@ -6,9 +6,9 @@ use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::slip::slip;
-use super::state::State;
+use super::state::{Entry, State};
 use super::tool::LawKind;
-use super::{limit, solve, time};
+use super::{MAX_CONTACTS, further, limit, solve, time};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) -> Output {
@@ -31,6 +31,10 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
         }
     }
 
+    for (tool, said) in state.tools.iter_mut().zip(&input.tools) {
+        tool.before = (said.active && said.pose.is_finite()).then_some(said.pose.position);
+    }
+
     // 4. The device feels minus what the bodies feel.
     answer(model, state)
 }
@@ -39,33 +43,62 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
 fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
     for (tool, tool_model) in model.tools.iter().enumerate() {
         let said = &input.tools[tool];
-        let place = state.contacts.of(tool, body);
-        let law = law_of(law_now(tool_model.law, place.map(|slot| state.contacts.slots[slot].law), said.grab));
+        let (places, count) = gather(state, tool, body);
+        let places = &places[..count];
+        let law_of_contact = places.first().map(|&slot| state.contacts.slots[slot].law);
+        let law = law_of(law_now(tool_model.law, law_of_contact, said.grab));
         state.tools[tool].refused[body] = None;
         if !said.active || input.controls.reset || !said.pose.is_finite() {
-            state.tools[tool].entry_depth[body] = 0.0;
-            place.iter().for_each(|&slot| state.contacts.clear(slot));
+            state.tools[tool].entry[body] = Entry::default();
+            places.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
-        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), tool, body, input);
-        match place {
-            Some(slot) => {
-                if !law.update(&approach, &mut state.contacts.slots[slot]) {
-                    state.tools[tool].entry_depth[body] = approach.depth();
-                    state.contacts.clear(slot);
+        let before = state.tools[tool].before;
+        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), (tool, body), before, input);
+        let mut lasts = false;
+        for &slot in places {
+            if law.update(&approach, &mut state.contacts.slots[slot]) {
+                lasts |= !state.contacts.slots[slot].local.held;
+            } else {
+                let depth = approach.depth();
+                state.tools[tool].entry[body] = Entry { depth, reached: depth };
+                state.contacts.clear(slot);
+            }
+        }
+        if count > 0 {
+            if lasts {
+                further::find(model, state, scratch, (tool, body));
+                continue;
+            }
+            if places.iter().any(|&slot| state.contacts.slots[slot].mode == Mode::Free) {
+                continue;
+            }
+        }
+        match law.begin(&approach, &mut state.tools[tool].entry[body], &mut scratch.covering) {
+            Ok(Some(begun)) => {
+                if let Some(slot) = solve::add_contact(model, state, begun, &scratch.covering) {
+                    limit::begin(model, state, slot, input.controls.strain_limit[body]);
                 }
             }
-            None => match law.begin(&approach, &mut state.tools[tool].entry_depth[body], &mut scratch.covering) {
-                Ok(Some(begun)) => {
-                    if let Some(slot) = solve::add_contact(model, state, begun, &scratch.covering) {
-                        limit::begin(model, state, slot, input.controls.strain_limit[body]);
-                    }
-                }
-                Ok(None) => {}
-                Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
-            },
+            Ok(None) => {}
+            Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
         }
     }
+}
+
+/// Slots of a tool's contacts with a body, and how many there are. A tool that presses nowhere waits nowhere.
+fn gather(state: &mut State, tool: usize, body: usize) -> ([usize; MAX_CONTACTS], usize) {
+    let mut places = [0; MAX_CONTACTS];
+    let mut count = 0;
+    for slot in state.contacts.of(tool, body) {
+        places[count] = slot;
+        count += 1;
+    }
+    if places[..count].iter().all(|&slot| state.contacts.slots[slot].waits()) {
+        places[..count].iter().for_each(|&slot| state.contacts.clear(slot));
+        count = 0;
+    }
+    (places, count)
 }
 
 /// The law of a tool's contact: a tool that holds on does so by a patch, whatever its law.
@@ -120,12 +153,17 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, co
 fn remember(model: &Model, state: &mut State, contact: &Contact) {
     let (tool, body) = (contact.tool, contact.body);
     let moves = model.bodies[body].moves();
-    if contact.law == LawKind::Local || (!moves && !contact.pressed) {
+    let entry = &mut state.tools[tool].entry[body];
+    if contact.law == LawKind::Local {
+        entry.reached = contact.local.depth.max(0.0);
+        return;
+    }
+    if !moves && !contact.pressed {
         return;
     }
     let position = contact.anchor + contact.wanted;
     let motion = state.bodies[body].motion.as_ref();
-    state.tools[tool].entry_depth[body] = Approach::at(model, motion, tool, body, position).depth();
+    state.tools[tool].entry[body].depth = Approach::at(model, motion, tool, body, position).depth();
 }
 
 fn answer(model: &Model, state: &State) -> Output {

@@ -80,7 +80,8 @@ impl StrikeInProgress {
             return 0.0;
         }
         let now = self.patch.read(modes, q);
-        let work = 0.5 * (self.force[0] + self.force[1]).dot(now - self.displacement);
+        let mean = self.force[1] + (self.force[0] - self.force[1]) * modes.integration.weight();
+        let work = mean.dot(now - self.displacement);
         (self.displacement, self.force[1]) = (now, self.force[0]);
         work
     }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::ToolShape;
-use palpate_core::dynamics::{ModalModel, Newmark, Rayleigh};
+use palpate_core::dynamics::{Integration, ModalModel, Newmark, Rayleigh};
 use palpate_core::fem::Supports;
 use palpate_core::green::{GreensFunction, Precision, Problem, precompute};
 use palpate_core::mesh::{Faces, TetMesh, Tets};
@@ -77,7 +77,7 @@ fn set_in_motion(body: BodyModel) -> BodyModel {
     let shapes: Vec<f64> = (0..dofs * modes as usize).map(|i| 0.3 * (0.1 * i as f64).sin()).collect();
     let newmark = Newmark::new(1e-3, 0.3025, 0.6).expect("a valid scheme");
     let rayleigh = Rayleigh { mass: 1.0, stiffness: 1e-4 };
-    let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, 1e-3, |k, c| newmark.mode_step(k, c));
+    let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, Integration::Newmark(newmark));
     let dynamics = BodyDynamics::new(modes.expect("valid modes"), 500.0).expect("a valid coupling");
     body.with_dynamics(dynamics).expect("rows that match")
 }

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from palpate.errors import Error
 from palpate.validation.verify import bending, curved, exactness, felt, half_space, vibration
 from palpate.validation.verify.check import Benchmark
-from palpate.validation.verify.contact import balance, beside, energy, friction, pressing, shapes, sliding
+from palpate.validation.verify.contact import balance, beside, energy, friction, groove, pressing, shapes, sliding
 
 BENCHMARKS = {
     benchmark.name: benchmark
@@ -31,6 +31,7 @@ BENCHMARKS = {
         Benchmark("hertz", "A sphere in the tick, R = 10 mm, on a block of 10 kPa", pressing.hertz, slow=True),
         Benchmark("shapes", "An ellipsoid and a rounded punch in the tick", shapes.shapes, slow=True),
         Benchmark("beside", "A sphere beside an edge, and beside another", beside.edges_and_neighbours, slow=True),
+        Benchmark("groove", "A sphere in a groove: two places at once", groove.groove, slow=True),
         Benchmark("slide", "Sliding without friction at constant depth", sliding.ripple, slow=True),
         Benchmark("sweep", "Sweeps by the micrometre", sliding.jumps, slow=True),
         Benchmark("friction", "Coulomb's cone, Mindlin's partial slip", friction.friction, slow=True),

@@ -48,6 +48,8 @@ pub struct Fan {
 pub struct Fans {
     pub fans: Vec<Fan>,
     pub of_corners: Vec<[u32; 3]>,
+    /// For each fan those that share a triangle with it.
+    pub neighbours: Vec<Vec<u32>>,
     pub creases: Vec<[bool; 3]>,
 }
 
@@ -66,7 +68,7 @@ impl Fans {
                 fit(rank as u32, fan, &before, &neighbours);
             }
         }
-        Self { fans, of_corners, creases }
+        Self { fans, of_corners, neighbours, creases }
     }
 }
 

@@ -51,6 +51,12 @@ pub struct FootPoint {
 }
 
 impl FootPoint {
+    /// The same point for a place elsewhere, the surface being taken for its plane and the point for fixed in it.
+    pub fn held(&self, p: DVec3) -> Self {
+        let distance = (p - self.position).dot(self.normal);
+        Self { distance, turning: DMat3::ZERO, shift: DMat3::ZERO, ..*self }
+    }
+
     /// The point that it is the foot of.
     fn of(&self) -> DVec3 {
         self.position + self.normal * self.distance

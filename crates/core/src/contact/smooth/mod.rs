@@ -33,6 +33,9 @@ pub struct SmoothSurface {
     pub(super) fans: Vec<Fan>,
     /// Whether the node of each fan may be touched.
     pub(super) touchable: Vec<bool>,
+    /// For each triangle the fans of its corners, and for each fan those that share a triangle with it.
+    pub(super) of_corners: Vec<[u32; 3]>,
+    pub(super) neighbours: Vec<Vec<u32>>,
     creases: Vec<[bool; 3]>,
     /// For each triangle where its fans begin in `met`, where those begin that lie beyond creases, and the end.
     ranges: Vec<[u32; 3]>,
@@ -43,12 +46,14 @@ pub struct SmoothSurface {
 impl SmoothSurface {
     /// Fits the surface; `touchable` tells of each node whether it may be touched.
     pub fn new(surface: &Surface, touchable: impl Fn(u32) -> bool) -> Self {
-        let Fans { fans, of_corners, creases } = Fans::new(surface);
+        let Fans { fans, of_corners, neighbours, creases } = Fans::new(surface);
         let touchable = fans.iter().map(|fan| touchable(fan.node)).collect();
-        let mut smooth = Self { fans, touchable, creases, ranges: Vec::new(), met: Vec::new(), arch: Arch::new() };
+        let walked = of_corners.clone();
+        let (ranges, met, arch) = (Vec::new(), Vec::new(), Arch::new());
+        let mut smooth = Self { fans, touchable, of_corners, neighbours, creases, ranges, met, arch };
         let mut walk = Walk {
             surface,
-            of_corners: &of_corners,
+            of_corners: &walked,
             visited: vec![u32::MAX; surface.triangles.len()],
             kept: vec![u32::MAX; smooth.fans.len()],
             queue: Vec::new(),

@@ -87,6 +87,38 @@ impl NullaryFnOnce for EnergySums<'_> {
     }
 }
 
+/// `v . v`, `q . k q` and `(p0 + weight (p1 - p0)) . (q - before)`, added to sums so far.
+pub struct WorkSums<'a> {
+    pub q: &'a [Lanes],
+    pub v: &'a [Lanes],
+    pub before: &'a [Lanes],
+    pub stiffness: &'a [Lanes],
+    pub loads: [&'a [Lanes]; 2],
+    pub weight: f64,
+    pub sums: [Lanes; 3],
+}
+
+impl NullaryFnOnce for WorkSums<'_> {
+    type Output = [Lanes; 3];
+    #[inline(always)]
+    fn call(self) -> [Lanes; 3] {
+        let [mut kinetic, mut strain, mut work] = self.sums;
+        for v in self.v {
+            kinetic = kinetic.plus(v, v);
+        }
+        for (q, k) in self.q.iter().zip(self.stiffness) {
+            strain = strain.plus(&q.times(k), q);
+        }
+        let [p0, p1] = self.loads;
+        for (((q, before), p0), p1) in self.q.iter().zip(self.before).zip(p0).zip(p1) {
+            let moved = q.plus_scaled(-1.0, before);
+            let mean = p0.plus_scaled(-self.weight, p0).plus_scaled(self.weight, p1);
+            work = work.plus(&mean, &moved);
+        }
+        [kinetic, strain, work]
+    }
+}
+
 /// `rows . x`, added to sums so far.
 pub struct Read<'a> {
     pub rows: [&'a [Lanes]; 3],

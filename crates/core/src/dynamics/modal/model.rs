@@ -8,7 +8,8 @@ use pulp::Arch;
 
 use super::kernels::{AddRows, Correct, Dot, FreeStep, Predict};
 use super::lanes::{LANES, Lanes, flat, grouped};
-use crate::dynamics::scheme::{ModeStep, Rayleigh};
+use crate::dynamics::integration::Integration;
+use crate::dynamics::scheme::Rayleigh;
 use crate::{Error, Result};
 
 /// Modes, the rows of their shapes at the wanted dofs, and the step of each mode.
@@ -29,6 +30,8 @@ pub struct ModalModel {
     /// What a unit of modal force at the step's end adds to the displacement, s^2, and to the velocity, s.
     pub(super) q_load: Vec<Lanes>,
     pub(super) v_load: Vec<Lanes>,
+    /// Which step they take.
+    pub integration: Integration,
     /// Time step, s.
     pub dt: f64,
 }
@@ -56,18 +59,11 @@ pub struct ModalScratch {
 impl ModalModel {
     /// Prepares the recurrences.
     ///
-    /// `shapes` holds `rows` x modes numbers, row by row; `step(k, c)` is the step of a mode with eigenvalue `k` and
-    /// damping `c`: Newmark's or the exact one.
+    /// `shapes` holds `rows` x modes numbers, row by row.
     ///
     /// # Errors
     /// Lengths that do not match, or a number that is not finite.
-    pub fn new(
-        eigenvalues: &[f64],
-        shapes: &[f64],
-        rayleigh: &Rayleigh,
-        dt: f64,
-        step: impl Fn(f64, f64) -> ModeStep,
-    ) -> Result<Self> {
+    pub fn new(eigenvalues: &[f64], shapes: &[f64], rayleigh: &Rayleigh, integration: Integration) -> Result<Self> {
         let modes = eigenvalues.len();
         if modes == 0 || !shapes.len().is_multiple_of(modes) {
             return Err(Error::Invalid(format!("{} shape values do not fit {modes} modes", shapes.len())));
@@ -80,7 +76,7 @@ impl ModalModel {
         let mut free_steps = vec![FreeStep::default(); groups];
         let [mut q_load, mut v_load] = [(); 2].map(|()| vec![Lanes::default(); groups]);
         for (i, (&k, &c)) in eigenvalues.iter().zip(&damping).enumerate() {
-            let (m, g, l) = (step(k, c), i / LANES, i % LANES);
+            let (m, g, l) = (integration.mode_step(k, c), i / LANES, i % LANES);
             let to = &mut free_steps[g];
             (to.qq.0[l], to.qv.0[l], to.qp.0[l]) = (m.qq, m.qv, m.qp);
             (to.vq.0[l], to.vv.0[l], to.vp.0[l]) = (m.vq, m.vv, m.vp);
@@ -99,7 +95,8 @@ impl ModalModel {
             free_steps,
             q_load,
             v_load,
-            dt,
+            integration,
+            dt: integration.dt(),
         })
     }
 
@@ -154,6 +151,20 @@ impl ModalModel {
     pub fn add_force(&self, row: u32, force: f64, load: &mut [Lanes]) {
         if (row as usize) < self.rows && force != 0.0 {
             self.arch.dispatch(AddRows { load, rows: [self.row(row as usize)], forces: [force] });
+        }
+    }
+
+    /// Adds to the displacements at a step's end what a modal force there does: `q += diag(q_load) load`.
+    pub fn add_step(&self, load: &[Lanes], q: &mut [Lanes]) {
+        for ((q, p), q_load) in q.iter_mut().zip(load).zip(&self.q_load) {
+            *q = q.plus(p, q_load);
+        }
+    }
+
+    /// Adds what a modal force does to the elastic modes at rest: `q += diag(1/k) load`.
+    pub fn add_static(&self, load: &[Lanes], q: &mut [Lanes]) {
+        for ((q, p), flexibility) in q.iter_mut().zip(load).zip(&self.flexibility) {
+            *q = q.plus(p, flexibility);
         }
     }
 

@@ -10,10 +10,11 @@
 use glam::DVec3;
 use pulp::NullaryFnOnce;
 
-use super::kernels::{AddRows, Correct, EnergySums, Predict, Read};
+use super::kernels::{AddRows, Correct, EnergySums, Predict, Read, WorkSums};
 use super::lanes::Lanes;
 use super::model::ModalModel;
 use super::projection::Projection;
+use crate::dynamics::integration::Integration;
 
 /// Groups of modes a block: about 20 arrays of them fill half of a first-level cache.
 const BLOCK: usize = 16;
@@ -29,6 +30,10 @@ pub struct PredictedState {
     pub free_q: Vec<Lanes>,
     /// Velocities there.
     pub free_v: Vec<Lanes>,
+    /// Modal forces now, N/sqrt(kg), where they are held within a step; else nothing reads them.
+    load: Vec<Lanes>,
+    /// Kinetic and strain energy now, J.
+    energy: f64,
 }
 
 /// A patch under a force, and where it goes.
@@ -50,7 +55,8 @@ pub struct StepEnergy {
     pub kinetic: f64,
     /// `u K u / 2` there, J.
     pub strain: f64,
-    /// What damping took out within the step, at the mean velocity, J.
+    /// What damping took out within the step, J: by Newmark's scheme at the mean velocity; of exact modes what they do not hold
+    /// of the work done on them.
     pub dissipated: f64,
 }
 
@@ -65,16 +71,32 @@ impl ModalModel {
     /// At rest.
     pub fn predicted_state(&self) -> PredictedState {
         let zero = || vec![Lanes::default(); self.groups];
-        PredictedState { q: zero(), v: zero(), free_q: zero(), free_v: zero() }
+        PredictedState { q: zero(), v: zero(), free_q: zero(), free_v: zero(), load: zero(), energy: 0.0 }
     }
 
     /// Ends the step by the forces of patches, and predicts the next one.
     pub fn advance(&self, state: &mut PredictedState, patches: &mut [LoadedPatch<'_>]) -> StepEnergy {
-        let [kinetic, strain, power] = self.arch.dispatch(Advance { model: self, state, patches });
+        let [kinetic, strain, third] = self.arch.dispatch(Advance { model: self, state, patches });
         for patch in patches {
             patch.free = DVec3::from(patch.sums.map(Lanes::sum));
         }
-        StepEnergy { kinetic: 0.5 * kinetic, strain: 0.5 * strain, dissipated: 0.25 * self.dt * power }
+        let (kinetic, strain, before) = (0.5 * kinetic, 0.5 * strain, state.energy);
+        state.energy = kinetic + strain;
+        let dissipated = match self.integration {
+            Integration::ExactHeld { .. } => third - (state.energy - before),
+            _ => 0.25 * self.dt * third,
+        };
+        StepEnergy { kinetic, strain, dissipated }
+    }
+}
+
+impl PredictedState {
+    /// Comes to rest.
+    pub fn rest(&mut self) {
+        for x in [&mut self.q, &mut self.v, &mut self.free_q, &mut self.free_v, &mut self.load] {
+            x.fill(Lanes::default());
+        }
+        self.energy = 0.0;
     }
 }
 
@@ -107,7 +129,16 @@ impl NullaryFnOnce for Advance<'_, '_> {
             let (q_load, v_load) = (&model.q_load[block.clone()], &model.v_load[block.clone()]);
             Correct { q_load, v_load, q: free_q, v: free_v, load }.call();
             let (stiffness, damping) = (&model.stiffness[block.clone()], &model.damping[block.clone()]);
-            sums = EnergySums { q: free_q, v: free_v, before: v, stiffness, damping, sums }.call();
+            sums = match model.integration {
+                Integration::ExactHeld { weight, .. } => {
+                    let before = &mut state.load[block.clone()];
+                    let loads = [&*before, &*load];
+                    let sums = WorkSums { q: free_q, v: free_v, before: q, stiffness, loads, weight, sums }.call();
+                    before.copy_from_slice(load);
+                    sums
+                }
+                _ => EnergySums { q: free_q, v: free_v, before: v, stiffness, damping, sums }.call(),
+            };
             q.copy_from_slice(free_q);
             v.copy_from_slice(free_v);
 

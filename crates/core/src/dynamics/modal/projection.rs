@@ -55,16 +55,9 @@ impl Projection {
 
     /// Takes the static displacement under a force on the patch off modal displacements: `x -= diag(1/k) G^T f`.
     pub fn take_static(&self, model: &ModalModel, force: DVec3, x: &mut [Lanes]) {
-        self.take_static_by(model, force, x, &mut vec![Lanes::default(); x.len()]);
-    }
-
-    /// The same in memory for the modal force, of the length of `x`.
-    pub fn take_static_by(&self, model: &ModalModel, force: DVec3, x: &mut [Lanes], load: &mut [Lanes]) {
-        load.fill(Lanes::default());
-        self.add_force(model, -force, load);
-        for ((x, p), flexibility) in x.iter_mut().zip(load.iter()).zip(&model.flexibility) {
-            *x = x.plus(p, flexibility);
-        }
+        let mut load = vec![Lanes::default(); x.len()];
+        self.add_force(model, -force, &mut load);
+        model.add_static(&load, x);
     }
 
     /// Displacement of this patch at the step's end per unit force on `other` there, `G diag(q_load) G_other^T`, m/N.

@@ -10,7 +10,8 @@ mod stick;
 
 pub(super) use local::ASKED;
 pub use local::{
-    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, place_near,
+    takes_cells,
 };
 pub use stick::series_compliance;
 
@@ -22,6 +23,7 @@ use super::covering::Covering;
 use super::input::Input;
 use super::model::Model;
 use super::motion::Motion;
+use super::state::Entry;
 use super::tool::{LawKind, ToolModel};
 use crate::contact::shape::ToolShape;
 use crate::contact::{Refusal, SurfacePoint};
@@ -40,7 +42,7 @@ pub fn law_of(kind: LawKind) -> &'static dyn Law {
 
 /// What a contact law says, in the order of a tick.
 pub trait Law: Sync {
-    /// For a tool without a contact: begins one where it reaches the body, with its patch in `covering`. `entry_depth` is what
+    /// For a tool without a contact: begins one where it reaches the body, with its patch in `covering`. `entry` is what
     /// the tool remembers of this body.
     ///
     /// # Errors
@@ -48,7 +50,7 @@ pub trait Law: Sync {
     fn begin(
         &self,
         approach: &Approach<'_>,
-        entry_depth: &mut f64,
+        entry: &mut Entry,
         covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal>;
 
@@ -84,16 +86,25 @@ pub struct Approach<'a> {
     pub grab: bool,
     /// Contact radius of a contact that begins now, m.
     pub contact_radius: f64,
+    /// How far the tool has gone since the last tick, m, where it was in the scene then.
+    pub gone: DVec3,
 }
 
 impl<'a> Approach<'a> {
     /// Of a tool as its device has it.
-    pub fn new(model: &'a Model, motion: Option<&'a Motion>, tool: usize, body: usize, input: &Input) -> Self {
+    pub fn new(
+        model: &'a Model,
+        motion: Option<&'a Motion>,
+        (tool, body): (usize, usize),
+        before: Option<DVec3>,
+        input: &Input,
+    ) -> Self {
         let said = &input.tools[tool];
         let position = model.bodies[body].placement.point_to_body(said.pose.position);
         let contact_radius = input.controls.contact_radius[tool];
         let orientation = DQuat::from_mat3(&model.bodies[body].placement.rotation.transpose()) * said.pose.orientation;
-        Self { grab: said.grab, orientation, contact_radius, ..Self::at(model, motion, tool, body, position) }
+        let gone = position - before.map_or(position, |before| model.bodies[body].placement.point_to_body(before));
+        Self { grab: said.grab, orientation, contact_radius, gone, ..Self::at(model, motion, tool, body, position) }
     }
 
     /// Of a tool at a place of the body's frame.
@@ -108,6 +119,7 @@ impl<'a> Approach<'a> {
             orientation: DQuat::IDENTITY,
             grab: false,
             contact_radius: 0.0,
+            gone: DVec3::ZERO,
         }
     }
 

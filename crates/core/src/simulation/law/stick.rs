@@ -12,6 +12,7 @@ use crate::contact::{Refusal, SurfacePoint, smallest_eigenvalue};
 use crate::simulation::body::BodyDynamics;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
+use crate::simulation::state::Entry;
 use crate::simulation::tool::{LawKind, ToolModel};
 
 /// A grab reaches this many tool radii from the surface.
@@ -53,21 +54,21 @@ impl<F: Footprint> Law for Sticking<F> {
     fn begin(
         &self,
         approach: &Approach<'_>,
-        entry_depth: &mut f64,
+        entry: &mut Entry,
         covering: &mut Covering,
     ) -> Result<Option<Contact>, Refusal> {
         let Some(closest) = approach.closest() else { return Ok(None) };
         let depth = approach.reach(closest.normal) - closest.signed_distance;
-        *entry_depth = entry_depth.min(depth.max(0.0));
+        entry.depth = entry.depth.min(depth.max(0.0));
         let reaches = match approach.grab {
             true => closest.signed_distance.abs() < GRAB_REACH * approach.tool.radius,
-            false => depth > *entry_depth,
+            false => depth > entry.depth,
         };
         if !reaches {
             return Ok(None);
         }
         self.0.cover(approach, &approach.body.material_point(&closest), covering)?;
-        let excess = if approach.grab { 0.0 } else { depth - *entry_depth };
+        let excess = if approach.grab { 0.0 } else { depth - entry.depth };
         let anchor = approach.position + closest.normal * excess;
         Ok(Some(Contact {
             law: self.0.kind(),

@@ -14,16 +14,12 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, covering: &
     let (tool, body) = (begun.tool, begun.body);
     let green = &model.bodies[body].green;
     let State { bodies, contacts, compliance, tools, pressures } = &mut *state;
-    // There are as many slots as pairs of a tool and a body.
-    let slot = contacts.empty()?;
+    let slot = contacts.empty(begun.local.further)?;
     if begun.law == LawKind::Local {
         let serial = contacts.next_serial();
-        contacts.slots[slot] = Contact { serial, ..begun };
+        contacts.put(slot, Contact { serial, ..begun });
         if let Some(pressures) = pressures.get_mut(slot) {
             *pressures = PressureState::default();
-        }
-        if let Some(motion) = &mut bodies[body].motion {
-            motion.begin_contact(slot);
         }
         return Some(slot);
     }
@@ -32,7 +28,7 @@ pub fn add_contact(model: &Model, state: &mut State, begun: Contact, covering: &
         return None;
     }
     let serial = contacts.next_serial();
-    contacts.slots[slot] = Contact { serial, ..begun };
+    contacts.put(slot, Contact { serial, ..begun });
     compliance[slot][slot] = contacts.patches[slot].own_compliance(green);
     for other in contacts.on(body).filter(|&other| other != slot) {
         let block = contacts.patches[slot].compliance_with(green, &contacts.patches[other]);

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::smooth::FanWeights;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::Contact;
 use crate::simulation::law::series_compliance;
@@ -61,6 +62,20 @@ pub fn dent_of(model: &Model, state: &State, slot: usize, laws: impl Fn(LawKind)
         contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
     };
     others.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
+}
+
+/// Displacement of a body at rest by the contacts that it had a tick ago, at a weighed place of its smooth surface, m.
+pub fn dent_at(model: &Model, state: &State, body: usize, weights: &FanWeights) -> DVec3 {
+    let (fixed, contacts) = (&model.bodies[body], &state.contacts);
+    let Some(local) = &fixed.local else { return DVec3::ZERO };
+    let mut dent = DVec3::ZERO;
+    for slot in contacts.on(body).filter(|&slot| contacts.slots[slot].force != DVec3::ZERO) {
+        for (fan, weight) in weights.iter() {
+            let node = local.smooth.fans()[fan].node as usize;
+            dent += contacts.patches[slot].compliance_at(&fixed.green, node) * contacts.slots[slot].force * weight;
+        }
+    }
+    dent / state.bodies[body].stiffness_scale
 }
 
 /// Slots of the contacts of a body that stick, in order; returns how many there are.

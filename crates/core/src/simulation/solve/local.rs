@@ -11,18 +11,19 @@ use glam::{DMat3, DVec3};
 
 use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
 use crate::contact::patch_weights;
-use crate::contact::regular::WIDTH;
+use crate::contact::regular::{WIDTH, compliance_of};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint};
+use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::{Covering, neighbourhood};
 use crate::simulation::input::Controls;
-use crate::simulation::law::{
-    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
-};
+use crate::simulation::law::{Cells, Guess, LocalBody, LocalResponse, LocalTool, Others, evaluate, takes_cells};
 use crate::simulation::model::Model;
 use crate::simulation::solve::forces::dent_of;
+use crate::simulation::solve::handover::{
+    Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join, joined,
+};
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -30,19 +31,25 @@ use crate::tensor::outer;
 
 /// Most steps; three or four are usual.
 pub const MOST_STEPS: usize = 16;
+/// From this step on steps are shortened, ever more: in a hollow about as narrow as the tool the force turns with the place so
+/// fast that whole steps go to and fro.
+const USUAL_STEPS: usize = 10;
+/// Longest step, over the tool's radius.
+const LONGEST: f64 = 0.5;
+/// Where the last step is longer than this, over the tool's radius, nothing has been found.
+const LOST: f64 = 2e-3;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
 pub const MOST_CELL_STEPS: usize = 3;
 /// A step of this length, over the tool's radius, is none.
 const SETTLED: f64 = 1e-7;
 /// A force that differs by less than this part from what was expected is found.
 const SAME: f64 = 1e-7;
-/// Both, over those above, where a tool takes pressure cells, which are found to about as much.
-const CELLS_LOOSER: f64 = 100.0;
+/// Both, over those above, where a tool takes pressure cells. They are found to 1e-6 of the depth, and the step that is left, of
+/// 1e-5 of the radius, bounds the error of the force; what it differs from the expected only tells that steps still go to and fro.
+const CELLS_LOOSER: [f64; 2] = [1e2, 1e4];
 /// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
 /// longer one. A half-space under a sphere is strained far beyond what is linear there.
 const MOST_DEPTH: f64 = 1.6;
-/// A foot that goes farther in a tick, over the tool's radius, has jumped.
-const FOOT_JUMP: f64 = 0.25;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
@@ -69,6 +76,21 @@ pub struct LocalScratch {
 }
 
 impl LocalScratch {
+    /// Weighs the fans around a foot that no contact has yet.
+    pub fn weigh(&mut self, body: usize, smooth: &SmoothSurface, foot: &FootPoint) -> &FanWeights {
+        self.turn_to(body);
+        smooth.weigh(foot, &mut self.weights[0]);
+        &self.weights[0]
+    }
+
+    /// Forgets the fans of another body.
+    fn turn_to(&mut self, body: usize) {
+        if self.body != Some(body) {
+            self.body = Some(body);
+            self.weights.iter_mut().for_each(|weights| weights.near.forget());
+        }
+    }
+
     /// Takes the step. The forces are expected to follow.
     fn go(&mut self, count: usize) {
         for a in 0..count {
@@ -145,24 +167,63 @@ pub struct Memory<'a> {
     pub system: &'a mut System,
 }
 
-/// Forces of the contacts of a body under the local law.
-pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: usize, controls: &Controls) {
-    let mut slots = [0; MAX_CONTACTS];
-    let mut count = 0;
-    for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
-        slots[count] = slot;
-        count += 1;
+/// What has become of the method.
+enum Outcome {
+    Settled,
+    Lost,
+    /// A contact had to be let go.
+    LetGo,
+}
+
+/// Forces of the contacts of a body under the local law. Where the foot of one has jumped, or none was found, they are found once
+/// more, with what takes its place. Where that finds nothing either they stay as they were a tick ago.
+pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, body: usize, controls: &Controls) {
+    for last in [false, true] {
+        let mut slots = [0; MAX_CONTACTS];
+        let mut count = 0;
+        for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
+            slots[count] = slot;
+            count += 1;
+        }
+        let slots = &slots[..count];
+        if count == 0 {
+            return;
+        }
+        match settle(model, state, &mut memory, slots, body, controls) {
+            Outcome::Settled => {}
+            Outcome::LetGo => return,
+            Outcome::Lost if last => {
+                return slots.iter().for_each(|&slot| {
+                    let contact = &mut state.contacts.slots[slot];
+                    contact.force = contact.local.force;
+                });
+            }
+            Outcome::Lost => {
+                hold_lost(state, &memory.local.steps[..count], slots);
+                continue;
+            }
+        }
+        let (responses, places) = (&memory.local.responses, &memory.local.places);
+        let found = Found { responses, places, covering: memory.covering };
+        if last || !hand_over(model, state, found, slots) {
+            take_up(model, state, memory.local, slots, body);
+            return;
+        }
     }
-    if count == 0 {
-        return;
-    }
-    let slots = &slots[..count];
+}
+
+/// Newton's method.
+fn settle(
+    model: &Model,
+    state: &mut State,
+    memory: &mut Memory<'_>,
+    slots: &[usize],
+    body: usize,
+    controls: &Controls,
+) -> Outcome {
     let Memory { covering, local, system } = memory;
-    if local.body != Some(body) {
-        local.body = Some(body);
-        local.weights.iter_mut().for_each(|weights| weights.near.forget());
-    }
-    local.others[..count].fill(Others::default());
+    local.turn_to(body);
+    local.others[..slots.len()].fill(Others::default());
     follow_motion(model, state, covering, local, slots, body);
     let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
@@ -177,23 +238,29 @@ pub fn local_forces(model: &Model, state: &mut State, memory: Memory<'_>, body: 
         }
     }
     let cells = slots.iter().any(|&slot| takes_pressures(model, state, slot));
-    let (most, looser) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, 1.0) };
+    let (most, [looser, looser_force]) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, [1.0; 2]) };
     for step in 0..most {
         if !meet(model, state, local, slots, body, controls, step) {
-            return;
+            return Outcome::LetGo;
         }
-        let longest = advance(local, system, &deepest, slots.len());
         let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
+        let longest = advance(local, system, &deepest, slots.len());
+        if step >= USUAL_STEPS || (!cells && longest > LONGEST * radius) {
+            let share = (LONGEST * radius / longest).min(if step < USUAL_STEPS { 1.0 } else { 0.5 });
+            local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
+        }
         // What contacts do to each other is known from the first step on.
         let knows_others = step > 0 || slots.len() == 1;
-        if knows_others && longest < looser * SETTLED * radius && local.changed < looser * SAME {
+        if knows_others && longest < looser * SETTLED * radius && local.changed < looser_force * SAME {
             break;
         }
         if step + 1 < most {
             local.go(slots.len());
+        } else if !cells && longest > LOST * radius {
+            return Outcome::Lost;
         }
     }
-    take_up(model, state, local, slots, body);
+    Outcome::Settled
 }
 
 /// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, or on one at
@@ -232,7 +299,7 @@ fn follow_motion(
             contacts.patches[slot].admit_touchable(&fixed.green, &covering.candidate);
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
-        motion.leave_out_static(&dynamics.modes, slot, contacts.slots[slot].force);
+        motion.leave_out_static(&dynamics.modes, contacts, slot);
         let mut moving = DMat3::ZERO;
         for (fan, _, gradient) in weights.with_gradients() {
             let moved = motion.remaining_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
@@ -310,10 +377,14 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
     for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
             let patches = &state.contacts.patches;
+            let [tool, same] = [slot, other].map(|slot| state.contacts.slots[slot].tool);
+            let apart = local.responses[a].foot.position.distance(local.responses[b].foot.position);
+            let joined = if tool == same { joined(apart, model.tools[tool].radius) } else { 0.0 };
+            let mean = (local.responses[a].compliance + local.responses[b].compliance) * 0.5;
             if state.bodies[body].motion.is_some() {
                 // The slope is that of the moving surface, whoever moves it.
                 let at_rest = patches[slot].compliance_with(green, &patches[other]);
-                local.between[a][b] = at_rest + local.change[a][b];
+                local.between[a][b] = at_rest * (1.0 - joined) + mean * joined + local.change[a][b];
                 continue;
             }
             let (mut block, mut slope) = (DMat3::ZERO, DVec3::ZERO);
@@ -323,7 +394,16 @@ fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[u
                 block += of_node * (weight / scale);
                 slope += gradient * (own.dot(of_node * force) / scale);
             }
-            local.between[a][b] = block;
+            if joined > 0.0
+                && let Some(met) = local_body(model, state, tool, body)
+            {
+                let mut shared = DVec3::ZERO;
+                for (fan, _, gradient) in local.weights[a].with_gradients() {
+                    shared += gradient * (0.5 * own.dot(compliance_of(&met.fields[fan]) * force) / scale);
+                }
+                slope = slope * (1.0 - joined) + shared * joined;
+            }
+            local.between[a][b] = block * (1.0 - joined) + mean * joined;
             local.others[a].slope += slope;
         }
     }
@@ -375,21 +455,14 @@ fn held_out(step: DVec3, foot: &FootPoint, deepest: f64) -> DVec3 {
     if beyond > 0.0 { step + foot.normal * beyond } else { step }
 }
 
-/// Whether a foot has come elsewhere than where the tool has gone: off a ridge, or through a body. The force there has
-/// nothing to do with the one before, and might have more energy: such a contact ends, and the next starts from none.
-fn has_jumped(contact: &Contact, response: &LocalResponse, place: DVec3, radius: f64) -> bool {
-    let gone = place.distance(contact.local.relative);
-    response.foot.position.distance(contact.local.foot.position) > 4.0 * gone + FOOT_JUMP * radius
-}
-
 /// Writes the answers down.
 fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
     for (a, &slot) in slots.iter().enumerate() {
         let response = &local.responses[a];
         let contact = &state.contacts.slots[slot];
-        let (tool, radius) = (contact.tool, model.tools[contact.tool].radius);
-        if has_jumped(contact, response, local.places[a], radius) {
-            state.tools[tool].entry_depth[body] = f64::INFINITY;
+        let tool = contact.tool;
+        if has_jumped(model, contact, response, local.places[a]) {
+            state.tools[tool].entry[body].depth = f64::INFINITY;
             state.contacts.clear(slot);
             continue;
         }
@@ -417,14 +490,11 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         own.stiffness = indentation.stiffness / (1.0 + along * indentation.stiffness);
         own.energy = indentation.energy + response.springs().energy();
         own.dissipated = response.friction.dissipated;
-        own.depth = depth(&model.tools[contact.tool].shape, own, &response.foot);
+        contact.local.depth = approach(&model.tools[tool], contact, contact.local.tool);
+        if !go_on(&model.tools[tool], contact) {
+            state.contacts.clear(slot);
+        }
     }
-}
-
-/// How far a tool reaches below the surface at rest, m.
-fn depth(shape: &ToolShape, contact: &LocalContact, foot: &FootPoint) -> f64 {
-    match *shape {
-        ToolShape::Sphere { radius } => radius - foot.normal.dot(contact.tool - foot.position),
-        _ => depth_below(shape, (contact.tool, DMat3::from_quat(contact.orientation)), foot),
-    }
+    change_parts(state, &local.responses, slots);
+    join(model, state, slots);
 }

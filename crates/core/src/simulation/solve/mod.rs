@@ -2,8 +2,10 @@
 
 mod compliance;
 mod forces;
+mod handover;
 mod local;
 
 pub use compliance::add_contact;
-pub use forces::{contact_forces, gather, own_compliance, solve_with};
+pub use forces::{contact_forces, dent_at, gather, own_compliance, solve_with};
+pub use handover::DEEPEST;
 pub use local::{LocalScratch, Memory, local_forces};

@@ -80,11 +80,16 @@ class ContactProblem:
     @classmethod
     def on_top(cls, green: GreensFunction, mesh: TetMesh) -> ContactProblem:
         """Of the faces on the top whose nodes may all be touched."""
-        faces = _top_faces(green, mesh)
+        up = np.array([0.0, 0.0, 1.0])
+        faces = faces_on(green, mesh, mesh.nodes[mesh.nodes[:, 2].argmax()], up)
+        return cls.on(faces, mesh.nodes[:, :2], lambda nodes: compliance_along(green, nodes, up))
+
+    @classmethod
+    def on(cls, faces: np.ndarray, plane: np.ndarray, compliance: Callable[[np.ndarray], np.ndarray]) -> ContactProblem:
+        """Of faces (k, 3 or 6) of a plane: places (nodes of the mesh, 2), m, in it, and `Psi` across it."""
         nodes, corners = np.unique(faces, return_inverse=True)
-        load, (places, hats) = _integrals(mesh.nodes[nodes, :2], corners.reshape(faces.shape))
-        compliance = load.T @ _compliance(green, nodes) @ load
-        return cls(mesh.nodes[nodes, :2], hats.sum(axis=0), compliance, (places, hats))
+        load, (places, hats) = _integrals(plane[nodes], corners.reshape(faces.shape))
+        return cls(plane[nodes], hats.sum(axis=0), load.T @ compliance(nodes) @ load, (places, hats))
 
     def press(self, gap: Gap, depths: Sequence[float]) -> list[Press]:
         """Press the tool to each depth of its lowest point below the untouched top, m."""
@@ -123,7 +128,8 @@ def at_the_meshs_points(
         kappa, Pa/m: as good as rigid, and there may be more points than a face has freedoms.
 
     """
-    faces = _top_faces(green, mesh)
+    up = np.array([0.0, 0.0, 1.0])
+    faces = faces_on(green, mesh, mesh.nodes[mesh.nodes[:, 2].argmax()], up)
     nodes, local = np.unique(faces, return_inverse=True)
     at, weight = _triangle_rule()
     corners = mesh.nodes[faces[:, :3], :2]
@@ -135,24 +141,24 @@ def at_the_meshs_points(
     local = local.reshape(faces.shape)
     for row, point in zip(rows, near, strict=True):
         row[local[point // len(at)]] = shapes[point % len(at)]
-    compliance = rows @ _compliance(green, nodes) @ rows.T + np.diag(1 / (penalty * areas[near]))
+    compliance = rows @ compliance_along(green, nodes, up) @ rows.T + np.diag(1 / (penalty * areas[near]))
     factor = scipy.linalg.cholesky(compliance, lower=True)
     gaps = gap(points[near])
     solved = [scipy.linalg.solve_triangular(factor, depth - gaps, lower=True) for depth in depths]
     return [float(nnls(factor.T, right, maxiter=5000)[0].sum()) for right in solved]
 
 
-def _top_faces(green: GreensFunction, mesh: TetMesh) -> np.ndarray:
-    """Faces on the top whose nodes may all be touched, (k, 3 or 6)."""
-    top = mesh.nodes[:, 2].max() - 1e-9 * np.ptp(mesh.nodes[:, 2])
-    faces = mesh.surface_faces[(mesh.nodes[mesh.surface_faces, 2] > top).all(axis=1)]
+def faces_on(green: GreensFunction, mesh: TetMesh, origin: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Faces on a plane whose nodes may all be touched, (k, 3 or 6)."""
+    off = np.abs((mesh.nodes - origin) @ normal) > 1e-9 * np.ptp(mesh.nodes, axis=0).max()
+    faces = mesh.surface_faces[~off[mesh.surface_faces].any(axis=1)]
     return faces[np.isin(faces, green.touchable_nodes).all(axis=1)]
 
 
-def _compliance(green: GreensFunction, nodes: np.ndarray) -> np.ndarray:
-    """`Psi` along z between nodes (n, n), m/N."""
-    rows = np.searchsorted(green.surface_nodes, nodes)
-    return np.array([green.solve(forces={int(node): (0, 0, 1)}).displacements[rows, 2] for node in nodes])
+def compliance_along(green: GreensFunction, nodes: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """`Psi` along a direction (3,) between nodes (n, n), m/N."""
+    rows, force = np.searchsorted(green.surface_nodes, nodes), tuple(direction)
+    return np.array([green.solve(forces={int(node): force}).displacements[rows] @ direction for node in nodes])
 
 
 def _areas(corners: np.ndarray) -> np.ndarray:

@@ -25,6 +25,17 @@ pub struct LocalContact {
     pub entry: f64,
     /// The closest point of the surface at rest.
     pub foot: FootPoint,
+    /// Whether it is a place beside another one of the same tool: it may wait there without a force.
+    pub(in crate::simulation) further: bool,
+    /// Whether it has just been found, and counts from where it is then.
+    pub(in crate::simulation) found: bool,
+    /// Depth that it may have come to since it was looked for last, m.
+    pub(in crate::simulation) came: f64,
+    /// Whether its foot stays on the plane where it was: the surface there has no closest point any more.
+    pub(in crate::simulation) held: bool,
+    /// Part of the half-space's stiffness that it has, and how that changes in a tick.
+    pub(in crate::simulation) part: f64,
+    pub(in crate::simulation) change: f64,
     /// Friction at the end of the last tick.
     pub(in crate::simulation) friction: Friction,
     /// Torque on the tool about its tip, N m.

@@ -44,11 +44,12 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// Of the body's constants at the foot and the tool's pad.
-    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, fields: &Fields) -> Self {
+    /// Of the body's constants at the foot and the tool's pad; of it a contact has a `part`.
+    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, fields: &Fields, part: f64) -> Self {
         let own = body.scale * fields.values[PLANE_STRAIN];
-        let modulus = effective_modulus(own, 0.0, tool.pad);
-        let slope = fields.slope(PLANE_STRAIN) * (body.scale * (modulus / own).powi(2));
+        let whole = effective_modulus(own, 0.0, tool.pad);
+        let modulus = part * whole;
+        let slope = fields.slope(PLANE_STRAIN) * (part * body.scale * (whole / own).powi(2));
         let poisson = fields.values[POISSON];
         Self { modulus, slope, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
     }

@@ -69,6 +69,13 @@ impl Reference {
         Some((foot, Self { offset, by_normal: DMat3::ZERO, inverse: DMat3::IDENTITY, normal: foot.normal }))
     }
 
+    /// The foot of a tool on the plane through an earlier one.
+    pub fn held(shape: &ToolShape, (place, rotation): (DVec3, DMat3), at: &FootPoint) -> Option<(FootPoint, Self)> {
+        let flat = FootPoint { turning: DMat3::ZERO, ..*at };
+        let reference = Core::new(shape, rotation).follow(&flat)?;
+        Some((at.held(place + reference.offset), reference))
+    }
+
     /// A gradient by the place of the reference point as one by the tool's place and one by its rotation about its tip.
     pub fn by_pose(&self, gradient: DVec3) -> (DVec3, DVec3) {
         let by_place = self.inverse.transpose() * gradient;

@@ -84,8 +84,10 @@ pub fn evaluate(
         return None;
     }
     let fields = weights.blend(body.fields);
+    // One that has just been found counts from where it is.
     let indentation = match &reference {
-        None => indent(body, tool, &foot, tool.radius - contact.entry - foot.distance, &fields),
+        _ if contact.found => Indentation::default(),
+        None => indent(body, tool, contact, &foot, &fields),
         Some(reference) => indent_shape(body, tool, contact, place, (&foot, reference), (weights, &fields), cells),
     };
     let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
@@ -130,10 +132,17 @@ fn meet(
     near: &mut Neighbourhood,
 ) -> Option<Met> {
     if let ToolShape::Sphere { .. } = tool.shape {
-        return Some(Met { foot: body.smooth.foot(body.drawn, guess.place, guess.foot, near)?, reference: None });
+        let foot = match contact.held {
+            true => contact.foot.held(guess.place),
+            false => body.smooth.foot(body.drawn, guess.place, guess.foot, near)?,
+        };
+        return Some(Met { foot, reference: None });
     }
     let pose = (guess.place, DMat3::from_quat(contact.orientation));
-    let (foot, reference) = Reference::find((body.smooth, body.drawn), tool.shape, pose, guess.foot, near)?;
+    let (foot, reference) = match contact.held {
+        true => Reference::held(tool.shape, pose, &contact.foot)?,
+        false => Reference::find((body.smooth, body.drawn), tool.shape, pose, guess.foot, near)?,
+    };
     Some(Met { foot, reference: Some(reference) })
 }
 
@@ -148,10 +157,17 @@ fn slope(body: LocalBody<'_>, force: DVec3, others: Others, fields: &Fields) -> 
 }
 
 /// Of a sphere.
-fn indent(body: LocalBody<'_>, tool: LocalTool<'_>, foot: &FootPoint, depth: f64, fields: &Fields) -> Indentation {
+fn indent(
+    body: LocalBody<'_>,
+    tool: LocalTool<'_>,
+    contact: &LocalContact,
+    foot: &FootPoint,
+    fields: &Fields,
+) -> Indentation {
+    let depth = tool.radius - contact.entry - foot.distance;
     let [mean, gauss] = [MEAN, GAUSS].map(|field| fields.values[field]);
     let [mean_slope, gauss_slope] = [MEAN, GAUSS].map(|field| fields.slope(field));
-    let half_space = HalfSpace::new(body, tool, fields);
+    let half_space = HalfSpace::new(body, tool, fields, contact.part);
     let curved = 1.0 / tool.radius;
     let product = curved * curved + 2.0 * mean * curved + gauss;
     let product_slope = mean_slope * (2.0 * curved) + gauss_slope;

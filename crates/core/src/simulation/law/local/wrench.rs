@@ -60,7 +60,7 @@ pub fn indent_shape(
     cells: Cells<'_>,
 ) -> Indentation {
     let fans = body.smooth.fans();
-    let half_space = HalfSpace::new(body, tool, fields);
+    let half_space = HalfSpace::new(body, tool, fields, contact.part);
     let (surface, curvature) = osculating_surface(body, foot, weights);
     // What it began with counts as if the tool were not so deep.
     let position = place + foot.normal * contact.entry;
@@ -175,7 +175,7 @@ mod tests {
         fn press(&self, shape: &ToolShape, place: DVec3, orientation: DQuat) -> Indentation {
             let drawn = DrawnSurface { surface: &self.surface, query: &self.query };
             let body = LocalBody { drawn, smooth: &self.smooth, fields: &self.fields, scale: 1.0 };
-            let contact = LocalContact { orientation, entry: 0.003, ..LocalContact::default() };
+            let contact = LocalContact { orientation, entry: 0.003, part: 1.0, ..LocalContact::default() };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
             let rotation = DMat3::from_quat(orientation);
             let centre = place + rotation * shape.centre();
