@@ -129,7 +129,6 @@ impl GreenCore {
     #[staticmethod]
     #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None))]
     #[allow(clippy::too_many_arguments)] // one call of one caller
-
     fn precompute_to(
         py: Python<'_>,
         arguments: &Bound<'_, PyTuple>,

@@ -86,12 +86,18 @@ impl<'a> Noise<'a> {
 
 /// Larger of the largest error of a force over the largest force, and of a displacement over the largest displacement.
 ///
-/// All by row; `is_force` tells which rows' errors are those of forces.
-pub fn relative_error(errors: &[f64], is_force: &[bool], displacements: &[f64], forces: &[f64]) -> f64 {
+/// All by row; `is_force` tells which rows' errors are those of forces. Forces below `least_force`, N, are compared with it.
+pub fn relative_error(
+    errors: &[f64],
+    is_force: &[bool],
+    displacements: &[f64],
+    forces: &[f64],
+    least_force: f64,
+) -> f64 {
     let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |m, x| m.max(x.abs()));
-    let of = |kind: bool, values: &[f64]| {
+    let of = |kind: bool, values: &[f64], least: f64| {
         let error = largest(&mut errors.iter().zip(is_force).filter(|&(_, &f)| f == kind).map(|(e, _)| *e));
-        if error > 0.0 { error / largest(&mut values.iter().copied()) } else { 0.0 }
+        if error > 0.0 { error / largest(&mut values.iter().copied()).max(least) } else { 0.0 }
     };
-    of(true, forces).max(of(false, displacements))
+    of(true, forces, least_force).max(of(false, displacements, 0.0))
 }

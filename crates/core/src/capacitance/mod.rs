@@ -23,6 +23,10 @@ use crate::{Error, Result};
 /// at the condition numbers of usual bodies. Larger, and weakly held bodies are refused; smaller, and floating ones pass.
 const COMPUTED_ERROR: f64 = 1e-11;
 
+/// Part of the force that a moved support would take alone, below which forces count as none: supports that move as one
+/// take none at all, and what remains is rounding.
+const RIGID_FORCE: f64 = 1e-3;
+
 /// Displacements and forces after a change of boundary conditions.
 pub struct Answer {
     /// Of the surface dofs, m (3s).
@@ -88,7 +92,13 @@ pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize,
         // What was unknown there is known now, and the other way round.
         (errors[row], is_force[row]) = (error, !is_force[row]);
     }
-    let error = relative_error(&errors, &is_force, &displacements, &forces);
+    // `K_jj` times the displacement: what moving a support alone would take.
+    let alone = |&(column, value): &(usize, f64)| {
+        let row = green.row_of_column(column);
+        if green.row_is_fixed[row] { (green.magnitude(row).powi(2) * value).abs() } else { 0.0 }
+    };
+    let least_force = RIGID_FORCE * known.iter().map(alone).fold(0.0, f64::max);
+    let error = relative_error(&errors, &is_force, &displacements, &forces, least_force);
     let reactions = green.fixed_rows.iter().map(|&row| forces[row as usize]).collect();
     displacements.truncate(surface);
     forces.truncate(surface);
