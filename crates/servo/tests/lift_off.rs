@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Contact, Input, Model, Pose, Scratch, Snapshot, State, ToolInput, step};
 
-use common::{TOOL, scene, single};
+use common::{DELTA, TOOL, scene, single};
 
 /// Most tangential force of a sticking press, over its pressing force.
 const CONE: f64 = 5.0;
@@ -41,11 +41,12 @@ struct Felt {
 }
 
 impl Felt {
-    /// Work that the hand did, J, and the largest that it had done at any tick.
-    fn work(&self) -> (f64, f64) {
+    /// Work that the hand did, J, and the largest that it had done at any tick, given the weight of the new force in the mean one
+    /// of a step.
+    fn work(&self, weight: f64) -> (f64, f64) {
         let (mut work, mut peak) = (0.0, 0.0_f64);
         for tick in 1..self.forces.len() {
-            let mean = 0.5 * (self.forces[tick] + self.forces[tick - 1]);
+            let mean = (1.0 - weight) * self.forces[tick - 1] + weight * self.forces[tick];
             work -= mean.dot(self.positions[tick] - self.positions[tick - 1]);
             peak = peak.max(work);
         }
@@ -118,15 +119,20 @@ fn a_drag_is_lifted_without_a_jump() {
             assert!(widest <= CONE * (1.0 + if drags.len() == 1 { 2e-9 } else { 1e-3 }), "{number}: {widest}");
             assert!(felt.contacts.last().is_some_and(Option::is_none), "lifted");
             // Each slip loses energy, and none is given out on the way.
-            let (work, peak) = felt.work();
+            let (work, peak) = felt.work(0.5);
             assert!(work > 0.0 && work < peak, "{number}: {work} J of {peak} J");
             let anchors: Vec<_> = felt.contacts.iter().flatten().map(|contact| contact.anchor).collect();
             assert!(anchors.first() != anchors.last(), "it slipped");
-            // The account has the whole work of the tool, and what slips lost of it.
+            // The account has the whole work of the tool, by the mean force that Newmark's scheme does work with, and what slips
+            // lost of it.
             if let Some(energy) = felt.energy {
+                let (work, _) = felt.work(DELTA);
                 let held = energy.kinetic + energy.strain + energy.coupling + energy.dissipated;
-                assert!((energy.work / work - 1.0).abs() < 1e-5, "{} J booked of {work} J", energy.work);
-                assert!((held / work - 1.0).abs() < 1e-3, "{held} J of {work} J");
+                // Of the steps in which the contact begins and ends the account has the part in touch.
+                assert!((energy.work / work - 1.0).abs() < 1e-4, "{} J booked of {work} J", energy.work);
+                // What is missing is the scheme's own damping, of modes and coupling.
+                let missing = 1.0 - held / energy.work;
+                assert!((0.0..0.01).contains(&missing), "{held} J of {} J", energy.work);
             }
         }
     }

@@ -70,12 +70,15 @@ fn green(problem: &Problem) -> Arc<GreensFunction> {
     Arc::new(precompute(problem, Precision::F32, &|_, _| true).expect("a solvable cube"))
 }
 
+/// Weight of the new acceleration in the velocity of a step of the bodies in motion.
+pub const DELTA: f64 = 0.6;
+
 /// Any shapes will do, but they must be small: the modes may not be softer than the body is at rest.
 fn set_in_motion(body: BodyModel) -> BodyModel {
     let (dofs, modes) = (body.free_displacements().len(), 20);
     let eigenvalues: Vec<f64> = (0..modes).map(|i| 1e3 * f64::from(i + 1)).collect();
     let shapes: Vec<f64> = (0..dofs * modes as usize).map(|i| 0.3 * (0.1 * i as f64).sin()).collect();
-    let newmark = Newmark::new(1e-3, 0.3025, 0.6).expect("a valid scheme");
+    let newmark = Newmark::new(1e-3, 0.3025, DELTA).expect("a valid scheme");
     let rayleigh = Rayleigh { mass: 1.0, stiffness: 1e-4 };
     let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, Integration::Newmark(newmark));
     let dynamics = BodyDynamics::new(modes.expect("valid modes"), 500.0).expect("a valid coupling");
