@@ -70,6 +70,7 @@ class GreenCore:
     touch_ranks: np.ndarray
     fixed_dofs: np.ndarray
     precision: str
+    typical_errors: tuple[float, float]
     key: str
     description: str
     youngs_modulus: float | None
@@ -77,7 +78,7 @@ class GreenCore:
     free_displacements: np.ndarray
     path: Path | None
     @staticmethod
-    def content_key(arguments: tuple[np.ndarray, ...], precision_name: str) -> str: ...
+    def content_key(arguments: tuple[np.ndarray, ...], precision_name: str | None = None) -> str: ...
     @staticmethod
     def precompute(
         arguments: tuple[np.ndarray, ...],
@@ -88,24 +89,27 @@ class GreenCore:
     @staticmethod
     def precompute_to(
         arguments: tuple[np.ndarray, ...],
-        precision_name: str,
+        precision_name: str | None,
+        within: float,
         description: str,
         progress: Callable[[int, int], Any] | None,
         path: Path,
         memory: int | None = None,
     ) -> tuple[int, bool]: ...
     @staticmethod
-    def plan(arguments: tuple[np.ndarray, ...], precision_name: str, memory: int | None = None) -> dict[str, Any]: ...
+    def plan(
+        arguments: tuple[np.ndarray, ...], precision_name: str | None = None, memory: int | None = None
+    ) -> dict[str, Any]: ...
     @staticmethod
     def load(path: Path, expected_key: str | None = None) -> GreenCore: ...
     def save(self, path: Path) -> None: ...
     def solve(
         self, known: list[tuple[int, float]], switched: list[tuple[int, float]]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]: ...
     def gather_us(self, nodes: list[int], repeats: int) -> float: ...
     def touch(
         self, point: tuple[float | None, ...], displacement: tuple[float | None, ...], radius: float
-    ) -> tuple[list[float], np.ndarray]: ...
+    ) -> tuple[list[float], np.ndarray, float]: ...
     def accepts_contact_radius(self, radius: float) -> bool: ...
     def entry(self, row: int, column: int) -> float: ...
 

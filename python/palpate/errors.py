@@ -21,6 +21,10 @@ class StoreError(Error):
     """A precomputed file that is damaged or belongs to another body."""
 
 
+class PrecisionError(Error):
+    """An answer that the numbers of a store do not carry, by its own estimate of its error."""
+
+
 class SceneError(Error):
     """A scene file with a mistake in it, or something asked of a scene that it does not have or cannot take."""
 
@@ -66,6 +70,10 @@ class LockingWarning(PalpateWarning):
 
 class StoreWarning(PalpateWarning):
     """Something in the way of a precomputed file was thrown away."""
+
+
+class PrecisionWarning(PalpateWarning):
+    """An answer, or what a store will answer, may be wrong by more than a per cent."""
 
 
 class TouchWarning(PalpateWarning):

@@ -27,6 +27,9 @@ pub enum Error {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The numbers of a store do not carry an answer.
+    #[error("{0}")]
+    Precision(String),
     /// The memory allowed is not enough.
     #[error("{0}")]
     Memory(String),

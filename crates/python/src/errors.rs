@@ -13,6 +13,7 @@ pub fn to_python(py: Python<'_>, error: Error) -> PyErr {
             return PyOSError::new_err((source.raw_os_error(), message, path.display().to_string()));
         }
         Error::Store { .. } => "StoreError",
+        Error::Precision(_) => "PrecisionError",
         Error::Singular(_) | Error::Invalid(_) | Error::Memory(_) => "BodyError",
     };
     let message = error.to_string();

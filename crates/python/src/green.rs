@@ -8,7 +8,9 @@ use std::time::Duration;
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::fem::Supports;
-use palpate_core::green::{Found, GreensFunction, Plan, Precision, Problem, Target, plan, precompute, precompute_to};
+use palpate_core::green::{
+    Found, GreensFunction, Plan, Precision, Problem, Target, Wanted, plan, precompute, precompute_to,
+};
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, capacitance, contact};
 use pyo3::prelude::*;
@@ -59,6 +61,11 @@ fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
     palpate_core::green::Interior::new(&stiffness, &problem.supports, &problem.surface_nodes, &problem.loads)
 }
 
+/// The format of a name, if one is named.
+fn named(py: Python<'_>, name: Option<&str>) -> PyResult<Option<Precision>> {
+    name.map(|name| precision(py, name)).transpose()
+}
+
 fn precision(py: Python<'_>, name: &str) -> PyResult<Precision> {
     Precision::parse(name)
         .ok_or_else(|| to_python(py, Error::Invalid(format!("unknown precision '{name}': use 'f16', 'f32' or 'f64'"))))
@@ -90,11 +97,12 @@ impl Interior {
 
 #[pymethods]
 impl GreenCore {
-    /// Content key of the Green's function of a problem.
+    /// Content key of the Green's function of a problem; without a name of that whose format the body chooses.
     #[staticmethod]
-    fn content_key(py: Python<'_>, arguments: &Bound<'_, PyTuple>, precision_name: &str) -> PyResult<String> {
+    #[pyo3(signature = (arguments, precision_name=None))]
+    fn content_key(py: Python<'_>, arguments: &Bound<'_, PyTuple>, precision_name: Option<&str>) -> PyResult<String> {
         let problem = problem(arguments)?;
-        let precision = precision(py, precision_name)?;
+        let precision = named(py, precision_name)?;
         Ok(py.detach(|| problem.key(precision)))
     }
 
@@ -116,20 +124,23 @@ impl GreenCore {
     }
 
     /// Solves the reference problem into a file within `memory` bytes, going on where an interrupted computation of the
-    /// same thing stopped. Returns how many columns it had finished, and whether something else was thrown away.
+    /// same thing stopped. Returns how many columns it had finished, and whether something else was thrown away. Without a
+    /// name of the format it is the cheapest whose typical contacts are right to `within`.
     #[staticmethod]
-    #[pyo3(signature = (arguments, precision_name, description, progress, path, memory=None))]
+    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None))]
+    #[allow(clippy::too_many_arguments)] // one call of one caller
     fn precompute_to(
         py: Python<'_>,
         arguments: &Bound<'_, PyTuple>,
-        precision_name: &str,
+        precision_name: Option<&str>,
+        within: f64,
         description: &str,
         progress: Option<Py<PyAny>>,
         path: PathBuf,
         memory: Option<usize>,
     ) -> PyResult<(usize, bool)> {
         let problem = problem(arguments)?;
-        let precision = precision(py, precision_name)?;
+        let precision = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
         let total = 3 * problem.touch.len();
         let target = Target { path: &path, precision, memory, description };
         let found = run_watched(py, total, progress.as_ref(), |note| {
@@ -140,17 +151,17 @@ impl GreenCore {
         Ok((found.resumed, found.discarded))
     }
 
-    /// Counts of the precomputation of a problem within `memory` bytes.
+    /// Counts of the precomputation of a problem within `memory` bytes; without a name, of the best format that fits.
     #[staticmethod]
-    #[pyo3(signature = (arguments, precision_name, memory=None))]
+    #[pyo3(signature = (arguments, precision_name=None, memory=None))]
     fn plan<'py>(
         py: Python<'py>,
         arguments: &Bound<'py, PyTuple>,
-        precision_name: &str,
+        precision_name: Option<&str>,
         memory: Option<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let problem = problem(arguments)?;
-        let precision = precision(py, precision_name)?;
+        let precision = named(py, precision_name)?;
         let counts = py.detach(|| plan(&problem, precision, memory)).map_err(|e| to_python(py, e))?;
         plan_dict(py, &counts)
     }
@@ -168,16 +179,18 @@ impl GreenCore {
         Ok(Self { green: Arc::new(green) })
     }
 
-    /// Answers a change of boundary conditions: displacements (3s), forces (3s), reactions at the fixed dofs.
-    #[allow(clippy::type_complexity)] // three arrays; naming them would need a class nobody else uses
+    /// Answers a change of boundary conditions: displacements (3s), forces (3s), reactions at the fixed dofs, and the
+    /// estimated relative error.
+    #[allow(clippy::type_complexity)] // three arrays and a number; naming them would need a class nobody else uses
     fn solve<'py>(
         &self,
         py: Python<'py>,
         known: Vec<(usize, f64)>,
         switched: Vec<(usize, f64)>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
         let answer = py.detach(|| capacitance::solve(&self.green, &known, &switched)).map_err(|e| to_python(py, e))?;
-        Ok((answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py), answer.reactions.into_pyarray(py)))
+        let (u, f) = (answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py));
+        Ok((u, f, answer.reactions.into_pyarray(py), answer.error))
     }
 
     /// Shortest of `repeats` times of a plain copy of the entries between touchable nodes (ranks), us: what benchmarks of the
@@ -195,18 +208,18 @@ impl GreenCore {
         Ok(py.detach(|| 1e6 * (0..repeats).map(|_| time()).fold(f64::INFINITY, f64::min)))
     }
 
-    /// Presses a patch: force on the body (3) and displacements (3s).
+    /// Presses a patch: force on the body (3), displacements (3s), and the estimated relative error.
     fn touch<'py>(
         &self,
         py: Python<'py>,
         point: [f64; 3],
         displacement: [Option<f64>; 3],
         radius: f64,
-    ) -> PyResult<([f64; 3], Bound<'py, PyArray1<f64>>)> {
-        let (force, displacements) = py
+    ) -> PyResult<([f64; 3], Bound<'py, PyArray1<f64>>, f64)> {
+        let touch = py
             .detach(|| contact::touch(&self.green, DVec3::from(point), displacement, radius))
             .map_err(|e| to_python(py, e))?;
-        Ok((force.to_array(), displacements.into_pyarray(py)))
+        Ok((touch.force.to_array(), touch.displacements.into_pyarray(py), touch.error))
     }
 
     /// Whether a contact of this radius, m, can be weighed everywhere on the surface.
@@ -273,6 +286,13 @@ impl GreenCore {
         self.green.free_displacements().into_pyarray(py)
     }
 
+    /// Estimated relative errors of typical contacts: of the force of a pressed node or patch, and of nodal forces under a
+    /// stamp.
+    #[getter]
+    fn typical_errors(&self) -> (f64, f64) {
+        (self.green.accuracy.touch, self.green.accuracy.stamp)
+    }
+
     /// Stored number format.
     #[getter]
     fn precision(&self) -> &'static str {
@@ -306,6 +326,7 @@ impl GreenCore {
 
 fn plan_dict<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
+    dict.set_item("precision", plan.precision.name())?;
     dict.set_item("free_dofs", plan.free_dofs)?;
     dict.set_item("columns", plan.columns)?;
     dict.set_item("rows", plan.rows)?;

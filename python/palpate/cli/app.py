@@ -101,8 +101,12 @@ def precompute(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
     unit: Unit = None,
     precision: Annotated[
-        str, typer.Option(help="Stored number format: f16, f32 or f64.", autocompletion=precisions)
-    ] = "f32",
+        str | None,
+        typer.Option(
+            help="Stored number format: f16, f32 or f64; default: the cheapest that this body allows.",
+            autocompletion=precisions,
+        ),
+    ] = None,
     touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
     element: ElementChoice = None,
     max_size: MaxSize = None,
@@ -130,9 +134,11 @@ def precompute(
         region = surface[parse(touch)(body.mesh.nodes[surface])]
         if len(region) == 0:
             raise palpate.BodyError(f"no surface node satisfies --touch '{touch}'")
-    print(palpate.plan(body, precision=precision, touch=region, memory=memory))
+    planned = palpate.plan(body, precision=precision, touch=region, memory=memory)
+    print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
     green = palpate.precompute(body, precision=precision, touch=region, path=out, memory=memory)
     print(f"{green.path}: {_green_line(green)}")
+    print(_precision_line(green))
 
 
 @app.command()
@@ -151,6 +157,7 @@ def touch(
     import numpy as np
 
     import palpate
+    from palpate.green import error_text
     from palpate.mesh import size_text
     from palpate.scene.default_radius import default_contact_radius
     from palpate.units import length
@@ -165,6 +172,7 @@ def touch(
     size = np.linalg.norm(answer.displacements, axis=1)
     print(f"force on the body: {np.array2string(answer.force, precision=5)} N, {np.linalg.norm(answer.force):.5g} N")
     print(f"largest displacement: {1e3 * size.max():.4g} mm at node {green.surface_nodes[size.argmax()]}")
+    print(f"estimated error: {error_text(answer.error)}")
     if radius is None:
         print(f"contact radius: {1e3 * reach:.3g} mm, by default; --radius changes it")
 
@@ -191,6 +199,7 @@ def info(
     if file.suffix == ".palpate":
         green = palpate.GreensFunction.load(file)
         print(f"{file}: {_green_line(green)}")
+        print(f"  {_precision_line(green)}")
         _print_origin(green.description, green.key)
         return
     if file.suffix == ".toml":
@@ -256,6 +265,13 @@ def _print_origin(description: dict[str, object], key: str) -> None:
     for name, value in ((name, value) for name, value in description.items() if name != "surface_moduli"):
         print(f"  {name.replace('_', ' ')}: {value}")
     print(f"  key: {key}")
+
+
+def _precision_line(green) -> str:
+    from palpate.green import error_text
+
+    touch, stamp = error_text(green.touch_error), error_text(green.stamp_error)
+    return f"precision {green.precision}: touches right to {touch}, nodal forces under a stamp to {stamp}, as measured"
 
 
 def _green_line(green) -> str:

@@ -18,6 +18,7 @@ from palpate.body import Body, description, problem_arrays
 from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
+from palpate.green.bounds import check_error
 from palpate.input_file import require_file
 from palpate.leftovers import remove_leftovers
 from palpate.mesh import size_text
@@ -79,6 +80,16 @@ class GreensFunction:
     def precision(self) -> str:
         """Stored number format, ``"f16"``, ``"f32"`` or ``"f64"``."""
         return self._core.precision
+
+    @property
+    def touch_error(self) -> float:
+        """Estimated relative error of the force on a pressed node or patch: the largest of those probed."""
+        return self._core.typical_errors[0]
+
+    @property
+    def stamp_error(self) -> float:
+        """Estimated relative error of nodal forces under a stamp of eight nodes: the largest of those probed."""
+        return self._core.typical_errors[1]
 
     @property
     def key(self) -> str:
@@ -174,8 +185,9 @@ class GreensFunction:
         green = cls(_native.GreenCore.load(path), body)
         if body is not None:
             touch = None if len(green.touchable_nodes) == len(green.surface_nodes) else green.touchable_nodes
-            expected = _native.GreenCore.content_key(problem_arrays(body, touch), green.precision)
-            if expected != green.key:
+            problem = problem_arrays(body, touch)
+            # Made with this format named, or chosen by the body.
+            if green.key not in (_native.GreenCore.content_key(problem, name) for name in (None, green.precision)):
                 raise StoreError(f"{path}: {_difference(green, body)}; compute it again")
         return green
 
@@ -205,6 +217,8 @@ class GreensFunction:
         BodyError
             A node that is not touchable, or in ``release`` not fixed; a wrong length; a number that is not finite;
             a force and a displacement on the same component; released supports that leave the body free to move.
+        PrecisionError
+            An answer that may be wrong by more than 10 %; a :class:`palpate.PrecisionWarning` tells of more than 1 %.
 
         """
         forced = self._by_column(forces, "forces", units.force)
@@ -223,9 +237,10 @@ class GreensFunction:
                 switched[column] = forced.get(column, 0.0)
             elif not fixed:  # a force on a support goes straight into it and moves nothing
                 known[column] = forced[column]
-        u, f, reactions = self._core.solve(sorted(known.items()), sorted(switched.items()))
+        u, f, reactions, error = self._core.solve(sorted(known.items()), sorted(switched.items()))
+        check_error(error, self.precision, "the answer", stacklevel=2)
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
-        return Answer(u, f, self._reactions(f, reactions), self)
+        return Answer(u, f, self._reactions(f, reactions), error, self)
 
     def touch(self, point: Sequence[float | str], displacement: Components, radius: float | str = 0.0) -> Touch:
         """Press a patch of the surface.
@@ -247,6 +262,8 @@ class GreensFunction:
             A number that is not finite, a negative radius, or one that covers more nodes than a tick can weigh.
         UnitError
             Text that is no length.
+        PrecisionError
+            A force that may be wrong by more than 10 %; a :class:`palpate.PrecisionWarning` tells of more than 1 %.
 
         """
         reach = units.length(radius)
@@ -255,11 +272,12 @@ class GreensFunction:
         target = three_numbers(point, "the touch point", BodyError, units.length)
         wanted = three_components(displacement, "displacement", BodyError, units.length)
         try:
-            force, u = self._core.touch(target, wanted, reach)
+            force, u, error = self._core.touch(target, wanted, reach)
         except BodyError:
             if self.accepts_contact_radius(reach):
                 raise
             raise self._too_wide(reach) from None
+        check_error(error, self.precision, "the touch", stacklevel=2)
         landed = self._surface_search.closest(np.array([target]))
         distance = float(np.linalg.norm(landed - target))
         if distance > FAR * self.extents.max():
@@ -269,7 +287,7 @@ class GreensFunction:
                 TouchWarning,
                 stacklevel=2,
             )
-        return Touch(np.array(force), u.reshape(-1, 3), landed, distance, self)
+        return Touch(np.array(force), u.reshape(-1, 3), landed, distance, error, self)
 
     def _too_wide(self, radius: float) -> BodyError:
         largest = 1e3 * self.largest_contact_radius(radius)
@@ -333,6 +351,18 @@ class GreensFunction:
             raise BodyError(f"release: fixed node {node} lies inside the body; only surface nodes can be released")
         first = self._column(node, "release")
         return [column for column in range(first, first + 3) if self._is_fixed(column)]
+
+
+def require_precise(green: GreensFunction, what: str) -> None:
+    """Refuse a store in which touches may be wrong by more than 10 %, and warn of 1 %: before a loop runs on it.
+
+    Raises
+    ------
+    PrecisionError
+        The store is refused; ``what`` would be wrong.
+
+    """
+    check_error(green.touch_error, green.precision, what, stacklevel=2)
 
 
 def _difference(green: GreensFunction, body: Body) -> str:

@@ -18,6 +18,9 @@ class Plan:
 
     Attributes
     ----------
+    precision
+        Stored number format it is counted for. One that the body chooses is known only when columns have been measured:
+        the counts are then those of the best that the memory allows, the most that will be needed.
     free_dofs, columns, rows
         Order of the matrix, and shape of the operator.
     factor_entries, factor_flops
@@ -35,6 +38,7 @@ class Plan:
 
     """
 
+    precision: str
     free_dofs: int
     columns: int
     rows: int
@@ -56,14 +60,14 @@ class Plan:
             f"{self.columns} columns of {self.rows} rows: factor {factor} Gflop, columns {sweeps} Gflop by sweeps "
             f"(surface last: at least {other})\n"
             f"peak memory {self.memory / 1e9:.2f} GB, {self.tasks} tasks with {self.block} columns each, "
-            f"store {self.store / 1e9:.3g} GB"
+            f"store {self.store / 1e9:.3g} GB in {self.precision}"
         )
 
 
 def plan(
     body: Body,
     *,
-    precision: str = "f32",
+    precision: str | None = None,
     touch: Sequence[int] | np.ndarray | None = None,
     memory: int | str | None = None,
 ) -> Plan:

@@ -13,7 +13,7 @@ import numpy as np
 from palpate import models
 from palpate.body import Body, parse
 from palpate.errors import Error, SceneError
-from palpate.green import GreensFunction, precompute
+from palpate.green import GreensFunction, precompute, require_precise
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import tetrahedralize_with
@@ -79,6 +79,8 @@ class BuiltScene:
     bodies: tuple[BuiltBody, ...]
 
     def __post_init__(self) -> None:
+        for body in self.bodies:
+            require_precise(body.green, f"forces on {body.name}")
         object.__setattr__(self, "scene", with_radii(self.scene, [body.green for body in self.bodies]))
 
     @classmethod

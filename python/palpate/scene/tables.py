@@ -68,7 +68,7 @@ class BodyTable(Table):
     max_element_size: Length | None = None
     element: Element | None = None
     refine: list[RefineTable] = Field(default_factory=list)
-    precision: str = Field("f32", pattern="^f(16|32|64)$")
+    precision: str | None = Field(None, pattern="^f(16|32|64)$")
     position: Point = (0.0, 0.0, 0.0)
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
     supports: SupportsTable | None = None

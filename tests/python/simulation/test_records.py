@@ -81,7 +81,8 @@ def test_a_line_tells_what_a_thing_is(built, block, block_green):
     assert repr(block_green) == expected
     touch = block_green.touch(TOP, (0, 0, -1e-3), 0.012)
     largest = 1e3 * np.linalg.norm(touch.displacements, axis=1).max()
-    assert repr(touch).startswith("Touch(force [") and repr(touch).endswith(f"largest displacement {largest:.4g} mm)")
+    assert repr(touch).startswith("Touch(force [")
+    assert repr(touch).endswith(f"largest displacement {largest:.4g} mm, right to {100 * touch.error:.2g} %)")
     assert repr(built.scene) == "Scene(block.palpate, tool of radius 5 mm)"
     recording = press(built, 1e-3)
     assert repr(recording).startswith("Recording(50 ticks, largest force ")

@@ -10,6 +10,9 @@
 //! and a released one is pushed by its own share of `F`. Without loads this
 //! is equations 3.8-3.10 of Jun, Choi and Cho with `C = -E^T Psi E`, written without the term that cancels on `S`.
 
+mod error;
+
+use error::{Noise, relative_error};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
 
@@ -20,6 +23,10 @@ use crate::{Error, Result};
 /// at the condition numbers of usual bodies. Larger, and weakly held bodies are refused; smaller, and floating ones pass.
 const COMPUTED_ERROR: f64 = 1e-11;
 
+/// Part of the force that a moved support would take alone, below which forces count as none: supports that move as one
+/// take none at all, and what remains is rounding.
+const RIGID_FORCE: f64 = 1e-3;
+
 /// Displacements and forces after a change of boundary conditions.
 pub struct Answer {
     /// Of the surface dofs, m (3s).
@@ -28,6 +35,9 @@ pub struct Answer {
     pub forces: Vec<f64>,
     /// `K u` at the fixed dofs, N, in their order.
     pub reactions: Vec<f64>,
+    /// Estimated error: of the forces relative to the largest force, or of the displacements relative to the largest
+    /// displacement, whichever is larger.
+    pub error: f64,
 }
 
 /// Solves the changed problem.
@@ -37,17 +47,20 @@ pub struct Answer {
 /// released support, N). Columns are those of [`GreensFunction`].
 ///
 /// # Errors
-/// A capacitance matrix that is singular to working precision: too much was released, or the store's precision does not
-/// carry that many neighbouring constraints.
+/// A capacitance matrix that is singular to working precision: [`Error::Singular`], too much was released, or
+/// [`Error::Precision`], the store does not carry that many neighbouring constraints.
 pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize, f64)]) -> Result<Answer> {
     green.require_intact()?;
     let mut response = if green.loads.is_empty() { vec![0.0; green.rows] } else { green.free_response.clone() };
+    let mut noise = Noise::new(green);
     for &(column, value) in known {
-        green.add_column(column, value, &mut response);
+        noise.add_column(column, value, &mut response);
     }
-    let unknown = capacitance_solve(green, switched, &response)?;
+    let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
+    let capacitance = switched_square(green, &rows);
+    let unknown = capacitance_solve(green, switched, &capacitance, &response)?;
     for (&(column, _), &q) in switched.iter().zip(&unknown) {
-        green.add_column(column, q, &mut response);
+        noise.add_column(column, q, &mut response);
     }
 
     // Sort knowns and unknowns into displacements and forces, row by row.
@@ -72,26 +85,44 @@ pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize,
         displacements[row] = u;
         forces[row] = f;
     }
+    let columns: Vec<usize> = switched.iter().map(|&(column, _)| column).collect();
+    let (of_unknown, mut errors) = noise.errors(&columns, &capacitance);
+    let mut is_force = green.row_is_fixed.clone();
+    for (&row, error) in rows.iter().zip(of_unknown) {
+        // What was unknown there is known now, and the other way round.
+        (errors[row], is_force[row]) = (error, !is_force[row]);
+    }
+    // `K_jj` times the displacement: what moving a support alone would take.
+    let alone = |&(column, value): &(usize, f64)| {
+        let row = green.row_of_column(column);
+        if green.row_is_fixed[row] { (green.magnitude(row).powi(2) * value).abs() } else { 0.0 }
+    };
+    let least_force = RIGID_FORCE * known.iter().map(alone).fold(0.0, f64::max);
+    let error = relative_error(&errors, &is_force, &displacements, &forces, least_force);
     let reactions = green.fixed_rows.iter().map(|&row| forces[row as usize]).collect();
     displacements.truncate(surface);
     forces.truncate(surface);
-    Ok(Answer { displacements, forces, reactions })
+    Ok(Answer { displacements, forces, reactions, error })
 }
 
 /// `Psi_SS^-1 [ vb_S - response_S ]`. Symmetric positive definite if only free dofs are prescribed; with released
 /// supports the coupling blocks are skew, and LU serves.
-fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response: &[f64]) -> Result<Vec<f64>> {
+fn capacitance_solve(
+    green: &GreensFunction,
+    switched: &[(usize, f64)],
+    capacitance: &Mat<f64>,
+    response: &[f64],
+) -> Result<Vec<f64>> {
     if switched.is_empty() {
         return Ok(Vec::new());
     }
     let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
     let n = rows.len();
-    let capacitance = switched_square(green, &rows);
     // A released support answers to its share of the reference loads besides the force given.
     let wanted = |i: usize| switched[i].1 + if green.row_is_fixed[rows[i]] { green.load_on_row(rows[i]) } else { 0.0 };
     let residual = Mat::from_fn(n, 1, |i, _| wanted(i) - response[rows[i]]);
     let unknown = if rows.iter().any(|&row| green.row_is_fixed[row]) {
-        solve_released(&capacitance, &residual, green.precision().unit_roundoff().max(COMPUTED_ERROR))?
+        solve_released(capacitance, &residual, green.precision().unit_roundoff().max(COMPUTED_ERROR))?
     } else {
         match capacitance.llt(Side::Lower) {
             Ok(factor) => factor.solve(&residual),
@@ -100,7 +131,14 @@ fn capacitance_solve(green: &GreensFunction, switched: &[(usize, f64)], response
         }
     };
     let unknown: Vec<f64> = (0..n).map(|i| unknown[(i, 0)]).collect();
-    if unknown.iter().all(|q| q.is_finite()) { Ok(unknown) } else { Err(floating()) }
+    if unknown.iter().all(|q| q.is_finite()) {
+        return Ok(unknown);
+    }
+    let precision = green.precision().name();
+    Err(Error::Precision(format!(
+        "the answer has no digit that is right: compliances of the prescribed nodes are the same in {precision}; prescribe \
+         fewer neighbouring nodes, or compute the store with --precision f64 (precision='f64')"
+    )))
 }
 
 /// `Psi_SS`, cut out of the blocks between the nodes of the rows `S`.

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, SurfaceQuery, TouchPatch, patch_weights};
 use crate::green::GreensFunction;
+use crate::green::accuracy::{Pressed, PressedError};
 use crate::{Error, Result};
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
@@ -20,18 +21,24 @@ pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
     mean + 2.0 * p * (r.acos() / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3).cos()
 }
 
+/// Answer to a pressed patch.
+pub struct Touch {
+    /// Force on the body, N.
+    pub force: DVec3,
+    /// Of all surface dofs (3s), those of the reference loads included, m.
+    pub displacements: Vec<f64>,
+    /// Estimated error: of the force relative to it, or of the displacements relative to the largest one, whichever is
+    /// larger. A force that is small beside the one that would undo the reference loads' displacement is compared with
+    /// that one.
+    pub error: f64,
+}
+
 /// Moves a patch at `point` of the unloaded surface to the mean displacement `displacement` (m, from the unloaded shape;
-/// `None` leaves a component free): `f = C^-1 (d - W^T u_free)`. Returns the force on the body (N) and the displacements
-/// of all surface dofs (m, 3s), those of the reference loads included.
+/// `None` leaves a component free): `f = C^-1 (d - W^T u_free)`.
 ///
 /// # Errors
 /// A patch with a node outside the touch region, on the support only, or with too many nodes.
-pub fn touch(
-    green: &GreensFunction,
-    point: DVec3,
-    displacement: [Option<f64>; 3],
-    radius: f64,
-) -> Result<(DVec3, Vec<f64>)> {
+pub fn touch(green: &GreensFunction, point: DVec3, displacement: [Option<f64>; 3], radius: f64) -> Result<Touch> {
     let query = SurfaceQuery::new(&green.surface)?;
     let centre =
         query.closest(&green.surface, point).ok_or_else(|| Error::Invalid("the touch point must be finite".into()))?;
@@ -44,11 +51,39 @@ pub fn touch(
     let compliance = patch.own_compliance(green);
     let mut displacements = green.free_displacements();
     let sag = patch_mean(patch.patch(), &displacements);
-    let wanted = std::array::from_fn(|k| displacement[k].map(|d| d - sag[k]));
-    let force = constrained_force(&compliance, wanted)
+    let prescribed = displacement.map(|d| d.is_some());
+    let stiffness = constrained_stiffness(&compliance, prescribed)
         .ok_or_else(|| Error::Invalid("the contact lies on the support, which does not give".into()))?;
+    let masked = |v: DVec3| DVec3::from_array(std::array::from_fn(|k| if prescribed[k] { v[k] } else { 0.0 }));
+    let wanted = DVec3::from(displacement.map(|d| d.unwrap_or(0.0)));
+    let force = stiffness * masked(wanted - sag);
     patch.add_response(green, force, &mut displacements);
-    Ok((force, displacements))
+    let largest_force = force.length().max((stiffness * masked(sag)).length());
+    let error = pressed(green, patch.patch(), stiffness, prescribed, force).error(green.accuracy, green.precision());
+    let error = relative_error(green, error, largest_force, &displacements);
+    Ok(Touch { force, displacements, error })
+}
+
+/// Of the force over the largest one, N, or of displacements over the largest one, whichever is larger.
+fn relative_error(green: &GreensFunction, error: PressedError, largest_force: f64, displacements: &[f64]) -> f64 {
+    let free = (0..displacements.len()).filter(|&row| !green.row_is_fixed[row]);
+    let magnitude = free.map(|row| green.magnitude(row)).fold(0.0, f64::max);
+    let moved = displacements.iter().fold(0.0f64, |m, u| m.max(u.abs()));
+    let ratio = |error: f64, of: f64| if error > 0.0 { error / of } else { 0.0 };
+    ratio(error.force, largest_force).max(ratio(magnitude * error.elsewhere, moved))
+}
+
+/// A patch as its errors are estimated; supported dofs take no part.
+fn pressed(green: &GreensFunction, patch: &Patch, stiffness: DMat3, prescribed: [bool; 3], force: DVec3) -> Pressed {
+    let (mut independent, mut coherent) = (DVec3::ZERO, DVec3::ZERO);
+    for (node, weight) in patch.iter() {
+        for axis in (0..3).filter(|axis| !green.row_is_fixed[3 * node + axis]) {
+            let magnitude = weight * green.magnitude(3 * node + axis);
+            independent[axis] += magnitude * magnitude;
+            coherent[axis] += magnitude.abs();
+        }
+    }
+    Pressed { stiffness, prescribed, independent: independent.map(f64::sqrt), coherent, force }
 }
 
 /// `W^T u`: the weighted mean displacement of a patch, m.
@@ -67,24 +102,18 @@ fn refused(green: &GreensFunction, radius: f64, refusal: Refusal) -> Error {
     })
 }
 
-/// `C_aa f_a = d_a` for the prescribed components, zero force on the free ones: free components are replaced by the
-/// identity. `None` if the compliance is zero there.
-fn constrained_force(compliance: &DMat3, displacement: [Option<f64>; 3]) -> Option<DVec3> {
+/// Inverse of `C_aa` for the prescribed components; free ones are replaced by the identity. `None` if the compliance is
+/// zero there.
+fn constrained_stiffness(compliance: &DMat3, prescribed: [bool; 3]) -> Option<DMat3> {
     let mut matrix = *compliance;
-    let mut right = DVec3::ZERO;
     let scale = (0..3).map(|k| compliance.col(k)[k]).fold(0.0, f64::max);
-    for (k, component) in displacement.into_iter().enumerate() {
-        match component {
-            Some(d) => right[k] = d,
-            None => {
-                for j in 0..3 {
-                    matrix.col_mut(j)[k] = 0.0;
-                    matrix.col_mut(k)[j] = 0.0;
-                }
-                matrix.col_mut(k)[k] = scale;
-            }
+    for k in (0..3).filter(|&k| !prescribed[k]) {
+        for j in 0..3 {
+            matrix.col_mut(j)[k] = 0.0;
+            matrix.col_mut(k)[j] = 0.0;
         }
+        matrix.col_mut(k)[k] = scale;
     }
-    let force = matrix.inverse() * right;
-    (scale > 0.0 && force.is_finite()).then_some(force)
+    let stiffness = matrix.inverse();
+    (scale > 0.0 && stiffness.is_finite()).then_some(stiffness)
 }

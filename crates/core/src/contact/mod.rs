@@ -19,7 +19,7 @@ mod touchable;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
-pub use compliance::{smallest_eigenvalue, touch};
+pub use compliance::{Touch, smallest_eigenvalue, touch};
 pub use hollows::Hollows;
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;

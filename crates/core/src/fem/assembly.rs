@@ -30,6 +30,11 @@ impl SymmetricCsc {
         let range = self.column_start[j]..self.column_start[j + 1];
         self.rows[range.clone()].iter().copied().zip(self.values[range].iter().copied())
     }
+
+    /// Entry of the diagonal.
+    pub fn diagonal(&self, dof: u32) -> f64 {
+        self.column(dof as usize).find(|&(row, _)| row == dof).map_or(0.0, |(_, value)| value)
+    }
 }
 
 /// Stiffness matrix of all dofs, N/m.

@@ -19,6 +19,15 @@ use super::places::{Places, TouchNode};
 use super::precision::Precision;
 use crate::Result;
 
+/// Largest magnitude of a stored integer.
+pub const RANGE: f64 = i16::MAX as f64;
+
+/// Scales of rows with these bounds: `s_i / sqrt(RANGE)`, so that `|q_ij| <= RANGE`; none where the format needs none.
+pub fn scales(precision: Precision, magnitude: &[f64]) -> Vec<f64> {
+    let of = |s: &f64| s / RANGE.sqrt();
+    if precision == Precision::F16 { magnitude.iter().map(of).collect() } else { Vec::new() }
+}
+
 /// The numbers of a Green's function.
 pub struct Entries {
     pub(super) arch: Arch,
@@ -28,6 +37,8 @@ pub struct Entries {
     /// Numbers of a column that are in memory: all, or those of the touchable nodes.
     pub(super) resident: usize,
     pub(super) numbers: Numbers,
+    /// Bound `s_i` of each stored row, `|Psi_ij| <= s_i s_j`; empty where nothing is computed yet.
+    magnitude: Vec<f64>,
     /// Scale of each stored row, and of the column that belongs to it; empty unless the numbers are integers.
     pub(super) scale: Vec<f64>,
     /// For each place the scales of its dofs, zero on supported ones: they neither move nor are pushed.
@@ -39,14 +50,15 @@ pub struct Entries {
 impl Entries {
     /// Numbers of columns of which the first rows, as many as fit, are in memory, and all in `file` if there is one.
     ///
-    /// `scale` is by stored row and empty unless the numbers are integers; `row_is_fixed` is in the user's order.
+    /// `magnitude` is by stored row; `row_is_fixed` is in the user's order.
     pub(super) fn new(
         places: Places,
         row_is_fixed: &[bool],
-        scale: Vec<f64>,
+        magnitude: Vec<f64>,
         numbers: Numbers,
         file: Option<ColumnsFile>,
     ) -> Self {
+        let scale = scales(numbers.precision(), &magnitude);
         let free = |place: usize| {
             let node = places.nodes()[place] as usize;
             let of_axis = |axis| scale.get(3 * place + axis).copied().unwrap_or(1.0);
@@ -56,7 +68,7 @@ impl Entries {
         let rows = row_is_fixed.len();
         let resident = if file.is_some() { 3 * places.touchable_count() } else { rows };
         let free = (0..places.nodes().len()).map(free).collect();
-        Self { arch: Arch::new(), rows, resident, numbers, scale, free, file, places }
+        Self { arch: Arch::new(), rows, resident, numbers, magnitude, scale, free, file, places }
     }
 
     /// Number format.
@@ -69,9 +81,14 @@ impl Entries {
         &self.places
     }
 
-    /// Scales of the stored rows.
-    pub(super) fn scale(&self) -> &[f64] {
-        &self.scale
+    /// Bounds of the stored rows.
+    pub(super) fn magnitudes(&self) -> &[f64] {
+        &self.magnitude
+    }
+
+    /// Bound `s_i` of a row in the user's order.
+    pub fn magnitude(&self, row: usize) -> f64 {
+        self.magnitude.get(self.places.stored_row(row)).copied().unwrap_or(0.0)
     }
 
     /// Hands the bytes of all columns to `put`, as first column and bytes.

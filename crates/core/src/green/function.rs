@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DMat3, DVec3};
 
+use super::accuracy::Accuracy;
 use super::entries::Entries;
 use super::places::TouchNode;
 use super::precision::Precision;
@@ -31,6 +32,8 @@ pub struct GreensFunction {
     pub row_is_fixed: Vec<bool>,
     /// The numbers.
     pub(super) entries: Entries,
+    /// How far they are from those of the body.
+    pub accuracy: Accuracy,
     /// Reference loads on all dofs of the mesh, N; empty for none.
     pub loads: Vec<f64>,
     /// What the reference loads alone do, on the rows: displacements, m, and `K u` on supported rows, N; empty for none.
@@ -54,6 +57,11 @@ impl GreensFunction {
     /// Number format of the entries.
     pub fn precision(&self) -> Precision {
         self.entries.precision()
+    }
+
+    /// Bound `s_i` of a row: `|Psi_ij| <= s_i s_j`; the root of a compliance, and of a stiffness on supported rows.
+    pub fn magnitude(&self, row: usize) -> f64 {
+        self.entries.magnitude(row)
     }
 
     /// The columns of surface node `node`; `None` if it may not be touched.

@@ -4,7 +4,7 @@
 use super::precision::Precision;
 
 /// Version of the store's layout; part of the key, so that an old file is recomputed, never misread.
-pub const FORMAT_VERSION: u32 = 3;
+pub const FORMAT_VERSION: u32 = 4;
 
 /// Hex BLAKE3 hash of element, precision, format version and sections of bytes, each with its length.
 #[cfg(feature = "offline")]
@@ -12,10 +12,11 @@ pub struct ContentKey(blake3::Hasher);
 
 #[cfg(feature = "offline")]
 impl ContentKey {
-    /// No section yet.
-    pub fn new(element: &str, precision: Precision) -> Self {
+    /// No section yet. `precision`: as asked for; `None` where the body decides.
+    pub fn new(element: &str, precision: Option<Precision>) -> Self {
         let mut hash = blake3::Hasher::new();
-        hash.update(format!("palpate green {FORMAT_VERSION} {element} {}", precision.name()).as_bytes());
+        let precision = precision.map_or("chosen", Precision::name);
+        hash.update(format!("palpate green {FORMAT_VERSION} {element} {precision}").as_bytes());
         Self(hash)
     }
 

@@ -11,6 +11,7 @@
 //! (Jun, Choi and Cho, equations 3.1-3.3, corrected.) Only the columns of touchable surface dofs and the rows of surface
 //! and supported dofs are kept.
 
+pub mod accuracy;
 mod blocks;
 mod checksums;
 mod columns_file;
@@ -34,4 +35,4 @@ pub use key::FORMAT_VERSION;
 pub use places::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]
-pub use precompute::{Found, Plan, Problem, Progress, Target, plan, precompute, precompute_to};
+pub use precompute::{Found, Plan, Problem, Progress, Target, Wanted, plan, precompute, precompute_to};

@@ -12,6 +12,9 @@ pub enum Precision {
 }
 
 impl Precision {
+    /// All, the cheapest first.
+    pub const ALL: [Precision; 3] = [Precision::F16, Precision::F32, Precision::F64];
+
     /// `"f16"`, `"f32"` or `"f64"`.
     pub fn name(self) -> &'static str {
         match self {
@@ -21,10 +24,10 @@ impl Precision {
         }
     }
 
-    /// Largest relative error of rounding a stored number.
+    /// Largest error of rounding an entry `Psi_ij`: relative to it, of F16 relative to its bound `s_i s_j`.
     pub fn unit_roundoff(self) -> f64 {
         match self {
-            Precision::F16 => f64::from(2.0_f32.powi(-15)),
+            Precision::F16 => f64::from(2.0_f32.powi(-16)),
             Precision::F32 => f64::from(f32::EPSILON) / 2.0,
             Precision::F64 => f64::EPSILON / 2.0,
         }
@@ -32,7 +35,7 @@ impl Precision {
 
     /// The format called `name`.
     pub fn parse(name: &str) -> Option<Self> {
-        [Precision::F16, Precision::F32, Precision::F64].into_iter().find(|p| p.name() == name)
+        Self::ALL.into_iter().find(|p| p.name() == name)
     }
 
     /// Bytes of a stored entry.

@@ -17,6 +17,7 @@ use std::path::Path;
 
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 
+use super::accuracy::Accuracy;
 use super::checksums::{Heads, SUM, block_count, sums_in_passing, sums_while_reading};
 use super::columns_file::ColumnsFile;
 use super::entries::Entries;
@@ -163,7 +164,13 @@ impl<'a> Reader<'a> {
             return Err(self.damaged("rows are missing"));
         }
         let precision = self.precision()?;
-        let entries = Entries::new(places, &row_is_fixed, self.optional("scale")?, Numbers::zeros(precision, 0), None);
+        let magnitude: Vec<f64> = self.numbers("magnitude")?;
+        if magnitude.len() != row_is_fixed.len() {
+            return Err(self.damaged("the magnitudes do not match the operator"));
+        }
+        let accuracy = Accuracy::from_slice(&self.numbers::<f64>("accuracy")?);
+        let accuracy = accuracy.ok_or_else(|| self.damaged("its accuracy"))?;
+        let entries = Entries::new(places, &row_is_fixed, magnitude, Numbers::zeros(precision, 0), None);
         let mut green = GreensFunction {
             surface: Surface::new(positions, self.faces()?)?,
             surface_nodes,
@@ -173,6 +180,7 @@ impl<'a> Reader<'a> {
             rows: row_is_fixed.len(),
             row_is_fixed,
             entries,
+            accuracy,
             loads: self.optional("loads")?,
             free_response: self.optional("free_response")?,
             key: field("key"),
@@ -207,10 +215,7 @@ impl<'a> Reader<'a> {
         if psi.shape != [columns, green.rows] {
             return Err(self.damaged("the operator's shape does not match the body"));
         }
-        let (places, scale) = (green.entries.places().clone(), green.entries.scale().to_vec());
-        if scale.len() != (if precision == Precision::F16 { green.rows } else { 0 }) {
-            return Err(self.damaged("the scales do not match the operator"));
-        }
+        let (places, magnitude) = (green.entries.places().clone(), green.entries.magnitudes().to_vec());
         let at = self.start + psi.data_offsets.0 as u64;
         let (column, head) = (green.rows * precision.bytes(), columns * precision.bytes());
         let length = columns * column;
@@ -225,7 +230,7 @@ impl<'a> Reader<'a> {
         let Self { file, length, .. } = self;
         let path = self.path.to_owned();
         let file = (!whole).then_some(ColumnsFile { file, path, length, at, column });
-        Ok(Entries::new(places, &green.row_is_fixed, scale, numbers, file))
+        Ok(Entries::new(places, &green.row_is_fixed, magnitude, numbers, file))
     }
 
     /// Compares sums with those that were written down.

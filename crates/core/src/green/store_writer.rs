@@ -173,10 +173,10 @@ impl GreensFunction {
                 tensors.push((name, Dtype::F64, vec![values.len()], bytemuck::cast_slice(values).to_vec()));
             }
         }
-        let scale = self.entries.scale();
-        if !scale.is_empty() {
-            tensors.insert(0, ("scale", Dtype::F64, vec![scale.len()], bytemuck::cast_slice(scale).to_vec()));
-        }
+        let magnitude = self.entries.magnitudes();
+        let accuracy = self.accuracy.to_array();
+        tensors.push(("accuracy", Dtype::F64, vec![accuracy.len()], bytemuck::cast_slice(&accuracy).to_vec()));
+        tensors.insert(0, ("magnitude", Dtype::F64, vec![magnitude.len()], bytemuck::cast_slice(magnitude).to_vec()));
         tensors
     }
 }

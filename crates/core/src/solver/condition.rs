@@ -17,20 +17,22 @@ pub const MOST_CONDITION: f64 = 1e13;
 /// Steps of the inverse iteration: the softest direction of a body that is nearly a mechanism stands out at once.
 const STEPS: usize = 4;
 
-/// Condition number of the scaled matrix, estimated from below, and the dof that moves most in its softest direction.
-#[derive(Clone, Copy, Debug)]
+/// Condition number of the scaled matrix, estimated from below, and what moves most in its softest direction.
+#[derive(Clone, Debug)]
 pub struct Condition {
     /// Largest over smallest eigenvalue.
     pub number: f64,
-    /// Dof of the whole body.
+    /// Dof of the whole body that moves most.
     pub softest: u32,
+    /// The softest direction, unit vector of `D^1/2 u` by rank of the free dofs: large where something stiff rides on
+    /// something soft.
+    pub direction: Vec<f64>,
 }
 
 /// Estimates the condition of `factor`, made from the free part of `stiffness`, by inverse iteration.
 pub fn condition(factor: &Factor, stiffness: &SymmetricCsc, supports: &Supports) -> Condition {
-    let diagonal: Vec<f64> =
-        supports.free.iter().map(|&dof| entry(stiffness, dof, dof).max(f64::MIN_POSITIVE)).collect();
-    let root: Vec<f64> = diagonal.iter().map(|d| d.sqrt()).collect();
+    let diagonal = supports.free.iter().map(|&dof| stiffness.diagonal(dof).max(f64::MIN_POSITIVE));
+    let root: Vec<f64> = diagonal.map(f64::sqrt).collect();
     let mut memory = factor.solve_scratch(1);
     let mut x = start(root.len());
     let (mut growth, mut softest) = (0.0, 0);
@@ -42,14 +44,15 @@ pub fn condition(factor: &Factor, stiffness: &SymmetricCsc, supports: &Supports)
         growth = x.iter().map(|x| x * x).sum::<f64>().sqrt();
         x.iter_mut().for_each(|x| *x /= growth);
     }
-    Condition { number: growth * largest_row_sum(stiffness, supports, &root), softest: supports.free[softest] }
+    let number = growth * largest_row_sum(stiffness, supports, &root);
+    Condition { number, softest: supports.free[softest], direction: x }
 }
 
 /// Refuses a matrix that is singular to working precision, with the place where the body gives most.
 ///
 /// # Errors
 /// A condition number beyond [`MOST_CONDITION`].
-pub fn require_regular(condition: Condition, nodes: &[glam::DVec3]) -> Result<()> {
+pub fn require_regular(condition: &Condition, nodes: &[glam::DVec3]) -> Result<()> {
     if condition.number <= MOST_CONDITION {
         return Ok(());
     }
@@ -71,10 +74,6 @@ fn start(count: usize) -> Vec<f64> {
 
 fn largest(values: &[f64]) -> usize {
     (0..values.len()).max_by(|&i, &j| values[i].abs().total_cmp(&values[j].abs())).unwrap_or(0)
-}
-
-fn entry(matrix: &SymmetricCsc, row: u32, column: u32) -> f64 {
-    matrix.column(column as usize).find(|&(at, _)| at == row).map_or(0.0, |(_, value)| value)
 }
 
 /// Largest sum of magnitudes in a row of `S`: no eigenvalue is larger.

@@ -6,12 +6,14 @@
 mod block;
 mod free_response;
 mod layout;
+mod made;
 mod mirror;
 mod number;
 mod operators;
 mod panels;
 mod partial;
 mod plan;
+mod probe;
 mod problem;
 mod run;
 mod scales;
@@ -21,6 +23,7 @@ mod system;
 mod tasks;
 mod tree;
 
+pub use made::Wanted;
 pub use plan::Plan;
 pub use problem::Problem;
 pub use run::{Found, Progress, Target, plan, precompute, precompute_to};

@@ -5,6 +5,7 @@ use rayon::current_num_threads;
 use super::block::Block;
 use super::layout::Layout;
 use super::mirror;
+use super::probe;
 use super::problem::Problem;
 use super::sweep::{loaded, scratch_numbers};
 use super::system::System;
@@ -25,6 +26,8 @@ const OVERHEAD_BYTES: usize = 24 << 20;
 /// The counts of a precomputation.
 #[derive(Clone, Debug)]
 pub struct Plan {
+    /// Number format it was counted for.
+    pub precision: Precision,
     /// Order of the factorised matrix.
     pub free_dofs: usize,
     /// Columns of the operator.
@@ -60,41 +63,75 @@ pub struct Prepared {
     pub layout: Layout,
     /// The tree.
     pub tree: Tree,
-    /// The blocks of columns.
+}
+
+/// Blocks of columns, and how they are solved.
+pub struct Route {
+    /// Them.
     pub blocks: Vec<Block>,
-    /// The counts.
-    pub plan: Plan,
+    /// Columns of a block.
+    pub width: usize,
+    /// Blocks solved at a time.
+    pub tasks: usize,
+    /// Peak of the memory taken, bytes.
+    pub peak: usize,
+}
+
+/// What a route has to fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Bytes that may be taken; `None`: any.
+    pub memory: Option<usize>,
+    /// The operator itself is to be held, too.
+    pub in_memory: bool,
+    /// The format is one of several that are measured first, in double precision.
+    pub choosing: bool,
 }
 
 impl Prepared {
-    /// Orders, counts, and chooses route and blocks so that the peak stays below `memory` bytes. `in_memory`: the
-    /// operator itself is to be held, too.
+    /// Assembles and orders.
     ///
     /// # Errors
-    /// A bound that cannot be kept, with what would fit.
-    pub fn new(problem: &Problem, precision: Precision, memory: Option<usize>, in_memory: bool) -> Result<Self> {
+    /// Not enough memory.
+    pub fn new(problem: &Problem) -> Result<Self> {
         let stiffness = crate::fem::stiffness(&problem.mesh, &problem.materials);
         let symbolic = Symbolic::new(&stiffness, &problem.supports)?;
         let layout = Layout::new(problem, &stiffness, &symbolic);
         let tree = Tree::new(symbolic.supernodes()?, &layout.wanted);
-        let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
-        let sizes = Sizes::new(&system, &symbolic, &tree, precision, in_memory)?;
-        let (width, tasks, peak) = sizes.choose(&layout, &tree, memory)?;
-        let blocks = layout.blocks(width);
-        let plan = Plan {
+        Ok(Self { stiffness, symbolic, layout, tree })
+    }
+
+    /// Chooses blocks and tasks so that the peak stays within the bounds.
+    ///
+    /// # Errors
+    /// A bound that cannot be kept, with what would fit.
+    pub fn route(&self, precision: Precision, bounds: Bounds) -> Result<Route> {
+        let sizes = Sizes::new(self, precision, bounds)?;
+        let (width, tasks, peak) = sizes.choose(&self.layout, &self.tree, bounds.memory)?;
+        Ok(Route { blocks: self.layout.blocks(width), width, tasks, peak })
+    }
+
+    /// The counts of a route.
+    ///
+    /// # Errors
+    /// Never: the structure is made supernodal.
+    pub fn plan(&self, problem: &Problem, precision: Precision, route: &Route) -> Result<Plan> {
+        let Self { stiffness, symbolic, layout, tree } = self;
+        let system = System { stiffness, supports: &problem.supports, layout };
+        Ok(Plan {
+            precision,
             free_dofs: problem.supports.free.len(),
             columns: layout.columns,
             rows: layout.rows(),
             factor_entries: symbolic.supernodes()?.len_val(),
             factor_flops: symbolic.flops()?,
-            sweep_flops: blocks.iter().map(|block| sweep_flops(&system, &tree, block)).sum(),
+            sweep_flops: route.blocks.iter().map(|block| sweep_flops(&system, tree, block)).sum(),
             surface_last_flops: ((layout.columns - layout.supported) as f64).powi(3),
-            width,
-            tasks,
-            memory: peak,
+            width: route.width,
+            tasks: route.tasks,
+            memory: route.peak,
             store: layout.columns * layout.rows() * precision.bytes(),
-        };
-        Ok(Self { stiffness, symbolic, layout, tree, blocks, plan })
+        })
     }
 }
 
@@ -114,7 +151,7 @@ fn sweep_flops(system: &System<'_>, tree: &Tree, block: &Block) -> f64 {
 struct Sizes {
     /// Matrix and structure, held throughout.
     matrix: usize,
-    /// Beside it during the factorisation, and while the operators are made from the factor.
+    /// Beside it during the factorisation, and while the operators are made from the factor and probed.
     factorising: usize,
     making: usize,
     /// The operators.
@@ -127,29 +164,27 @@ struct Sizes {
 }
 
 impl Sizes {
-    fn new(
-        system: &System<'_>,
-        symbolic: &Symbolic,
-        tree: &Tree,
-        precision: Precision,
-        in_memory: bool,
-    ) -> Result<Self> {
+    fn new(prepared: &Prepared, precision: Precision, bounds: Bounds) -> Result<Self> {
+        let Prepared { stiffness, symbolic, layout, tree } = prepared;
         let supernodes = symbolic.supernodes()?;
-        let (layout, stored, computed) = (system.layout, precision.panel_bytes(), precision.computed_bytes());
+        let (stored, computed) = (precision.panel_bytes(), precision.computed_bytes());
+        let measured = if bounds.choosing { Precision::F64.computed_bytes() } else { computed };
         let factor = 8 * supernodes.len_val();
         let lower = 16 * symbolic.matrix_entries();
-        let dofs = system.stiffness.dimension;
+        let dofs = stiffness.dimension;
         let structure = 8 * supernodes.row_idx().len() + 64 * dofs + 4 * tree.boundaries.len();
         let numbers: usize = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).sum();
         let largest = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).max().unwrap_or(0);
+        // Three columns at a time by the factor, with residual and correction; then those of a patch by sweeps.
+        let probing = (3 * 8 * largest).max(measured * scratch_numbers(tree, probe::WIDTH)).max(9 * 8 * dofs);
         let panels: usize = layout.blocks(WIDTHS[0]).iter().map(Block::len).sum();
         let held = stored * panels + precision.bytes() * layout.columns * layout.rows();
         Ok(Self {
-            matrix: 12 * system.stiffness.values.len() + structure + OVERHEAD_BYTES,
+            matrix: 12 * stiffness.values.len() + structure + OVERHEAD_BYTES,
             factorising: factor + lower + symbolic.scratch_bytes(faer::Par::rayon(0)),
-            making: factor + computed * numbers + 3 * 8 * largest,
+            making: factor + measured * numbers + probing,
             operators: computed * numbers,
-            result: if in_memory { held } else { 0 },
+            result: if bounds.in_memory { held } else { 0 },
             stored,
             computed,
         })

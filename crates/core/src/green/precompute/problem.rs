@@ -25,8 +25,9 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Content key of the Green's function with this precision: mesh, materials, supports, loads, touch region.
-    pub fn key(&self, precision: Precision) -> String {
+    /// Content key of the Green's function with this precision (`None`: chosen by the body): mesh, materials, supports,
+    /// loads, touch region.
+    pub fn key(&self, precision: Option<Precision>) -> String {
         let mut key = ContentKey::new(self.mesh.tets.element_name(), precision);
         key.section(bytemuck::cast_slice(&self.mesh.nodes));
         key.section(bytemuck::cast_slice(self.mesh.tets.as_flattened()));

@@ -1,10 +1,13 @@
-//! Sixteen bits an entry: `Psi_ij = s_i s_j q_ij`, `q` an integer, with one scale a dof, so that `q` is as symmetric as
-//! `Psi`.
+//! The bound of every row, which scales entries of sixteen bits and measures the error of all.
 //!
 //! With `s_i^2` the compliance `Psi_ii` of a free dof and the stiffness `K_ii` of a supported one, the inequality of
 //! Cauchy and Schwarz in the inner product of `K_NN^-1` gives `|Psi_ij| <= s_i s_j` for every pair: `Psi_NN` directly,
 //! `Psi_DD <= K_DD` because the subtracted part is positive, and `(Psi_ND)_ij^2 <= Psi_ii (K - Psi)_jj`. Rows without a
-//! column have no mirror and are scaled by their largest entry.
+//! column have no mirror; theirs follows from their largest entry.
+//!
+//! Sixteen bits an entry: `Psi_ij = s_i s_j q_ij / RANGE`, `q` an integer, with one scale a dof, so that `q` is as symmetric as
+//! `Psi`. A scale a block of nodes gains nothing: neighbours have about the same bound, and what hurts is rounding relative
+//! to it in nearly dependent columns.
 //!
 //! Half-precision floats of the same size and scales were measured beside these integers and lose: what a contact solves
 //! with are the entries near their bound, and those have 15 bits here and 11 there (nodal forces under 20 neighbouring
@@ -16,26 +19,22 @@ use super::number::Number;
 use crate::Result;
 use crate::fem::SymmetricCsc;
 
-/// Largest `|q|`.
-const RANGE: f64 = i16::MAX as f64;
-
-/// Scale of every row of the store; a column has that of its row.
+/// Bound `s_i` of every row of the store.
 ///
 /// # Errors
 /// That of reading a panel.
-pub fn scales<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -> Result<Vec<f64>> {
+pub fn magnitudes<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -> Result<Vec<f64>> {
     let Layout { row_dofs, order, columns, supported, place_of_stored, .. } = mirror.layout;
-    let own = |dof: u32| stiffness.column(dof as usize).find(|&(row, _)| row == dof).map_or(0.0, |(_, value)| value);
     let mut of_place: Vec<f64> = mirror.diagonal()?.into_iter().map(Number::to_f64).collect();
-    for (scale, &row) in of_place.iter_mut().zip(&order[..*supported]) {
-        *scale = own(row_dofs[row as usize]);
+    for (square, &row) in of_place.iter_mut().zip(&order[..*supported]) {
+        *square = stiffness.diagonal(row_dofs[row as usize]);
     }
-    of_place.iter_mut().for_each(|scale| *scale = (*scale / RANGE).sqrt());
+    of_place.iter_mut().for_each(|square| *square = square.sqrt());
     let mut largest = vec![0.0f64; order.len() - columns];
     mirror.rows_without_column(&mut |row, column, value| {
         largest[row - columns] = largest[row - columns].max(value.to_f64().abs() / of_place[column]);
     })?;
-    of_place.extend(largest.into_iter().map(|value| if value > 0.0 { value / RANGE } else { 1.0 }));
+    of_place.extend(largest.into_iter().map(|value| if value > 0.0 { value } else { 1.0 }));
     Ok(place_of_stored.iter().map(|&place| of_place[place as usize]).collect())
 }
 

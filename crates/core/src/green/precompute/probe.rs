@@ -1,0 +1,231 @@
+//! The error of the columns of a body, measured on a few of them before the others are computed.
+//!
+//! The three columns of some nodes are solved by the factor and corrected by their residuals: `x + K^-1 (f - K x)`, which
+//! leaves what rounding the entries of `K` itself does. Beside them stand the columns that the sweeps give, and with the
+//! patches around those nodes typical contacts are solved: their errors by the same estimate as an answer's
+//! ([`crate::green::accuracy`]).
+
+use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::{Mat, MatMut, Side};
+use glam::{DMat3, DVec3};
+
+use super::free_response::subtract_product;
+use super::number::Number;
+use super::problem::Problem;
+use super::sweep::{Scratch, Source, Sweep, loaded, readers};
+use super::system::System;
+use crate::green::accuracy::{Accuracy, Pressed, ROUNDING_MARGIN, rounding_noise, unknown_errors};
+use crate::green::precision::Precision;
+use crate::solver::{Condition, Factor};
+
+/// Patches that are probed, and nodes of each: some per cent of the columns of a body of 600 touchable nodes.
+const PATCHES: usize = 3;
+const NODES: usize = 8;
+/// Columns of a patch.
+pub const WIDTH: usize = 3 * NODES;
+
+/// A few neighbouring touchable nodes, free along all axes; the first is the one they lie around.
+pub struct Patch {
+    /// Their dofs.
+    dofs: Vec<u32>,
+    /// Right rows of the first node's three columns.
+    exact: Vec<[f64; 3]>,
+}
+
+/// What is compared with.
+pub struct Probe {
+    patches: Vec<Patch>,
+    /// Error of the factor's own columns: `|w_j| / s_j`.
+    pub factor_error: f64,
+}
+
+impl Probe {
+    /// Chooses patches, the first where the body is softest beside its own stiffness, the others far from it, and solves.
+    pub fn new(problem: &Problem, system: &System<'_>, factor: &Factor, condition: &Condition) -> Self {
+        let mut probe = Self { patches: Vec::new(), factor_error: 0.0 };
+        for nodes in chosen_patches(problem, condition) {
+            let dofs: Vec<u32> = nodes.into_iter().flat_map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
+            let (exact, error) = exact_columns(system, factor, &dofs);
+            probe.factor_error = probe.factor_error.max(error);
+            probe.patches.push(Patch { dofs, exact });
+        }
+        if probe.patches.is_empty() {
+            // Nothing but supports may be touched: what the condition number allows.
+            probe.factor_error = condition.number * f64::EPSILON;
+        }
+        probe
+    }
+
+    /// Whether there is no patch: only supports may be touched.
+    pub fn is_empty(&self) -> bool {
+        self.patches.is_empty()
+    }
+
+    /// `Psi` between the dofs of every patch as the sweeps compute it.
+    pub fn squares<C: Number>(&self, system: &System<'_>, sweep: &Sweep<C>) -> Squares {
+        let mut scratch = Scratch::new(&sweep.tree, WIDTH);
+        let of = |patch: &Patch| swept(system, sweep, &mut scratch, &patch.dofs);
+        Squares(self.patches.iter().map(of).collect())
+    }
+
+    /// Largest error of what the sweeps computed, over `s_i s_j`.
+    pub fn computed_error(&self, squares: &Squares) -> f64 {
+        let mut largest = self.factor_error;
+        for (patch, square) in self.patches.iter().zip(&squares.0) {
+            for (i, exact) in patch.exact.iter().enumerate() {
+                for (j, exact) in exact.iter().enumerate() {
+                    let bound = (square[(i, i)] * square[(j, j)]).sqrt();
+                    largest = largest.max((square[(i, j)] - exact).abs() / bound);
+                }
+            }
+        }
+        // A column of no number is as wrong as can be.
+        if largest.is_finite() { largest } else { 1.0 }
+    }
+}
+
+/// `Psi` between the dofs of each patch.
+pub struct Squares(Vec<Mat<f64>>);
+
+impl Squares {
+    /// Errors of typical contacts with these entries: of the force of pressed nodes and patches, and of nodal forces under
+    /// stamps.
+    pub fn typical(&self, computed: f64, loads: f64, precision: Precision) -> Accuracy {
+        // Contacts are as deep as they please, loads are not: theirs is told by the answers.
+        let entries = Accuracy { computed, ..Accuracy::default() };
+        let mut typical = Accuracy { computed, loads, ..Accuracy::default() };
+        for square in &self.0 {
+            for count in [1, square.nrows() / 3] {
+                typical.touch = typical.touch.max(pressed_error(square, count, entries, precision));
+            }
+            typical.stamp = typical.stamp.max(stamp_error(square, entries, precision));
+        }
+        typical
+    }
+}
+
+/// Nodes of every patch.
+fn chosen_patches(problem: &Problem, condition: &Condition) -> Vec<Vec<u32>> {
+    let supports = &problem.supports;
+    let free = |&node: &u32| (3 * node..3 * node + 3).all(|dof| !supports.is_fixed(dof));
+    let nodes: Vec<u32> = problem.touch.iter().map(|&t| problem.surface_nodes[t as usize]).filter(free).collect();
+    let amplitude = |node: u32| -> f64 {
+        (3 * node..3 * node + 3).map(|dof| condition.direction[supports.free_rank[dof as usize] as usize].powi(2)).sum()
+    };
+    let position = |node: u32| problem.mesh.nodes[node as usize];
+    let mut centres: Vec<u32> = Vec::new();
+    for _ in 0..PATCHES.min(nodes.len()) {
+        let distance = |node: u32| -> f64 {
+            let distances = centres.iter().map(|&c| position(c).distance_squared(position(node)));
+            distances.fold(f64::INFINITY, f64::min)
+        };
+        let rank = |node: u32| if centres.is_empty() { amplitude(node) } else { distance(node) };
+        let farthest = nodes.iter().copied().max_by(|&a, &b| rank(a).total_cmp(&rank(b)));
+        centres.extend(farthest);
+    }
+    let around = |centre: u32| {
+        let mut near = nodes.clone();
+        near.sort_by(|&a, &b| {
+            let distance = |node: u32| position(centre).distance_squared(position(node));
+            distance(a).total_cmp(&distance(b)).then(a.cmp(&b))
+        });
+        near.truncate(NODES);
+        near
+    };
+    centres.into_iter().map(around).collect()
+}
+
+/// Rows `dofs` of the columns of the first three, corrected; and the largest `|w_j| / s_j` before that.
+fn exact_columns(system: &System<'_>, factor: &Factor, dofs: &[u32]) -> (Vec<[f64; 3]>, f64) {
+    let (stiffness, supports) = (system.stiffness, system.supports);
+    let count = supports.free.len();
+    let rank = |dof: u32| supports.free_rank[dof as usize] as usize;
+    let mut memory = factor.solve_scratch(3);
+    let mut solve =
+        |x: &mut [f64]| factor.solve_in_place(MatMut::from_column_major_slice_mut(x, count, 3), &mut memory);
+    let mut columns = vec![0.0; 3 * count];
+    for (k, &dof) in dofs[..3].iter().enumerate() {
+        columns[k * count + rank(dof)] = 1.0;
+    }
+    let mut residual = columns.clone();
+    solve(&mut columns);
+    for (x, r) in columns.chunks_exact(count).zip(residual.chunks_exact_mut(count)) {
+        subtract_product(stiffness, supports, x, r);
+    }
+    let mut correction = residual.clone();
+    solve(&mut correction);
+    let mut error = 0.0f64;
+    for (k, &dof) in dofs[..3].iter().enumerate() {
+        let part = k * count..(k + 1) * count;
+        let energy: f64 = residual[part.clone()].iter().zip(&correction[part]).map(|(r, e)| r * e).sum();
+        error = error.max((energy.abs() / columns[k * count + rank(dof)]).sqrt());
+    }
+    columns.iter_mut().zip(&correction).for_each(|(x, e)| *x += e);
+    let row = |&dof: &u32| [0, 1, 2].map(|k| columns[k * count + rank(dof)]);
+    (dofs.iter().map(row).collect(), error)
+}
+
+/// The patch's rows of its columns, as the sweeps compute them; the mean of both halves.
+fn swept<C: Number>(system: &System<'_>, sweep: &Sweep<C>, scratch: &mut Scratch<C>, dofs: &[u32]) -> Mat<f64> {
+    let (tree, width) = (&sweep.tree, dofs.len());
+    let rows: Vec<u32> = dofs.iter().filter_map(|&dof| system.layout.kept(tree, system.supports, dof)).collect();
+    let source = |(column, &row): (usize, &u32)| Source { row, column: column as u32, value: 1.0 };
+    let sources: Vec<Source> = rows.iter().enumerate().map(source).collect();
+    sweep.solve(scratch, &sources, &loaded(tree, width, &sources), &readers(tree, width, None));
+    let value = |i: usize, j: usize| scratch.row(rows[i], width)[j].to_f64();
+    Mat::from_fn(width, width, |i, j| 0.5 * (value(i, j) + value(j, i)))
+}
+
+/// Largest relative error of the force on the first `count` nodes of a patch, pressed as one along each axis.
+fn pressed_error(square: &Mat<f64>, count: usize, accuracy: Accuracy, precision: Precision) -> f64 {
+    let weight = 1.0 / count as f64;
+    let (mut compliance, mut independent, mut coherent) = (DMat3::ZERO, DVec3::ZERO, DVec3::ZERO);
+    for i in 0..3 * count {
+        for j in 0..3 * count {
+            compliance.col_mut(j % 3)[i % 3] += weight * weight * square[(i, j)];
+        }
+        independent[i % 3] += weight * weight * square[(i, i)];
+        coherent[i % 3] += weight * square[(i, i)].sqrt();
+    }
+    let (stiffness, prescribed) = (compliance.inverse(), [true; 3]);
+    let independent = independent.map(f64::sqrt);
+    let of_axis = |axis: usize| {
+        let force = stiffness.col(axis);
+        let pressed = Pressed { stiffness, prescribed, independent, coherent, force };
+        pressed.error(accuracy, precision).force / force.length()
+    };
+    (0..3).map(of_axis).map(finite).fold(0.0, f64::max)
+}
+
+/// Largest relative error of the nodal forces under a patch whose nodes are all moved along one axis.
+fn stamp_error(square: &Mat<f64>, accuracy: Accuracy, precision: Precision) -> f64 {
+    let n = square.nrows();
+    let magnitude: Vec<f64> = (0..n).map(|i| square[(i, i)].sqrt()).collect();
+    let scaled = Mat::from_fn(n, n, |i, j| square[(i, j)] / (magnitude[i] * magnitude[j]));
+    let Ok(factor) = scaled.llt(Side::Lower) else { return 1.0 };
+    let inverse = factor.inverse();
+    let of_axis = |axis: usize| {
+        let moved = Mat::from_fn(n, 1, |i, _| if i % 3 == axis { 1.0 / magnitude[i] } else { 0.0 });
+        let scaled_force = factor.solve(&moved);
+        let size = scaled_force.norm_l2();
+        let noise: Vec<f64> = (0..n)
+            .map(|i| match precision {
+                Precision::F16 => rounding_noise(precision, 1.0, size),
+                _ => {
+                    let squares: f64 = (0..n).map(|j| (scaled[(i, j)] * scaled_force[(j, 0)]).powi(2)).sum();
+                    ROUNDING_MARGIN * precision.unit_roundoff() * squares.sqrt()
+                }
+            })
+            .collect();
+        let errors = unknown_errors(inverse.as_ref(), &noise, accuracy.residual(size));
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |m, x| m.max(x.abs()));
+        let error = largest(&mut errors.iter().zip(&magnitude).map(|(e, s)| e / s));
+        error / largest(&mut magnitude.iter().enumerate().map(|(i, s)| scaled_force[(i, 0)] / s))
+    };
+    (0..3).map(of_axis).map(finite).fold(0.0, f64::max)
+}
+
+/// An error without a number is one of everything.
+fn finite(error: f64) -> f64 {
+    if error.is_finite() { error } else { 1.0 }
+}
