@@ -124,14 +124,13 @@ def drag(page, start: tuple[float, float], end: tuple[float, float], steps: int 
         time.sleep(pause)
 
 
-# Parts of the force that it changes by at rest. A sphere's closed form is solved to 1e-7 a tick; of the pressure cells
-# under other shapes one opens or closes now and then, which is worth up to 3e-4 (measured over 5000 ticks at rest).
-STILL, STILL_CELLS = 1e-6, 5e-4
+# Part of the force that it changes by at rest: the tool comes ever nearer to where the pointer wants it.
+STILL = 1e-6
 # So far apart forces are compared, in ticks of the loop: on a page that draws nothing new they stand still.
 TICKS_APART = 250
 
 
-def settled_force(page, still: float = STILL) -> np.ndarray:
+def settled_force(page) -> np.ndarray:
     """Force once it stands still within a part of itself."""
     ticks, before, end = -np.inf, np.full(3, np.inf), time.monotonic() + 60.0
     while time.monotonic() < end:
@@ -140,7 +139,7 @@ def settled_force(page, still: float = STILL) -> np.ndarray:
         if passed < TICKS_APART:
             time.sleep(0.05)
             continue
-        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= still * np.linalg.norm(now):
+        if np.linalg.norm(now) > 0 and np.linalg.norm(now - before) <= STILL * np.linalg.norm(now):
             return now
         ticks, before = seen["ticks"], now
     raise AssertionError("the force does not settle")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browser import MARKS, STILL_CELLS, Program, drag, press, settled_depth, settled_force, state, until
+from browser import MARKS, Program, drag, press, settled_depth, settled_force, state, until
 
 from palpate.vectors import rotated
 
@@ -42,7 +42,7 @@ def test_a_stylus_lies_on_the_body_and_is_turned_by_hand(page):
     x, y = page.evaluate("window.palpate.pickPoint()")
     press(page)
     assert page.locator("#tilt-value").input_value() == "90°"
-    normal = settled_force(page, STILL_CELLS)
+    normal = settled_force(page)
     normal /= np.linalg.norm(normal)
     lying = axis_of(page)
     assert abs(lying @ normal) < 0.3
@@ -51,20 +51,20 @@ def test_a_stylus_lies_on_the_body_and_is_turned_by_hand(page):
     page.keyboard.down("Alt")
     drag(page, (x, y), (x + 100, y))
     page.keyboard.up("Alt")
-    settled_force(page, STILL_CELLS)
+    settled_force(page)
     assert page.locator("#turn-value").input_value() == "50°"
     assert np.degrees(np.arccos(lying @ axis_of(page))) == pytest.approx(50, abs=3)
     assert settled_depth(page) == depth and state(page)["contacts"] == 1
     page.keyboard.down("Alt")
     drag(page, (x + 100, y), (x + 100, y - 180))
     page.keyboard.up("Alt")
-    settled_force(page, STILL_CELLS)
+    settled_force(page)
     assert page.locator("#tilt-value").input_value() == "0°"
     assert axis_of(page) @ normal > 0.9
     # A drag without Alt slides on from where it was, not from under the pointer.
     before = np.array(state(page)["tools"][0]["position"])
     drag(page, (x + 100, y - 180), (x + 102, y - 180))
-    settled_force(page, STILL_CELLS)
+    settled_force(page)
     assert np.linalg.norm(np.array(state(page)["tools"][0]["position"]) - before) < 5e-3
     page.mouse.up()
     until(page, lambda s: s["contacts"] == 0)
@@ -77,7 +77,7 @@ def test_a_flat_punch_is_stiffer_than_a_ball_and_softer_on_its_rim(page):
         if shape == "punch":
             slide_to(page, "tilt", tilt)
         press(page)
-        forces[shape, tilt] = np.linalg.norm(settled_force(page, STILL_CELLS))
+        forces[shape, tilt] = np.linalg.norm(settled_force(page))
         page.mouse.up()
         until(page, lambda s: s["contacts"] == 0)
     assert forces["punch", 0] > 1.3 * forces["sphere", 0]

@@ -51,6 +51,9 @@ const JUMP: f64 = 2.0;
 /// not quite the level sets of a distance.
 const WAY: f64 = 2.0;
 
+/// A place is expected to go no farther than this many times as far as its tool.
+const AHEAD: f64 = 1.5;
+
 /// The law.
 pub struct Local;
 
@@ -193,7 +196,13 @@ impl Law for Local {
 
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
         let local = &mut contact.local;
-        let jumped = approach.position.distance(local.tool) > JUMP * approach.tool.radius;
+        let gone = approach.position.distance(local.tool);
+        let jumped = gone > JUMP * approach.tool.radius;
+        // A place over the surface at rest goes about as far as its tool, or less. What it has gone beyond is the remainder of the
+        // method, less than its tolerance a tick: it would be repeated until the tolerance is passed, then taken back at once.
+        if approach.motion.is_none() {
+            local.advance = local.advance.clamp_length_max(AHEAD * gone);
+        }
         (local.tool, local.orientation) = (approach.position, approach.orientation);
         // Withdrawn, it may come in again as deep as it has been left.
         !approach.grab && !jumped
