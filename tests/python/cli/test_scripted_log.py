@@ -78,5 +78,5 @@ def test_the_depth_in_a_groove_is_that_of_the_wall_that_is_pressed_farther():
             # The device is there within some hundredths of a second.
             time.sleep(1.0)
             frame = simulation.frame()
-            assert len(frame.contacts) == 2
             assert scripted.depth_of_first_tool(frame) == expected
+    assert len(frame.contacts) == 2
