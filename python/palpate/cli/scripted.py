@@ -72,7 +72,7 @@ def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
                 logs.append(simulation.drain_log())
                 # The press is along a line: the largest force has the largest strain.
                 frame = simulation.frame()
-                depths.append((frame.time, _depth(frame)))
+                depths.append((frame.time, depth_of_first_tool(frame)))
                 if STRAIN_SAMPLES * elapsed >= len(sampled) * seconds:
                     sampled.append(frame)
                 hardest = max(hardest, frame, key=_force_on_body)
@@ -111,12 +111,14 @@ def _force_on_body(frame: Frame) -> float:
     return float(np.linalg.norm(np.sum(forces, axis=0))) if forces else 0.0
 
 
-def _depth(frame: Frame) -> float:
-    """Approach of the first tool and the surface, m; of a tool that sticks to its patch how far that was pushed in."""
-    contact = next((contact for contact in frame.contacts if contact.tool == 0), None)
-    if contact is None:
-        return 0.0
-    return contact.depth or -float(contact.displacement @ contact.normal)
+def depth_of_first_tool(frame: Frame) -> float:
+    """Approach of the first tool and the surface, m; of a tool that sticks to its patch how far that was pushed in.
+
+    Of a tool that touches at several places, where it is deepest.
+    """
+    pressed = [contact for contact in frame.contacts if contact.tool == 0]
+    depths = [contact.depth or -float(contact.displacement @ contact.normal) for contact in pressed]
+    return max(depths, default=0.0)
 
 
 def _at_ticks(time_of_ticks: np.ndarray, samples: Sequence[tuple[float, float]]) -> np.ndarray:

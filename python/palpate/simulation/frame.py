@@ -121,7 +121,7 @@ class Frame(ComparedByValue, Exported):
     limited
         (tools,) whether each tool is kept from following its device by the limit of strain.
     contacts
-        Of the tools that touch.
+        One for each place at which a tool touches a body: up to three a tool and body under the local law.
     bodies
         One a body of the scene.
     statistics

@@ -13,6 +13,8 @@ import pytest
 from command_line import run
 
 import palpate
+from palpate.cli import scripted
+from palpate.validation.verify.contact import groove
 
 SCENE = '[body]\nmodel = "kidney"\npaper = true\n[tool]\ncontact = "patch"\ncontact_radius = "6mm"\n'
 
@@ -63,3 +65,18 @@ def test_the_log_is_kept_on_ctrl_c(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["a.csv", "a.png", "a.toml", "cache"]
     log = read_log(tmp_path / "a.csv")
     assert 1.0 < log["time_s"][-1] < 20 and len(log) > 500
+
+
+def test_the_depth_in_a_groove_is_that_of_the_wall_that_is_pressed_farther():
+    """Between walls at 45 degrees a sphere beside the middle, by s, is as much deeper in one: (d + |s|) / sqrt(2)."""
+    down, aside = 1e-3, 0.4e-3
+    expected = pytest.approx((down + aside) / np.sqrt(2), rel=0.03)
+    with groove.grooved_loop() as simulation:
+        # The wall that is left behind was touched first.
+        for place in (-aside, aside):
+            simulation.move(np.array([place, 0.0, groove.TOUCHES]) + down * groove.DOWN)
+            # The device is there within some hundredths of a second.
+            time.sleep(1.0)
+            frame = simulation.frame()
+            assert scripted.depth_of_first_tool(frame) == expected
+    assert len(frame.contacts) == 2

@@ -5,6 +5,7 @@ import * as THREE from "three";
 import type { FrameData, FrameMessage, SceneData } from "../net/protocol";
 import { grouped } from "../regions";
 import type { Store, Theme } from "../store";
+import { contactsOf } from "../tool_contacts";
 import { BodyView } from "./body_view";
 import type { Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
@@ -102,8 +103,8 @@ export class Stage {
     this.tools.forEach((view, i) => {
       const tool = frame.tools[i];
       if (!tool) return;
-      const contact = frame.contacts.find((one) => one.tool === i) ?? null;
-      changed = view.update({ tool, contact, pinned: pinned.includes(i) }) || changed;
+      const contacts = contactsOf(frame.contacts, i);
+      changed = view.update({ tool, contacts, pinned: pinned.includes(i) }) || changed;
     });
     return changed;
   }

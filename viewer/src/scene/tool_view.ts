@@ -1,10 +1,12 @@
-// A tool, the patch it touches, the force on its device as an arrow, and a pin where it was left.
+// A tool, the patches it touches, the force on its device as an arrow, and a pin where it was left.
 
 import * as THREE from "three";
 
 import type { ContactMessage, SceneMessage, ToolFrame, ToolMessage, Vec3 } from "../net/protocol";
+import { deepest } from "../tool_contacts";
 import type { BodyView } from "./body_view";
 import { closestSurfacePoint } from "./closest_point";
+import { ContactRings } from "./contact_rings";
 import { ForceArrow } from "./force_arrow";
 import { LimitView } from "./limit_view";
 import { PinView } from "./pin_view";
@@ -12,28 +14,33 @@ import type { SurfacePoint } from "./surface";
 import { originAt } from "./tool_shape";
 import type { SurfaceSpot, ToolShape } from "./tool_shape";
 
-const RING_COLOR = 0xfff3d6;
 /** A contact smaller than this, over the size of the scene, is shown as a ring of this radius all the same. */
 const RING_MIN = 0.004;
-const FORWARD = new THREE.Vector3(0, 0, 1);
 
 /** A tool in a frame. */
 export interface ToolPose {
   tool: ToolFrame;
-  contact: ContactMessage | null;
+  contacts: ContactMessage[];
   pinned: boolean;
+}
+
+/** Where a contact sits on its body. */
+interface Touched {
+  body: number;
+  point: Vec3;
+  place: SurfacePoint;
 }
 
 export class ToolView {
   readonly group = new THREE.Group();
   private readonly solid: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
-  private readonly ring: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
+  private readonly rings = new ContactRings();
   private readonly arrow: ForceArrow;
   private readonly limit: LimitView;
   private readonly pin: PinView;
   private drawnState = "";
-  /** Where the current contact sits; looked for again where it has slid. */
-  private touched: { body: number; point: Vec3; place: SurfacePoint } | null = null;
+  /** Of the current contacts; looked for again where one has slid. */
+  private touched: Touched[] = [];
 
   constructor(
     private readonly scene: SceneMessage,
@@ -47,37 +54,32 @@ export class ToolView {
       // Of glass, so that the dent below it is seen.
       new THREE.MeshStandardMaterial({ color: 0xd5dbe3, roughness: 0.28, metalness: 0.15, transparent: true, opacity: 0.5 }),
     );
-    this.ring = new THREE.Mesh(
-      new THREE.RingGeometry(0.93, 1, 64),
-      new THREE.MeshBasicMaterial({
-        color: RING_COLOR,
-        side: THREE.DoubleSide,
-        transparent: true,
-        opacity: 0.85,
-        depthTest: false,
-      }),
-    );
     this.arrow = new ForceArrow(size, scene.max_force);
     this.limit = new LimitView(tool.radius);
     this.pin = new PinView();
-    this.group.add(this.solid, this.ring, this.arrow.group, this.limit.group, this.pin.sprite);
+    this.group.add(this.solid, this.rings.group, this.arrow.group, this.limit.group, this.pin.sprite);
     this.group.visible = false;
   }
 
-  /** Tells whether the picture changes. The ring of a contact moves with the body: call it after the bodies moved. */
+  /** Tells whether the picture changes. The rings of contacts move with the bodies: call it after these moved. */
   update(pose: ToolPose): boolean {
-    const { tool, contact, pinned } = pose;
-    const touched = this.find(contact);
-    const offset = touched ? touched.body.exaggerationAt(touched.place).toArray() : [0, 0, 0];
+    const { tool, pinned } = pose;
+    const contacts = pose.contacts.filter(({ body }) => body < this.bodies.length);
+    this.touched = contacts.map((contact) => this.find(contact));
+    // Of several places, the deepest is the one that the tool is drawn at.
+    const contact = deepest(contacts);
+    const touched = contact && this.touched[contacts.indexOf(contact)]!;
+    const offset = touched ? this.bodies[touched.body]!.exaggerationAt(touched.place).toArray() : [0, 0, 0];
     const state = JSON.stringify([pose, offset]);
     if (state === this.drawnState) return false;
     this.drawnState = state;
     const [w, x, y, z] = tool.orientation;
     this.group.visible = tool.active;
     this.solid.quaternion.set(x, y, z, w);
-    const shown = touched && shownAt(touched, offset);
-    // A tool that slides is held by its force: it is drawn on the surface that gives no farther.
-    const held = tool.limited && shown !== null && contact?.depth != null;
+    const shown = touched && this.shownAt(touched, offset);
+    // A tool that slides is held by its force: it is drawn on the surface that gives no farther. One that several places
+    // hold is where the server has it: on one of them it would be drawn into the others.
+    const held = tool.limited && shown !== null && contact?.depth != null && contacts.length === 1;
     const place = held ? originAt(this.shape, this.solid.quaternion, shown, 0).toArray() : tool.position;
     this.solid.position.set(...place);
     this.limit.update(place, tool.wanted);
@@ -86,21 +88,27 @@ export class ToolView {
     this.arrow.update(this.pressedFrom(place, shown), this.tool.radius, tool.active ? tool.force : [0, 0, 0]);
     // Where displacements are drawn larger than they are, the tool goes with the surface that it touches.
     this.group.position.fromArray(offset);
-    this.ring.visible = shown !== null;
-    if (contact && shown) this.drawRing(contact, shown);
+    const smallest = RING_MIN * this.scene.size;
+    this.rings.update(
+      this.touched.map((one, i) => ({ ...this.shownAt(one, offset), radius: Math.max(contacts[i]!.radius, smallest) })),
+    );
     return true;
   }
 
-  private find(contact: ContactMessage | null): { body: BodyView; place: SurfacePoint } | null {
-    const body = contact ? this.bodies[contact.body] : undefined;
-    if (!contact || !body) {
-      this.touched = null;
-      return null;
-    }
-    if (this.touched?.body !== contact.body || !samePoint(this.touched.point, contact.point)) {
-      this.touched = { body: contact.body, point: contact.point, place: closestSurfacePoint(body.surface, contact.point) };
-    }
-    return { body, place: this.touched.place };
+  private find({ body, point }: ContactMessage): Touched {
+    const known = this.touched.find((one) => one.body === body && samePoint(one.point, point));
+    return known ?? { body, point, place: closestSurfacePoint(this.bodies[body]!.surface, point) };
+  }
+
+  /** Where a place of the rest surface is drawn, and the normal there, less an offset of the whole tool. */
+  private shownAt({ body, place }: Touched, offset: number[]): SurfaceSpot {
+    const { surface, placed } = this.bodies[body]!;
+    const point = new THREE.Vector3(...surface.at(surface.shown, place)).applyMatrix4(placed.matrix);
+    const normal = new THREE.Vector3(...surface.at(surface.shownNormals, place)).normalize();
+    return {
+      point: point.sub(new THREE.Vector3().fromArray(offset)),
+      normal: normal.applyQuaternion(placed.quaternion),
+    };
   }
 
   /** A radius above the place of the tool that presses: of a sphere its centre, of a stylus on its side its middle. */
@@ -112,36 +120,15 @@ export class ToolView {
     return pressing.addScaledVector(shown.normal, this.tool.radius).add(new THREE.Vector3(...place)).toArray();
   }
 
-  private drawRing(contact: ContactMessage, { point, normal }: SurfaceSpot): void {
-    this.ring.position.copy(point);
-    this.ring.quaternion.setFromUnitVectors(FORWARD, normal);
-    this.ring.scale.setScalar(Math.max(contact.radius, RING_MIN * this.scene.size));
-  }
-
   dispose(): void {
     this.group.removeFromParent();
     this.limit.dispose();
     this.pin.dispose();
     this.arrow.dispose();
-    for (const mesh of [this.solid, this.ring]) {
-      mesh.geometry.dispose();
-      mesh.material.dispose();
-    }
+    this.rings.dispose();
+    this.solid.geometry.dispose();
+    this.solid.material.dispose();
   }
-}
-
-/** Where a place of the rest surface is drawn, and the normal there, less an offset of the whole tool. */
-function shownAt(
-  { body, place }: { body: BodyView; place: SurfacePoint },
-  offset: number[],
-): SurfaceSpot {
-  const { surface, placed } = body;
-  const point = new THREE.Vector3(...surface.at(surface.shown, place)).applyMatrix4(placed.matrix);
-  const normal = new THREE.Vector3(...surface.at(surface.shownNormals, place)).normalize();
-  return {
-    point: point.sub(new THREE.Vector3().fromArray(offset)),
-    normal: normal.applyQuaternion(placed.quaternion),
-  };
 }
 
 function samePoint(a: Vec3, b: Vec3): boolean {

@@ -28,6 +28,16 @@ describe("the log of a press", () => {
     expect(log.depth).toEqual([4]);
   });
 
+  it("takes the whole force of a tool at several places, and the depth of the deepest", () => {
+    const log = new PressLog();
+    const wall = (side: number, depth: number) => ({ ...press(0, depth, 0), force: [3 * side, 0, -4] });
+    log.append(frame(wall(-1, 1e-3), wall(1, 2e-3), press(1, 9e-3, 5)), 0);
+    log.append(frame(wall(1, 3e-3), wall(-1, 1e-3)), 0);
+    expect(log.depth).toEqual([2, 3]);
+    // What they push across, by 3 N each way, cancels.
+    expect(log.force).toEqual([8, 8]);
+  });
+
   it("leaves out what is held rather than pressed", () => {
     const log = new PressLog();
     log.append(frame({ ...press(0, 1e-3, 1), mode: "grab", depth: null }), 0);

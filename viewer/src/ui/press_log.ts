@@ -1,6 +1,7 @@
 // Force against depth of the press that is shown: one point a frame, from where it began; the next press begins anew.
 
 import type { FrameMessage } from "../net/protocol";
+import { contactsOf, deepest, wholeForce } from "../tool_contacts";
 
 /** A minute of frames. */
 const POINTS_MAX = 3600;
@@ -11,22 +12,23 @@ export class PressLog {
   readonly force: number[] = [];
   private tool: number | null = null;
 
-  /** Takes in the contact of a tool, the driven one or null. */
+  /** Takes in the whole force of a tool, the driven one or null, and how deep it is where it is deepest. */
   append({ contacts }: FrameMessage, tool: number | null): void {
-    const contact = contacts.find((one) => one.tool === tool && one.depth !== null);
+    const touching = contactsOf(contacts, tool);
+    const depth = deepest(touching)?.depth ?? null;
     // What was pressed last stays until something else is.
-    if (contact?.depth == null) {
+    if (depth === null) {
       this.tool = null;
       return;
     }
-    if (this.tool !== contact.tool) this.clear();
-    this.tool = contact.tool;
+    if (this.tool !== tool) this.clear();
+    this.tool = tool;
     if (this.depth.length === POINTS_MAX) {
       this.depth.shift();
       this.force.shift();
     }
-    this.depth.push(1000 * contact.depth);
-    this.force.push(Math.hypot(...contact.force));
+    this.depth.push(1000 * depth);
+    this.force.push(Math.hypot(...wholeForce(touching)));
   }
 
   clear(): void {

@@ -2,6 +2,7 @@
 
 import { drivenTool } from "../store";
 import type { State, Store } from "../store";
+import { contactsOf, deepest, feltStiffness } from "../tool_contacts";
 import { byId, setText } from "./dom";
 import { MINUS, millimetres, newtonsPerMillimetre, percent, signed, threeDigits } from "./numbers";
 
@@ -14,6 +15,7 @@ export class Readout {
   private readonly magnitude = byId("force-value");
   private readonly components = [byId("force-x"), byId("force-y"), byId("force-z")];
   private readonly stiffness = byId("stiffness-felt");
+  private readonly contactLabel = byId("contact-label");
   private readonly contact = byId("contact-value");
   private readonly pinned = byId("pinned-value");
   private readonly depthLabel = byId("depth-label");
@@ -46,14 +48,19 @@ export class Readout {
     if (driven?.refused) setText(this.refused, driven.refused);
   }
 
-  /** Of the driven tool: what is told of the contact itself, and until there is one what the pointer wants. */
+  /**
+   * Of the driven tool: what is told of the contact itself, and until there is one what the pointer wants. Of several
+   * places depth and radius are those of the deepest, whose depth is plotted too; all of the tool slides if each does.
+   */
   private showContact(state: Readonly<State>): void {
-    const { pressing, frame } = state;
-    const tool = drivenTool(state);
-    const contact = frame?.contacts.find((one) => one.tool === tool);
-    const stiffness = contact?.stiffness ?? null;
+    const { pressing, frame, scene } = state;
+    const contacts = contactsOf(frame?.contacts ?? [], drivenTool(state));
+    const contact = deepest(contacts);
+    const stiffness = feltStiffness(contacts, scene?.bodies ?? []);
     setText(this.stiffness, stiffness === null ? "–" : newtonsPerMillimetre(stiffness));
-    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${contact.slipping ? "slides" : "sticks"}` : "–");
+    const slides = contacts.every(({ slipping }) => slipping);
+    setText(this.contactLabel, contacts.length > 1 ? `${contacts.length} places` : "Contact");
+    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${slides ? "slides" : "sticks"}` : "–");
     setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
     const depth = contact?.depth ?? pressing?.depth;
     setText(this.depth, depth === undefined ? "–" : millimetres(depth).replace("-", MINUS));
