@@ -19,7 +19,7 @@ MAX_PAGE_LINES = 100
 CHAPTERS = ("element", "mesh", "fem", "solver", "green", "capacitance", "contact", "strain", "dynamics", "simulation")
 
 # What the online part of core builds without.
-OFFLINE_ONLY = {"faer", "metis-sys", "rayon", "memmap2"}
+OFFLINE_ONLY = {"faer", "metis-sys", "rayon"}
 
 # What each crate must not depend on, and why.
 FORBIDDEN = {

@@ -9,7 +9,7 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Mode, Model, Pose, Snapshot, StrainWatch, Strike};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
 
-use crate::clock::now_ns;
+use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::preparer::StrainPreparer;
 use crate::safety::{Fault, SafetyLimits};
@@ -66,7 +66,7 @@ pub struct Recording {
     pub displacements: Vec<DVec3>,
     /// Whether the limit of strain kept each tool from following its device (ticks x tools).
     pub limited: Vec<bool>,
-    /// What each tick took, ns: the only part that differs from run to run.
+    /// What each tick took of the thread's time, ns: the only part that differs from run to run.
     pub compute_ns: Vec<u64>,
     /// The first fault that latched.
     pub fault: Option<Fault>,
@@ -100,9 +100,9 @@ pub fn run(
             handle.set(settings)?;
         }
         preparation.hand_over(tick);
-        let begun = now_ns();
+        let begun = computed_ns();
         force_loop.tick((1e9 * script.period * tick as f64).round() as u64, script.period);
-        recording.compute_ns.push(now_ns() - begun);
+        recording.compute_ns.push(computed_ns() - begun);
         preparation.prepare(tick);
         let published = handle.latest();
         let (status, state) = (&published.status, &published.state);

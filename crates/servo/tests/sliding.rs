@@ -7,7 +7,7 @@ mod counting_allocator;
 
 use glam::{DQuat, DVec3};
 use palpate_core::contact::shape::ToolShape;
-use palpate_core::simulation::{MAX_TOOLS, Pose};
+use palpate_core::simulation::{Input, MAX_TOOLS, Pose, Scratch, State, ToolInput, step};
 use palpate_devices::{Reading, Wrench};
 use palpate_servo::{ForceLoop, SafetyLimits, Settings};
 
@@ -61,5 +61,32 @@ fn sliding_ticks_never_allocate_and_repeat_to_the_bit() {
         let pushed = wrenches.iter().map(|of_tick| of_tick[0].force.z).fold(0.0, f64::max);
         assert!(pushed > 0.01, "{pushed}");
         assert!(run(moving, [sphere(), shape.clone()]).0 == wrenches, "other bits");
+    }
+}
+
+/// Sixteen are the most that a tick may take, three where a tool takes pressure cells.
+#[test]
+fn newtons_method_takes_few_steps() {
+    let sphere = || ToolShape::sphere(0.01).expect("a sphere");
+    let capsule = ToolShape::capsule(0.005, 0.005).expect("a capsule");
+    for (shape, usual, most) in [(sphere(), 6, 10), (capsule, 3, 3)] {
+        let model = sliding(false, [sphere(), shape]);
+        let (mut state, mut scratch) = (State::new(&model), Scratch::new(&model));
+        let mut input = Input::default();
+        input.controls.friction = [0.3; MAX_TOOLS];
+        let mut taken = Vec::new();
+        for tick in 0..TICKS {
+            for tool in 0..2 {
+                let Reading { pose, active, .. } = reading(tool, tick);
+                input.tools[tool] = ToolInput { pose, active, ..ToolInput::default() };
+            }
+            step(&model, &mut state, &mut scratch, &input);
+            if state.contacts.iter().count() == 2 {
+                taken.push(scratch.newton_steps());
+            }
+        }
+        taken.sort_unstable();
+        assert!(taken.len() > 200);
+        assert!(taken[taken.len() / 2] <= usual && taken[taken.len() - 1] <= most, "{:?}", &taken[taken.len() - 5..]);
     }
 }

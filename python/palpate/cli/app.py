@@ -103,7 +103,7 @@ def precompute(
     precision: Annotated[
         str | None,
         typer.Option(
-            help="Stored number format: f16, f32 or f64; default: the cheapest that this body allows.",
+            help="Stored number format: f16, f32 or f64; default: the cheapest that answers touches to 0.03 %.",
             autocompletion=precisions,
         ),
     ] = None,

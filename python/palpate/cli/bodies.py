@@ -31,7 +31,7 @@ Unit = Annotated[
         autocompletion=units,
     ),
 ]
-MaxSize = Annotated[str | None, typer.Option(help="Longest edge, such as 4mm.")]
+MaxSize = Annotated[str | None, typer.Option(help="Longest edge, such as 4mm; default: by size and shape of the body.")]
 Repair = Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")]
 ElementChoice = Annotated[
     Element | None,

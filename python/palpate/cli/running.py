@@ -78,7 +78,7 @@ def run(
     ] = None,
     youngs_modulus: Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")] = None,
     poissons_ratio: Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")] = None,
-    density: Annotated[str | None, typer.Option(help="Density, such as 1000kg/m3.")] = None,
+    density: Annotated[str | None, typer.Option(help="Density; of a mesh, default: 1000kg/m3.")] = None,
     unit: Annotated[
         str | None,
         typer.Option(help="Unit of length of a mesh; default: the one that fits its size.", autocompletion=units),
@@ -94,7 +94,8 @@ def run(
 ) -> None:
     """Run the 1 kHz force loop on a scene, a store, or a bare mesh or surface, in the browser.
 
-    Of a mesh, what is not given has a default, which is printed. Of a scene, options stand instead of what it says.
+    Of a mesh, what is not given has a default, which is printed. Of a scene, options of tool,
+    material and supports stand instead of what it says.
     With --headless it presses on the highest point by a script, and writes the log and a plot.
 
     Example: palpate run scene.toml

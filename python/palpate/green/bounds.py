@@ -50,5 +50,5 @@ def remedy(error: float, precision: str) -> str:
     better = "f32" if precision == "f16" and error < 256 * CHOSEN else "f64"
     return (
         f"the parts of this body, or the nodes prescribed, differ too much in stiffness for {precision}; "
-        f"compute the store with --precision {better} (precision='{better}')"
+        f"compute the store with --precision {better} (precision='{better}', in a scene body.precision)"
     )

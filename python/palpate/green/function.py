@@ -165,7 +165,7 @@ class GreensFunction:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, body: Body | None = None) -> GreensFunction:
-        """Map a store and verify every block of it.
+        """Read a store and verify every block of it.
 
         Parameters
         ----------

@@ -60,6 +60,8 @@ class DynamicsTable(Table):
     def _one_damping(self) -> DynamicsTable:
         if self.rayleigh is not None and "damping_ratios" in self.model_fields_set:
             raise ValueError("give damping_ratios or rayleigh, not both")
+        if self.scheme == "exact" and self.alpha is not None:
+            raise ValueError("alpha belongs to scheme = 'newmark'; leave it out")
         return self
 
     def build(self, body: Body, max_stiffness: float, progress: bool | Callable[[int, int], None] = True) -> BodyMotion:

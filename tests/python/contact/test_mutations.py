@@ -88,7 +88,8 @@ def test_exponent_and_evenness_see_other_laws():
     # 5 % more on one side of an element's edge, and a force that turns over.
     kinked = slide.forces * np.where(np.arange(len(slide.forces)) < 50, 1.05, 1.0)[:, None]
     assert measures.ripple(kinked) > 0.003
-    assert measures.largest_jump(kinked) > 1 or np.abs(slide.forces).max() < 0.1
+    # Forces ten times as large, so that 5 % of them are beyond the 5 mN that are allowed to all.
+    assert measures.largest_jump(10 * kinked) > 1 >= measures.largest_jump(10 * slide.forces)
     turned = slide.forces * np.where(np.arange(len(slide.forces)) < 50, -1.0, 1.0)[:, None]
     assert measures.largest_jump(turned) > 1
     assert measures.attraction(turned, slide.normals) > 0
@@ -118,8 +119,9 @@ def test_closed_paths_see_stale_turned_and_misdirected_forces(bench, tools):
 
     assert leak(forces) <= energy.TOLERANCE
     assert leak(stale(forces, axis=1)) > energy.TOLERANCE
-    # The wrong sign draws the hand in: by the same rule it gets back more than it ever put in.
-    assert leak(-forces) > energy.TOLERANCE or measures.attraction(-forces, np.array([0.0, 0.0, 1.0])) > 0
+    # A conservative force stays so with the wrong sign; it draws the hand in.
+    assert measures.attraction(forces, np.array([0.0, 0.0, 1.0])) == 0
+    assert measures.attraction(-forces, np.array([0.0, 0.0, 1.0])) > 0
     # Without friction all force along the flat top comes from the change of C_reg.
     misdirected = forces * np.array([-1.0, -1.0, 1.0])
     assert leak(misdirected) > energy.TOLERANCE

@@ -108,6 +108,17 @@ def test_a_rounded_punch_is_sneddons_in_series_with_the_block(block):
     assert force[2] == pytest.approx(expected, rel=0.05)
 
 
+def test_a_finger_pad_is_a_second_half_space_in_series(block):
+    """Hertz for two elastic bodies; the pad does not change its volume: `1/E* = (1 - nu^2)/E + (1 - 1/4)/E_pad`."""
+    radius, depth, pad = 0.008, 4e-4, 15e3
+    modulus = 1 / (1 / MODULUS + 0.75 / pad)
+    expected = in_series(block, lambda d: 4 / 3 * modulus * np.sqrt(radius) * max(d, 0.0) ** 1.5, depth, radius)
+    soft = pressed(simulation_of(block, radius=radius, pad_youngs_modulus=pad), radius, depth).forces[-1]
+    assert soft[2] == pytest.approx(expected, rel=0.05)
+    rigid = pressed(simulation_of(block, radius=radius), radius, depth).forces[-1]
+    assert rigid[2] > 1.3 * expected
+
+
 def test_a_sphere_from_a_file_is_the_sphere(block, tmp_path):
     radius, depth = 0.006, 1e-3
     ball = trimesh.creation.icosphere(subdivisions=4, radius=1e3 * radius)

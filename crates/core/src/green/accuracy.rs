@@ -5,7 +5,8 @@
 //! reach an answer in different ways.
 //!
 //! Rounding into the store changes entries independently of each other. Forces `q` on columns then displace a row by a
-//! noise of standard deviation at most `rounding s_i |S q|`, `S = diag(s)`, and a solve with the capacitance matrix `C`
+//! noise of standard deviation at most `rounding s_i |S q|`, `S = diag(s)` (in `f32` and `f64` that of the entries themselves
+//! is taken), and a solve with the capacitance matrix `C`
 //! passes it on by the rows of its inverse: `sqrt(sum_k (C^-1)_ik^2 noise_k^2)`. That is the condition of `C` times the
 //! rounding of the store, but for this answer alone.
 //!

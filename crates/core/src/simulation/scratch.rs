@@ -17,4 +17,9 @@ impl Scratch {
     pub fn new(model: &Model) -> Self {
         Self { covering: Covering::new(model), system: Box::default(), local: Box::new(LocalScratch::new(model)) }
     }
+
+    /// Steps of Newton's method that the last body with contacts under the local law took.
+    pub fn newton_steps(&self) -> usize {
+        self.local.taken
+    }
 }

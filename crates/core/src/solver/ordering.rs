@@ -2,7 +2,13 @@
 //! Through `metis-sys`: the safe `metis` crate does not offer nested dissection.
 #![allow(unsafe_code)] // METIS is a C library.
 
+use std::sync::{Mutex, PoisonError};
+
 use metis_sys::{METIS_NodeND, idx_t, rstatus_et_METIS_OK};
+
+/// METIS draws from the C library's one generator, which each call seeds: two at once would get each other's numbers, and an
+/// order, with it the last bits of a store, that depends on when they came.
+static GENERATOR: Mutex<()> = Mutex::new(());
 
 /// Nested-dissection order of a graph in compressed adjacency form (no self loops): `order[new] = old`, postordered.
 ///
@@ -18,6 +24,7 @@ pub fn nested_dissection(start: &[usize], adjacency: &[u32]) -> Vec<u32> {
     let mut adjncy: Vec<idx_t> = adjacency.iter().map(|&a| a as idx_t).collect();
     let mut order = vec![0 as idx_t; count];
     let mut rank = vec![0 as idx_t; count];
+    let alone = GENERATOR.lock().unwrap_or_else(PoisonError::into_inner);
     // SAFETY: the arrays have the lengths METIS documents (count + 1, xadj[count], count, count) and outlive the call;
     // null weights and options ask for the defaults.
     let status = unsafe {
@@ -31,6 +38,7 @@ pub fn nested_dissection(start: &[usize], adjacency: &[u32]) -> Vec<u32> {
             rank.as_mut_ptr(),
         )
     };
+    drop(alone);
     if status != rstatus_et_METIS_OK {
         return identity();
     }
@@ -89,22 +97,33 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// A grid of 9 x 8 vertices.
-    fn grid() -> (Vec<usize>, Vec<u32>) {
+    /// A grid of `wide` x `high` vertices.
+    fn grid(wide: i32, high: i32) -> (Vec<usize>, Vec<u32>) {
         let (mut start, mut adjacency) = (vec![0], Vec::new());
-        for i in 0..72i32 {
-            let (x, y) = (i % 9, i / 9);
+        for i in 0..wide * high {
+            let (x, y) = (i % wide, i / wide);
             let neighbours = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
-            let inside = neighbours.into_iter().filter(|&(a, b)| (0..9).contains(&a) && (0..8).contains(&b));
-            adjacency.extend(inside.map(|(a, b)| (9 * b + a) as u32));
+            let inside = neighbours.into_iter().filter(|&(a, b)| (0..wide).contains(&a) && (0..high).contains(&b));
+            adjacency.extend(inside.map(|(a, b)| (wide * b + a) as u32));
             start.push(adjacency.len());
         }
         (start, adjacency)
     }
 
     #[test]
+    fn orders_made_at_once_are_those_made_one_by_one() {
+        let (start, adjacency) = grid(90, 80);
+        let order = nested_dissection(&start, &adjacency);
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| assert!((0..5).all(|_| nested_dissection(&start, &adjacency) == order)));
+            }
+        });
+    }
+
+    #[test]
     fn order_is_a_permutation_in_which_subtrees_are_consecutive() {
-        let (start, adjacency) = grid();
+        let (start, adjacency) = grid(9, 8);
         let order = nested_dissection(&start, &adjacency);
         let mut rank = vec![u32::MAX; 72];
         for (place, &vertex) in order.iter().enumerate() {

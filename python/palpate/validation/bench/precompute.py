@@ -169,7 +169,7 @@ class System:
 
 
 def palpate_columns(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Seconds for the operator in memory, and for writing, verifying and mapping its file."""
+    """Seconds for the operator in memory, and for writing, verifying and reading its file."""
     started = now()
     core = _native.GreenCore.precompute(problem_arrays(body, None), "f32", "{}", None)
     computed = now()

@@ -9,21 +9,23 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::contact::local::cells::{CellScratch, PressureState, Resolution};
+use crate::contact::local::cells::Resolution;
 use crate::contact::patch_weights;
-use crate::contact::regular::{WIDTH, compliance_of};
+use crate::contact::regular::WIDTH;
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
+use crate::contact::smooth::FootPoint;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::covering::{Covering, neighbourhood};
+use crate::simulation::covering::Covering;
 use crate::simulation::input::Controls;
-use crate::simulation::law::{Cells, Guess, LocalBody, LocalResponse, LocalTool, Others, evaluate, takes_cells};
+use crate::simulation::law::{Cells, Guess, LocalTool, Others, evaluate, takes_cells};
 use crate::simulation::model::Model;
+use crate::simulation::solve::coupling::{couple, cover};
 use crate::simulation::solve::forces::dent_of;
 use crate::simulation::solve::handover::{
-    Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join, joined,
+    Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join,
 };
+use crate::simulation::solve::local_scratch::{LocalScratch, local_body};
 use crate::simulation::state::State;
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -52,87 +54,6 @@ const CELLS_LOOSER: [f64; 2] = [1e2, 1e4];
 const MOST_DEPTH: f64 = 1.6;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
-
-/// Memory of the method.
-pub struct LocalScratch {
-    /// The body that the fans in `weights` belong to.
-    body: Option<usize>,
-    weights: Vec<FanWeights>,
-    responses: Vec<LocalResponse>,
-    /// Compliance between contacts, and what the others do at each.
-    between: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
-    /// Compliance of one step less that at rest, on a body in motion, with the coupling on the diagonal.
-    change: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
-    others: [Others; MAX_CONTACTS],
-    /// What every contact counts from.
-    from: [DVec3; MAX_CONTACTS],
-    places: [DVec3; MAX_CONTACTS],
-    steps: [DVec3; MAX_CONTACTS],
-    /// Largest difference of a force from what was expected, over that force.
-    changed: f64,
-    cells: Box<CellScratch>,
-    /// For contacts without cells.
-    unused: PressureState,
-}
-
-impl LocalScratch {
-    /// Weighs the fans around a foot that no contact has yet.
-    pub fn weigh(&mut self, body: usize, smooth: &SmoothSurface, foot: &FootPoint) -> &FanWeights {
-        self.turn_to(body);
-        smooth.weigh(foot, &mut self.weights[0]);
-        &self.weights[0]
-    }
-
-    /// Forgets the fans of another body.
-    fn turn_to(&mut self, body: usize) {
-        if self.body != Some(body) {
-            self.body = Some(body);
-            self.weights.iter_mut().for_each(|weights| weights.near.forget());
-        }
-    }
-
-    /// Takes the step. The forces are expected to follow.
-    fn go(&mut self, count: usize) {
-        for a in 0..count {
-            self.places[a] += self.steps[a];
-            let response = &mut self.responses[a];
-            response.force += response.jacobian * self.steps[a];
-        }
-    }
-}
-
-impl LocalScratch {
-    /// For a model.
-    pub fn new(model: &Model) -> Self {
-        Self {
-            body: None,
-            weights: vec![FanWeights::new(neighbourhood(model)); MAX_CONTACTS],
-            responses: vec![LocalResponse::default(); MAX_CONTACTS],
-            between: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
-            change: Box::new([[DMat3::ZERO; MAX_CONTACTS]; MAX_CONTACTS]),
-            others: [Others::default(); MAX_CONTACTS],
-            from: [DVec3::ZERO; MAX_CONTACTS],
-            places: [DVec3::ZERO; MAX_CONTACTS],
-            steps: [DVec3::ZERO; MAX_CONTACTS],
-            changed: 0.0,
-            cells: Box::default(),
-            unused: PressureState::default(),
-        }
-    }
-}
-
-/// What a tool meets of a body; `None` where the local law is not prepared.
-pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize) -> Option<LocalBody<'a>> {
-    let fixed = &model.bodies[body];
-    let local = fixed.local.as_ref()?;
-    let regular = model.regular[tool][body].as_deref()?;
-    Some(LocalBody {
-        drawn: fixed.drawn(),
-        smooth: &local.smooth,
-        fields: &regular.fields,
-        scale: state.bodies[body].stiffness_scale,
-    })
-}
 
 fn local_tool<'a>(model: &'a Model, controls: &Controls, tool: usize) -> LocalTool<'a> {
     let fixed = &model.tools[tool];
@@ -240,6 +161,7 @@ fn settle(
     let cells = slots.iter().any(|&slot| takes_pressures(model, state, slot));
     let (most, [looser, looser_force]) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, [1.0; 2]) };
     for step in 0..most {
+        local.taken = step + 1;
         if !meet(model, state, local, slots, body, controls, step) {
             return Outcome::LetGo;
         }
@@ -361,60 +283,6 @@ fn meet(
         couple(model, state, local, slots, body);
     }
     true
-}
-
-/// Compliance between the contacts, and how it changes with the place of each.
-fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots: &[usize], body: usize) {
-    let green = &model.bodies[body].green;
-    let scale = state.bodies[body].stiffness_scale;
-    for (a, &slot) in slots.iter().enumerate() {
-        if state.bodies[body].motion.is_none() {
-            cover(model, state, &local.weights[a], slot, body);
-        }
-        local.others[a].slope = DVec3::ZERO;
-    }
-    let Some(fans) = model.bodies[body].local.as_ref().map(|own| own.smooth.fans()) else { return };
-    for (a, &slot) in slots.iter().enumerate() {
-        for (b, &other) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
-            let patches = &state.contacts.patches;
-            let [tool, same] = [slot, other].map(|slot| state.contacts.slots[slot].tool);
-            let apart = local.responses[a].foot.position.distance(local.responses[b].foot.position);
-            let joined = if tool == same { joined(apart, model.tools[tool].radius) } else { 0.0 };
-            let mean = (local.responses[a].compliance + local.responses[b].compliance) * 0.5;
-            if state.bodies[body].motion.is_some() {
-                // The slope is that of the moving surface, whoever moves it.
-                let at_rest = patches[slot].compliance_with(green, &patches[other]);
-                local.between[a][b] = at_rest * (1.0 - joined) + mean * joined + local.change[a][b];
-                continue;
-            }
-            let (mut block, mut slope) = (DMat3::ZERO, DVec3::ZERO);
-            let (own, force) = (local.responses[a].force, local.responses[b].force);
-            for (fan, weight, gradient) in local.weights[a].with_gradients() {
-                let of_node = patches[other].compliance_at(green, fans[fan].node as usize);
-                block += of_node * (weight / scale);
-                slope += gradient * (own.dot(of_node * force) / scale);
-            }
-            if joined > 0.0
-                && let Some(met) = local_body(model, state, tool, body)
-            {
-                let mut shared = DVec3::ZERO;
-                for (fan, _, gradient) in local.weights[a].with_gradients() {
-                    shared += gradient * (0.5 * own.dot(compliance_of(&met.fields[fan]) * force) / scale);
-                }
-                slope = slope * (1.0 - joined) + shared * joined;
-            }
-            local.between[a][b] = block * (1.0 - joined) + mean * joined;
-            local.others[a].slope += slope;
-        }
-    }
-}
-
-/// The nodes below a contact, as blended.
-fn cover(model: &Model, state: &mut State, weights: &FanWeights, slot: usize, body: usize) {
-    let fixed = &model.bodies[body];
-    let Some(local) = &fixed.local else { return };
-    let fans = local.smooth.fans();
-    state.contacts.patches[slot].blend(&fixed.green, weights.iter().map(|(fan, weight)| (fans[fan].node, weight)));
 }
 
 /// One step of Newton's method; the longest of all.
