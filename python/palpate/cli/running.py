@@ -139,7 +139,7 @@ def _view(
 def _force_line(record: PressRecord, max_force: float) -> str:
     """Tell the largest force on the device, and that of the body where the device's limit held it."""
     force = (record.log["force"] ** 2).sum(axis=1).max() ** 0.5
-    line = f"{len(record.log)} ticks, largest force {force:.3f} N"
+    line = f"{len(record.log)} ticks, largest force {force:.3g} N"
     if force >= max_force * (1 - 1e-9) and record.force > max_force:
         line += f", where it was limited ([device] max_force = {max_force:g}): the body's was {record.force:.3f} N"
     return line
