@@ -28,7 +28,8 @@ class Contact(ComparedByValue):
     mode
         ``"press"``, or ``"grab"`` for a tool that holds on.
     point, normal
-        Contact point on the untouched surface (3,), m, and its outward normal (3,), in the world.
+        Contact point on the untouched surface (3,), m, of a tool that slides the centre of pressure, and its outward
+        normal (3,), in the world.
     force, torque
         On the body (3,), N, and about the tip (3,), N m, in the world.
     anchor
