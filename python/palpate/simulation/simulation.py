@@ -338,8 +338,8 @@ class Simulation:
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
-        names = ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused", "port_energy")
-        statistics = {name: raw[name] for name in names}
+        names = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
+        statistics = {name: raw[name] for name in (*names, "port_energy")}
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         bodies = tuple(
