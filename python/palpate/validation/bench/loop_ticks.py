@@ -99,7 +99,7 @@ def played(simulation: Simulation, path: np.ndarray, plays: int) -> np.ndarray:
 
 
 def by_kind(times: np.ndarray, kinds: np.ndarray) -> dict[str, tuple[Times, float]]:
-    """Sum up times (plays, t), us, of each kind, and tell its costliest tick of the script: the shortest of its plays."""
+    """Sum up times (plays, t), us, by kind; beside them the costliest tick of the script, the shortest of its plays."""
     return {
         name: (Times.of(times[:, kinds == rank]), float(times[:, kinds == rank].min(axis=0).max()))
         for rank, name in enumerate(KINDS)

@@ -106,5 +106,5 @@ def plot_wakeups(wakeup_us: np.ndarray, title: str, path: Path) -> None:
     axes.set_xlabel("time from a deadline to the begin of its tick [us]")
     axes.set_ylabel("ticks")
     axes.set_title(title, loc="left")
-    axes.legend(frameon=False)
+    axes.legend(edgecolor="none")
     write_figure(figure, path)
