@@ -14,6 +14,7 @@ mod record;
 mod recorder;
 mod replay;
 mod safety;
+mod scheduling;
 mod servo;
 mod settings;
 mod statistics;
@@ -34,6 +35,7 @@ pub use record::{
 pub use recorder::RecordingProgress;
 pub use replay::{Difference, Owner, Replay};
 pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
+pub use scheduling::Scheduling;
 pub use servo::Servo;
 pub use settings::Settings;
 pub use statistics::{Histogram, Summary};

@@ -11,8 +11,8 @@ use palpate_core::simulation::{Input, Model, Pose, Scratch, Snapshot, State, Str
 use palpate_devices::simulated::{Target, simulated};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Wrench, known};
 use palpate_servo::{
-    Fault, FaultReason, ForceLoop, LoopHandle, SafetyLimits, Script, Servo, Settings, StrainPreparer, TickRecord,
-    now_ns, run,
+    Fault, FaultReason, ForceLoop, LoopHandle, SafetyLimits, Scheduling, Script, Servo, Settings, StrainPreparer,
+    TickRecord, now_ns, run,
 };
 
 use common::{PERIOD, PERIOD_NS, Scripted, device, scene, settings, single};
@@ -166,7 +166,7 @@ fn what_does_not_fit_the_scene_is_an_error() {
     let start = |limits, rate| {
         let scene = single(false);
         let strain = StrainPreparer::new(&scene);
-        let servo = Servo::start(scene, vec![with_limits(limits)], patient(), settings(), rate, strain);
+        let servo = Servo::start(scene, vec![with_limits(limits)], patient(), settings(), Scheduling::at(rate), strain);
         servo.err().map(|error| error.to_string())
     };
     refused(start(weak, 500.0), "holds at most 2000 N/m: lower max_stiffness to 2000");
@@ -369,7 +369,7 @@ fn a_servo_keeps_its_rate_and_leaves_its_devices_without_a_wrench() {
     };
     let scene = single(false);
     let strain = StrainPreparer::new(&scene);
-    let servo = Servo::start(scene, vec![Box::new(device)], patient(), settings(), 500.0, strain);
+    let servo = Servo::start(scene, vec![Box::new(device)], patient(), settings(), Scheduling::at(500.0), strain);
     let mut servo = servo.expect("a running loop");
     let (start, mut status) = (Instant::now(), servo.latest().status);
     while status.ticks < 250 && start.elapsed() < Duration::from_secs(20) {
