@@ -8,8 +8,8 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{MAX_TOOLS, Mode, Strike};
 use palpate_devices::{Buttons, DeviceFault, Pose, Reading, Twist, Wrench};
 use palpate_servo::{
-    Computed, FaultReason, PortEnergy, RecordedContact, RecordedInput, RecordedOutput, RecordedTool, Settings,
-    StrainArrivals, StrainAsked, TickRecord,
+    Computed, FaultReason, RecordedContact, RecordedInput, RecordedOutput, RecordedTool, Settings, StrainArrivals,
+    StrainAsked, TickRecord,
 };
 use serde::{Deserialize, Serialize};
 
@@ -153,9 +153,7 @@ pub struct Tool {
     wrench: Vectors,
     computed: Vectors,
     law: Vectors,
-    energy_given: f64,
-    energy_owed: f64,
-    energy_unpaid: f64,
+    port_energy: [f32; 3],
 }
 
 impl Tool {
@@ -175,9 +173,7 @@ impl Tool {
             wrench: (&output.wrench).into(),
             computed: (&output.computed.limited).into(),
             law: (&output.computed.law).into(),
-            energy_given: output.port.given,
-            energy_owed: output.port.owed,
-            energy_unpaid: output.port.unpaid,
+            port_energy: output.port,
         }
     }
 
@@ -198,7 +194,7 @@ impl Tool {
         RecordedTool {
             computed: Computed { law: self.law.into(), limited: self.computed.into() },
             wrench: self.wrench.into(),
-            port: PortEnergy { given: self.energy_given, owed: self.energy_owed, unpaid: self.energy_unpaid },
+            port: self.port_energy,
             limited: self.limited,
             fault: self.fault.into(),
         }

@@ -34,9 +34,7 @@ bool limited                       # held back by the limit of strain
 geometry_msgs/Wrench wrench        # on the device, after the safety stage: N, and N m about the tip
 geometry_msgs/Wrench computed      # before the safety stage
 geometry_msgs/Wrench law           # before the limit of strain
-float64 energy_given               # to the hand, J
-float64 energy_owed
-float64 energy_unpaid
+float32[3] port_energy             # given to the hand, owed to it and never paid, J, to five digits
 ",
 );
 const CONTACT: (&str, &str) = (

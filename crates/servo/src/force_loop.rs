@@ -11,7 +11,7 @@ use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
 use crate::preparer::{StrainPreparer, StrainWorker};
-use crate::record::{RecordedInput, RecordedTool, StrainArrivals};
+use crate::record::{RecordedInput, RecordedTool, StrainArrivals, recorded_port};
 use crate::safety::{Computed, Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
 use crate::settings::{Settings, refuse_unless};
 use crate::subnormals::FlushSubnormals;
@@ -248,7 +248,7 @@ impl ForceLoop {
             if let Err(fault) = device.write(wrench) {
                 stage.latch(FaultReason::Device(fault));
             }
-            let (port, limited, fault) = (stage.energy(), output.limited[tool], stage.fault());
+            let (port, limited, fault) = (recorded_port(stage.energy()), output.limited[tool], stage.fault());
             *self.ends.recorder.tool(tool) = RecordedTool { computed, wrench, port, limited, fault };
         }
     }

@@ -129,8 +129,8 @@ pub struct RecordedTool {
     pub computed: Computed,
     /// What went out to the device.
     pub wrench: Wrench,
-    /// Energy at the device's port.
-    pub port: PortEnergy,
+    /// Energy at the device's port, given, owed and never paid, J, to five digits.
+    pub port: [f32; 3],
     /// Whether the limit of strain kept the tool from following its device.
     pub limited: bool,
     /// The tool's fault after the tick.
@@ -163,7 +163,7 @@ pub struct RecordedContact {
     pub normal: [f32; 3],
     /// Force on the body as computed, N: on the device it comes made safe.
     pub force: [f32; 3],
-    /// Torque on the body about the tip, N m.
+    /// Torque on the body about the tip, N m; none below [`LEAST_TORQUE`].
     pub torque: [f32; 3],
     /// Contact radius under the local law, m.
     pub radius: f32,
@@ -171,6 +171,13 @@ pub struct RecordedContact {
     pub depth: f32,
     /// Felt stiffness along the normal under the local law, N/m.
     pub stiffness: f32,
+}
+
+/// Torque that nobody feels, N m: what rounding leaves of that of a sphere without friction.
+const LEAST_TORQUE: f64 = 1e-12;
+
+fn felt(torque: DVec3) -> DVec3 {
+    if torque.abs().max_element() < LEAST_TORQUE { DVec3::ZERO } else { torque }
 }
 
 /// The nearest number of 16 binary digits, five decimal ones: the bytes that stay zero take no room in a compressed file.
@@ -225,12 +232,17 @@ impl RecordedContact {
             point: vector(placement.point_to_world(contact.point)),
             normal: vector(placement.vector_to_world(contact.normal)),
             force: vector(placement.vector_to_world(contact.force)),
-            torque: vector(-placement.vector_to_world(contact.local.torque)),
+            torque: vector(felt(-placement.vector_to_world(contact.local.torque))),
             radius: of_local(contact.local.radius),
             depth: of_local(contact.local.depth),
             stiffness: of_local(contact.local.stiffness),
         }
     }
+}
+
+/// Energy at a port, to five digits.
+pub(crate) fn recorded_port(port: PortEnergy) -> [f32; 3] {
+    [port.given, port.owed, port.unpaid].map(brief)
 }
 
 /// Time and energies of the bodies in motion.

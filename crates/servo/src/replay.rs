@@ -14,7 +14,7 @@ use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedContact, RecordedInput, RecordedOutput, RecordedTool, StrainAsked, TickRecord};
-use crate::safety::{PortEnergy, SafetyLimits};
+use crate::safety::SafetyLimits;
 use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainRequest};
 
@@ -204,8 +204,7 @@ impl Differences {
             self.numbers(names[0], &force_was, &force_is);
             self.numbers(names[1], &torque_was, &torque_is);
         }
-        let port = |port: &PortEnergy| [port.given, port.owed, port.unpaid];
-        self.numbers("energy at the port", &port(&was.port), &port(&is.port));
+        self.numbers("energy at the port", &was.port.map(f64::from), &is.port.map(f64::from));
         self.numbers("limit of strain", &[f64::from(was.limited)], &[f64::from(is.limited)]);
         self.numbers("fault", &[f64::from(was.fault.is_some())], &[f64::from(is.fault.is_some())]);
     }

@@ -3,19 +3,26 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use palpate_core::simulation::Model;
 use palpate_core::{Error, Result};
 use palpate_devices::Device;
+use rtrb::Consumer;
 
 use crate::clock::{next_deadline, now_ns, sleep_until_ns};
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::{LogRow, RealtimeStatus};
 use crate::preparer::{StrainPreparer, StrainWorker};
+use crate::record::TickRecord;
 use crate::safety::SafetyLimits;
 use crate::scheduling::Scheduling;
 use crate::settings::Settings;
+
+/// How long, and how often at most, the end of a recording is waited for: a loop that ticks takes note within one.
+const WAIT: Duration = Duration::from_millis(1);
+const MOST_WAITS: u32 = 1000;
 
 /// A running loop.
 pub struct Servo {
@@ -92,6 +99,25 @@ impl Servo {
     /// Hands out the rows of the log since the last call.
     pub fn drain_log(&mut self, each: impl FnMut(LogRow)) {
         self.handle.drain_log(each);
+    }
+
+    /// See [`LoopHandle::begin_recording`].
+    ///
+    /// # Errors
+    /// A loop that is being recorded already.
+    pub fn begin_recording(&mut self) -> Result<Consumer<TickRecord>> {
+        self.handle.begin_recording()
+    }
+
+    /// Ends the recording and waits until the loop has taken note of it: how many ticks it made meanwhile.
+    pub fn end_recording(&mut self) -> u64 {
+        self.handle.end_recording();
+        let mut left = MOST_WAITS;
+        while self.handle.latest().status.recording.records && left > 0 {
+            std::thread::sleep(WAIT);
+            left -= 1;
+        }
+        self.handle.latest().status.recording.ticks
     }
 
     /// Stops the loop; the devices are left without a wrench.
