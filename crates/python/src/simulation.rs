@@ -299,7 +299,7 @@ impl SimulationCore {
         };
         let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
         let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
-        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script));
+        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script, |_| ()));
         let recording = recording.map_err(|e| to_python(py, e))?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
         let mut energies: Vec<Vec<f64>> = vec![Vec::new(); self.model.bodies.len()];
