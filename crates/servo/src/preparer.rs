@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use palpate_core::simulation::{MAX_BODIES, Model, StrainWatch};
+#[cfg(feature = "offline")]
+use palpate_core::simulation::StrainWatch;
+use palpate_core::simulation::{MAX_BODIES, Model};
 #[cfg(feature = "offline")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};

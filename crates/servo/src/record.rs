@@ -13,7 +13,9 @@ use palpate_devices::{DeviceFault, Reading};
 
 use crate::safety::{Computed, FaultReason, PortEnergy};
 use crate::settings::Settings;
-use crate::strain::IN_FLIGHT;
+
+/// Requests for strain and responses that may be under way.
+pub(crate) const IN_FLIGHT: usize = 16;
 
 /// What came into a tick and what it answered.
 #[derive(Clone, Copy, Debug)]

@@ -12,10 +12,7 @@ use palpate_core::simulation::{MAX_BODIES, State, StrainWatch};
 use palpate_core::strain::MAX_CONTACTS_WATCHED;
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::record::{StrainArrivals, StrainAsked};
-
-/// Requests and responses that may be under way.
-pub(crate) const IN_FLIGHT: usize = 16;
+use crate::record::{IN_FLIGHT, StrainArrivals, StrainAsked};
 
 /// The contacts of one body, for which strain is to be prepared.
 #[derive(Clone)]
