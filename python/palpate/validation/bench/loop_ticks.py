@@ -137,27 +137,28 @@ def running(simulation: Simulation, path: np.ndarray | None, seconds: float, rep
     """
     rows, period = [], 1.0 / simulation.scene.device.rate
     with simulation:
-        _drive(simulation, path, period, WARM, None)
+        _drive(simulation, path, period, 0.0, time.monotonic() + WARM)
         simulation.drain_log()
-        before = simulation.frame().statistics
+        before, begun = simulation.frame().statistics, time.monotonic()
         chunks = max(1, round(10 * seconds))
         for chunk in range(chunks):
-            _drive(simulation, path, period, seconds / chunks, chunk * seconds / chunks)
+            end = (chunk + 1) * seconds / chunks
+            _drive(simulation, path, period, chunk * seconds / chunks, begun + end)
             rows.append(simulation.drain_log())
             if report is not None:
-                report((chunk + 1) * seconds / chunks)
+                report(end)
         after = simulation.frame().statistics
     log = np.concatenate(rows)
     computing, missed = (after[k] - before[k] for k in ("missed_computing", "missed_deadlines"))
     return LoopTimes(log["compute_us"], log["wakeup_us"], computing, missed - computing, *after["realtime"])
 
 
-def _drive(simulation: Simulation, path: np.ndarray | None, period: float, seconds: float, since: float | None) -> None:
-    """Send the tools along the path for a time; ``since`` the start of the path, s."""
+def _drive(simulation: Simulation, path: np.ndarray | None, period: float, since: float, end: float) -> None:
+    """Send the tools along the path, from ``since`` seconds after its start, until an end by the monotonic clock, s."""
     begun = time.monotonic()
-    while (passed := time.monotonic() - begun) < seconds:
+    while (now := time.monotonic()) < end:
         if path is not None:
-            places: Sequence = path[int((passed + (since or 0.0)) / period) % len(path)]
+            places: Sequence = path[int((now - begun + since) / period) % len(path)]
             for tool, place in enumerate(places):
                 simulation.move(place, tool=tool)
-        time.sleep(SEND if path is not None else min(0.05, seconds))
+        time.sleep(min(SEND if path is not None else 0.05, max(0.0, end - now)))

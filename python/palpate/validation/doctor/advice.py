@@ -15,7 +15,8 @@ from palpate.validation.doctor.machine import UNLIMITED, Machine
 
 # Below this locked memory is refused to a loop: mlockall asks for all that the process has mapped, some GB, bytes.
 ENOUGH_MEMORY = 16 * 2**30
-PRIORITY = 80
+# The loop itself takes a few per cent of one processor; beyond this others come in its way.
+BUSY = 0.5
 # Clocks that are read without a call of the kernel, or by a fast one.
 FAST_CLOCKS = {
     "tsc",
@@ -48,7 +49,12 @@ class Advice:
     remedy: tuple[str, ...]
 
 
-def advice(machine: Machine, priority: bool | None, locked_memory: bool | None) -> list[Advice]:
+def advice(
+    machine: Machine,
+    priority: bool | None,
+    locked_memory: bool | None,
+    taken: tuple[float, float] | None = None,
+) -> list[Advice]:
     """Everything that would help, most important first.
 
     Parameters
@@ -57,6 +63,8 @@ def advice(machine: Machine, priority: bool | None, locked_memory: bool | None) 
         What the system tells.
     priority, locked_memory
         What it granted a running loop; None where none has run.
+    taken
+        Shares of the processors' time that all programs took meanwhile, and that the host of a virtual machine took.
 
     """
     if machine.system != "Linux":
@@ -66,9 +74,10 @@ def advice(machine: Machine, priority: bool | None, locked_memory: bool | None) 
         *_priority(machine, priority),
         *_quota(machine),
         *_processors(machine),
+        *_load(taken),
         *_memory(machine, locked_memory),
         *_governor(machine),
-        *_guest(machine),
+        *_guest(machine, taken),
         *_kernel(machine),
         *_isolation(machine),
         *_smt(machine),
@@ -131,6 +140,15 @@ def _processors(machine: Machine) -> Iterator[Advice]:
         )
 
 
+def _load(taken: tuple[float, float] | None) -> Iterator[Advice]:
+    if taken is not None and taken[0] > BUSY:
+        yield Advice(
+            "load",
+            f"programs kept {100 * taken[0]:.0f} % of the processors' time busy while the loop ran",
+            ("# end what is not needed (top tells), or give the rest fewer processors: taskset, cpuset",),
+        )
+
+
 def _memory(machine: Machine, locked: bool | None) -> Iterator[Advice]:
     limit = machine.memlock_limit
     enough = machine.ipc_lock or limit is None or limit == UNLIMITED or limit >= ENOUGH_MEMORY
@@ -158,11 +176,12 @@ def _governor(machine: Machine) -> Iterator[Advice]:
         )
 
 
-def _guest(machine: Machine) -> Iterator[Advice]:
+def _guest(machine: Machine, taken: tuple[float, float] | None) -> Iterator[Advice]:
     if machine.hypervisor:
+        stolen = "" if taken is None else f", for {100 * taken[1]:.1f} % of the time while the loop ran"
         yield Advice(
             "virtual-machine",
-            f"a virtual machine (hypervisor: {machine.hypervisor}): its host stops it whenever it likes",
+            f"a virtual machine (hypervisor: {machine.hypervisor}): its host stops it whenever it likes{stolen}",
             ("# run the loop on the host, or give the machine processors of its own there (virsh vcpupin)",),
         )
 

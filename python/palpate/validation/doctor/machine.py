@@ -133,6 +133,41 @@ def read_machine(root: Path = Path("/")) -> Machine:
     )
 
 
+@dataclass(frozen=True)
+class ProcessorTime:
+    """Time of all processors since the start of the system, in ticks of the kernel's accounts.
+
+    Attributes
+    ----------
+    total
+        All of it.
+    idle
+        Nothing to do, or waiting for a disk.
+    stolen
+        Given to other guests by the host of a virtual machine.
+
+    """
+
+    total: int
+    idle: int
+    stolen: int
+
+    def shares_since(self, before: ProcessorTime) -> tuple[float, float]:
+        """Shares of the time since then that programs of this system took, and that the host took away."""
+        total = max(1, self.total - before.total)
+        idle, stolen = self.idle - before.idle, self.stolen - before.stolen
+        return (total - idle - stolen) / total, stolen / total
+
+
+def processor_time(root: Path = Path("/")) -> ProcessorTime | None:
+    """Read /proc/stat: user, nice, system, idle, iowait, irq, softirq, steal (proc(5)); user has that of guests."""
+    first = (_Files(root).text("/proc/stat") or "").partition("\n")[0].split()
+    if len(first) < 9 or first[0] != "cpu":
+        return None
+    times = [int(value) for value in first[1:9]]
+    return ProcessorTime(sum(times), times[3] + times[4], times[7])
+
+
 def cpu_list(text: str | None) -> tuple[int, ...] | None:
     """Processors of a list as the kernel writes it: ``0-3,6``."""
     if text is None:

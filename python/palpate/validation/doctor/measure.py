@@ -24,7 +24,7 @@ from palpate.viewer.server import ViewerServer
 CELLS, CONTACTS, LAW = servo.PLATES[0], 1, "local"
 PLACES, PLAYS = 40, 25
 # How long the page is watched, s, and how long it may take to show itself.
-PAGE_SECONDS, PAGE_LIMIT = 4.0, 20.0
+PAGE_SECONDS, PAGE_LIMIT = 4.0, 60.0
 # A graphics processor is not asked for: what is measured must not depend on a screen being there.
 CHROMIUM_FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 

@@ -41,6 +41,9 @@ class Report:
         Frames of the page.
     advice
         What to change, most important first.
+    taken
+        Shares of the processors' time that programs took while the loop ran, and that the host of a virtual machine
+        took; None where the system does not tell.
 
     """
 
@@ -50,6 +53,7 @@ class Report:
     ticks: dict[str, Times]
     page: PageRate
     advice: list[Advice]
+    taken: tuple[float, float] | None = None
 
     @property
     def missed(self) -> float:
@@ -81,6 +85,8 @@ def as_json(report: Report) -> dict[str, Any]:
             "missed_computing": loop.missed_computing,
             "missed_waking": loop.missed_waking,
             "missed_share": report.missed,
+            "busy_share": report.taken and report.taken[0],
+            "stolen_share": report.taken and report.taken[1],
             "wakeup": asdict(Times.of(loop.wakeup_us)),
             "compute": asdict(Times.of(loop.compute_us)),
             "wakeup_histogram": [
@@ -154,6 +160,9 @@ def _loop_lines(report: Report) -> Iterator[str]:
         yield f"  {low:7.0f} to {high:7.0f} us {count:7d}  {bar}"
     for name, times in (("wake-up", Times.of(loop.wakeup_us)), ("computing", Times.of(loop.compute_us))):
         yield f"  {name + ':':10s} median {times.median:.0f} us, p99.9 {times.p999:.0f} us, worst {times.worst:.0f} us"
+    if report.taken is not None:
+        busy, stolen = (100 * share for share in report.taken)
+        yield f"  processors meanwhile: {busy:.0f} % busy, {stolen:.1f} % taken by the host of a virtual machine"
     yield f"  deadlines missed: {loop.missed_waking} by waking up late, {loop.missed_computing} by computing"
 
 
