@@ -151,6 +151,16 @@ def chromium():
         browser.close()
 
 
+@pytest.fixture(scope="module")
+def program(cache):
+    """The demo of the paper's liver, with a page; it ends cleanly by Ctrl-C."""
+    from browser import Program
+
+    started = Program(cache, "liver", "--paper")
+    yield started
+    assert started.stop() == 0
+
+
 @pytest.fixture
 def page(chromium, program):
     """A page of the module's ``program``."""
