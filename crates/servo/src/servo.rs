@@ -29,9 +29,6 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// Ticks a second where nothing else is asked for, Hz.
-    pub const DEFAULT_RATE: f64 = 1000.0;
-
     /// Starts the loop with one device a tool, `rate` ticks a second (100 to 10000 Hz), and beside it a thread that prepares
     /// the strain of contacts.
     ///
