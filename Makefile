@@ -46,7 +46,7 @@ demo: $(VENV)/.installed $(PAGE)
 
 # Two processes: much of the time goes into waiting for browsers, meshers and servers.
 test: $(VENV)/.installed $(PAGE) lint
-	cargo test --release --quiet --workspace --exclude palpate-python
+	cargo test --release --quiet --workspace
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile $(ARGS)
 
 lint: $(VENV)/.installed viewer/node_modules/.checks
