@@ -28,6 +28,10 @@ FLAGS = [
     "--disable-sync",
 ]
 
+# Drawn in software on a busy machine a page may show two pictures a second: a wait ends by what is seen, and fails only
+# after this time, s.
+PATIENCE = 60.0
+
 MARKS = [
     pytest.mark.browser,
     pytest.mark.skipif(
@@ -36,11 +40,15 @@ MARKS = [
 ]
 
 
+# The program, but for one thing: a page that a busy machine keeps from drawing for 2 s is not taken for one that is gone.
+PATIENT = f"from palpate.viewer import server; server.LOST_AFTER = {PATIENCE}; from palpate.cli import main; main()"
+
+
 class Program:
     """`palpate demo`, or another command with a page, as a user starts it; ``cache`` None is the user's own."""
 
     def __init__(self, cache: Path | None, *arguments: str, command: str = "demo"):
-        words = [sys.executable, "-m", "palpate", command, *arguments, "--port", "0", "--no-browser"]
+        words = [sys.executable, "-c", PATIENT, command, *arguments, "--port", "0", "--no-browser"]
         environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=environment)
         told = (re.search(r"http://\S+", line) for line in self.process.stdout)
@@ -77,11 +85,6 @@ def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
 
 def state(page) -> dict:
     return page.evaluate("window.palpate ? window.palpate.state() : {frames: 0, connected: false}")
-
-
-# Drawn in software on a busy machine a page may show two pictures a second: a wait ends by what is seen, and fails only
-# after this time, s.
-PATIENCE = 60.0
 
 
 def until(page, condition, seconds: float = PATIENCE) -> dict:

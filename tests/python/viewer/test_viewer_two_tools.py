@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, opened, press, settled_force, state, until
+from browser import MARKS, PATIENCE, Program, opened, press, settled_force, state, until
 
 import palpate
 from palpate.viewer.server import ViewerServer
@@ -55,9 +55,11 @@ class Pair:
 
 @pytest.fixture(scope="module")
 def pair(cache):
-    started = Pair(cache)
-    yield started
-    started.stop()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("palpate.viewer.server.LOST_AFTER", PATIENCE)
+        started = Pair(cache)
+        yield started
+        started.stop()
 
 
 def test_two_tools_on_two_bodies(chromium, pair):
