@@ -40,7 +40,7 @@ MARKS = [
 ]
 
 
-# The program, but for one thing: a page that a busy machine keeps from drawing for 2 s is not taken for one that is gone.
+# The program, but that a page which a busy machine keeps from drawing for 2 s is not taken for one that is gone.
 PATIENT = f"from palpate.viewer import server; server.LOST_AFTER = {PATIENCE}; from palpate.cli import main; main()"
 
 
