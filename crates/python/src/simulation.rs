@@ -7,7 +7,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntyped
 use palpate_core::simulation::{MAX_BODIES, Model, Pose, Snapshot, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{Handle, Target, simulated};
-use palpate_servo::{Published, SafetyLimits, Script, Servo, Settings, StrainPreparer};
+use palpate_servo::{Published, SafetyLimits, Scheduling, Script, Servo, Settings, StrainPreparer};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -27,7 +27,7 @@ pub struct SimulationCore {
     model: Arc<Model>,
     limits: SafetyLimits,
     settings: Settings,
-    rate: f64,
+    scheduling: Scheduling,
     strain: StrainPreparer,
     handles: Vec<Handle>,
     targets: Vec<Target>,
@@ -37,7 +37,8 @@ pub struct SimulationCore {
 
 #[pymethods]
 impl SimulationCore {
-    /// Prepares bodies and tools, with limits of force (N), slew (N/s) and ramp (s), and a rate, Hz.
+    /// Prepares bodies and tools, with limits of force (N), slew (N/s) and ramp (s), and the loop's rate, Hz, processors and
+    /// priority.
     #[new]
     fn new(
         py: Python<'_>,
@@ -45,7 +46,7 @@ impl SimulationCore {
         tools: Vec<ToolArguments>,
         limits: (f64, f64, f64),
         strain_limit: f64,
-        rate: f64,
+        scheduling: (f64, Vec<usize>, u8),
     ) -> PyResult<Self> {
         let parts = bodies.iter().map(body_parts).collect::<PyResult<Vec<_>>>()?;
         let prepare = || {
@@ -62,7 +63,7 @@ impl SimulationCore {
         Ok(Self {
             limits: SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..SafetyLimits::default() },
             settings,
-            rate,
+            scheduling: Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 },
             strain: StrainPreparer::new(&model),
             handles: Vec::new(),
             targets: vec![Target::default(); model.tools.len()],
@@ -76,8 +77,8 @@ impl SimulationCore {
         self.strain.set_measure(body, measure.measure.clone());
     }
 
-    /// Starts the loop.
-    fn start(&mut self, py: Python<'_>) -> PyResult<()> {
+    /// Starts the loop; whether the system granted its priority, and locked memory.
+    fn start(&mut self, py: Python<'_>) -> PyResult<(bool, bool)> {
         let (handles, devices): (Vec<_>, Vec<_>) = self
             .targets
             .iter()
@@ -87,11 +88,13 @@ impl SimulationCore {
             })
             .unzip();
         self.handles = handles;
-        let (model, limits, settings, rate, strain) =
-            (self.model.clone(), self.limits, self.settings, self.rate, self.strain.clone());
-        let started = py.detach(|| Servo::start(model, devices, limits, settings, rate, strain));
-        *self.servo() = Some(started.map_err(|e| to_python(py, e))?);
-        Ok(())
+        let (model, limits, settings, scheduling, strain) =
+            (self.model.clone(), self.limits, self.settings, self.scheduling.clone(), self.strain.clone());
+        let started = py.detach(|| Servo::start(model, devices, limits, settings, scheduling, strain));
+        let servo = started.map_err(|e| to_python(py, e))?;
+        let realtime = servo.realtime();
+        *self.servo() = Some(servo);
+        Ok((realtime.priority, realtime.locked_memory))
     }
 
     /// Stops the loop.
@@ -287,7 +290,13 @@ impl SimulationCore {
                 (tick, Strike { body, point: point.into(), impulse: impulse.into(), radius, duration })
             })
             .collect();
-        let script = Script { period: 1.0 / self.rate, poses: &poses, grabs: &grabs, strikes: &strikes, watch: &watch };
+        let script = Script {
+            period: 1.0 / self.scheduling.rate,
+            poses: &poses,
+            grabs: &grabs,
+            strikes: &strikes,
+            watch: &watch,
+        };
         let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
         let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
         let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script));

@@ -19,6 +19,7 @@ from palpate.simulation import settings
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.frame import BodyFrame, Contact, Frame
 from palpate.simulation.recording import LOG_DTYPE, Recording
+from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
@@ -35,6 +36,8 @@ class Simulation:
     ----------
     scene
         What to touch, and with what.
+    cpus, priority
+        Processors and priority of the loop's thread, in place of those of ``scene.device``.
 
     Attributes
     ----------
@@ -46,12 +49,12 @@ class Simulation:
     Raises
     ------
     Error
-        A body that cannot be solved, or a contact radius that covers too many nodes.
+        A body that cannot be solved, a contact radius that covers too many nodes, or ``cpus`` that there are not.
 
     """
 
-    def __init__(self, scene: Scene | BuiltScene):
-        built = scene if isinstance(scene, BuiltScene) else scene.build()
+    def __init__(self, scene: Scene | BuiltScene, *, cpus: Sequence[int] | None = None, priority: int | None = None):
+        built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
         device, tools = self.scene.device, self.scene.tools
         self._scales = [1.0] * len(self.bodies)
@@ -64,7 +67,7 @@ class Simulation:
             [tool_arguments(self.scene, rank) for rank in range(len(tools))],
             (device.max_force, device.max_slew, device.ramp),
             self.scene.view.strain_limit,
-            device.rate,
+            (device.rate, device.cpus, device.priority),
         )
         self._strain_limit, self._armed = self.scene.view.strain_limit, False
         self._running = False
@@ -99,10 +102,19 @@ class Simulation:
         return self.bodies[0].motion
 
     def start(self) -> None:
-        """Start the loop; tools are out of the scene until moved."""
+        """Start the loop; tools are out of the scene until moved.
+
+        A priority that was asked for and is not granted gives a :class:`SchedulingWarning`.
+
+        Raises
+        ------
+        SceneError
+            Processors of ``scene.device`` that this process may not run on.
+
+        """
         if not self._running:
             self._arm_strain_limit()
-            self._core.start()
+            start_loop(self._core, self.scene.device)
             self._running = True
 
     def stop(self) -> None:
@@ -326,8 +338,8 @@ class Simulation:
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
-        names = ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused", "port_energy")
-        statistics = {name: raw[name] for name in names}
+        names = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
+        statistics = {name: raw[name] for name in (*names, "port_energy")}
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         bodies = tuple(
