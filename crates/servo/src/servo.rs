@@ -35,9 +35,6 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// Ticks a second where nothing else is asked for, Hz.
-    pub const DEFAULT_RATE: f64 = 1000.0;
-
     /// Starts the loop with one device a tool on a thread scheduled as told, and beside it a thread that prepares the strain
     /// of contacts.
     ///
