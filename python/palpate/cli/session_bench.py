@@ -33,7 +33,7 @@ def record(
         with narrated(f"preparing {read.name}"):
             built = read.build()
         with tempfile.TemporaryDirectory() as folder, progress_reporter(read.name, True) as report:
-            results.append(run_session(built, Path(folder) / "session.mcap", 60 * minutes, report=report))
+            results.append(run_session(built, scene.stem, Path(folder) / "session.mcap", 60 * minutes, report=report))
     if as_json:
         print(json.dumps([asdict(result) for result in results], indent=2))
         return

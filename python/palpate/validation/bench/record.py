@@ -112,6 +112,7 @@ class Script:
 
 def run_session(
     built: BuiltScene,
+    name: str,
     path: Path,
     seconds: float,
     again: bool = True,
@@ -140,7 +141,7 @@ def run_session(
     recording = Recording.load(path)
     finite = np.isfinite(recording.forces).all(axis=-1) & np.isfinite(recording.torques).all(axis=-1)
     return SessionResult(
-        scene=built.scene.name,
+        scene=name,
         seconds=seconds,
         ticks=len(recording.ticks),
         dropped=-1 if done is None else done.dropped,
