@@ -17,6 +17,7 @@ from palpate.errors import (
     PalpateWarning,
     PrecisionError,
     PrecisionWarning,
+    RecordingWarning,
     SceneError,
     SchedulingWarning,
     SimulationError,
@@ -31,6 +32,7 @@ from palpate.fields import StressRecovery, SurfaceStress
 from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
 from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
+from palpate.sessions import Comparison, QuantityDifference, compare, export, rerun
 from palpate.simulation import Contact, Difference, Frame, Recording, RecordingStatus, Replayed, Simulation, replay
 
 __version__ = version("palpate")
@@ -39,6 +41,7 @@ __all__ = [
     "Answer",
     "Body",
     "BodyError",
+    "Comparison",
     "Contact",
     "Difference",
     "Energy",
@@ -56,8 +59,10 @@ __all__ = [
     "Plan",
     "PrecisionError",
     "PrecisionWarning",
+    "QuantityDifference",
     "Recording",
     "RecordingStatus",
+    "RecordingWarning",
     "Replayed",
     "Scene",
     "SceneError",
@@ -74,12 +79,15 @@ __all__ = [
     "UnclearUnitError",
     "UnitError",
     "ViewerError",
+    "compare",
+    "export",
     "models",
     "modes",
     "plan",
     "precompute",
     "rayleigh_from_ratios",
     "replay",
+    "rerun",
     "shapes",
     "tetrahedralize",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,3 +31,24 @@ def written_beside(path: Path) -> Iterator[Path]:
         raise
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def folder_beside(path: Path) -> Iterator[Path]:
+    """Give an empty folder to fill, which takes the place of ``path`` when the block ends well, and else is deleted."""
+    remove_leftovers(path)
+    partial = path.with_name(f".{os.getpid()}.{path.name}")
+    before = path.with_name(f".{os.getpid()}.{path.name}.before")
+    partial.mkdir()
+    try:
+        yield partial
+        # A folder that is not empty cannot be replaced in one step.
+        if path.exists():
+            os.replace(path, before)
+        os.replace(partial, path)
+    except OSError as error:
+        error.filename = os.fspath(path)
+        raise
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+        shutil.rmtree(before, ignore_errors=True)

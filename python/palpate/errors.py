@@ -82,3 +82,7 @@ class SchedulingWarning(PalpateWarning):
 
 class TouchWarning(PalpateWarning):
     """A touch landed on the surface far from the point that was asked for."""
+
+
+class RecordingWarning(PalpateWarning):
+    """A recording is not whole, or is not made again as it was."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shutil
 from pathlib import Path
 
 _NAMES = (re.compile(r"(?P<name>.+)\.(?P<process>\d+)\.(new|partial)"), re.compile(r"\.(?P<process>\d+)\.(?P<name>.+)"))
@@ -22,6 +23,9 @@ def remove_leftovers(path: Path) -> None:
         return
     for file in path.parent.iterdir():
         if is_leftover(file, path.name):
+            if file.is_dir():
+                shutil.rmtree(file, ignore_errors=True)
+                continue
             with contextlib.suppress(OSError):
                 file.unlink()
 

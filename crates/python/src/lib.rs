@@ -8,6 +8,7 @@ mod frame;
 mod green;
 mod recording;
 mod replay;
+mod rerun;
 mod scene;
 mod simulation;
 mod strain;
@@ -36,6 +37,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::SimulationCore>()?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
+    module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;
     module.add_class::<surface::SurfaceSearch>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;

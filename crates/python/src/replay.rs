@@ -9,8 +9,8 @@ use numpy::IntoPyArray;
 use palpate_core::simulation::Mode;
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
-use palpate_recording::Ticks;
-use palpate_servo::{Owner, TickRecord};
+use palpate_recording::{Ticks, same_settings};
+use palpate_servo::{Owner, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -20,7 +20,7 @@ use crate::scene::{energy_array, wxyz};
 use crate::simulation::SimulationCore;
 
 /// Ticks between two looks for an interrupt.
-const INTERRUPT_TICKS: usize = 256;
+pub const INTERRUPT_TICKS: usize = 256;
 
 /// A recording's place: a file, or its bytes.
 #[derive(FromPyObject)]
@@ -33,7 +33,11 @@ pub enum Source {
 
 type AnyTicks = Ticks<Box<dyn Read + Send>>;
 
-fn open(source: Source) -> Result<AnyTicks> {
+/// Opens a recording.
+///
+/// # Errors
+/// The system's; what is no recording.
+pub fn open(source: Source) -> Result<AnyTicks> {
     let (read, name): (Box<dyn Read + Send>, String) = match source {
         Source::Path(path) => {
             let file = File::open(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
@@ -56,6 +60,8 @@ struct Columns {
     limited: Vec<bool>,
     faults: Vec<Option<String>>,
     events: Vec<(u64, String)>,
+    /// Settings, and the ticks from which they hold.
+    settings: Vec<(u64, Settings)>,
     delay_us: Vec<f64>,
     compute_us: Vec<f64>,
     /// Tick, tool, body, mode (2 holds on), whether it slips and is limited.
@@ -107,7 +113,10 @@ impl Columns {
             self.limited.push(got.limited);
         }
         self.tell(record, tools);
-        let tick = record.tick;
+        let (tick, settings) = (record.tick, &record.input.settings);
+        if self.settings.last().is_none_or(|(_, before)| !same_settings(before, settings)) {
+            self.settings.push((tick, *settings));
+        }
         for c in record.output.contacts.iter() {
             let grab = if c.mode == Mode::Grab { 2 } else { 1 };
             self.contact_state.extend([tick, c.tool.into(), c.body.into(), grab, c.slipping.into(), c.limited.into()]);
@@ -183,10 +192,31 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
     answer.set_item("delay_us", columns.delay_us.into_pyarray(py))?;
     answer.set_item("compute_us", columns.compute_us.into_pyarray(py))?;
     answer.set_item("events", columns.events)?;
+    let settings = columns.settings.iter().map(|(tick, settings)| settings_dict(py, *tick, settings, tools));
+    answer.set_item("settings", settings.collect::<PyResult<Vec<_>>>()?)?;
     answer.set_item("contact_state", columns.contact_state.into_pyarray(py))?;
     answer.set_item("contact_numbers", columns.contact_numbers.into_pyarray(py))?;
     answer.set_item("bodies", columns.bodies.into_pyarray(py))?;
     Ok(answer)
+}
+
+/// Settings from a tick on, with a stiffness scale for each body there could be.
+fn settings_dict<'py>(py: Python<'py>, tick: u64, settings: &Settings, tools: usize) -> PyResult<Bound<'py, PyDict>> {
+    let tools = tools.min(settings.friction.len());
+    let said = PyDict::new(py);
+    said.set_item("tick", tick)?;
+    said.set_item("contact_radius", settings.contact_radius[..tools].to_vec())?;
+    said.set_item("friction", settings.friction[..tools].to_vec())?;
+    said.set_item("stiffness_scale", settings.stiffness_scale.to_vec())?;
+    said.set_item("strain_limit", settings.strain_limit)?;
+    said.set_item("time_scale", settings.time_scale)?;
+    let strike = &settings.strike;
+    said.set_item("strike_body", strike.body)?;
+    said.set_item("strike_point", strike.point.to_array())?;
+    said.set_item("strike_impulse", strike.impulse.to_array())?;
+    said.set_item("strike_radius", strike.radius)?;
+    said.set_item("strike_duration", strike.duration)?;
+    Ok(said)
 }
 
 /// Tick, whose, quantity, numbers recorded and now.

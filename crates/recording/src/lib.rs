@@ -9,6 +9,7 @@ mod recorder;
 mod schemas;
 mod writer;
 
+pub use messages::same_settings;
 pub use reader::{Ending, Ticks};
 pub use recorder::{Recorder, RecorderStatus};
 pub use writer::{Header, TickWriter};

@@ -404,7 +404,7 @@ fn fill(to: &mut [f64], from: &[f64]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
-/// What is the same in two settings as far as a recording goes.
+/// Whether two settings are the same as far as a recording goes: counters and the watched node aside.
 pub fn same_settings(a: &Settings, b: &Settings) -> bool {
     let counted = |settings: &Settings| Settings { resets: 0, strikes: 0, watch: None, ..*settings };
     counted(a) == counted(b)

@@ -26,7 +26,7 @@ pub use clock::now_ns;
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
-pub use offline::{Recording, Script, run};
+pub use offline::{Recording, Script, rerun, run};
 pub use preparer::{StrainPreparer, StrainWorker};
 pub use record::{
     RecordedContact, RecordedContacts, RecordedInput, RecordedOutput, RecordedTool, StrainArrivals, StrainAsked,

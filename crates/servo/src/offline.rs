@@ -12,7 +12,8 @@ use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist
 use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::preparer::StrainPreparer;
-use crate::record::TickRecord;
+use crate::record::{RecordedInput, TickRecord};
+use crate::replay::Replayed;
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::{Settings, check_node, refuse_unless};
 use crate::strain::{PreparerEnd, StrainAnswer};
@@ -103,6 +104,45 @@ pub fn run(
         }
     }
     Ok(recording)
+}
+
+/// Ticks through recorded inputs without looking at what came out of them: what the devices said, strikes, resets and the
+/// pace of bodies are as recorded, all other settings as given. Hands out a record of each tick.
+///
+/// # Errors
+/// See [`ForceLoop::new`]; an input that cannot be had, or a strike on a body that the model does not have.
+pub fn rerun(
+    model: &Arc<Model>,
+    limits: SafetyLimits,
+    settings: Settings,
+    strain: &StrainPreparer,
+    inputs: impl IntoIterator<Item = Result<RecordedInput>>,
+    mut each: impl FnMut(&TickRecord),
+) -> Result<()> {
+    let (mut readings, devices): (Vec<_>, Vec<_>) =
+        model.tools.iter().map(|_| Replayed::new(DeviceLimits::UNLIMITED)).unzip();
+    let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
+    let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
+    force_loop.limit_strain_of(strain.known());
+    let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
+    let mut records = handle.begin_recording()?;
+    let mut settings = settings;
+    for (tick, input) in inputs.into_iter().enumerate() {
+        let input = input?;
+        settings.time_scale = input.settings.time_scale;
+        settings.strike = input.settings.strike;
+        settings.strikes = settings.strikes.wrapping_add(u32::from(input.strike));
+        settings.resets = settings.resets.wrapping_add(u32::from(input.reset));
+        handle.set(settings)?;
+        for (readings, said) in readings.iter_mut().zip(&input.readings) {
+            let _ = readings.push(*said);
+        }
+        preparation.hand_over(tick);
+        force_loop.tick(input.due_ns, input.period);
+        preparation.prepare(tick);
+        records.pop().iter().for_each(&mut each);
+    }
+    Ok(())
 }
 
 /// Strain responses between the ticks, handed over after a fixed number of them.

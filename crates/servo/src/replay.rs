@@ -84,9 +84,9 @@ impl Replay {
         let settings = Settings { resets: 0, strikes: 0, ..settings };
         let (mut readings, mut replayed) = (Vec::new(), Vec::new());
         for &limits in devices {
-            let (producer, consumer) = RingBuffer::new(1);
+            let (producer, device) = Replayed::new(limits);
             readings.push(producer);
-            replayed.push(Box::new(Replayed { readings: consumer, limits }) as Box<dyn Device>);
+            replayed.push(Box::new(device) as Box<dyn Device>);
         }
         let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), replayed, limits, settings, || 0)?;
         force_loop.limit_strain_of(strain.known());
@@ -143,9 +143,17 @@ impl Replay {
 }
 
 /// A device that says what was recorded.
-struct Replayed {
+pub(crate) struct Replayed {
     readings: Consumer<Result<Reading, DeviceFault>>,
     limits: DeviceLimits,
+}
+
+impl Replayed {
+    /// One, and where it is told a reading before each tick.
+    pub(crate) fn new(limits: DeviceLimits) -> (Producer<Result<Reading, DeviceFault>>, Self) {
+        let (producer, readings) = RingBuffer::new(1);
+        (producer, Self { readings, limits })
+    }
 }
 
 impl Device for Replayed {

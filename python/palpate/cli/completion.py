@@ -24,6 +24,13 @@ def precisions(incomplete: str) -> list[str]:
     return _beginning(("f16", "f32", "f64"), incomplete)
 
 
+def formats(incomplete: str) -> list[tuple[str, str]]:
+    """List the formats that a recording is written in, and what they are."""
+    from palpate.sessions import FORMATS
+
+    return [(ending[1:], what) for ending, what in FORMATS.items() if ending[1:].startswith(incomplete)]
+
+
 def checks(incomplete: str) -> list[tuple[str, str]]:
     """Benchmarks with a known answer, and what they are."""
     from palpate.validation.verify import BENCHMARKS

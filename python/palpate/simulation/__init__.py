@@ -1,8 +1,9 @@
 """The force loop of a scene, what is read of it, and what it leaves behind."""
 
-from palpate.simulation.frame import BodyFrame, Contact, Frame
+from palpate.simulation.about import scene_of, shown_of
+from palpate.simulation.frame import BodyFrame, Contact, Frame, frame_of
 from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
-from palpate.simulation.replay import Difference, Replayed, replay, simulation_of
+from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, unbroken
 from palpate.simulation.simulation import Simulation
 
 __all__ = [
@@ -15,6 +16,10 @@ __all__ = [
     "RecordingStatus",
     "Replayed",
     "Simulation",
+    "frame_of",
     "replay",
+    "scene_of",
+    "shown_of",
     "simulation_of",
+    "unbroken",
 ]

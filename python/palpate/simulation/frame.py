@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from palpate.vectors import brief
 
 if TYPE_CHECKING:
     import meshio
+
+PERCENTILES = ("p50", "p99", "p999", "max")
+STATISTICS = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,3 +183,27 @@ class Frame(ComparedByValue, Exported):
     def within_linear_range(self) -> bool:
         """Whether the largest strain is within the 10 % to which linear elasticity is honest."""
         return all(body.within_linear_range for body in self.bodies)
+
+
+def frame_of(raw: dict[str, Any], bodies: Sequence[BuiltBody], stiffness_scales: Sequence[float]) -> Frame:
+    """Frame of a tick as the native module hands it out, of a running loop or of one made again.
+
+    ``stiffness_scales`` are Young's moduli of the bodies in that tick over those of their Green's functions.
+    """
+    statistics = {name: raw[name] for name in (*STATISTICS, "port_energy")}
+    for name in ("compute_us", "wakeup_us"):
+        statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
+    moved = tuple(
+        BodyFrame(surface.reshape(-1, 3), None if energy is None else Energy(*energy), body.green, body, scale)
+        for body, (surface, energy), scale in zip(bodies, raw["bodies"], stiffness_scales, strict=True)
+    )
+    tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "limited")]
+    contacts = [contact_of(record, bodies) for record in raw["contacts"]]
+    return Frame(raw["time"], *tools, contacts, moved, statistics)
+
+
+def contact_of(record: tuple[Any, ...], bodies: Sequence[BuiltBody]) -> Contact:
+    """Contact as the native module hands it out, with the nodes of the body's mesh."""
+    tool, body, mode, vectors, flags, numbers, nodes, weights = record
+    nodes = bodies[body].green.surface_nodes[nodes]
+    return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights))

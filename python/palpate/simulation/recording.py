@@ -113,7 +113,10 @@ class Recording(ComparedByValue):
             A file that cannot be read, or is no recording.
 
         """
-        source = Path(path)
+        return cls._of(Path(path))
+
+    @classmethod
+    def _of(cls, source: bytes | Path) -> Recording:
         columns = _native.read_recording(source)
         number = columns["number"]
         shaped = _Shaped(columns)
@@ -232,6 +235,19 @@ class Recording(ComparedByValue):
     def events(self) -> Sequence[tuple[int, str]]:
         """Ticks and what happened in them: resets, strikes, faults."""
         return self._columns["events"]
+
+    @property
+    def settings(self) -> Sequence[Mapping[str, Any]]:
+        """Settings in the order in which they came into force, from the tick ``tick`` on.
+
+        ``contact_radius`` (m) and ``friction`` are of each tool, ``stiffness_scale`` of each body, ``strain_limit`` and
+        ``time_scale`` of the scene; ``strike_body``, ``strike_point`` (m), ``strike_impulse`` (N s), ``strike_radius``
+        (m) and ``strike_duration`` (s) are those of the latest strike.
+        """
+        bodies = len(json.loads(self.about["keys"]))
+        of_bodies = [row["stiffness_scale"][:bodies] for row in self._columns["settings"]]
+        rows = zip(self._columns["settings"], of_bodies, strict=True)
+        return [{**row, "stiffness_scale": scales} for row, scales in rows]
 
     @cached_property
     def _columns(self) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from palpate import _native
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
@@ -115,9 +117,7 @@ def replay(
     """
     recorded = recording if isinstance(recording, Recording) else Recording.load(Path(recording))
     again = _native.Replay(simulation_of(recorded, scene)._core, recorded.source)
-    # Behind the first tick that was dropped nothing can be the same.
-    missing = [rank for rank, number in enumerate(recorded.ticks.tolist()) if rank != number]
-    expected = missing[0] if missing else len(recorded.ticks)
+    expected = unbroken(recorded)
     differences: list[Difference] = []
     done = 0
     with progress_reporter("replaying", progress) as report:
@@ -130,4 +130,10 @@ def replay(
                 break
             if report is not None:
                 report(done, expected)
-    return Replayed(done, tuple(differences), not missing and recorded.dropped == 0)
+    return Replayed(done, tuple(differences), recorded.dropped == 0 and expected == len(recorded.ticks))
+
+
+def unbroken(recording: Recording) -> int:
+    """Count the ticks before the first that was dropped, behind which nothing can be made again."""
+    missing = np.flatnonzero(recording.ticks != np.arange(len(recording.ticks)))
+    return int(missing[0]) if len(missing) else len(recording.ticks)

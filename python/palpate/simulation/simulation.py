@@ -20,13 +20,12 @@ from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.frame import BodyFrame, Contact, Frame
+from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
-PERCENTILES = ("p50", "p99", "p999", "max")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -236,21 +235,11 @@ class Simulation(Adjustable):
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
-        names = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
-        statistics = {name: raw[name] for name in (*names, "port_energy")}
-        for name in ("compute_us", "wakeup_us"):
-            statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
-        bodies = tuple(
-            BodyFrame(moved.reshape(-1, 3), None if energy is None else Energy(*energy), body.green, body, scale)
-            for body, (moved, energy), scale in zip(self.bodies, raw["bodies"], self._scales, strict=True)
-        )
-        tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "limited")]
-        contacts = [self._contact(record) for record in raw["contacts"]]
-        return Frame(raw["time"], *tools, contacts, bodies, statistics)
+        return frame_of(raw, self.bodies, self._scales)
 
     def contacts(self) -> list[Contact]:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
-        return [self._contact(record) for record in self._core.contacts() or []]
+        return [contact_of(record, self.bodies) for record in self._core.contacts() or []]
 
     @property
     def strain_measure(self) -> StrainMeasure:
@@ -365,8 +354,3 @@ class Simulation(Adjustable):
         time = np.arange(1, ticks + 1) / self.scene.device.rate
         watched = raw["watched"].reshape(ticks, len(ranks), 3)
         return Recording(time, forces, torques, watched, limited, energies, source=raw["file"])
-
-    def _contact(self, record: tuple[Any, ...]) -> Contact:
-        tool, body, mode, vectors, flags, numbers, nodes, weights = record
-        nodes = self.bodies[body].green.surface_nodes[nodes]
-        return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights))

@@ -1,0 +1,61 @@
+//! The inputs of a recording, given to another simulation.
+
+use std::collections::BTreeMap;
+
+use palpate_core::{Error, Result};
+use palpate_servo::{RecordedInput, Settings, TickRecord};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::to_python;
+use crate::recording::{Recorded, header};
+use crate::replay::{INTERRUPT_TICKS, Source, open};
+use crate::simulation::SimulationCore;
+
+/// Gives the inputs of a recording, up to the first tick that is missing, to a simulation with settings of its own: the
+/// recording that comes of it. `told` is called with the ticks done.
+#[pyfunction]
+pub fn rerun<'py>(
+    py: Python<'py>,
+    core: &SimulationCore,
+    source: Source,
+    about: BTreeMap<String, String>,
+    told: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let ticks = open(source).map_err(|e| to_python(py, e))?;
+    let settings = Settings { resets: 0, strikes: 0, watch: None, ..core.settings };
+    let (model, limits, strain) = (core.model.clone(), core.limits, core.strain.clone());
+    let rate = core.scheduling.rate;
+    let mut file = Recorded::new(header(about, &model, rate, false)).map_err(|e| to_python(py, e))?;
+    let mut stopped = None;
+    let inputs = ticks.enumerate().map_while(|(rank, record)| match record {
+        Ok(record) if record.tick != rank as u64 => None,
+        Ok(record) => {
+            stopped = if rank.is_multiple_of(INTERRUPT_TICKS) { tell(told.as_ref(), rank).err() } else { None };
+            match &stopped {
+                None => Some(Ok(record.input)),
+                Some(_) => Some(Err(Error::Invalid("interrupted".into()))),
+            }
+        }
+        Err(error) => Some(Err(error)),
+    });
+    let inputs: Inputs<'_> = Box::new(inputs);
+    let each = |record: &TickRecord| file.push(record);
+    let made = py.detach(|| palpate_servo::rerun(&model, limits, settings, &strain, inputs, each));
+    if let Some(error) = stopped {
+        return Err(error);
+    }
+    made.map_err(|e| to_python(py, e))?;
+    let bytes = file.finish().map_err(|e| to_python(py, e))?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+type Inputs<'a> = Box<dyn Iterator<Item = Result<RecordedInput>> + Send + 'a>;
+
+/// Looks for an interrupt, and tells how far it is.
+fn tell(told: Option<&Py<PyAny>>, done: usize) -> PyResult<()> {
+    Python::attach(|py| {
+        py.check_signals()?;
+        told.map_or(Ok(()), |told| told.call1(py, (done,)).map(|_| ()))
+    })
+}

@@ -1,0 +1,207 @@
+"""Recordings from the command line: written for other programs, and compared."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.app import app
+from palpate.cli.completion import formats
+
+if TYPE_CHECKING:
+    from palpate.scene import Scene
+    from palpate.sessions import Comparison, QuantityDifference
+    from palpate.simulation import Recording
+
+
+@app.command()
+def export(
+    file: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
+    to: Annotated[
+        str | None,
+        typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="File; default: beside the recording.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Frames a second of pvd, glb and mp4; default: 30.")] = None,
+    start: Annotated[str, typer.Option("--from", help="Begin there, such as 2s.")] = "0s",
+    end: Annotated[str | None, typer.Option("--until", help="End there, such as 5s; default: at the end.")] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Scene file with the same bodies; default: the scene in the recording.")
+    ] = None,
+) -> None:
+    """Write a recording for other programs: tables, ParaView, Blender, slides.
+
+    csv and parquet have one row a tick, and one row a contact in a second file. pvd is a time series for ParaView,
+    glb an animation for Blender and other viewers, mp4 a film: for these the recording is made again.
+
+    Example: palpate export press.mcap --to csv
+
+    Example: palpate export press.mcap --to mp4 --from 2s --until 5s
+
+    Example: palpate export press.mcap --out results/press.pvd --rate 60
+    """
+    import palpate
+    from palpate.units import time
+
+    target = _target(file, to, out)
+    recording = _loaded(file)
+    span = {"start": time(start), "end": None if end is None else time(end)}
+    same = None if scene is None else palpate.Scene.read(scene)
+    for written in palpate.export(recording, target, rate=rate, scene=same, progress=True, **span):
+        print(written)
+
+
+def _target(file: Path, to: str | None, out: Path | None) -> Path:
+    """File to write.
+
+    Raises
+    ------
+    Error
+        No format, an unknown one, or two that contradict each other.
+
+    """
+    from palpate.errors import Error
+    from palpate.sessions import FORMATS
+
+    known = ", ".join(f"{ending[1:]} ({what})" for ending, what in FORMATS.items())
+    if to is not None and f".{to}" not in FORMATS:
+        raise Error(f"--to {to}: unknown format; known are {known}")
+    if out is None:
+        if to is None:
+            raise Error(f"say --to or --out; formats are {known}")
+        return file.with_suffix(f".{to}")
+    if to is None or out.suffix.lower() == f".{to}":
+        return out
+    if out.suffix:
+        raise Error(f"--to {to} and --out {out} name two formats")
+    return out.with_suffix(f".{to}")
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="A recording (.mcap).")],
+    b: Annotated[Path | None, typer.Argument(help="Another one; or --scene.")] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Scene file: compare with what the same hand would have felt there.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the plot and, with --scene, the recording.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Compare two recordings tick by tick; exit code 0 for the same bits, 1 for others.
+
+    Example: palpate compare before.mcap after.mcap --out results
+
+    Example: palpate compare press.mcap --scene stiffer.toml
+    """
+    from palpate.errors import Error
+    from palpate.sessions import compare as compared
+
+    if (b is None) == (scene is None):
+        raise Error("compare takes two recordings, or one and --scene")
+    first = _loaded(a)
+    if b is not None:
+        second, name = _loaded(b), b.name
+    else:
+        second, name = _rerun(first, scene), scene.name
+    found = compared(first, second)
+    if as_json:
+        print(json.dumps(_as_json(found), indent=2))
+    else:
+        _print(found, (a.name, name))
+    if out is not None:
+        _write(out, (first, second), (a, b or scene), keep=b is None)
+    raise typer.Exit(0 if found.same else 1)
+
+
+def _rerun(recording: Recording, scene: Path) -> Recording:
+    import palpate
+    from palpate.progress import narrated
+
+    read: Scene = palpate.Scene.read(scene)
+    with narrated(f"preparing {read.name}"):
+        built = read.build()
+    return palpate.rerun(recording, built, progress=True)
+
+
+def _write(out: Path, both: tuple[Recording, Recording], files: tuple[Path, Path], keep: bool) -> None:
+    """Write the plot, and the second recording where there is no file of it."""
+    from palpate.validation.plots import plot_comparison
+
+    out.mkdir(parents=True, exist_ok=True)
+    name = f"{files[0].stem}-{files[1].stem}"
+    plot_comparison(*both, (files[0].name, files[1].name), out / f"{name}.png")
+    written = [out / f"{name}.png"]
+    if keep:
+        both[1].save(out / f"{name}.mcap")
+        written.append(out / f"{name}.mcap")
+    print(f"wrote {' and '.join(map(str, written))}", file=sys.stderr)
+
+
+def _loaded(file: Path) -> Recording:
+    """Read a recording, and tell of one that is not whole."""
+    from palpate.errors import Error, RecordingWarning
+    from palpate.input_file import require_file
+    from palpate.simulation import Recording
+
+    require_file(file, Error)
+    recording = Recording.load(file)
+    if recording.dropped is None:
+        length = f"{recording.time[-1]:.3f} s" if len(recording.time) else "nothing"
+        text = f"{file} was cut short: what is there is {length}"
+        warnings.warn(text, RecordingWarning, stacklevel=2)
+    elif recording.dropped:
+        warnings.warn(f"{file}: {recording.dropped} ticks were dropped", RecordingWarning, stacklevel=2)
+    return recording
+
+
+def _print(found: Comparison, names: tuple[str, str]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    console.width = max(console.width, 110) if not console.is_terminal else console.width
+    if found.same:
+        print(f"{names[0]} and {names[1]}: the same bits in all {found.ticks} ticks")
+    else:
+        print(f"{names[0]} has {found.counts[0]} ticks, {names[1]} {found.counts[1]}; {found.ticks} are compared")
+    first = found.first
+    if first is not None:
+        what = ", an input: what follows cannot be the same" if first.is_input else ""
+        print(f"first difference: tick {first.first}, {f'{first.of} {first.quantity}'.strip()}{what}")
+        table = Table(box=None, pad_edge=False, header_style="dim")
+        for title in ("", "difference of"):
+            table.add_column(title, no_wrap=True)
+        for title in ("largest", "rms", "largest value", "at tick", "time [s]", "from tick"):
+            table.add_column(title, justify="right", no_wrap=True)
+        for row in found.quantities:
+            if row.first is not None:
+                table.add_row(*_cells(row))
+        console.print(table)
+    for key, was, now in found.settings:
+        print(f"{key}: {_shown(was)} and {_shown(now)}")
+
+
+def _cells(row: QuantityDifference) -> tuple[str, ...]:
+    def figure(value: float) -> str:
+        return f"{value:.3g} {row.unit}".strip()
+
+    largest = "by sign of zero" if row.largest == 0 else figure(row.largest)
+    rest = (figure(row.rms), figure(row.reference), str(row.tick), f"{row.time:.3f}", str(row.first))
+    return row.of, row.quantity, largest, *rest
+
+
+def _shown(value: object) -> str:
+    return "nothing" if value is None else str(value)
+
+
+def _as_json(found: Comparison) -> dict:
+    from dataclasses import asdict
+
+    first = None if found.first is None else found.first.first
+    settings = [dict(zip(("key", "a", "b"), row, strict=True)) for row in found.settings]
+    return {**asdict(found), "settings": settings, "same": found.same, "first": first}

@@ -1,0 +1,7 @@
+"""Recordings taken further: written for other programs, compared, given to another scene."""
+
+from palpate.sessions.compare import Comparison, QuantityDifference, compare
+from palpate.sessions.export import FORMATS, export
+from palpate.sessions.rerun import rerun
+
+__all__ = ["FORMATS", "Comparison", "QuantityDifference", "compare", "export", "rerun"]
