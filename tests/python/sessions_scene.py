@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 import palpate
+from palpate.cli import main
 from palpate.scene import BuiltScene
 
 TOP = np.array([0.041, 0.026, 0.05])
@@ -35,3 +41,13 @@ def path() -> tuple[np.ndarray, np.ndarray]:
     turned = np.stack([np.cos(half), 0 * t, np.sin(half), 0 * t], axis=1)
     straight = np.tile([1.0, 0, 0, 0], (TICKS, 1))
     return np.stack([ball, capsule], axis=1), np.stack([straight, turned], axis=1)
+
+
+def called(monkeypatch, capsys, *words) -> SimpleNamespace:
+    """The command line within this process: what it returned and said."""
+    monkeypatch.setattr(sys, "argv", ["palpate", *map(str, words)])
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr()
+    return SimpleNamespace(returncode=ended.value.code or 0, stdout=said.out, stderr=said.err)

@@ -8,6 +8,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     recordings,
     running,
     session_bench,
+    sessions,
     verification,
 )
 from palpate.cli.app import main

@@ -20,7 +20,7 @@ WIDTH, HEIGHT, DPI = 1280, 720, 100
 TOOL_COLOR, FORCE_COLOR = (0.30, 0.37, 0.47, 1.0), (0.93, 0.53, 0.05, 1.0)
 COLORS = ("tab:orange", "tab:blue", "tab:green", "tab:purple")
 # Towards the light, and the part of the brightness that comes from everywhere.
-LIGHT, AMBIENT = np.array([0.35, -0.55, 0.76]), 0.5
+LIGHT, AMBIENT = np.array([0.35, -0.55, 0.76]), 0.6
 
 
 def write_mp4(frames: RecordedFrames, path: Path, rate: float, report: Report = None) -> None:
@@ -83,7 +83,7 @@ class Picture:
         self._canvas = FigureCanvasAgg(self._figure)
         self._patches = self._scene(frames)
         self._now = self._curves(frames)
-        self._text = self._figure.text(0.68, 0.9, "", fontsize=15, family="monospace", va="top")
+        self._text = self._figure.text(0.68, 0.82, "", fontsize=15, family="monospace", va="top")
 
     def draw(self, recorded: RecordedFrame) -> bytes:
         """Pixels of a frame, row by row, red green blue."""

@@ -59,9 +59,11 @@ class Span:
         """
         end = np.inf if self.end is None else self.end
         rows = np.flatnonzero((time >= self.start) & (time <= end))
+        if len(time) == 0:
+            raise Error("the recording is empty: there is nothing to write")
         if len(rows) == 0:
-            last = f"{time[-1]:.3f} s long" if len(time) else "empty"
-            raise Error(f"nothing was recorded from {self.start:g} s to {end:g} s: the recording is {last}")
+            upto = "on" if self.end is None else f"to {self.end:g} s"
+            raise Error(f"nothing was recorded from {self.start:g} s {upto}: the recording is {time[-1]:.3f} s long")
         return rows
 
 

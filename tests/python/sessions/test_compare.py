@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from command_line import refused, run
-from sessions_scene import STRIKE, built_of, path, scene_of
+from command_line import refused
+from sessions_scene import STRIKE, built_of, called, path, scene_of
 
 import palpate
 
@@ -74,16 +74,20 @@ def test_a_hand_in_the_same_scene_feels_the_same_and_in_another_what_it_would_ha
         palpate.rerun(recording, built_of(scene_of(tool={"radius": 0.006}), block, block_green))
 
 
-def test_the_command_ends_as_diff_does(file, recording, slippery, tmp_path):
+def test_the_command_ends_as_diff_does(file, recording, slippery, tmp_path, monkeypatch, capsys):
+    def command(*words):
+        return called(monkeypatch, capsys, "compare", file, *words)
+
+    monkeypatch.chdir(tmp_path)
     slippery.save(tmp_path / "slippery.mcap")
-    result = run("compare", file, "slippery.mcap", "--out", "plots", "--json", cwd=tmp_path)
+    result = command("slippery.mcap", "--out", "plots", "--json")
     assert result.returncode == 1, result
     told = json.loads(result.stdout)
     assert told["first"] == palpate.compare(recording, slippery).first.first and not told["same"]
     assert (tmp_path / "plots" / "press-slippery.png").stat().st_size > 10_000
-    table = run("compare", file, "slippery.mcap", cwd=tmp_path)
+    table = command("slippery.mcap")
     assert table.returncode == 1 and f"first difference: tick {told['first']}, " in table.stdout
-    same = run("compare", file, file, cwd=tmp_path)
+    same = command(file)
     assert same.returncode == 0 and "the same bits in all 300 ticks" in same.stdout
-    refused(run("compare", file, cwd=tmp_path), "two recordings, or one and --scene")
-    refused(run("compare", file, "none.mcap", cwd=tmp_path), "none.mcap: no such file")
+    refused(command(), "two recordings, or one and --scene")
+    refused(command("none.mcap"), "none.mcap: no such file")
