@@ -161,7 +161,7 @@ class _Document:
             if path == "rotation":
                 self._animate(node, path, _continuous(values)[:, [1, 2, 3, 0]], "VEC4")
             else:
-                self._animate(node, path, values, "VEC3", "STEP" if path == "scale" else "LINEAR")
+                self._animate(node, path, values, "VEC3")
 
     def write(self, path: Path) -> None:
         self._made.buffers = [self._kinds.Buffer(byteLength=len(self._bytes))]
@@ -187,10 +187,10 @@ class _Document:
         made.nodes.append(node)
         return node
 
-    def _animate(self, node: Any, path: str, values: np.ndarray, kind: str, between: str = "LINEAR") -> None:
+    def _animate(self, node: Any, path: str, values: np.ndarray, kind: str) -> None:
         gl, animation = self._kinds, self._made.animations[0]
         output = self._accessor(values, kind)
-        animation.samplers.append(gl.AnimationSampler(input=self._times, output=output, interpolation=between))
+        animation.samplers.append(gl.AnimationSampler(input=self._times, output=output, interpolation="LINEAR"))
         target = gl.AnimationChannelTarget(node=self._made.nodes.index(node), path=path)
         animation.channels.append(gl.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
 

@@ -12,23 +12,21 @@ from palpate.validation.plots.style import COLORS, empty_figure, write_figure
 
 def plot_comparison(a: Recording, b: Recording, names: tuple[str, str], path: Path) -> None:
     """Draw the forces on the devices of the tools and ticks that both have; written beside and renamed."""
-    common, *rows = np.intersect1d(a.ticks, b.ticks, assume_unique=True, return_indices=True)
+    _, *rows = np.intersect1d(a.ticks, b.ticks, assume_unique=True, return_indices=True)
     forces = [one.forces.reshape(len(one.ticks), -1, 3)[row] for one, row in zip((a, b), rows, strict=True)]
     time, tools = a.time[rows[0]], min(forces[0].shape[1], forces[1].shape[1])
     figure = empty_figure(9, 5.5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for tool, color in zip(range(tools), COLORS, strict=False):
+        sizes = [np.linalg.norm(force[:, tool], axis=1) for force in forces]
         of = f", tool {tool}" if tools > 1 else ""
-        for side, (name, style, width) in enumerate(zip(names, ("-", "--"), (2.2, 1.2), strict=True)):
-            size = np.linalg.norm(forces[side][:, tool], axis=1)
-            shade = color if side == 0 else "0.1"
-            upper.plot(time, size, style, color=shade, linewidth=width, label=f"{name}{of}")
+        upper.plot(time, sizes[0], color=color, linewidth=2.2, label=f"{names[0]}{of}")
+        upper.plot(time, sizes[1], "--", color="0.1", linewidth=1.2, label=None if tool else names[1])
         difference = np.linalg.norm(forces[0][:, tool] - forces[1][:, tool], axis=1)
         lower.plot(time, difference, color=color, linewidth=1.2, label=f"tool {tool}")
     upper.set_ylabel("force on the device [N]")
-    upper.set_title(f"{len(common)} ticks that both have", loc="left")
-    upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2 * tools, frameon=False)
-    lower.set_ylabel("size of the difference [N]")
+    upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=tools + 1, frameon=False)
+    lower.set_ylabel("difference [N]")
     lower.set_xlabel("time [s]")
     lower.set_ylim(bottom=0)
     write_figure(figure, path)
