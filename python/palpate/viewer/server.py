@@ -65,6 +65,8 @@ class Client:
 class ViewerServer:
     """Serves one session.
 
+    A kind of session of its own is named by ``session_type`` of a class derived from this one.
+
     Parameters
     ----------
     built
@@ -83,6 +85,8 @@ class ViewerServer:
 
     """
 
+    session_type: type[Session] = Session
+
     def __init__(
         self,
         built: BuiltScene,
@@ -95,7 +99,7 @@ class ViewerServer:
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
-        self._session = Session(built)
+        self._session = self.session_type(built)
         self._session.start()
         self._worker = Worker()
         self._models, self._scene_of = list(models), scene_of
@@ -190,9 +194,7 @@ class ViewerServer:
         try:
             if self._controller is None:
                 self._controller = client
-            role = "control" if self._controller is client else "watch"
-            models = choices(self._models)
-            await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
+            await self._greet(client)
             client.may_send.set()
             sender = asyncio.create_task(self._send_frames(client))
             async for text in connection:
@@ -204,6 +206,12 @@ class ViewerServer:
                 sender.cancel()
             self._clients.remove(client)
             await self._lose_control(client)
+
+    async def _greet(self, client: Client) -> None:
+        """Tell a page what it needs to know before its first scene."""
+        role = "control" if self._controller is client else "watch"
+        models = choices(self._models)
+        await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
 
     async def _welcome(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
