@@ -108,7 +108,7 @@ def _observe(library: Library, weber_fraction: float, seed: int, out: Path) -> N
 
 
 def _print_spread(library: Library, weber_fraction: float, exams: int, seed: int) -> None:
-    """What an exam finds of a known observer, over seeds."""
+    """Print what exams find of a known observer, over seeds."""
     import numpy as np
 
     from palpate.exam import observed_many

@@ -3,8 +3,8 @@
 What would give a nodule away: elements and regions, the wire frame of a mesh made finer around it, the dent that is
 shallower over it, colours, force and stiffness as numbers, arrows and plots, the centre of pressure, the limit of
 strain. So the page gets the surface at rest of a body that all trials have in common, no displacements, no contacts, no
-log. It gets where the tool is, which its hand knows, and the force on the device: that is what is felt, and what the
-page turns into sound for whoever has no device.
+log. It gets where the tool is, which its hand knows, and how loud the tone is that stands for the force where there is
+no device to be felt.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from palpate.viewer.tool_shapes import by_tool, outline
 
 # The only field, always zero.
 NOTHING = {"name": "displacement", "title": "Displacement", "unit": "mm", "signed": False, "max": 1.0, "largest": 0.0}
+# What a page is not told of a tool.
+SILENT = {"limited": False, "wanted": None, "force": [0.0, 0.0, 0.0], "refused": None}
 # Messages of a client that this session takes; settings would change what is felt.
 TAKEN = ("press", "release", "reset")
 
@@ -32,11 +34,14 @@ class HiddenSession(Session):
     ----------
     built
         Body with a nodule or without.
+    loud_force
+        Force at which the tone is loudest, N.
 
     """
 
-    def __init__(self, built: BuiltScene):
+    def __init__(self, built: BuiltScene, loud_force: float):
         super().__init__(built)
+        self._loud_force = loud_force
         self._touched: np.ndarray | None = None
         self._count = len(built.bodies[0].green.surface_nodes)
 
@@ -77,7 +82,7 @@ class HiddenSession(Session):
             "type": "frame",
             "frame": number,
             "time": frame.time,
-            "tools": [{**self._tool_header(frame, 0), "limited": False, "wanted": None, "refused": None}],
+            "tools": [{**self._tool_header(frame, 0), **SILENT}],
             "contacts": [],
             **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
             "realtime": all(frame.statistics["realtime"]),
@@ -86,6 +91,7 @@ class HiddenSession(Session):
             "motion": None,
             "fields": [NOTHING],
             "interior": [False],
+            "loudness": min(float(np.linalg.norm(frame.forces[0])) / self._loud_force, 1.0),
         }
         still = {"displacements": ("f4", np.zeros((self._count, 3))), "scalar": ("u1", np.zeros(self._count))}
         rows = {"log": ("f4", np.zeros((0, 3))), "history": ("f4", np.zeros((0, 8)))}

@@ -193,7 +193,7 @@ class Library:
         return chosen
 
     def _measured(self, nodules: Sequence[Nodule], report: Callable[[int, int], None]) -> np.ndarray:
-        """Forces (nodules, places), N; those that are known already are not measured again."""
+        """Return forces (nodules, places), N; those that are known already are not measured again."""
         known = _Known(self.exam, self.places)
         rows = []
         for done, nodule in enumerate(nodules):

@@ -17,7 +17,7 @@ from palpate.exam.result import Result
 from palpate.viewer.background import LongWork
 from palpate.viewer.server import Client, ViewerServer
 
-# The page's sound is as loud as it gets at so many times the force over plain tissue at the exam's depth.
+# The tone is as loud as it gets at so many times the force over plain tissue at the exam's depth.
 LOUDEST = 3.0
 
 
@@ -48,11 +48,11 @@ class ExamServer(ViewerServer):
 
     """
 
-    session_type = HiddenSession
-
     def __init__(self, course: Course, folder: Path, *, host: str, port: int):
         trial = course.trial
         assert trial is not None, "the exam is over"
+        loud_force = LOUDEST * float(course.library.plain_forces.max())
+        self.session_type = lambda built: HiddenSession(built, loud_force)
         super().__init__(course.library.built(trial.nodule), host=host, port=port)
         self._course, self._folder, self._record = course, folder, Record(folder / "exam.csv")
         self._shown = trial.number
@@ -109,7 +109,7 @@ class ExamServer(ViewerServer):
         if trial is None:
             await self._conclude(building)
         else:
-            make = lambda: HiddenSession(self._course.library.built(trial.nodule))  # noqa: E731
+            make = lambda: self.session_type(self._course.library.built(trial.nodule))  # noqa: E731
             await self._switch("Next trial", make, self._show_next, building)
         await self._tell_all(self._exam_message())
 
@@ -139,7 +139,6 @@ class ExamServer(ViewerServer):
             "trial": min(len(course.answers) + 1, course.count),
             "trials": course.count,
             "places": places,
-            "loud_force": LOUDEST * float(course.library.plain_forces.max()),
             "result": None if self.result is None else self._told(self.result),
         }
 

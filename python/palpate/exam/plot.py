@@ -9,11 +9,12 @@ import numpy as np
 
 from palpate.exam.course import Course
 from palpate.exam.psychometric import proportion_correct
-from palpate.exam.result import Result, interval, percent
+from palpate.exam.result import Result, percent, told_fraction
 from palpate.validation.plots import COLORS, empty_figure, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 # Trials are put together where their felt contrasts differ by less than this ratio.
 BIN = 1.35
@@ -39,13 +40,24 @@ def _draw_staircase(axes: Axes, numbers: np.ndarray, felt: np.ndarray, scores: n
         if mask.any():
             axes.plot(numbers[mask], 100 * felt[mask], marker, color=color, markersize=5, label=label)
     seek = f"found in {percent(result.target)}"
-    axes.axhline(100 * result.felt_contrast, color="0.2", linewidth=1, linestyle="--", label=seek)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
+    if np.isfinite(result.felt_contrast):
+        axes.axhline(100 * result.felt_contrast, color="0.2", linewidth=1, linestyle="--", label=seek)
+    _logarithmic(axes.yaxis)
+    axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set_xlabel("trial")
     axes.set_ylabel("felt contrast dK/K [%]")
     axes.set_title("staircase", loc="left")
     axes.legend(frameon=False, loc="best")
+
+
+def _logarithmic(axis: Axis) -> None:
+    """Make an axis logarithmic, its numbers written out at 1, 2 and 5."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _draw_function(axes: Axes, felt: np.ndarray, scores: np.ndarray, result: Result) -> None:
@@ -67,9 +79,8 @@ def _draw_function(axes: Axes, felt: np.ndarray, scores: np.ndarray, result: Res
         axes.plot(place, 100 * scores[inside].mean(), "o", color="0.15", markersize=2.5 + 1.3 * np.sqrt(inside.sum()))
     axes.axhline(100 / estimate.alternatives, color="0.5", linewidth=1, linestyle=":")
     axes.axvline(100 * estimate.weber_fraction, color=COLORS[1], linewidth=1, linestyle="--")
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
+    _logarithmic(axes.xaxis)
     axes.set_ylim(0, 103)
     axes.set_xlabel("felt contrast dK/K [%]")
     axes.set_ylabel("found [%]")
-    axes.set_title(f"Weber fraction {percent(estimate.weber_fraction)} ({interval(estimate)})", loc="left")
+    axes.set_title(f"Weber fraction {told_fraction(estimate)}", loc="left")

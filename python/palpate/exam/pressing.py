@@ -94,7 +94,7 @@ def forces_at(built: BuiltScene, places: Places, depth: float) -> np.ndarray:
 
 
 def _upright_on(normal: np.ndarray) -> np.ndarray:
-    """Unit quaternion w x y z that turns z to a normal the shortest way: half the turn is `(1 + n_z, z x n)`."""
+    """Return the quaternion w x y z that turns z to a normal the shortest way, `(1 + n_z, z x n)` made a unit."""
     if normal[2] < -1 + 1e-9:
         return np.array([0.0, 1.0, 0.0, 0.0])
     half = np.array([1.0 + normal[2], -normal[1], normal[0], 0.0])

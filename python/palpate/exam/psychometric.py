@@ -9,8 +9,8 @@ contrast `x`, is felt harder than the `m - 1` others, `1 + w n_i`:
     P(x; w) = int phi(t) Phi(x/w + (1 + x) t)^(m - 1) dt
 
 (Green and Swets 1966, ch. 2; Hacker and Ratcliff, Perception & Psychophysics 26, 168-170, 1979, for equal variances,
-`x -> 0` at a given `d' = x/w`). Chance, `1/m`, is its value at `x = 0`. With a lapse in the share `l` of the trials, where
-the answer is a guess, `psi = l/m + (1 - l) P` (Wichmann and Hill, Perception & Psychophysics 63, 1293-1313, 2001).
+`x -> 0` at a given `d' = x/w`). Chance, `1/m`, is its value at `x = 0`. With a lapse in the share `l` of the trials,
+where the answer is a guess, `psi = l/m + (1 - l) P` (Wichmann and Hill, Perception & Psychophysics 63, 1293, 2001).
 
 Two looks in turn (`m = 2`) are told apart in 76 % of the trials at `x = w`; the difference at 75 %, which is often
 quoted as the just noticeable one, is `0.954 w`.
@@ -28,10 +28,12 @@ from scipy.optimize import brentq
 from scipy.special import log_ndtr
 
 # Weber fractions that are searched, and lapse rates.
-GRID = np.geomspace(2e-3, 3.0, 500)
+GRID = np.geomspace(2e-3, 1.0, 450)
 LAPSES = np.linspace(0.0, 0.06, 7)
 # Half of the 95 % quantile of chi squared with one degree of freedom.
 HALF_QUANTILE = 1.9207
+# Contrasts beyond so many Weber fractions are not told apart.
+FARTHEST = 50.0
 # Points of the quadrature over the noise, and its half width; the trapezoidal rule converges faster than any power.
 POINTS, HALF_WIDTH = 81, 7.0
 
@@ -80,16 +82,17 @@ def proportion_correct(contrasts: np.ndarray, weber_fraction: np.ndarray | float
 
 
 def contrast_at(probability: float, weber_fraction: float, alternatives: int) -> float:
-    """Felt contrast at which `P(x; w)` has a value above chance and below one."""
-    # In units of w, for the function is steep on no other scale.
-    return weber_fraction * float(
-        brentq(
-            lambda d: float(proportion_correct(d * weber_fraction, weber_fraction, alternatives)) - probability,
-            0.0,
-            20.0,
-            xtol=1e-6,
-        )
-    )
+    """Felt contrast at which `P(x; w)` has a value above chance; infinite where it stays below.
+
+    What is felt of a hard nodule is as noisy as it is hard: `P` comes no nearer to one than `Phi(1/w)`.
+    """
+
+    def above(distance: float) -> float:
+        right = proportion_correct(np.array(distance * weber_fraction), weber_fraction, alternatives)
+        return float(right) - probability
+
+    # In units of w, the scale on which the function is steep.
+    return weber_fraction * float(brentq(above, 0.0, FARTHEST, xtol=1e-6)) if above(FARTHEST) > 0.0 else np.inf
 
 
 class Psychometrics:

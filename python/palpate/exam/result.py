@@ -26,7 +26,7 @@ class Result:
     target
         Probability of a right answer that the staircase sought.
     felt_contrast
-        Found with that probability, `dK/K`.
+        Found with that probability, `dK/K`; infinite for a hand that never is so sure.
     material_contrasts
         ``radius``, ``depth`` (m) and ``contrast``, `E/E0`, that is felt so, for each kind of nodule; ``contrast`` is
         None where none of the exam's feels so soft or so hard.
@@ -78,12 +78,14 @@ class Result:
     def lines(self) -> list[str]:
         """Return what a person reads."""
         e = self.estimate
+        felt = "no felt stiffness"
+        if np.isfinite(self.felt_contrast):
+            felt = f"a felt stiffness {percent(self.felt_contrast)} above its surroundings"
         told = [
-            f"Weber fraction {percent(e.weber_fraction)}, 95 % interval {interval(e)}",
-            f"{self.right} of {self.trials} nodules found, {self.none} times 'none', guesses would find 1 of "
+            f"Weber fraction {told_fraction(e)}",
+            f"{self.right} of {self.trials} nodules found, {self.none} answered 'none'; guesses would find 1 of "
             f"{e.alternatives}",
-            f"found in {percent(self.target)} of trials: felt stiffness {percent(self.felt_contrast)} above its "
-            "surroundings",
+            f"found in {percent(self.target)} of trials: {felt}",
         ]
         for kind in self.material_contrasts:
             nodule = f"  radius {_millimetres(kind['radius'])}, {_millimetres(kind['depth'])} deep"
@@ -98,8 +100,8 @@ class Result:
     def to_json(self) -> dict[str, Any]:
         """Return all numbers; what is not bounded is null."""
         whole = asdict(self)
-        high = whole["estimate"]["high"]
-        whole["estimate"]["high"] = high if np.isfinite(high) else None
+        for table, key in ((whole["estimate"], "high"), (whole, "felt_contrast")):
+            table[key] = table[key] if np.isfinite(table[key]) else None
         return whole
 
     def write(self, path: Path) -> None:
@@ -130,10 +132,12 @@ def percent(part: float) -> str:
     return f"{100 * part:.3g} %"
 
 
-def interval(estimate: Estimate) -> str:
-    """Interval of an estimate as people read it."""
-    high = "no bound" if not np.isfinite(estimate.high) else percent(estimate.high)
-    return f"{percent(estimate.low)} to {high}"
+def told_fraction(estimate: Estimate) -> str:
+    """Weber fraction with its 95 % interval, or the bound that the answers give it."""
+    low, high = percent(estimate.low), percent(estimate.high)
+    if not np.isfinite(estimate.high):
+        return f"above {low} (95 %)" if estimate.low > 0 else "not bounded by these answers"
+    return f"{percent(estimate.weber_fraction)} ({low} to {high})" if estimate.low > 0 else f"below {high} (95 %)"
 
 
 def _millimetres(length: float | None) -> str:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
-# Down-step, a ratio of contrasts: large until the answers have turned twice, to come down from the start, then small, to
-# stay among the contrasts that tell most. Of 1.12, 1.18, 1.25 and 1.35 the smallest gives the smallest spread.
+# Down-step, a ratio of contrasts: large until the answers have turned twice, to come down from the start, then small,
+# to stay among the contrasts that tell most. Of 1.12, 1.18, 1.25 and 1.35 the smallest gives the smallest spread.
 STEP, FIRST_STEP, FIRST_REVERSALS = math.log(1.12), math.log(1.56), 2
 
 

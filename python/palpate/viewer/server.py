@@ -65,7 +65,7 @@ class Client:
 class ViewerServer:
     """Serves one session.
 
-    A kind of session of its own is named by ``session_type`` of a class derived from this one.
+    A derived class may make sessions of its own kind by ``session_type``.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class ViewerServer:
 
     """
 
-    session_type: type[Session] = Session
+    session_type: Callable[[BuiltScene], Session] = Session
 
     def __init__(
         self,
