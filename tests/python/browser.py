@@ -55,8 +55,8 @@ class Program:
 
 
 @contextlib.contextmanager
-def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
-    """The page with a scene on it; anything on its console is a failure."""
+def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None):
+    """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends."""
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
     page = context.new_page()
     complaints = []
@@ -64,6 +64,8 @@ def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
         "console", lambda message: complaints.append(message.text) if message.type in {"error", "warning"} else None
     )
     page.on("pageerror", lambda error: complaints.append(str(error)))
+    if listen is not None:
+        page.on("websocket", lambda socket: socket.on("framereceived", lambda message: listen(message)))
     try:
         page.goto(program.address)
         until(page, lambda s: s["frames"] > 3)
