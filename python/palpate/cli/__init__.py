@@ -1,6 +1,14 @@
 """The command line."""
 
-from palpate.cli import benchmarks, caching, examining, running, verification  # noqa: F401  they register their commands
+from palpate.cli import (  # noqa: F401  they register their commands
+    benchmarks,
+    caching,
+    doctor,
+    envelope,
+    examining,
+    running,
+    verification,
+)
 from palpate.cli.app import main
 
 __all__ = ["main"]

@@ -141,10 +141,10 @@ def test_tables_of_other_exams_are_refused(library, tmp_path):
     with pytest.raises(palpate.SceneError, match=r"exam.csv:2: place is ., this exam has .: .* give another --out"):
         record.resume(library, None)
     path.write_text("time,force\n1,2\n")
-    with pytest.raises(palpate.SceneError, match="exam.csv:1: not the table of an exam"):
+    with pytest.raises(palpate.SceneError, match=r"exam.csv:1: not the table of an exam"):
         record.resume(library, None)
     path.write_text(text.replace("mark", "mark,x").replace("1,5", "one,5"))
-    with pytest.raises(palpate.SceneError, match="cannot be read as the table of an exam|this exam has"):
+    with pytest.raises(palpate.SceneError, match=r"cannot be read as the table of an exam|this exam has"):
         record.resume(library, None)
 
 
