@@ -1,4 +1,4 @@
-r"""From answers to a Weber fraction: signal detection in one of `m` places, by maximum likelihood.
+"""From answers to a Weber fraction: signal detection in one of `m` places, by maximum likelihood.
 
 Model. A press on place `i` is felt as a stiffness `K_i (1 + w n_i)` with independent standard normal `n_i`: noise in
 proportion to what is felt, Weber's law. `w` is the Weber fraction: the standard deviation of one look over what is

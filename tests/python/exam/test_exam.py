@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,6 +40,8 @@ def made(folder):
 @pytest.fixture
 def library(made, folder, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    # Matplotlib looks at every font of the machine, for seconds, unless it finds what it wrote the last time.
+    monkeypatch.setenv("MPLCONFIGDIR", str(Path.home() / ".cache" / "matplotlib"))
     return made
 
 
@@ -202,7 +205,7 @@ class TestPage:
         received: list[str | bytes] = []
         program = Program(folder / "cache", "nodule", str(path), "--out", str(out), command="exam")
         try:
-            with opened(chromium, program, listen=received.append) as page:
+            with opened(chromium, program, (800, 500), received.append) as page:
                 assert not page.locator("#readout").is_visible() and not page.locator("#legend").is_visible()
                 assert page.locator("#plots").is_hidden() and page.locator("#show-colors").is_hidden()
                 page.keyboard.press("m")
@@ -212,7 +215,7 @@ class TestPage:
             interrupted(program)
         program = Program(folder / "cache", "nodule", str(path), "--out", str(out), command="exam")
         try:
-            with opened(chromium, program, listen=received.append) as page:
+            with opened(chromium, program, (800, 500), received.append) as page:
                 assert state(page)["exam"]["trial"] == 2
                 mark_the_loudest(page, trial=3)
                 page.get_by_test_id("exam-none").click()
