@@ -15,8 +15,8 @@ from palpate.simulation import Simulation
 # The tool comes down from this far above, m, by so much a tick, m (20 mm/s at 1 kHz), and stays for so many ticks: the
 # forces have long stood still by then, after the ramp of the safety stage.
 ABOVE, ADVANCE, STAYING = 1e-3, 2e-5, 300
-# Draws before random places are given up.
-DRAWS = 2000
+# Points that random places are chosen among, and orders in which they are tried before they are given up.
+DRAWS, ORDERS = 2000, 50
 
 
 @dataclass(frozen=True)
@@ -60,22 +60,24 @@ def places_of(exam: ExamFile, mesh: TetMesh, touchable: np.ndarray) -> Places:
 
 
 def _drawn(exam: ExamFile, surface: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Random points, evenly over the surface within the box, each kept if it is far enough from those before."""
+    """Random points, evenly over the surface within the box: in a random order each that is far from those before."""
     table = exam.question.random
     assert table is not None
     low, high = np.array(table.low), np.array(table.high)
     points, faces = trimesh.sample.sample_surface(surface, DRAWS, seed=table.seed)
     points, faces = np.asarray(points), np.asarray(faces)
-    chosen: list[int] = []
-    for rank in np.flatnonzero(((low <= points) & (points <= high)).all(axis=1)).tolist():
-        if len(chosen) < table.count and all(
-            np.linalg.norm(points[rank] - points[other]) >= table.apart for other in chosen
-        ):
-            chosen.append(rank)
-    if len(chosen) < table.count:
-        told = f"only {len(chosen)} of {table.count} places found in the box, {1e3 * table.apart:g} mm apart"
-        raise exam.mistake(["exam", "random"], f"exam.random: {told}")
-    return points[chosen], faces[chosen]
+    inside = np.flatnonzero(((low <= points) & (points <= high)).all(axis=1))
+    draw, most = np.random.default_rng([table.seed, 3]), 0
+    for _ in range(ORDERS):
+        chosen: list[int] = []
+        for rank in draw.permutation(inside).tolist():
+            if (np.linalg.norm(points[chosen] - points[rank], axis=1) >= table.apart).all():
+                chosen.append(rank)
+            if len(chosen) == table.count:
+                return points[chosen], faces[chosen]
+        most = max(most, len(chosen))
+    told = f"only {most} of {table.count} places found in the box, {1e3 * table.apart:g} mm apart"
+    raise exam.mistake(["exam", "random"], f"exam.random: {told}")
 
 
 def forces_at(built: BuiltScene, places: Places, depth: float) -> np.ndarray:
