@@ -40,7 +40,7 @@ def record(
     row = "{:16s} {:>8s} {:>8s} {:>8s} {:>10s} {:>9s} {:>10s} {:>8s} {:>6s}"
     print(row.format("scene", "ticks", "touching", "dropped", "computing", "waking", "not finite", "MB/min", "same"))
     for r in results:
-        same = "-" if r.same is None else "yes" if r.same else "NO"
+        same = "yes" if r.same else "NO"
         numbers = [r.ticks, r.contacts, r.dropped, r.missed_computing, r.missed_waking, r.not_finite]
         print(row.format(r.scene, *map(str, numbers), f"{r.mb_per_minute:.2f}", same))
     print("computing, waking: deadlines missed while a tick computed, and because one began late")

@@ -48,7 +48,7 @@ class SessionResult:
     mb_per_minute
         Size of the file.
     same
-        Whether every bit came out again; None if that was not asked.
+        Whether every bit came out again.
 
     """
 
@@ -61,7 +61,7 @@ class SessionResult:
     not_finite: int
     contacts: int
     mb_per_minute: float
-    same: bool | None
+    same: bool
 
 
 class Script:
@@ -115,22 +115,25 @@ def run_session(
     name: str,
     path: Path,
     seconds: float,
-    again: bool = True,
+    pace: float = 1.0,
     report: Callable[[int, int], None] | None = None,
 ) -> SessionResult:
-    """Record a scripted session of a scene in a new file, at its real rate, and make it again."""
+    """Record a scripted session of a scene in a new file, at its real rate, and make it again.
+
+    Hands move ``pace`` times as fast as people do.
+    """
     with Simulation(built) as simulation:
         simulation.record(path)
         script, start, struck, resets = Script(simulation), time.monotonic(), 0, 0
         moves = any(body.motion is not None for body in built.bodies)
         while (at := time.monotonic() - start) < seconds:
-            script.move(at)
-            if moves and at > (struck + 1) * STRIKE_EVERY:
+            script.move(pace * at)
+            if moves and pace * at > (struck + 1) * STRIKE_EVERY:
                 struck += 1
                 simulation.strike(
                     built.bodies[0].points_to_scene(built.bodies[0].green.surface_positions)[0], (0, 0, -STRIKE)
                 )
-            if at > (resets + 1) * RESET_EVERY:
+            if pace * at > (resets + 1) * RESET_EVERY:
                 resets += 1
                 simulation.reset()
             if report is not None:
@@ -150,5 +153,5 @@ def run_session(
         not_finite=int((~finite).sum()),
         contacts=len(np.unique(recording.contacts["tick"])),
         mb_per_minute=path.stat().st_size / 1e6 / seconds * 60,
-        same=replay(recording, built).same if again else None,
+        same=replay(recording, built).same,
     )
