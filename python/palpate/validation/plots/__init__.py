@@ -3,7 +3,7 @@
 from palpate.validation.plots.accuracy import plot_convergence, plot_felt_stiffness
 from palpate.validation.plots.contact import plot_contact, plot_partial_slip, plot_pressing
 from palpate.validation.plots.sessions import plot_history, plot_log, write_columns, write_log
-from palpate.validation.plots.style import COLORS, empty_figure, write_figure
+from palpate.figures import COLORS, empty_figure, write_figure
 
 __all__ = [
     "COLORS",

@@ -1,0 +1,236 @@
+"""The stiffness of a body over its surface, as a tool meets it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.equality import ComparedByValue
+from palpate.palpation.interpolation import SurfaceField, node_normals
+from palpate.palpation.press import Measured
+from palpate.palpation.protocol import Protocol, Sites, sites_at, sites_on
+from palpate.palpation.reading import PressCurve, press_paths, read_presses, read_strokes
+from palpate.palpation.runs import probe, run_all
+from palpate.palpation.sides import SurfaceShape
+from palpate.palpation.strokes import Track, strokes_on
+from palpate.scene import BuiltScene, Scene
+from palpate.simulation import Simulation
+
+if TYPE_CHECKING:
+    import meshio
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StiffnessMap(ComparedByValue):
+    """What a palpation has found, one row for each of p points. Compared by value, number by number; not hashable.
+
+    Attributes
+    ----------
+    points, normals
+        (p, 3) m on the surface that the tool meets, and outward unit normals (p, 3), in the scene.
+    bodies, strokes
+        (p,) numbers of the bodies, and of the strokes; -1 of presses.
+    force
+        (p,) N along the normal at the depth; NaN where something held the tool before, and so are the next two.
+    stiffness
+        (p,) N/m, the slope dF/dd at the depth.
+    secant_stiffness
+        (p,) N/m, F/d.
+    held_by
+        (p,) "strain limit", "force limit", "other place" where the tool touched beside its point first, "no contact"
+        where it lost the surface; else empty.
+    reached_depth, reached_force
+        (p,) m and N, where nothing held the tool yet.
+    curves
+        One a press, or a stroke.
+    skipped
+        Points of the grid that were left out, by reason.
+    spacing, depth, speed
+        Of the protocol: m, m, m/s.
+
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    bodies: np.ndarray
+    strokes: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    secant_stiffness: np.ndarray
+    held_by: np.ndarray
+    reached_depth: np.ndarray
+    reached_force: np.ndarray
+    curves: tuple[PressCurve, ...]
+    skipped: dict[str, int]
+    spacing: float
+    depth: float
+    speed: float
+    scene: BuiltScene = field(compare=False)
+
+    def __repr__(self) -> str:
+        known = self.stiffness[np.isfinite(self.stiffness)]
+        told = f"{known.min():.4g} to {known.max():.4g} N/m" if len(known) else "no stiffness"
+        held = f", {len(self.points) - len(known)} held before" if len(known) < len(self.points) else ""
+        return f"StiffnessMap({len(self.points)} points {1e3 * self.depth:.3g} mm deep, {told}{held})"
+
+    def at(self, points: np.ndarray, normals: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
+        """Stiffness (n,), N/m, interpolated at points (n, 3), m, with outward normals (n, 3); NaN far from all points.
+
+        ``values`` (p,) takes other values at the points in its place.
+        """
+        known = self.stiffness if values is None else values
+        return SurfaceField(self.points, self.normals, known, self.spacing).at(points, normals)
+
+    def to_meshio(self, **values: np.ndarray) -> meshio.Mesh:
+        """Give the surfaces of all bodies in the scene, the map at their nodes; NaN far from all points.
+
+        Point data are ``stiffness`` and ``secant_stiffness``, N/m, and what is given (p,) by name.
+        """
+        from palpate.palpation.files import surface_mesh
+
+        return surface_mesh(self, {"stiffness": self.stiffness, "secant_stiffness": self.secant_stiffness, **values})
+
+    def surfaces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Of each body, in the scene: positions (s, 3), m, normals (s, 3), and triangles (t, 3) as rows of them."""
+        found = []
+        for body in self.scene.bodies:
+            shape = SurfaceShape(body.green)
+            normals = body.vectors_to_scene(node_normals(shape.positions, shape.triangles))
+            found.append((body.points_to_scene(shape.positions), normals, shape.triangles))
+        return found
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView and the page; replaced only when complete."""
+        from palpate.fields import write_result
+
+        write_result(self.to_meshio(), path)
+
+    def write_points(self, path: str | os.PathLike[str]) -> None:
+        """Write a row for each point as CSV."""
+        from palpate.palpation.files import write_points
+
+        write_points(self, Path(path))
+
+    def write_curves(self, path: str | os.PathLike[str]) -> None:
+        """Write a row for each tick of each curve as CSV."""
+        from palpate.palpation.files import write_curves
+
+        write_curves(self, Path(path))
+
+    def plot(self) -> Figure:
+        """Picture of the map on the surface, as a figure of matplotlib; ``savefig`` writes it."""
+        from palpate.palpation.pictures import picture_of_map
+
+        return picture_of_map(self)
+
+    def plot_curves(self) -> Figure:
+        """Force against depth of all presses, or along all strokes."""
+        from palpate.palpation.pictures import picture_of_curves
+
+        return picture_of_curves(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write all of it into a folder, which is made: points, curves, surface, pictures.
+
+        Returns
+        -------
+        list
+            The files: ``points.csv``, ``curves.csv``, ``curves.png``, ``stiffness.vtu``, ``stiffness.png``.
+
+        """
+        from palpate.palpation.files import save_map
+
+        return save_map(self, Path(folder))
+
+
+def stiffness_map(
+    scene: Scene | BuiltScene,
+    spacing: float | str,
+    depth: float | str,
+    speed: float | str = 0.01,
+    *,
+    on: str | None = None,
+    points: Sequence[Any] | None = None,
+    strokes: bool = False,
+    partial: str | os.PathLike[str] | None = None,
+    progress: bool | Callable[[int, int], None] = False,
+) -> StiffnessMap:
+    """Palpate the bodies of a scene with its first tool, at points about equally far apart on their surfaces.
+
+    Each press begins with a body at rest, in the ticks of the force loop but without a clock: the same scene gives the
+    same bits. Stiffness is dF/dd and F/d at the depth (:mod:`palpate.palpation.press`).
+
+    Parameters
+    ----------
+    scene
+        What to palpate, and with what. Its limits of strain and of force hold; how a device ramps and slews does not.
+    spacing, depth, speed
+        Of the points, m; from first touch on, m; of a press or along a stroke, m/s. Text may have a unit: ``"10mm"``.
+    on
+        Predicate over x, y, z, min and max in a body's own frame that points satisfy, such as ``"z > max - 1mm"``.
+    points
+        Points in the scene, m, in place of a grid; each is moved onto the closest surface.
+    strokes
+        Whether lines a spacing apart are slid over at the depth instead.
+    partial
+        File that keeps finished runs, to go on from; it stays.
+    progress
+        Whether a bar is shown on a terminal, or a function of (done, total).
+
+    Raises
+    ------
+    Error
+        A spacing wider than the body, a depth beyond the tool, a speed with too few ticks, no point to press, or a
+        fault of the loop.
+
+    """
+    built = scene if isinstance(scene, BuiltScene) else scene.build()
+    protocol = Protocol.of(spacing, depth, speed, strokes)
+    simulation = Simulation(probe(built))
+    protocol.check(simulation)
+    if strokes:
+        sites, lines = strokes_on(simulation, protocol, on)
+    else:
+        sites = sites_on(simulation, protocol, on) if points is None else sites_at(simulation, points)
+        lines = []
+    return palpated(built, simulation, protocol, sites, lines, None if partial is None else Path(partial), progress)
+
+
+def palpated(
+    built: BuiltScene,
+    simulation: Simulation,
+    protocol: Protocol,
+    sites: Sites,
+    strokes: list[np.ndarray],
+    partial: Path | None,
+    progress: bool | Callable[[int, int], None],
+) -> StiffnessMap:
+    """Run a protocol at sites, or along strokes over them, and read what it has found."""
+    rate = simulation.scene.device.rate
+    if strokes:
+        tracks = [Track.of(sites, stroke, protocol, rate) for stroke in strokes]
+        runs = run_all(simulation, [path for t in tracks for path in t.paths(simulation, protocol)], partial, progress)
+        found, curves = read_strokes(simulation, protocol, tracks, runs)
+    else:
+        runs = run_all(simulation, press_paths(simulation, sites, protocol), partial, progress)
+        found, curves = read_presses(simulation, protocol, sites, runs)
+    columns = {name: np.array([getattr(one, name) for one in found]) for name in Measured.__dataclass_fields__}
+    return StiffnessMap(
+        points=sites.points,
+        normals=sites.normals,
+        bodies=sites.bodies,
+        strokes=np.repeat(np.arange(len(strokes)), [len(s) for s in strokes]) if strokes else np.full(len(found), -1),
+        **columns,
+        curves=tuple(curves),
+        skipped=sites.skipped,
+        spacing=protocol.spacing,
+        depth=protocol.depth,
+        speed=protocol.speed,
+        scene=built,
+    )

@@ -1,0 +1,164 @@
+"""Strokes: lines over the surface, slid over at constant depth.
+
+Each side of a body is cut by planes a spacing apart, across the second of its axes: where they meet the surface a tool
+slides from one end to the other. Each stroke is made three times, at `d`, `d - e` and `d - 2 e`, so that the slope of
+force over depth is known all along it: `dF/dd = (3 F(d) - 4 F(d - e) + F(d - 2 e)) / (2 e)`, of second order in `e`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import SceneError
+from palpate.palpation.press import standing_on
+from palpate.palpation.protocol import Protocol, Selection, Sites, closest
+from palpate.palpation.runs import Path3D
+from palpate.palpation.sides import Side, SurfaceShape
+from palpate.simulation import Simulation
+
+# Step of the depth between the passes, of the depth; places a spacing at which a stroke is measured; fewest of a stroke.
+DEPTH_STEP, PASSES = 0.1, 3
+PER_SPACING, FEWEST_PLACES = 4, 3
+
+
+@dataclass(frozen=True)
+class Track:
+    """The line of a stroke, tick by tick from its first place on.
+
+    Attributes
+    ----------
+    points, normals
+        (t, 3) m, and outward unit normals (t, 3), in the scene.
+    position
+        (t,) m along the line.
+    ticks
+        (k,) at which its places are reached.
+    lead
+        Ticks before, in which the tool comes down.
+
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    position: np.ndarray
+    ticks: np.ndarray
+    lead: int
+
+    @classmethod
+    def of(cls, sites: Sites, stroke: np.ndarray, protocol: Protocol, rate: float) -> Track:
+        """Line through the sites (k,) of a stroke at the protocol's speed."""
+        places, normals = sites.points[stroke], sites.normals[stroke]
+        apart = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        ticks = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(apart * rate / protocol.speed)).astype(int))])
+
+        def at_ticks(values: np.ndarray) -> np.ndarray:
+            return np.interp(np.arange(ticks[-1] + 1), ticks, values)
+
+        normal = np.column_stack([at_ticks(axis) for axis in normals.T])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        lead = int(np.ceil(2 * protocol.depth * rate / protocol.speed)) + 1
+        position = at_ticks(np.concatenate([[0.0], np.cumsum(apart)]))
+        return cls(np.column_stack([at_ticks(axis) for axis in places.T]), normal, position, ticks, lead)
+
+    def paths(self, simulation: Simulation, protocol: Protocol) -> list[Path3D]:
+        """Paths of the passes, the deepest first: down onto the first place, then along the line."""
+        turned, reach = standing_on(simulation, self.normals)
+        turned = np.vstack([np.repeat(turned[:1], self.lead, axis=0), turned])
+        paths = []
+        for depth in protocol.depth * (1 - DEPTH_STEP * np.arange(PASSES)):
+            down = np.linspace(-depth, depth, self.lead, endpoint=False)
+            before = self.points[0] + (reach - down)[:, None] * self.normals[0]
+            paths.append(Path3D(np.vstack([before, self.points + (reach - depth) * self.normals]), turned))
+        return paths
+
+
+def slope_of_passes(forces: np.ndarray, protocol: Protocol) -> np.ndarray:
+    """Slope of force over depth (t,), N/m, from forces (3, t), N, of the passes."""
+    deep, middle, shallow = forces
+    return (3 * deep - 4 * middle + shallow) / (2 * DEPTH_STEP * protocol.depth)
+
+
+def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tuple[Sites, list[np.ndarray]]:
+    """Places of strokes over all bodies, and which of them (k,) each stroke visits, in order.
+
+    Raises
+    ------
+    SceneError
+        A spacing wider than every body, or no stroke.
+
+    """
+    selection = Selection(simulation, protocol, on)
+    points, normals, bodies, strokes = [], [], [], []
+    count = 0
+    for body, shape in enumerate(selection.shapes):
+        for line, triangles in (line for side in shape.sides for line in _lines(side, protocol.spacing)):
+            kept = selection.keeps(body, line, triangles)
+            for run in _runs(kept):
+                feet, along, _ = closest(simulation, body, simulation.bodies[body].points_to_scene(line[run]))
+                points.append(feet)
+                normals.append(along)
+                bodies.append(np.full(len(feet), body))
+                strokes.append(np.arange(count, count + len(feet)))
+                count += len(feet)
+    if not strokes:
+        raise SceneError(selection.nothing_left("no line to stroke"))
+    sites = Sites(np.vstack(points), np.vstack(normals), np.concatenate(bodies), selection.left_out)
+    return sites, strokes
+
+
+def _runs(kept: np.ndarray) -> list[np.ndarray]:
+    """Ranks of consecutive places of a mask (n,) that are long enough for a stroke."""
+    ranks = np.split(np.arange(len(kept)), np.flatnonzero(np.diff(kept)) + 1)
+    return [run for run in ranks if len(run) >= FEWEST_PLACES and kept[run[0]]]
+
+
+def _lines(side: Side, spacing: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Lines over a side: places (k, 3) m along each, and the triangles (k,) that they lie on."""
+    from trimesh import Trimesh
+    from trimesh.intersections import mesh_plane
+
+    first, second = side.axes()
+    surface = Trimesh(side.positions, side.triangles, process=False)
+    across = side.positions[side.triangles] @ second
+    low, high = float(across.min()), float(across.max())
+    count = max(1, int((high - low) / spacing * (1 + 1e-9)))
+    lines = []
+    for offset in (low + high) / 2 + spacing * (np.arange(count) - (count - 1) / 2):
+        # Beside the nodes, that no plane passes through one.
+        origin = (offset + 1e-7 * (high - low)) * second
+        segments, faces = mesh_plane(surface, second, origin, return_faces=True)
+        for chain in _chained(segments):
+            forward = chain if (chain[-1] - chain[0]) @ first >= 0 else chain[::-1]
+            places = _resampled(forward, spacing / PER_SPACING)
+            lines.append((places, side.ranks[faces[_nearest(places, segments)]]))
+    return lines
+
+
+def _chained(segments: np.ndarray) -> list[np.ndarray]:
+    """Polylines (k, 3) of line segments (n, 2, 3) that share their ends."""
+    from trimesh.path.exchange.misc import lines_to_path
+    from trimesh.path.path import Path3D as Polylines
+
+    if len(segments) == 0:
+        return []
+    chains = [np.asarray(chain) for chain in Polylines(**lines_to_path(segments)).discrete]
+    return sorted(chains, key=lambda chain: tuple(chain.min(axis=0)))
+
+
+def _resampled(chain: np.ndarray, step: float) -> np.ndarray:
+    """Places about a step apart along a polyline, its ends left out by half of that."""
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1))])
+    count = max(1, round(arc[-1] / step))
+    at = (np.arange(count) + 0.5) * arc[-1] / count
+    return np.column_stack([np.interp(at, arc, axis) for axis in chain.T])
+
+
+def _nearest(places: np.ndarray, segments: np.ndarray) -> np.ndarray:
+    """Which of the segments (n, 2, 3) is closest to each place (k,)."""
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    squared = np.maximum((along**2).sum(axis=1), 1e-300)
+    offset = places[:, None] - start
+    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
+    return np.linalg.norm(offset - share[..., None] * along, axis=2).argmin(axis=1)
