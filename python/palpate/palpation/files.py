@@ -29,9 +29,9 @@ def save_map(found: StiffnessMap, folder: Path) -> list[Path]:
     points, curves, curves_picture, surface, picture = paths = [folder / name for name in names]
     write_points(found, points)
     write_curves(found, curves)
-    write_figure(found.plot_curves(), curves_picture)
+    write_figure(found.plot_curves(), curves_picture, grid=False)
     found.write(surface)
-    write_figure(found.plot(), picture)
+    write_figure(found.plot(), picture, grid=False)
     return paths
 
 
@@ -54,7 +54,7 @@ def save_detection(detection: Detection, folder: Path) -> list[Path]:
     rows = ((n.body, *n.place, n.ratio, n.difference, n.half_width, n.point) for n in detection.nodules)
     _write_rows(nodules, names, rows)
     write_result(detection.to_meshio(), surface)
-    write_figure(detection.plot(), picture)
+    write_figure(detection.plot(), picture, grid=False)
     return paths
 
 

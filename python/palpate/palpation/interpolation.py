@@ -11,7 +11,7 @@ import numpy as np
 
 # Share of normals in the distance, by spacings; how far from the closest place values are known, in spacings: out to the
 # corner of a square lattice's last cell, and over an edge half-way round.
-NORMALS, KNOWN = 1.5, 1.6
+NORMALS, KNOWN = 1.2, 1.6
 NEIGHBOURS = 24
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.figures import empty_figure
+from palpate.mesh import size_text
 from palpate.palpation.interpolation import node_normals
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 ONE_WAY = np.cos(np.radians(10.0))
 # Triangles of a picture are no longer than this part of the spacing; where that would be too many, they stay larger.
 FINE, MOST_TRIANGLES = 0.2, 120_000
+# Per cent of the values between which colours change: one rim of a hole would take them all.
+RANGE = (2.0, 98.0)
 # Surface without a value, and light that shapes it: from the viewer's left above.
 BARE, AMBIENT = np.array([0.86, 0.86, 0.86]), 0.62
 LIGHT = np.array([-0.3, -0.3, 0.9])
@@ -50,10 +53,12 @@ def picture_of_curves(found: StiffnessMap) -> Figure:
     figure = empty_figure(7, 4.5)
     axes = figure.subplots()
     strokes = bool((found.strokes >= 0).any())
+    largest = max(float(curve.normal_force.max()) for curve in found.curves)
+    scale, unit = (1.0, "N") if largest >= 1.0 else (1e3, "mN")
     lines, values = [], []
     for rank, curve in enumerate(found.curves):
         across = curve.position if strokes else curve.depth
-        lines.append(np.column_stack([1e3 * across, curve.normal_force]))
+        lines.append(np.column_stack([1e3 * across, scale * curve.normal_force]))
         own = found.stiffness[found.strokes == rank] if strokes else found.stiffness[rank : rank + 1]
         own = own[np.isfinite(own)]
         values.append(own.mean() if len(own) else np.nan)
@@ -64,9 +69,9 @@ def picture_of_curves(found: StiffnessMap) -> Figure:
     drawn.cmap.set_bad("0.6")
     axes.add_collection(drawn)
     axes.set_xlim(0.0, max(line[:, 0].max() for line in lines) * 1.02)
-    axes.set_ylim(0.0, max(max(line[:, 1].max() for line in lines) * 1.05, 1e-9))
+    axes.set_ylim(0.0, max(max(line[:, 1].max() for line in lines) * 1.05, 1e-6))
     axes.set_xlabel("position along the stroke [mm]" if strokes else "depth [mm]")
-    axes.set_ylabel("normal force [N]")
+    axes.set_ylabel(f"normal force [{unit}]")
     held = ", red: held by a limit" if any(curve.limited.any() for curve in found.curves) else ""
     told = f"{len(found.curves)} strokes at {1e3 * found.depth:.3g} mm depth" if strokes else f"{len(lines)} presses"
     axes.set_title(f"{told}{held}", loc="left")
@@ -90,7 +95,7 @@ def _picture(
     from matplotlib.colors import Normalize
 
     known = values[np.isfinite(values)]
-    low, high = ends or ((float(known.min()), float(known.max())) if len(known) else (0.0, 1.0))
+    low, high = ends or (np.percentile(known, RANGE).tolist() if len(known) else (0.0, 1.0))
     # A body that is the same everywhere is one colour, not its rounding blown up.
     middle, half = (low + high) / 2, max((high - low) / 2, 5e-3 * max(abs(low), abs(high)), 1e-12)
     shades = ScalarMappable(Normalize(middle - half, middle + half), colormaps[colors])
@@ -108,8 +113,11 @@ def _picture(
         azimuth = float(np.degrees(np.arctan2(mean[1], mean[0]))) if np.hypot(*mean[:2]) > 0.1 else -60.0
         for one, turn in zip(axes, (0.0, 180.0), strict=True):
             _draw_body(one, found, values, meshes, (azimuth + turn, ELEVATION), shades, nodules)
-    figure.suptitle(title, x=0.02, ha="left", fontsize=12)
-    figure.colorbar(shades, ax=axes, label=label, shrink=0.85)
+    sides = np.ptp(np.vstack([positions for positions, _, _ in meshes]), axis=0)
+    figure.suptitle(title if flat else f"{title}; {size_text(sides)}", x=0.02, ha="left", fontsize=12)
+    beyond = (bool((known < shades.norm.vmin).any()), bool((known > shades.norm.vmax).any()))
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[beyond]
+    figure.colorbar(shades, ax=axes, label=label, shrink=0.85, extend=extend)
     return figure
 
 
@@ -156,7 +164,8 @@ def _draw_plane(
     known = np.isfinite(values)
     places = found.points @ plane.T
     axes.plot(*places[known].T, "o", markersize=3.5, markerfacecolor="white", markeredgecolor="0.2", linestyle="")
-    axes.plot(*places[~known].T, "x", markersize=5, color="tab:red", linestyle="", label="held before the depth")
+    if not known.all():
+        axes.plot(*places[~known].T, "x", markersize=5, color="tab:red", linestyle="", label="held before the depth")
     for rank, nodule in enumerate(nodules):
         told = "nodule" if rank == 0 else None
         axes.plot(*(nodule.place @ plane.T), "+", markersize=16, markeredgewidth=2, color="black", label=told)
@@ -215,6 +224,9 @@ def _draw_body(
             )
     for set_limits, bottom, top in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high, strict=True):
         set_limits(bottom, top)
-    axes.set_box_aspect(np.maximum(high - low, 1e-3 * (high - low).max()), zoom=1.1)
+    axes.set_box_aspect(np.maximum(high - low, 1e-3 * (high - low).max()), zoom=1.2)
+    axes.set_proj_type("ortho")
     axes.view_init(elev=view[1], azim=view[0])
-    axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
+    axes.set_axis_off()
+    axis = int(np.abs(towards[:2]).argmax())
+    axes.set_title(f"from {'+' if towards[axis] > 0 else '-'}{'xy'[axis]}, {view[1]:.0f} degrees above", fontsize=10)

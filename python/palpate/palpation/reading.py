@@ -86,24 +86,22 @@ def read_strokes(
         forces, limited = passes[0]
         clamped = _clamped(simulation, forces)
         slope = slope_of_passes(normal_forces, protocol)
-        found += [
-            _measured_at(
-                float(normal_forces[0, tick]), float(slope[tick]), limited[tick], clamped[tick], protocol.depth
-            )
-            for tick in track.ticks
-        ]
+        # The tool has the surface where it is pushed back, the more the deeper.
+        pressed = (np.diff(np.vstack([normal_forces, np.zeros(len(forces))]), axis=0) < 0).all(axis=0)
+        for tick in track.ticks:
+            force = float(normal_forces[0, tick])
+            if not pressed[tick]:
+                found.append(Measured(np.nan, np.nan, np.nan, NO_CONTACT, np.nan, force))
+            elif limited[tick] or clamped[tick]:
+                reason = STRAIN_LIMIT if limited[tick] else FORCE_LIMIT
+                found.append(Measured(np.nan, np.nan, np.nan, reason, np.nan, force))
+            else:
+                at = protocol.depth
+                found.append(Measured(force, float(slope[tick]), force / at, "", at, force))
         depth = np.full(len(forces), protocol.depth)
         time = (track.lead + np.arange(len(forces))) / rate
         curves.append(PressCurve(time, depth, track.position, forces, normal_forces[0], limited | clamped))
     return found, curves
-
-
-def _measured_at(force: float, slope: float, limited: bool, clamped: bool, depth: float) -> Measured:
-    if force <= 0:
-        return Measured(np.nan, np.nan, np.nan, NO_CONTACT, 0.0, 0.0)
-    if limited or clamped:
-        return Measured(np.nan, np.nan, np.nan, STRAIN_LIMIT if limited else FORCE_LIMIT, np.nan, force)
-    return Measured(force, slope, force / depth, "", depth, force)
 
 
 def _clamped(simulation: Simulation, forces: np.ndarray) -> np.ndarray:

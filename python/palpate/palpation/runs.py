@@ -45,8 +45,9 @@ def run_all(
     paths: Sequence[Path3D],
     partial: Path | None,
     progress: bool | Callable[[int, int], None],
-) -> list[Run]:
-    """Forces on the device (t, 3), N, and whether strain was limited (t,), of each path, each from a body at rest.
+) -> tuple[list[Run], int]:
+    """Forces on the device (t, 3), N, and whether strain was limited (t,), of each path, each from a body at rest; and how
+    many were known.
 
     Raises
     ------
@@ -65,7 +66,7 @@ def run_all(
             if report is not None:
                 report(rank + 1, len(paths))
         runs = [kept.runs[rank] for rank in range(len(paths))]
-    return runs
+    return runs, kept.found
 
 
 def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.equality import ComparedByValue
+from palpate.errors import SceneError
 from palpate.palpation.interpolation import SurfaceField, node_normals
-from palpate.palpation.press import Measured
+from palpate.palpation.press import FORCE_LIMIT, NO_CONTACT, OTHER_PLACE, STRAIN_LIMIT, Measured
 from palpate.palpation.protocol import Protocol, Sites, sites_at, sites_on
 from palpate.palpation.reading import PressCurve, press_paths, read_presses, read_strokes
 from palpate.palpation.runs import probe, run_all
@@ -53,6 +54,10 @@ class StiffnessMap(ComparedByValue):
         Points of the grid that were left out, by reason.
     spacing, depth, speed
         Of the protocol: m, m, m/s.
+    scene
+        What was palpated.
+    resumed
+        Runs that a partial file knew.
 
     """
 
@@ -72,6 +77,7 @@ class StiffnessMap(ComparedByValue):
     depth: float
     speed: float
     scene: BuiltScene = field(compare=False)
+    resumed: int = field(default=0, compare=False)
 
     def __repr__(self) -> str:
         known = self.stiffness[np.isfinite(self.stiffness)]
@@ -212,14 +218,15 @@ def palpated(
     progress: bool | Callable[[int, int], None],
 ) -> StiffnessMap:
     """Run a protocol at sites, or along strokes over them, and read what it has found."""
-    rate = simulation.scene.device.rate
     if strokes:
-        tracks = [Track.of(sites, stroke, protocol, rate) for stroke in strokes]
-        runs = run_all(simulation, [path for t in tracks for path in t.paths(simulation, protocol)], partial, progress)
+        tracks = [Track.of(simulation, sites, stroke, protocol) for stroke in strokes]
+        paths = [path for track in tracks for path in track.paths(simulation, protocol)]
+        runs, known = run_all(simulation, paths, partial, progress)
         found, curves = read_strokes(simulation, protocol, tracks, runs)
     else:
-        runs = run_all(simulation, press_paths(simulation, sites, protocol), partial, progress)
+        runs, known = run_all(simulation, press_paths(simulation, sites, protocol), partial, progress)
         found, curves = read_presses(simulation, protocol, sites, runs)
+    _require_one(found, protocol, partial)
     columns = {name: np.array([getattr(one, name) for one in found]) for name in Measured.__dataclass_fields__}
     return StiffnessMap(
         points=sites.points,
@@ -233,4 +240,28 @@ def palpated(
         depth=protocol.depth,
         speed=protocol.speed,
         scene=built,
+        resumed=known,
     )
+
+
+def _require_one(found: Sequence[Measured], protocol: Protocol, partial: Path | None) -> None:
+    """Refuse a palpation in which no point has a stiffness; its runs are not worth keeping."""
+    if any(not one.held_by for one in found):
+        return
+    if partial is not None:
+        partial.unlink(missing_ok=True)
+    reasons = [one.held_by for one in found]
+    reason = max(dict.fromkeys(reasons), key=reasons.count)
+    deepest = max((one.reached_depth for one in found if np.isfinite(one.reached_depth)), default=0.0)
+    cures = {
+        STRAIN_LIMIT: "set view.strain_limit, 0 for none",
+        FORCE_LIMIT: "set device.max_force",
+        OTHER_PLACE: "take a smaller tool",
+        NO_CONTACT: "press less deep",
+    }
+    reached = (
+        f", at {1e3 * deepest:.2g} mm at most: press less deep, or {cures[reason]}"
+        if deepest > 0
+        else f": {cures[reason]}"
+    )
+    raise SceneError(f"no point could be pressed {1e3 * protocol.depth:.3g} mm deep ({reason}{reached})")

@@ -15,7 +15,7 @@ from palpate.errors import SceneError
 from palpate.palpation.press import standing_on
 from palpate.palpation.protocol import Protocol, Selection, Sites, closest
 from palpate.palpation.runs import Path3D
-from palpate.palpation.sides import Side, SurfaceShape
+from palpate.palpation.sides import Side
 from palpate.simulation import Simulation
 
 # Step of the depth between the passes, of the depth; places a spacing at which a stroke is measured; fewest of a stroke.
@@ -47,20 +47,20 @@ class Track:
     lead: int
 
     @classmethod
-    def of(cls, sites: Sites, stroke: np.ndarray, protocol: Protocol, rate: float) -> Track:
-        """Line through the sites (k,) of a stroke at the protocol's speed."""
-        places, normals = sites.points[stroke], sites.normals[stroke]
+    def of(cls, simulation: Simulation, sites: Sites, stroke: np.ndarray, protocol: Protocol) -> Track:
+        """Line through the sites (k,) of a stroke at the protocol's speed, on the surface at every tick."""
+        rate, places = simulation.scene.device.rate, sites.points[stroke]
         apart = np.linalg.norm(np.diff(places, axis=0), axis=1)
         ticks = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(apart * rate / protocol.speed)).astype(int))])
 
         def at_ticks(values: np.ndarray) -> np.ndarray:
             return np.interp(np.arange(ticks[-1] + 1), ticks, values)
 
-        normal = np.column_stack([at_ticks(axis) for axis in normals.T])
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        chords = np.column_stack([at_ticks(axis) for axis in places.T])
+        points, normals, _ = closest(simulation, int(sites.bodies[stroke[0]]), chords)
         lead = int(np.ceil(2 * protocol.depth * rate / protocol.speed)) + 1
         position = at_ticks(np.concatenate([[0.0], np.cumsum(apart)]))
-        return cls(np.column_stack([at_ticks(axis) for axis in places.T]), normal, position, ticks, lead)
+        return cls(points, normals, position, ticks, lead)
 
     def paths(self, simulation: Simulation, protocol: Protocol) -> list[Path3D]:
         """Paths of the passes, the deepest first: down onto the first place, then along the line."""
@@ -86,9 +86,12 @@ def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tu
     Raises
     ------
     SceneError
-        A spacing wider than every body, or no stroke.
+        A spacing wider than every body, no stroke, or a tool that sticks.
 
     """
+    law = simulation.scene.tools[0].contact
+    if law != "local":
+        raise SceneError(f"strokes are for a tool that slides: contact = 'local', this one has '{law}'")
     selection = Selection(simulation, protocol, on)
     points, normals, bodies, strokes = [], [], [], []
     count = 0
