@@ -16,6 +16,7 @@ from palpate.cli.completion import models, units
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
     from palpate.scene import BuiltScene, Scene
+    from palpate.viewer.surface_map import SurfaceMap
 
 Headless = Annotated[
     float | None, typer.Option(min=0.1, help="No viewer: this many seconds of a scripted press at 1 kHz.")
@@ -86,6 +87,9 @@ def run(
     max_size: MaxSize = None,
     element: ElementChoice = None,
     repair: Repair = False,
+    surface_map: Annotated[
+        Path | None, typer.Option("--map", help="Map of 'palpate palpate' to show: stiffness.vtu or detection.vtu.")
+    ] = None,
     headless: Headless = None,
     out: Out = Path(),
     port: Port = PORT,
@@ -103,6 +107,8 @@ def run(
     Example: palpate run organ.stl --unit mm --fix "z < min + 5mm" -E 10kPa --radius 8mm
 
     Example: palpate run scene.toml --headless 3 --out results
+
+    Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
     """
     from palpate.cli.run_file import RunOptions, built_from
 
@@ -112,7 +118,12 @@ def run(
     if headless is not None:
         _scripted(built, file.stem, headless, out)
         return
-    _view(built, host, port, browser)
+    maps = None
+    if surface_map is not None:
+        from palpate.viewer.surface_map import read_map
+
+        maps = read_map(surface_map, built)
+    _view(built, host, port, browser, maps=maps)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -129,11 +140,12 @@ def _view(
     browser: bool,
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
+    maps: Sequence[SurfaceMap | None] | None = None,
 ) -> None:
     from palpate.viewer.live import open_viewer
     from palpate.viewer.server import ViewerServer
 
-    open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of), browser=browser)
+    open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of, maps=maps), browser=browser)
 
 
 def _force_line(record: PressRecord, max_force: float) -> str:

@@ -1,9 +1,9 @@
 """What lies hidden in a body: its stiffness beside that of the same body of one material.
 
-Both are palpated alike, so the shape of the body, its supports and what a mesh is off drop out of the ratio. A nodule is
-a peak of `|ratio - 1|`; its place is that of the bump `A / (1 + r^2 / w^2)^2` fitted to the points around in the tangent
-plane, by least squares. The bump has the shape of what a small inclusion at depth `w` changes: strain under a press falls
-off as `1 / (r^2 + w^2)`, and the change goes with its square (a first-order estimate; the width is fitted, not read off).
+Both are palpated alike, so the shape of the body, its supports and what a mesh is off drop out of the ratio. A nodule
+is a peak of `|ratio - 1|`; its place is that of the bump `A / (1 + r^2 / w^2)^2` fitted to the points around in the
+tangent plane, by least squares. The bump has the shape of what a small inclusion at depth `w` changes: strain under a
+press falls off as `1 / (r^2 + w^2)`, and the change goes with its square (to first order; the width is fitted).
 """
 
 from __future__ import annotations

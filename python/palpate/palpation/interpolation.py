@@ -1,16 +1,16 @@
 """Values at scattered places of a surface, taken to all of it.
 
-Interpolated by radial basis functions, `sum w_i |x - x_i| + c`, over the closest places: what was measured stands at its
-place, between places it is as smooth as that allows. Distances are those of places and normals together, so that the far
-side of a thin part, or the next side beyond an edge, takes nothing from this one.
+Interpolated by radial basis functions, `sum w_i |x - x_i| + c`, over the closest places: what was measured stands at
+its place, between places it is as smooth as that allows. Distances are those of places and normals together, so that
+the far side of a thin part, or the next side beyond an edge, takes nothing from this one.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-# Share of normals in the distance, by spacings; how far from the closest place values are known, in spacings: out to the
-# corner of a square lattice's last cell, and over an edge half-way round.
+# Share of normals in the distance, by spacings; how far from the closest place values are known, in spacings: out to
+# the corner of a square lattice's last cell, and over an edge half-way round.
 NORMALS, KNOWN = 1.2, 1.6
 NEIGHBOURS = 24
 

@@ -27,8 +27,8 @@ RANGE = (2.0, 98.0)
 # Surface without a value, and light that shapes it: from the viewer's left above.
 BARE, AMBIENT = np.array([0.86, 0.86, 0.86]), 0.62
 LIGHT = np.array([-0.3, -0.3, 0.9])
-# Seen from the middle of the normals, and from behind.
-ELEVATION = 20.0
+# Seen from the middle of the normals where they have one of this length, and from behind.
+ELEVATION, MOSTLY = 20.0, 0.3
 
 
 def picture_of_map(found: StiffnessMap) -> Figure:
@@ -48,6 +48,7 @@ def picture_of_detection(detection: Detection) -> Figure:
 
 def picture_of_curves(found: StiffnessMap) -> Figure:
     """Force against depth of all presses, coloured by stiffness, or along all strokes."""
+    from matplotlib import colormaps
     from matplotlib.collections import LineCollection
 
     figure = empty_figure(7, 4.5)
@@ -64,9 +65,8 @@ def picture_of_curves(found: StiffnessMap) -> Figure:
         values.append(own.mean() if len(own) else np.nan)
         held = np.flatnonzero(curve.limited)
         axes.plot(*lines[-1][held].T, ".", color="tab:red", markersize=2)
-    drawn = LineCollection(lines, cmap="viridis", linewidths=1.2)
+    drawn = LineCollection(lines, cmap=colormaps["viridis"].with_extremes(bad="0.6"), linewidths=1.2)
     drawn.set_array(np.ma.masked_invalid(values))
-    drawn.cmap.set_bad("0.6")
     axes.add_collection(drawn)
     axes.set_xlim(0.0, max(line[:, 0].max() for line in lines) * 1.02)
     axes.set_ylim(0.0, max(max(line[:, 1].max() for line in lines) * 1.05, 1e-6))
@@ -110,7 +110,7 @@ def _picture(
     else:
         figure = empty_figure(11, 5.2)
         axes = [figure.add_subplot(1, 2, k, projection="3d") for k in (1, 2)]
-        azimuth = float(np.degrees(np.arctan2(mean[1], mean[0]))) if np.hypot(*mean[:2]) > 0.1 else -60.0
+        azimuth = _azimuth(found, meshes)
         for one, turn in zip(axes, (0.0, 180.0), strict=True):
             _draw_body(one, found, values, meshes, (azimuth + turn, ELEVATION), shades, nodules)
     sides = np.ptp(np.vstack([positions for positions, _, _ in meshes]), axis=0)
@@ -119,6 +119,15 @@ def _picture(
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[beyond]
     figure.colorbar(shades, ax=axes, label=label, shrink=0.85, extend=extend)
     return figure
+
+
+def _azimuth(found: StiffnessMap, meshes: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> float:
+    """Direction, degrees about z, that most points are seen from; of points all around half aside of the broad side."""
+    mean = found.normals.mean(axis=0)[:2]
+    if np.hypot(*mean) > MOSTLY:
+        return float(np.degrees(np.arctan2(mean[1], mean[0])))
+    sides = np.ptp(np.vstack([positions for positions, _, _ in meshes]), axis=0)
+    return -60.0 if sides[0] >= sides[1] else 30.0
 
 
 def _fine(found: StiffnessMap, values: np.ndarray, body: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -157,7 +166,8 @@ def _draw_plane(
             continue
         places = positions @ plane.T
         bare = ~np.isfinite(at_nodes[facing]).all(axis=1)
-        axes.tripcolor(*places.T, facing[bare], facecolors=np.ones(bare.sum()), cmap="gray", vmin=0, vmax=1.16)
+        if bare.any():
+            axes.tripcolor(*places.T, facing[bare], facecolors=np.ones(bare.sum()), cmap="gray", vmin=0, vmax=1.16)
         if not bare.all():
             seen = np.nan_to_num(at_nodes)
             axes.tripcolor(*places.T, facing[~bare], seen, shading="gouraud", cmap=shades.cmap, norm=shades.norm)
@@ -224,7 +234,10 @@ def _draw_body(
             )
     for set_limits, bottom, top in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high, strict=True):
         set_limits(bottom, top)
-    axes.set_box_aspect(np.maximum(high - low, 1e-3 * (high - low).max()), zoom=1.2)
+    axes.computed_zorder = False
+    sides = np.maximum(high - low, 1e-3 * (high - low).max())
+    # matplotlib makes the diagonal of the box as long as the axes allow for a cube.
+    axes.set_box_aspect(sides, zoom=1.5 * np.linalg.norm(sides) / (np.sqrt(3) * sides.max()))
     axes.set_proj_type("ortho")
     axes.view_init(elev=view[1], azim=view[0])
     axes.set_axis_off()

@@ -1,7 +1,7 @@
 """One press: the path of the tool, and what its force tells of the surface.
 
-The tool comes along the inward normal until it has gone `d` beyond first touch. With the component `F` of its force along
-the outward normal,
+The tool comes along the inward normal until it has gone `d` beyond first touch. With the component `F` of its force
+along the outward normal,
 
     stiffness          dF/dd at the depth, by a parabola through the last fifth of the press
     secant stiffness   F/d

@@ -17,8 +17,8 @@ from palpate.palpation.sides import SurfaceShape
 from palpate.simulation import Simulation
 from palpate.vectors import brief, three_numbers
 
-# Ticks that a press takes at least, or its curve has no slope.
-FEWEST_TICKS = 40
+# Ticks that a press takes at least: the slope is that of a parabola through the last fifth of them.
+FEWEST_TICKS = 20
 # A point that is given by hand lies at most this part of the body's longest side off the surface.
 OFF_SURFACE = 0.05
 
@@ -80,8 +80,8 @@ class Protocol:
         if not self.strokes and self.depth / self.speed * rate < FEWEST_TICKS:
             fastest = self.depth * rate / FEWEST_TICKS
             raise SceneError(
-                f"at {self.speed:g} m/s a press of {1e3 * self.depth:.3g} mm takes fewer than {FEWEST_TICKS} ticks of "
-                f"{1e3 / rate:g} ms: press with at most {1e3 * fastest:.3g} mm/s"
+                f"at {1e3 * self.speed:.3g} mm/s a press of {1e3 * self.depth:.3g} mm takes fewer than {FEWEST_TICKS} ticks"
+                f" of {1e3 / rate:g} ms: press with at most {1e3 * fastest:.3g} mm/s"
             )
 
 
@@ -241,7 +241,7 @@ def closest(simulation: Simulation, body: int, points: np.ndarray) -> tuple[np.n
 
 
 def contact_radius(simulation: Simulation, depth: float) -> float:
-    """Radius, m, that the first tool's contact has at a depth on a flat surface, `sqrt(R d)`; of other shapes of its front."""
+    """Radius, m, of the first tool's contact at a depth on a flat surface, `sqrt(R d)`, `R` that of its front."""
     tool = simulation.scene.tools[0]
     radius = tool.radius or (max(tool.semi_axes[:2]) ** 2 / tool.semi_axes[2] if tool.semi_axes else depth)
     return radius if tool.shape == "punch" else float(np.sqrt(radius * depth))

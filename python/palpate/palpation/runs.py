@@ -46,8 +46,9 @@ def run_all(
     partial: Path | None,
     progress: bool | Callable[[int, int], None],
 ) -> tuple[list[Run], int]:
-    """Forces on the device (t, 3), N, and whether strain was limited (t,), of each path, each from a body at rest; and how
-    many were known.
+    """Run each path from a body at rest; how many runs were known already is told too.
+
+    A run is the forces on the device (t, 3), N, and whether strain was limited (t,).
 
     Raises
     ------

@@ -1,10 +1,10 @@
 """Where a protocol presses: points about equally far apart on the surface of a body.
 
 The surface is cut into sides along its sharp edges. A flat side gets a square lattice, as wide apart as asked, in the
-middle of the side. A curved side gets as many points as a hexagonal packing of that distance has, `A / (sqrt(3)/2 s^2)`,
-first each as far as possible from those before (Gonzalez 1985), then moved to the middle of what is closest to it (Lloyd
-1982). Distances are those of places together with normals, so that both faces of a thin part are told apart. The same
-body gives the same points.
+middle of the side. A curved side gets as many points as a hexagonal packing of that distance has,
+`A / (sqrt(3)/2 s^2)`, first each as far as possible from those before (Gonzalez 1985), then moved to the middle of what
+is closest to it (Lloyd 1982). Distances are those of places together with normals, so that both faces of a thin part
+are told apart. The same body gives the same points.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ def evenly_on(side: Side, spacing: float) -> Samples:
 def too_many(count: int, spacing: float) -> SceneError:
     """Error of a spacing that is far too small."""
     return SceneError(
-        f"a grid of {1e3 * spacing:.3g} mm has {count} points on this surface, more than {MOST_POINTS}: give a wider one, "
-        "or a part of the surface"
+        f"a grid of {1e3 * spacing:.3g} mm has {count} points here, more than {MOST_POINTS}: give a wider one "
+        "or a part of it"
     )
 
 

@@ -46,7 +46,7 @@ class Side:
         return bool((self.normals @ (mean / np.linalg.norm(mean))).min() > np.cos(FLAT))
 
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Directions (3,): in a flat side along x of the body, or y where it faces x, and across; else of most extent."""
+        """Directions (3,): in a flat side along x of the body, or y where it faces x; else of most extent."""
         if not self.is_flat:
             middles = self.positions[self.triangles].mean(axis=1)
             offset = middles - self.areas @ middles / self.area
@@ -142,7 +142,7 @@ class SurfaceShape:
             return np.zeros(len(points), dtype=bool)
         start, end = self.positions[edges[:, 0]], self.positions[edges[:, 1]]
         length = np.linalg.norm(end - start, axis=1)
-        # Every place of a line is within half its length of its middle: what is near none of these is measured no further.
+        # Every place of a line is within half its length of its middle: what is near none of these is left out.
         near = cKDTree((start + end) / 2).query_ball_point(points, distance + length.max() / 2)
         mask = np.zeros(len(points), dtype=bool)
         for rank, lines in enumerate(near):

@@ -112,7 +112,7 @@ class StiffnessMap(ComparedByValue):
         return found
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView and the page; replaced only when complete."""
+        """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView and the page; a file is replaced at once."""
         from palpate.fields import write_result
 
         write_result(self.to_meshio(), path)

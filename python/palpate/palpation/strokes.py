@@ -18,7 +18,8 @@ from palpate.palpation.runs import Path3D
 from palpate.palpation.sides import Side
 from palpate.simulation import Simulation
 
-# Step of the depth between the passes, of the depth; places a spacing at which a stroke is measured; fewest of a stroke.
+# Step between the passes, of the depth, and how many there are; places a spacing at which a stroke is measured, and the
+# fewest of a stroke.
 DEPTH_STEP, PASSES = 0.1, 3
 PER_SPACING, FEWEST_PLACES = 4, 3
 
