@@ -80,8 +80,8 @@ class Protocol:
         if not self.strokes and self.depth / self.speed * rate < FEWEST_TICKS:
             fastest = self.depth * rate / FEWEST_TICKS
             raise SceneError(
-                f"at {1e3 * self.speed:.3g} mm/s a press of {1e3 * self.depth:.3g} mm takes fewer than {FEWEST_TICKS} ticks"
-                f" of {1e3 / rate:g} ms: press with at most {1e3 * fastest:.3g} mm/s"
+                f"at {1e3 * self.speed:.3g} mm/s a press of {1e3 * self.depth:.3g} mm takes fewer than {FEWEST_TICKS}"
+                f" ticks of {1e3 / rate:g} ms: press with at most {1e3 * fastest:.3g} mm/s"
             )
 
 

@@ -22,6 +22,10 @@ from palpate.simulation import Simulation
 # fewest of a stroke.
 DEPTH_STEP, PASSES = 0.1, 3
 PER_SPACING, FEWEST_PLACES = 4, 3
+# Part of the spacing by which a plane is moved aside.
+ASIDE = 1e-4
+# Ends closer than this part of a section's size are one.
+SAME_END = 1e-7
 
 
 @dataclass(frozen=True)
@@ -130,8 +134,8 @@ def _lines(side: Side, spacing: float) -> list[tuple[np.ndarray, np.ndarray]]:
     count = max(1, int((high - low) / spacing * (1 + 1e-9)))
     lines = []
     for offset in (low + high) / 2 + spacing * (np.arange(count) - (count - 1) / 2):
-        # Beside the nodes, that no plane passes through one.
-        origin = (offset + 1e-7 * (high - low)) * second
+        # Beside the nodes of a regular mesh, where a plane would cut no triangle in two.
+        origin = (offset + ASIDE * spacing) * second
         segments, faces = mesh_plane(surface, second, origin, return_faces=True)
         for chain in _chained(segments):
             forward = chain if (chain[-1] - chain[0]) @ first >= 0 else chain[::-1]
@@ -141,14 +145,29 @@ def _lines(side: Side, spacing: float) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _chained(segments: np.ndarray) -> list[np.ndarray]:
-    """Polylines (k, 3) of line segments (n, 2, 3) that share their ends."""
-    from trimesh.path.exchange.misc import lines_to_path
-    from trimesh.path.path import Path3D as Polylines
-
+    """Polylines (k, 3) of line segments (n, 2, 3) that share their ends; a closed one ends where it begins."""
     if len(segments) == 0:
         return []
-    chains = [np.asarray(chain) for chain in Polylines(**lines_to_path(segments)).discrete]
-    return sorted(chains, key=lambda chain: tuple(chain.min(axis=0)))
+    ends = segments.reshape(-1, 3)
+    grid = np.round(ends / (SAME_END * np.ptp(ends, axis=0).max())).astype(np.int64)
+    _, first, joined = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    beside: dict[int, set[int]] = {}
+    for one, other in joined.reshape(-1, 2).tolist():
+        if one != other:
+            beside.setdefault(one, set()).add(other)
+            beside.setdefault(other, set()).add(one)
+    chains = []
+    # Open lines from their ends on, then closed ones.
+    for start in sorted(beside, key=lambda node: (len(beside[node]) != 1, node)):
+        while beside[start]:
+            chain = [start]
+            while beside[chain[-1]]:
+                onwards = min(beside[chain[-1]])
+                beside[chain[-1]].remove(onwards)
+                beside[onwards].remove(chain[-1])
+                chain.append(onwards)
+            chains.append(ends[first[chain]])
+    return chains
 
 
 def _resampled(chain: np.ndarray, step: float) -> np.ndarray:

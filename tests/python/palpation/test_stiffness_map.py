@@ -66,7 +66,7 @@ def test_strokes_feel_what_presses_feel(block):
     # One line each, straight along x, a spacing apart.
     for rank in range(3):
         line = strokes.points[strokes.strokes == rank]
-        assert np.ptp(line[:, 1]) < 1e-6 and line[0, 1] == pytest.approx(0.01 + 0.02 * rank, abs=1e-5)
+        assert np.ptp(line[:, 1]) < 1e-6 and line[0, 1] == pytest.approx(0.01 + 0.02 * rank, abs=3e-6)
         assert (np.diff(line[:, 0]) > 0).all()
         assert strokes.curves[rank].position[-1] == pytest.approx(np.ptp(line[:, 0]), rel=1e-6)
 
@@ -84,7 +84,7 @@ def test_what_a_limit_holds_has_no_stiffness(store):
     with pytest.raises(
         palpate.SceneError, match=r"no point could be pressed 1 mm deep \(strain limit, at 0\.\d+ mm at"
     ):
-        stiffness_map(scene_of(store, strain_limit=0.02), "20mm", "1mm", on=TOP)
+        stiffness_map(scene_of(store, strain_limit=0.005), "20mm", "1mm", on=TOP)
 
 
 def test_the_surface_is_interpolated_where_points_are(top):
