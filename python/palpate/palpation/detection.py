@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.body import Body
-from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
 from palpate.mesh import size_text
 from palpate.palpation.protocol import Protocol, Sites, closest
+from palpate.palpation.records import DetectionRecord, Nodule
 from palpate.palpation.runs import probe
 from palpate.palpation.stiffness_map import StiffnessMap, palpated
 from palpate.scene import BuiltScene, Scene
@@ -43,35 +43,8 @@ AROUND, FEWEST, SAME_SIDE = 2.5, 6, 0.5
 SAME_SURFACE = 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class Nodule(ComparedByValue):
-    """Something hidden, as it is felt. Compared by value, number by number; not hashable.
-
-    Attributes
-    ----------
-    place
-        (3,) m on the surface, in the scene: where the fitted bump is highest.
-    body
-        Number of the body.
-    point
-        The point of the map with the largest change.
-    ratio, difference
-        Of the stiffness there to that without it, and N/m more than that.
-    half_width
-        Distance at which half of the change is left, m.
-
-    """
-
-    place: np.ndarray
-    body: int
-    point: int
-    ratio: float
-    difference: float
-    half_width: float
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Detection(ComparedByValue):
+class Detection(DetectionRecord):
     """A map beside that of a body without anything hidden. Compared by value, number by number; not hashable.
 
     Attributes
@@ -85,12 +58,6 @@ class Detection(ComparedByValue):
 
     """
 
-    found: StiffnessMap
-    plain: StiffnessMap
-    ratio: np.ndarray
-    difference: np.ndarray
-    nodules: tuple[Nodule, ...]
-
     def __repr__(self) -> str:
         count = f"{len(self.nodules)} nodule{'' if len(self.nodules) == 1 else 's'}"
         known = self.ratio[np.isfinite(self.ratio)]
@@ -99,8 +66,9 @@ class Detection(ComparedByValue):
 
     def to_meshio(self) -> meshio.Mesh:
         """Give :meth:`StiffnessMap.to_meshio` with ``plain_stiffness``, ``difference``, N/m, and ``ratio``."""
-        more = {"plain_stiffness": self.plain.stiffness, "difference": self.difference, "ratio": self.ratio}
-        return self.found.to_meshio(**more)
+        from palpate.palpation.files import mesh_of_detection
+
+        return mesh_of_detection(self)
 
     def plot(self) -> Figure:
         """Picture of the ratio on the surface with the nodules, as a figure of matplotlib."""

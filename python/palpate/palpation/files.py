@@ -12,30 +12,29 @@ import numpy as np
 from palpate.atomic import written_beside
 from palpate.fields import write_result
 from palpate.figures import write_figure
+from palpate.palpation.pictures import picture_of_curves, picture_of_detection, picture_of_map
+from palpate.palpation.records import DetectionRecord, MapRecord
 
 if TYPE_CHECKING:
     import meshio
 
-    from palpate.palpation.detection import Detection
-    from palpate.palpation.stiffness_map import StiffnessMap
-
 XYZ = ("x_m", "y_m", "z_m")
 
 
-def save_map(found: StiffnessMap, folder: Path) -> list[Path]:
+def save_map(found: MapRecord, folder: Path) -> list[Path]:
     """See :meth:`StiffnessMap.save`."""
     folder.mkdir(parents=True, exist_ok=True)
     names = ("points.csv", "curves.csv", "curves.png", "stiffness.vtu", "stiffness.png")
     points, curves, curves_picture, surface, picture = paths = [folder / name for name in names]
     write_points(found, points)
     write_curves(found, curves)
-    write_figure(found.plot_curves(), curves_picture, grid=False)
-    found.write(surface)
-    write_figure(found.plot(), picture, grid=False)
+    write_figure(picture_of_curves(found), curves_picture, grid=False)
+    write_result(mesh_of_map(found), surface)
+    write_figure(picture_of_map(found), picture, grid=False)
     return paths
 
 
-def save_detection(detection: Detection, folder: Path) -> list[Path]:
+def save_detection(detection: DetectionRecord, folder: Path) -> list[Path]:
     """See :meth:`Detection.save`."""
     folder.mkdir(parents=True, exist_ok=True)
     names = ("detection.csv", "nodules.csv", "detection.vtu", "detection.png")
@@ -53,12 +52,12 @@ def save_detection(detection: Detection, folder: Path) -> list[Path]:
     names = ("body", *XYZ, "ratio", "difference_N_per_m", "half_width_m", "point")
     rows = ((n.body, *n.place, n.ratio, n.difference, n.half_width, n.point) for n in detection.nodules)
     _write_rows(nodules, names, rows)
-    write_result(detection.to_meshio(), surface)
-    write_figure(detection.plot(), picture, grid=False)
+    write_result(mesh_of_detection(detection), surface)
+    write_figure(picture_of_detection(detection), picture, grid=False)
     return paths
 
 
-def write_points(found: StiffnessMap, path: Path) -> None:
+def write_points(found: MapRecord, path: Path) -> None:
     """Write a row for each point."""
     columns = {
         "point": np.arange(len(found.points)),
@@ -76,7 +75,7 @@ def write_points(found: StiffnessMap, path: Path) -> None:
     _write_rows(path, columns, zip(*columns.values(), strict=True))
 
 
-def write_curves(found: StiffnessMap, path: Path) -> None:
+def write_curves(found: MapRecord, path: Path) -> None:
     """Write a row for each tick of each curve, with the number of its point or stroke."""
     of = "stroke" if (found.strokes >= 0).any() else "point"
     names = (of, "time_s", "position_m", "depth_m", "normal_force_N", "fx_N", "fy_N", "fz_N", "limited")
@@ -89,7 +88,18 @@ def write_curves(found: StiffnessMap, path: Path) -> None:
             np.savetxt(stream, np.column_stack([count, *moved, curve.limited]), delimiter=",", fmt=formats)
 
 
-def surface_mesh(found: StiffnessMap, values: Mapping[str, np.ndarray]) -> meshio.Mesh:
+def mesh_of_map(found: MapRecord, **more: np.ndarray) -> meshio.Mesh:
+    """See :meth:`StiffnessMap.to_meshio`."""
+    return _surface_mesh(found, {"stiffness": found.stiffness, "secant_stiffness": found.secant_stiffness, **more})
+
+
+def mesh_of_detection(detection: DetectionRecord) -> meshio.Mesh:
+    """See :meth:`Detection.to_meshio`."""
+    more = {"plain_stiffness": detection.plain.stiffness, "difference": detection.difference, "ratio": detection.ratio}
+    return mesh_of_map(detection.found, **more)
+
+
+def _surface_mesh(found: MapRecord, values: Mapping[str, np.ndarray]) -> meshio.Mesh:
     """Surfaces of all bodies in the scene, with values (p,) at points taken to their nodes."""
     import meshio
 

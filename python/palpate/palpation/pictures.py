@@ -10,13 +10,12 @@ import numpy as np
 from palpate.figures import empty_figure
 from palpate.mesh import size_text
 from palpate.palpation.interpolation import node_normals
+from palpate.palpation.records import DetectionRecord, MapRecord, Nodule
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from palpate.palpation.detection import Detection, Nodule
-    from palpate.palpation.stiffness_map import StiffnessMap
 
 # Points that look the same way within this cosine are seen from there, as a plane.
 ONE_WAY = np.cos(np.radians(10.0))
@@ -31,13 +30,13 @@ LIGHT = np.array([-0.3, -0.3, 0.9])
 ELEVATION, MOSTLY = 20.0, 0.3
 
 
-def picture_of_map(found: StiffnessMap) -> Figure:
+def picture_of_map(found: MapRecord) -> Figure:
     """Stiffness on the surface, and the points at which it was measured."""
     title = f"stiffness dF/dd at {1e3 * found.depth:.3g} mm depth"
     return _picture(found, found.stiffness, title, "stiffness [N/m]", "viridis", None, ())
 
 
-def picture_of_detection(detection: Detection) -> Figure:
+def picture_of_detection(detection: DetectionRecord) -> Figure:
     """Stiffness over that of the plain body, and the nodules."""
     values = 100 * (detection.ratio - 1)
     known = values[np.isfinite(values)]
@@ -46,7 +45,7 @@ def picture_of_detection(detection: Detection) -> Figure:
     return _picture(detection.found, values, title, "change [%]", "coolwarm", (-end, end), detection.nodules)
 
 
-def picture_of_curves(found: StiffnessMap) -> Figure:
+def picture_of_curves(found: MapRecord) -> Figure:
     """Force against depth of all presses, coloured by stiffness, or along all strokes."""
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection
@@ -82,7 +81,7 @@ def picture_of_curves(found: StiffnessMap) -> Figure:
 
 
 def _picture(
-    found: StiffnessMap,
+    found: MapRecord,
     values: np.ndarray,
     title: str,
     label: str,
@@ -121,7 +120,7 @@ def _picture(
     return figure
 
 
-def _azimuth(found: StiffnessMap, meshes: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> float:
+def _azimuth(found: MapRecord, meshes: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> float:
     """Direction, degrees about z, that most points are seen from; of points all around half aside of the broad side."""
     mean = found.normals.mean(axis=0)[:2]
     if np.hypot(*mean) > MOSTLY:
@@ -130,7 +129,7 @@ def _azimuth(found: StiffnessMap, meshes: Sequence[tuple[np.ndarray, np.ndarray,
     return -60.0 if sides[0] >= sides[1] else 30.0
 
 
-def _fine(found: StiffnessMap, values: np.ndarray, body: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _fine(found: MapRecord, values: np.ndarray, body: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Surface of a body, cut finely: positions (s, 3), triangles (t, 3), values (s,)."""
     from trimesh.remesh import subdivide_to_size
 
@@ -146,7 +145,7 @@ def _fine(found: StiffnessMap, values: np.ndarray, body: int) -> tuple[np.ndarra
 
 def _draw_plane(
     axes: Axes,
-    found: StiffnessMap,
+    found: MapRecord,
     values: np.ndarray,
     meshes: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
     up: np.ndarray,
@@ -190,7 +189,7 @@ def _draw_plane(
 
 def _draw_body(
     axes: Any,
-    found: StiffnessMap,
+    found: MapRecord,
     values: np.ndarray,
     meshes: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
     view: tuple[float, float],

@@ -3,49 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.equality import ComparedByValue
 from palpate.palpation.partial import Run
 from palpate.palpation.press import FORCE_LIMIT, NO_CONTACT, STRAIN_LIMIT, Measured, depths_of, measured, standing_on
 from palpate.palpation.protocol import Protocol, Sites
+from palpate.palpation.records import PressCurve
 from palpate.palpation.runs import Path3D
 from palpate.palpation.strokes import PASSES, Track, slope_of_passes
 from palpate.simulation import Simulation
 
 # A device puts out its largest force to within rounding.
 CLAMPED = 1 - 1e-9
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PressCurve(ComparedByValue):
-    """Force against depth of one press, or along one stroke. Compared by value, number by number; not hashable.
-
-    Attributes
-    ----------
-    time
-        (t,) s, since the first tick.
-    depth
-        (t,) m, below zero before the touch.
-    position
-        (t,) m along a stroke; zeros of a press.
-    force
-        (t, 3) N on the tool, in the scene.
-    normal_force
-        (t,) N along the outward normal.
-    limited
-        (t,) whether the limit of strain or that of force held the tool.
-
-    """
-
-    time: np.ndarray
-    depth: np.ndarray
-    position: np.ndarray
-    force: np.ndarray
-    normal_force: np.ndarray
-    limited: np.ndarray
 
 
 def press_paths(simulation: Simulation, sites: Sites, protocol: Protocol) -> list[Path3D]:

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -72,12 +73,10 @@ def run_all(
 
 def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:
     """Hash of everything that determines the forces: bodies, tool, limits, version, and every position."""
-    from palpate import __version__
-
     scene = simulation.scene
     motions = [_motion_of(body.motion) for body in simulation.bodies]
     told = {
-        "version": __version__,
+        "version": version("palpate"),
         "bodies": [(body.green.key, body.position, body.orientation) for body in simulation.bodies],
         "motions": repr(motions),
         "tools": [tool.model_dump() for tool in scene.tools],

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
-from palpate.palpation.interpolation import SurfaceField, node_normals
 from palpate.palpation.press import FORCE_LIMIT, NO_CONTACT, OTHER_PLACE, STRAIN_LIMIT, Measured
 from palpate.palpation.protocol import Protocol, Sites, sites_at, sites_on
-from palpate.palpation.reading import PressCurve, press_paths, read_presses, read_strokes
+from palpate.palpation.reading import press_paths, read_presses, read_strokes
+from palpate.palpation.records import MapRecord
 from palpate.palpation.runs import probe, run_all
-from palpate.palpation.sides import SurfaceShape
 from palpate.palpation.strokes import Track, strokes_on
 from palpate.scene import BuiltScene, Scene
 from palpate.simulation import Simulation
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StiffnessMap(ComparedByValue):
+class StiffnessMap(MapRecord):
     """What a palpation has found, one row for each of p points. Compared by value, number by number; not hashable.
 
     Attributes
@@ -61,55 +59,20 @@ class StiffnessMap(ComparedByValue):
 
     """
 
-    points: np.ndarray
-    normals: np.ndarray
-    bodies: np.ndarray
-    strokes: np.ndarray
-    force: np.ndarray
-    stiffness: np.ndarray
-    secant_stiffness: np.ndarray
-    held_by: np.ndarray
-    reached_depth: np.ndarray
-    reached_force: np.ndarray
-    curves: tuple[PressCurve, ...]
-    skipped: dict[str, int]
-    spacing: float
-    depth: float
-    speed: float
-    scene: BuiltScene = field(compare=False)
-    resumed: int = field(default=0, compare=False)
-
     def __repr__(self) -> str:
         known = self.stiffness[np.isfinite(self.stiffness)]
         told = f"{known.min():.4g} to {known.max():.4g} N/m" if len(known) else "no stiffness"
         held = f", {len(self.points) - len(known)} held before" if len(known) < len(self.points) else ""
         return f"StiffnessMap({len(self.points)} points {1e3 * self.depth:.3g} mm deep, {told}{held})"
 
-    def at(self, points: np.ndarray, normals: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """Stiffness (n,), N/m, interpolated at points (n, 3), m, with outward normals (n, 3); NaN far from all points.
-
-        ``values`` (p,) takes other values at the points in its place.
-        """
-        known = self.stiffness if values is None else values
-        return SurfaceField(self.points, self.normals, known, self.spacing).at(points, normals)
-
-    def to_meshio(self, **values: np.ndarray) -> meshio.Mesh:
+    def to_meshio(self) -> meshio.Mesh:
         """Give the surfaces of all bodies in the scene, the map at their nodes; NaN far from all points.
 
-        Point data are ``stiffness`` and ``secant_stiffness``, N/m, and what is given (p,) by name.
+        Point data are ``stiffness`` and ``secant_stiffness``, N/m.
         """
-        from palpate.palpation.files import surface_mesh
+        from palpate.palpation.files import mesh_of_map
 
-        return surface_mesh(self, {"stiffness": self.stiffness, "secant_stiffness": self.secant_stiffness, **values})
-
-    def surfaces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Of each body, in the scene: positions (s, 3), m, normals (s, 3), and triangles (t, 3) as rows of them."""
-        found = []
-        for body in self.scene.bodies:
-            shape = SurfaceShape(body.green)
-            normals = body.vectors_to_scene(node_normals(shape.positions, shape.triangles))
-            found.append((body.points_to_scene(shape.positions), normals, shape.triangles))
-        return found
+        return mesh_of_map(self)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView and the page; a file is replaced at once."""
