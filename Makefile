@@ -44,10 +44,11 @@ viewer: $(PAGE)
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)
 
-# Two processes: much of the time goes into waiting for browsers, meshers and servers.
+# Two processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py says what
+# each of them takes on, and in which order.
 test: $(VENV)/.installed $(PAGE) lint
-	cargo test --release --quiet --workspace --exclude palpate-python
-	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile $(ARGS)
+	cargo test --release --quiet --workspace
+	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder $(ARGS)
 
 lint: $(VENV)/.installed viewer/node_modules/.checks
 	cargo fmt --all --check

@@ -18,6 +18,7 @@ from palpate.errors import (
     PrecisionError,
     PrecisionWarning,
     SceneError,
+    SchedulingWarning,
     SimulationError,
     StoreError,
     StoreWarning,
@@ -30,7 +31,7 @@ from palpate.fields import StressRecovery, SurfaceStress
 from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
 from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
-from palpate.simulation import Contact, Frame, Recording, Simulation
+from palpate.simulation import Contact, Difference, Frame, Recording, RecordingStatus, Replayed, Simulation, replay
 
 __version__ = version("palpate")
 
@@ -39,6 +40,7 @@ __all__ = [
     "Body",
     "BodyError",
     "Contact",
+    "Difference",
     "Energy",
     "Error",
     "Frame",
@@ -55,8 +57,11 @@ __all__ = [
     "PrecisionError",
     "PrecisionWarning",
     "Recording",
+    "RecordingStatus",
+    "Replayed",
     "Scene",
     "SceneError",
+    "SchedulingWarning",
     "Simulation",
     "SimulationError",
     "StoreError",
@@ -75,6 +80,7 @@ __all__ = [
     "plan",
     "precompute",
     "rayleigh_from_ratios",
+    "replay",
     "shapes",
     "tetrahedralize",
 ]

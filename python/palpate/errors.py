@@ -76,5 +76,9 @@ class PrecisionWarning(PalpateWarning):
     """An answer, or what a store will answer, may be wrong by more than a per cent."""
 
 
+class SchedulingWarning(PalpateWarning):
+    """The system did not give the force loop the scheduling that was asked for: ticks may begin late."""
+
+
 class TouchWarning(PalpateWarning):
     """A touch landed on the surface far from the point that was asked for."""

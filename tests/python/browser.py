@@ -28,6 +28,10 @@ FLAGS = [
     "--disable-sync",
 ]
 
+# Drawn in software on a busy machine a page may show two pictures a second: a wait ends by what is seen, and fails only
+# after this time, s.
+PATIENCE = 60.0
+
 MARKS = [
     pytest.mark.browser,
     pytest.mark.skipif(
@@ -36,11 +40,15 @@ MARKS = [
 ]
 
 
+# The program, but that a page which a busy machine keeps from drawing for 2 s is not taken for one that is gone.
+PATIENT = f"from palpate.viewer import server; server.LOST_AFTER = {PATIENCE}; from palpate.cli import main; main()"
+
+
 class Program:
     """`palpate demo`, or another command with a page, as a user starts it; ``cache`` None is the user's own."""
 
     def __init__(self, cache: Path | None, *arguments: str, command: str = "demo"):
-        words = [sys.executable, "-m", "palpate", command, *arguments, "--port", "0", "--no-browser"]
+        words = [sys.executable, "-c", PATIENT, command, *arguments, "--port", "0", "--no-browser"]
         environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=environment)
         told = (re.search(r"http://\S+", line) for line in self.process.stdout)
@@ -58,6 +66,7 @@ class Program:
 def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
     """The page with a scene on it; anything on its console is a failure."""
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+    context.set_default_timeout(1e3 * PATIENCE)
     page = context.new_page()
     complaints = []
     page.on(
@@ -78,7 +87,7 @@ def state(page) -> dict:
     return page.evaluate("window.palpate ? window.palpate.state() : {frames: 0, connected: false}")
 
 
-def until(page, condition, seconds: float = 30.0) -> dict:
+def until(page, condition, seconds: float = PATIENCE) -> dict:
     """State of the page once a condition holds (its policy forbids Playwright's own waiting by eval)."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -87,6 +96,20 @@ def until(page, condition, seconds: float = 30.0) -> dict:
             return seen
         time.sleep(0.02)
     raise AssertionError(f"waited {seconds} s in vain; the last state was {seen}")
+
+
+def drawn(page, frames: int = 3) -> None:
+    """Wait until the page has drawn so many more frames: what was asked of it before is in them."""
+    before = state(page)["frames"]
+    until(page, lambda s: s["frames"] >= before + frames)
+
+
+def eventually(page, look, condition, seconds: float = PATIENCE):
+    """What is seen once it meets a condition, looked at again after each frame; the last look if it never does."""
+    end = time.monotonic() + seconds
+    while not condition(seen := look()) and time.monotonic() < end:
+        drawn(page, 1)
+    return seen
 
 
 def press(page, notches: int = 0, place: tuple[float, float] | None = None, contacts: int = 1) -> dict:
@@ -105,14 +128,14 @@ def press(page, notches: int = 0, place: tuple[float, float] | None = None, cont
 
 
 def settled_depth(page) -> float:
-    """Depth that the pointer wants, m, once it has come to its goal."""
-    before = -1.0
-    for _ in range(100):
+    """Depth that the pointer wants, m, once it has come to its goal: the same before and after some frames."""
+    before, end = -1.0, time.monotonic() + PATIENCE
+    while time.monotonic() < end:
         now = state(page)["depth"]
         if now == before:
             return now
         before = now
-        time.sleep(0.05)
+        drawn(page)
     raise AssertionError("the depth does not settle")
 
 
@@ -132,7 +155,7 @@ TICKS_APART = 250
 
 def settled_force(page) -> np.ndarray:
     """Force once it stands still within a part of itself."""
-    ticks, before, end = -np.inf, np.full(3, np.inf), time.monotonic() + 60.0
+    ticks, before, end = -np.inf, np.full(3, np.inf), time.monotonic() + PATIENCE
     while time.monotonic() < end:
         seen = state(page)
         now, passed = np.array(seen["force"]), seen["ticks"] - ticks

@@ -8,7 +8,7 @@ import sys
 
 def run(*arguments, cwd, **kwargs):
     command = [sys.executable, "-c", "from palpate.cli import main; main()", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, **kwargs)
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=280, **kwargs)
 
 
 def refused(result, *words):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 import scipy.sparse.linalg
@@ -23,6 +25,22 @@ def pytest_runtest_makereport(item, call):
         report.longrepr = (
             f"skipped, and --no-skips was given: {call.excinfo.value if call.excinfo else report.longrepr}"
         )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """What a worker takes on is a file, but for browsers: all in one, for two that draw in software starve each other.
+
+    The browsers come first and then files with slow tests, so that no worker is left with a long one at the end.
+    """
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+
+    def rank(item) -> int:
+        return 0 if item.get_closest_marker("browser") else 1 if item.path in slow else 2
+
+    items.sort(key=rank)
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group("browser" if rank(item) == 0 else str(item.path)))
 
 
 def box_mesh(cells=(4, 3, 3), size=(0.08, 0.05, 0.05), jitter=0.15, seed=1) -> TetMesh:
@@ -136,7 +154,17 @@ def block_green(block, tmp_path_factory) -> palpate.GreensFunction:
 
 @pytest.fixture(scope="session")
 def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("cache")
+    """A cache for all tests of a run, whichever worker they are in: stores come by rename, so that two may make one."""
+    base = tmp_path_factory.getbasetemp()
+    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
+    shared.mkdir(exist_ok=True)
+    return shared
+
+
+@pytest.fixture
+def shared_cache(cache, monkeypatch, private_cache):
+    """The cache of all tests in place of one of this test's."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
 
 
 @pytest.fixture(scope="module")
@@ -149,6 +177,16 @@ def chromium():
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield browser
         browser.close()
+
+
+@pytest.fixture(scope="module")
+def program(cache):
+    """The demo of the paper's liver, with a page; it ends cleanly by Ctrl-C."""
+    from browser import Program
+
+    started = Program(cache, "liver", "--paper")
+    yield started
+    assert started.stop() == 0
 
 
 @pytest.fixture

@@ -5,12 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import time
 
 import numpy as np
 from websockets.asyncio.client import connect
 
 from palpate.viewer import messages
 from palpate.viewer.server import ViewerServer
+
+# Frames come as fast as a busy machine lets them: a wait ends by what they hold, and fails only after this time, s.
+PATIENCE = 60.0
+# So far apart forces are compared, in ticks of the loop, which may be late too.
+TICKS_APART = 15
 
 
 class Page:
@@ -23,7 +29,7 @@ class Page:
     async def say(self, **message):
         await self.socket.send(json.dumps(message))
 
-    async def receive(self, kind: str, limit: float = 5.0):
+    async def receive(self, kind: str, limit: float = PATIENCE):
         """Next message of a kind; binary frames are acknowledged as a page would."""
 
         async def wait():
@@ -41,7 +47,8 @@ class Page:
         return await asyncio.wait_for(wait(), limit)
 
     async def frame_where(self, condition):
-        for _ in range(400):
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
             header, arrays = await self.receive("frame")
             if condition(header):
                 return header, arrays
@@ -68,11 +75,13 @@ async def page(server, *, token=None, origin=None):
 
 
 async def settled(client, condition=lambda header: True):
-    """Frame once the hand has arrived: the force stands still but for what a tick leaves open, 1e-7 of it."""
-    force = [np.inf] * 3
-    for _ in range(200):
+    """Frame once the hand has arrived: the force stands still but for what ticks leave open, 1e-7 of it."""
+    force, ticks, end = [np.inf] * 3, -np.inf, time.monotonic() + PATIENCE
+    while time.monotonic() < end:
         header, arrays = await client.receive("frame")
-        before, force = force, header["tools"][0]["force"]
+        if header["ticks"] - ticks < TICKS_APART:
+            continue
+        before, force, ticks = force, header["tools"][0]["force"], header["ticks"]
         if header["contacts"] and np.allclose(force, before, rtol=1e-5, atol=1e-7) and condition(header):
             return header, arrays
     raise AssertionError(f"the force does not settle; the last frame was {header}")

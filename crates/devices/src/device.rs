@@ -19,7 +19,7 @@ impl Buttons {
 }
 
 /// What a device says at a tick.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Where the tool is.
     pub pose: Pose,

@@ -4,7 +4,10 @@
 mod body;
 mod dynamics;
 mod errors;
+mod frame;
 mod green;
+mod recording;
+mod replay;
 mod scene;
 mod simulation;
 mod strain;
@@ -31,6 +34,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_class::<replay::Replay>()?;
+    module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_class::<surface::SurfaceSearch>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;

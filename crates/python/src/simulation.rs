@@ -1,20 +1,23 @@
 //! A simulation: the loop with simulated devices, and the same ticks offline.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use palpate_core::simulation::{MAX_BODIES, Model, Pose, Snapshot, Strike};
+use palpate_core::simulation::{MAX_BODIES, Model, Pose, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{Handle, Target, simulated};
-use palpate_servo::{Published, SafetyLimits, Script, Servo, Settings, StrainPreparer};
+use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, StrainPreparer, TickRecord};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::to_python;
+use crate::frame::frame;
+use crate::recording::{Recorded, Recording, RecordingStatus, header};
 use crate::scene::{
     BodyArguments, ContactRecord, ToolArguments, body_parts, contact_records, energy_array, poses, quaternion, tool,
-    wxyz,
 };
 use crate::strain::StrainMeasure;
 
@@ -24,20 +27,22 @@ type StrikeArguments = (usize, usize, [f64; 3], [f64; 3], f64, f64);
 /// Model, limits and settings of a simulation, and its loop while it runs.
 #[pyclass(module = "palpate._native")]
 pub struct SimulationCore {
-    model: Arc<Model>,
-    limits: SafetyLimits,
-    settings: Settings,
-    rate: f64,
-    strain: StrainPreparer,
+    pub(crate) model: Arc<Model>,
+    pub(crate) limits: SafetyLimits,
+    pub(crate) settings: Settings,
+    pub(crate) scheduling: Scheduling,
+    pub(crate) strain: StrainPreparer,
     handles: Vec<Handle>,
     targets: Vec<Target>,
     /// Locked by callers from Python among themselves; the loop knows nothing of it.
     servo: Mutex<Option<Servo>>,
+    recording: Option<Recording>,
 }
 
 #[pymethods]
 impl SimulationCore {
-    /// Prepares bodies and tools, with limits of force (N), slew (N/s) and ramp (s), and a rate, Hz.
+    /// Prepares bodies and tools, with limits of force (N), slew (N/s) and ramp (s), and the loop's rate, Hz, processors and
+    /// priority.
     #[new]
     fn new(
         py: Python<'_>,
@@ -45,7 +50,7 @@ impl SimulationCore {
         tools: Vec<ToolArguments>,
         limits: (f64, f64, f64),
         strain_limit: f64,
-        rate: f64,
+        scheduling: (f64, Vec<usize>, u8),
     ) -> PyResult<Self> {
         let parts = bodies.iter().map(body_parts).collect::<PyResult<Vec<_>>>()?;
         let prepare = || {
@@ -62,11 +67,12 @@ impl SimulationCore {
         Ok(Self {
             limits: SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..SafetyLimits::default() },
             settings,
-            rate,
+            scheduling: Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 },
             strain: StrainPreparer::new(&model),
             handles: Vec::new(),
             targets: vec![Target::default(); model.tools.len()],
             servo: Mutex::new(None),
+            recording: None,
             model,
         })
     }
@@ -76,8 +82,8 @@ impl SimulationCore {
         self.strain.set_measure(body, measure.measure.clone());
     }
 
-    /// Starts the loop.
-    fn start(&mut self, py: Python<'_>) -> PyResult<()> {
+    /// Starts the loop; whether the system granted its priority, and locked memory.
+    fn start(&mut self, py: Python<'_>) -> PyResult<(bool, bool)> {
         let (handles, devices): (Vec<_>, Vec<_>) = self
             .targets
             .iter()
@@ -87,17 +93,23 @@ impl SimulationCore {
             })
             .unzip();
         self.handles = handles;
-        let (model, limits, settings, rate, strain) =
-            (self.model.clone(), self.limits, self.settings, self.rate, self.strain.clone());
-        let started = py.detach(|| Servo::start(model, devices, limits, settings, rate, strain));
-        *self.servo() = Some(started.map_err(|e| to_python(py, e))?);
-        Ok(())
+        let (model, limits, settings, scheduling, strain) =
+            (self.model.clone(), self.limits, self.settings, self.scheduling.clone(), self.strain.clone());
+        let started = py.detach(|| Servo::start(model, devices, limits, settings, scheduling, strain));
+        let servo = started.map_err(|e| to_python(py, e))?;
+        let realtime = servo.realtime();
+        *self.servo() = Some(servo);
+        Ok((realtime.priority, realtime.locked_memory))
     }
 
     /// Stops the loop.
     fn stop(&mut self, py: Python<'_>) {
+        let recording = self.recording.take();
         if let Some(mut servo) = self.servo().take() {
-            py.detach(|| servo.stop());
+            py.detach(|| {
+                recording.map(|recording| recording.end(&mut servo));
+                servo.stop();
+            });
         }
     }
 
@@ -207,39 +219,8 @@ impl SimulationCore {
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let (model, tools) = (self.model.clone(), self.targets.len());
         let Some(servo) = self.servo() else { return Ok(None) };
-        let Published { status, state } = servo.latest().clone();
-        let surfaces = py.detach(|| {
-            let intact = model.bodies.iter().try_for_each(|body| body.green().require_intact());
-            intact.map(|()| (0..model.bodies.len()).map(|body| state.displacements(&model, body)).collect::<Vec<_>>())
-        });
-        let surfaces = surfaces.map_err(|e| to_python(py, e))?;
-        let frame = PyDict::new(py);
-        let bodies = PyList::empty(py);
-        for (body, displacements) in surfaces.into_iter().enumerate() {
-            bodies.append((displacements.into_pyarray(py), state.energy(body).as_ref().map(energy_array)))?;
-        }
-        frame.set_item("bodies", bodies)?;
-        frame.set_item("time", status.time)?;
-        frame.set_item("forces", status.wrenches[..tools].iter().map(|w| w.force.to_array()).collect::<Vec<_>>())?;
-        frame.set_item("torques", status.wrenches[..tools].iter().map(|w| w.torque.to_array()).collect::<Vec<_>>())?;
-        let poses = || status.readings[..tools].iter().map(|reading| reading.pose);
-        frame.set_item("positions", poses().map(|pose| pose.position.to_array()).collect::<Vec<_>>())?;
-        frame.set_item("orientations", poses().map(|pose| wxyz(pose.orientation)).collect::<Vec<_>>())?;
-        frame.set_item("limited", status.limited[..tools].to_vec())?;
-        frame.set_item("contacts", contact_records(&model, &state))?;
-        frame.set_item("refused", refusals(&state, tools))?;
-        let summary = |s: palpate_servo::Summary| [s.p50, s.p99, s.p999, s.max];
-        frame.set_item("compute_us", summary(status.compute))?;
-        frame.set_item("wakeup_us", summary(status.wakeup))?;
-        frame.set_item("ticks", status.ticks)?;
-        frame.set_item("missed_deadlines", status.missed_deadlines())?;
-        frame.set_item("missed_computing", status.missed_computing)?;
-        frame.set_item("dropped_rows", status.dropped_rows)?;
-        let port = |port: &palpate_servo::PortEnergy| [port.given, port.owed, port.unpaid];
-        frame.set_item("port_energy", status.ports[..tools].iter().map(port).collect::<Vec<_>>())?;
-        frame.set_item("fault", status.fault.map(|fault| fault.to_string()))?;
-        frame.set_item("realtime", (status.realtime.priority, status.realtime.locked_memory))?;
-        Ok(Some(frame))
+        let published = servo.latest().clone();
+        frame(py, &model, tools, published).map(Some)
     }
 
     /// Contacts of the latest tick, as in `frame` but without the rest of it; None if the loop does not run.
@@ -267,31 +248,65 @@ impl SimulationCore {
         rows.into_pyarray(py)
     }
 
+    /// Has the running loop begin anew and records it in a new file, with what is known of it.
+    fn begin_recording(&mut self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> PyResult<()> {
+        let header = header(about, &self.model, self.scheduling.rate, true);
+        let Some(servo) = self.servo() else { return Ok(()) };
+        let begun = py.detach(|| Recording::begin(&path, header, servo));
+        self.recording = Some(begun.map_err(|e| to_python(py, e))?);
+        Ok(())
+    }
+
+    /// File, ticks, bytes, ticks dropped and why nothing is written any more, of a recording under way.
+    fn recording(&mut self) -> Option<RecordingStatus> {
+        let progress = self.servo().as_mut()?.latest().status.recording;
+        self.recording.as_ref().map(|recording| recording.status(progress.dropped))
+    }
+
+    /// Ends the recording: the same of it as a whole.
+    fn end_recording(&mut self, py: Python<'_>) -> Option<RecordingStatus> {
+        let recording = self.recording.take()?;
+        let servo = self.servo().as_mut()?;
+        Some(py.detach(|| recording.end(servo)))
+    }
+
     /// Moves the tools through positions (ticks, tools, 3), NaN where one is out of the scene, orientations (ticks, tools,
-    /// 4) and grabs (ticks, tools) offline, with strikes in order of time and watched nodes as pairs of body and rank.
+    /// 4) and grabs (ticks, tools) offline, with strikes in order of time and watched nodes as pairs of body and rank; `about` is
+    /// what the recording says of itself.
     fn run<'py>(
         &self,
         py: Python<'py>,
         positions: PyReadonlyArray3<'py, f64>,
         orientations: PyReadonlyArray3<'py, f64>,
         grabs: PyReadonlyArray2<'py, bool>,
-        strikes: Vec<StrikeArguments>,
-        watch: Vec<(usize, u32)>,
+        extras: (Vec<StrikeArguments>, Vec<(usize, u32)>),
+        about: BTreeMap<String, String>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let poses = poses(positions.as_slice()?, orientations.as_slice()?);
         let grabs = grabs.as_slice()?.to_vec();
         let ticks = positions.shape()[0];
+        let (strikes, watch) = extras;
         let strikes: Vec<_> = strikes
             .into_iter()
             .map(|(tick, body, point, impulse, duration, radius)| {
                 (tick, Strike { body, point: point.into(), impulse: impulse.into(), radius, duration })
             })
             .collect();
-        let script = Script { period: 1.0 / self.rate, poses: &poses, grabs: &grabs, strikes: &strikes, watch: &watch };
+        let script = Script {
+            period: 1.0 / self.scheduling.rate,
+            poses: &poses,
+            grabs: &grabs,
+            strikes: &strikes,
+            watch: &watch,
+        };
         let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
         let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
-        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script));
+        let mut file =
+            Recorded::new(header(about, &self.model, self.scheduling.rate, false)).map_err(|e| to_python(py, e))?;
+        let each = |record: &TickRecord| file.push(record);
+        let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script, each));
         let recording = recording.map_err(|e| to_python(py, e))?;
+        let file = file.finish().map_err(|e| to_python(py, e))?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
         let mut energies: Vec<Vec<f64>> = vec![Vec::new(); self.model.bodies.len()];
         for (body, of_body) in recording.energies {
@@ -304,6 +319,7 @@ impl SimulationCore {
         answer.set_item("limited", recording.limited.into_pyarray(py))?;
         answer.set_item("energies", energies.into_iter().map(|e| e.into_pyarray(py)).collect::<Vec<_>>())?;
         answer.set_item("compute_ns", recording.compute_ns.into_pyarray(py))?;
+        answer.set_item("file", PyBytes::new(py, &file))?;
         answer.set_item("fault", recording.fault.map(|fault| fault.to_string()))?;
         debug_assert_eq!(poses.len(), ticks * self.model.tools.len());
         Ok(answer)
@@ -326,11 +342,4 @@ impl SimulationCore {
             None => Ok(()),
         }
     }
-}
-
-/// For each tool why no contact began, or None.
-fn refusals(state: &Snapshot, tools: usize) -> Vec<Option<&'static str>> {
-    let of_tool =
-        |tool: &palpate_core::simulation::ToolState| tool.refused.iter().flatten().next().map(|r| r.message());
-    state.tools[..tools].iter().map(of_tool).collect()
 }

@@ -1,4 +1,4 @@
-//! Deadlines on the monotonic clock, real-time scheduling and locked memory: everything of this crate that calls the
+//! Deadlines on the monotonic clock, real-time scheduling, processors and locked memory: everything of this crate that calls the
 //! operating system.
 #![allow(unsafe_code)] // libc
 
@@ -32,11 +32,35 @@ pub fn sleep_until_ns(deadline: u64) {
     {}
 }
 
-/// Asks for a first-in first-out real-time priority for this thread; whether it was granted.
-pub fn request_realtime_priority() -> bool {
-    let parameters = libc::sched_param { sched_priority: 80 };
+/// Asks for a first-in first-out real-time priority, 1 to 99, for this thread; whether it was granted.
+pub fn request_realtime_priority(priority: u8) -> bool {
+    let parameters = libc::sched_param { sched_priority: priority.into() };
     // SAFETY: `parameters` is valid for the call; 0 names the calling thread.
     unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) == 0 }
+}
+
+/// Processors that this thread may run on, in order; none where the system does not tell.
+pub fn allowed_cpus() -> Vec<usize> {
+    // SAFETY: a set of processors is an array of bits, for which all zeros is the empty set.
+    let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
+    // SAFETY: `set` is as large as the call is told; 0 names the calling thread.
+    if unsafe { libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) } != 0 {
+        return Vec::new();
+    }
+    // SAFETY: numbers stay below the size of the set.
+    (0..libc::CPU_SETSIZE as usize).filter(|&cpu| unsafe { libc::CPU_ISSET(cpu, &set) }).collect()
+}
+
+/// Keeps this thread to processors; whether the system took them.
+pub fn keep_to_cpus(cpus: &[usize]) -> bool {
+    // SAFETY: a set of processors is an array of bits, for which all zeros is the empty set.
+    let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
+    for &cpu in cpus.iter().filter(|&&cpu| cpu < libc::CPU_SETSIZE as usize) {
+        // SAFETY: the number lies within the set.
+        unsafe { libc::CPU_SET(cpu, &mut set) };
+    }
+    // SAFETY: `set` is as large as the call is told; 0 names the calling thread.
+    unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set) == 0 }
 }
 
 /// Asks that no page of the process is ever swapped out; whether it was granted.

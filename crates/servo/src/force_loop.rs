@@ -11,6 +11,7 @@ use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
 use crate::preparer::{StrainPreparer, StrainWorker};
+use crate::record::{RecordedInput, RecordedTool, StrainArrivals, recorded_port};
 use crate::safety::{Computed, Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
 use crate::settings::{Settings, refuse_unless};
 use crate::subnormals::FlushSubnormals;
@@ -38,6 +39,8 @@ pub struct ForceLoop {
     start_ns: Option<u64>,
     /// Row of the last tick: how long it took is known when it is over.
     row: Option<LogRow>,
+    /// Bodies whose requests for strain find no room in a tick that is made again.
+    withheld: u32,
 }
 
 impl ForceLoop {
@@ -71,7 +74,7 @@ impl ForceLoop {
         for (tool, device) in devices.iter().enumerate() {
             stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?, moves));
         }
-        let (ends, handle) = handoffs(&model, &settings);
+        let (ends, handle) = handoffs(&model, &settings, &stages);
         let (state, scratch) = (State::new(&model), Scratch::new(&model));
         let force_loop = Self {
             model,
@@ -88,6 +91,7 @@ impl ForceLoop {
             limited: [false; MAX_BODIES],
             start_ns: None,
             row: None,
+            withheld: 0,
         };
         Ok((force_loop, handle))
     }
@@ -150,6 +154,16 @@ impl ForceLoop {
         Ok(())
     }
 
+    /// Readies a tick that is made again for what did not follow from its input: faults by timing or of drivers, and requests
+    /// that found no room.
+    pub(crate) fn prepare_again(&mut self, input: &RecordedInput) {
+        self.fault = input.fault;
+        for (stage, fault) in self.stages.iter_mut().zip(input.tool_faults) {
+            fault.into_iter().for_each(|fault| stage.latch(fault));
+        }
+        self.withheld = input.strain.unasked;
+    }
+
     pub(crate) fn set_realtime(&mut self, realtime: RealtimeStatus) {
         self.status.realtime = realtime;
     }
@@ -158,25 +172,39 @@ impl ForceLoop {
     #[inline(never)]
     fn guarded_tick(&mut self, now_ns: u64, period: f64) {
         self.timing.begin(now_ns);
+        self.begin_record(now_ns, period);
         let mut input = self.receive(period);
         self.read_devices(&mut input, now_ns, period);
         let output = step(&self.model, &mut self.state, &mut self.scratch, &input);
         self.write_devices(&output, period);
-        self.ends.strain.ask(&self.state, &input.controls.strain_limit);
+        self.ask_for_strain(&input);
         self.account(now_ns, &output);
         self.publish();
         let (took_ns, overrun) = self.timing.end(period, &self.limits, &mut self.status);
         if let Some(row) = &mut self.row {
             row.compute_us = 1e-3 * took_ns as f64;
         }
+        self.ends.recorder.end_tick(&self.model, &self.state, self.timing.delay_ns(), took_ns);
         overrun.into_iter().for_each(|reason| self.latch(reason));
+    }
+
+    /// Begins a recording that has been asked for, in a new state.
+    fn begin_record(&mut self, now_ns: u64, period: f64) {
+        let recorder = &mut self.ends.recorder;
+        if recorder.exchange(&mut self.state, &mut self.stages) {
+            self.ends.strain.begin(recorder.number());
+        }
+        recorder.begin_tick((now_ns, period), self.fault, &self.stages);
     }
 
     /// What has come in through the hand-offs since the last tick.
     fn receive(&mut self, period: f64) -> Input {
         let settings = *self.ends.settings.read();
         let controls = settings.controls(&self.settings, period, &self.limited);
-        self.ends.strain.receive(&mut self.state);
+        let record = self.ends.recorder.input();
+        (record.settings, record.reset, record.strike) = (settings, controls.reset, controls.strike.is_some());
+        record.strain = StrainArrivals::default();
+        self.ends.strain.receive(&mut self.state, &mut record.strain);
         self.settings = settings;
         if controls.reset {
             self.fault = self.fault.filter(|fault| fault.outlasts_reset());
@@ -189,7 +217,9 @@ impl ForceLoop {
     /// What the devices say. A tool with a fault is out of the scene: what it would touch has no hand behind it.
     fn read_devices(&mut self, input: &mut Input, now_ns: u64, period: f64) {
         for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
-            let admitted = stage.admit(device.read(now_ns, period), now_ns, period);
+            let said = device.read(now_ns, period);
+            self.ends.recorder.input().readings[tool] = said;
+            let admitted = stage.admit(said, now_ns, period);
             let reading = &mut self.status.readings[tool];
             match admitted {
                 Some(said) => *reading = said,
@@ -218,7 +248,15 @@ impl ForceLoop {
             if let Err(fault) = device.write(wrench) {
                 stage.latch(FaultReason::Device(fault));
             }
+            let (port, limited, fault) = (recorded_port(stage.energy()), output.limited[tool], stage.fault());
+            *self.ends.recorder.tool(tool) = RecordedTool { computed, wrench, port, limited, fault };
         }
+    }
+
+    fn ask_for_strain(&mut self, input: &Input) {
+        let (ends, limits) = (&mut self.ends, &input.controls.strain_limit);
+        let unasked = ends.strain.ask(&self.state, limits, ends.recorder.number(), self.withheld);
+        ends.recorder.input().strain.unasked = unasked;
     }
 
     /// Numbers of this tick; the row of the last one goes out.
@@ -230,6 +268,7 @@ impl ForceLoop {
         status.time = 1e-9 * now_ns.saturating_sub(start_ns) as f64;
         status.limited = output.limited;
         status.fault = fault(self.fault, &self.stages);
+        status.recording = self.ends.recorder.progress();
         let mut row = LogRow {
             time: status.time,
             position: status.readings[0].pose.position,

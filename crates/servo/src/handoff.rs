@@ -12,6 +12,9 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
 
 use crate::log::{LogRow, Status};
+use crate::record::TickRecord;
+use crate::recorder::{RecorderEnd, RecorderHandle, recorder_ends};
+use crate::safety::SafetyStage;
 use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainEnd, strain_ends};
 
@@ -33,6 +36,7 @@ pub(crate) struct LoopEnds {
     pub published: Input<Published>,
     pub rows: Producer<LogRow>,
     pub strain: StrainEnd,
+    pub recorder: RecorderEnd,
 }
 
 /// Everybody else's ends.
@@ -43,22 +47,26 @@ pub struct LoopHandle {
     rows: Consumer<LogRow>,
     /// For whoever prepares strain responses.
     strain: Option<PreparerEnd>,
+    recorder: RecorderHandle,
 }
 
-/// Both ends, with settings that have been checked.
-pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings) -> (LoopEnds, LoopHandle) {
+/// Both ends, with settings that have been checked and the safety stages of the start.
+pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings, stages: &[SafetyStage]) -> (LoopEnds, LoopHandle) {
     let (settings_in, settings_out) = triple_buffer(settings);
     let first = Published { status: Status::default(), state: Snapshot::new(model) };
     let (published_in, published_out) = triple_buffer(&first);
     let (producer, consumer) = RingBuffer::new(LOG_ROWS);
     let (strain, preparer) = strain_ends();
-    let ends = LoopEnds { strain, settings: settings_out, published: published_in, rows: producer };
+    let (recorder_end, recorder) = recorder_ends(stages);
+    let ends =
+        LoopEnds { strain, recorder: recorder_end, settings: settings_out, published: published_in, rows: producer };
     let handle = LoopHandle {
         model: model.clone(),
         settings: settings_in,
         published: published_out,
         rows: consumer,
         strain: Some(preparer),
+        recorder,
     };
     (ends, handle)
 }
@@ -78,6 +86,20 @@ impl LoopHandle {
     pub(crate) fn take_strain(&mut self) -> Result<PreparerEnd> {
         let taken = || Error::Invalid("the strain of this loop is limited already".into());
         self.strain.take().ok_or_else(taken)
+    }
+
+    /// Has the loop begin anew, at rest and at the start of the safety ramp, and push a record of each tick into the ring whose
+    /// other end this is: a recording can be made again only from a known state. A latched fault stays.
+    ///
+    /// # Errors
+    /// A loop that is being recorded already.
+    pub fn begin_recording(&mut self) -> Result<Consumer<TickRecord>> {
+        self.recorder.begin(&self.model)
+    }
+
+    /// Has the loop push no more records; what is in the ring stays.
+    pub fn end_recording(&mut self) {
+        self.recorder.end();
     }
 
     /// The latest tick; wait-free.

@@ -10,7 +10,11 @@ mod handoff;
 mod log;
 mod offline;
 mod preparer;
+mod record;
+mod recorder;
+mod replay;
 mod safety;
+mod scheduling;
 mod servo;
 mod settings;
 mod statistics;
@@ -22,9 +26,16 @@ pub use clock::now_ns;
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
-pub use offline::{RecordedContact, Recording, Script, run};
+pub use offline::{Recording, Script, run};
 pub use preparer::{StrainPreparer, StrainWorker};
-pub use safety::{Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
+pub use record::{
+    RecordedContact, RecordedContacts, RecordedInput, RecordedOutput, RecordedTool, StrainArrivals, StrainAsked,
+    TickRecord,
+};
+pub use recorder::RecordingProgress;
+pub use replay::{Difference, Owner, Replay};
+pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
+pub use scheduling::Scheduling;
 pub use servo::Servo;
 pub use settings::Settings;
 pub use statistics::{Histogram, Summary};

@@ -5,6 +5,7 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS};
 use palpate_devices::{Reading, Wrench};
 
+use crate::recorder::RecordingProgress;
 use crate::safety::{Fault, PortEnergy};
 use crate::statistics::Summary;
 
@@ -46,6 +47,8 @@ pub struct Status {
     pub fault: Option<Fault>,
     /// What the operating system granted the loop's own thread.
     pub realtime: RealtimeStatus,
+    /// How far a recording has come.
+    pub recording: RecordingProgress,
 }
 
 impl Status {

@@ -6,15 +6,16 @@ use std::sync::Arc;
 use glam::DVec3;
 use palpate_core::Result;
 use palpate_core::dynamics::Energy;
-use palpate_core::simulation::{Mode, Model, Pose, Snapshot, StrainWatch, Strike};
+use palpate_core::simulation::{Model, Pose, Strike};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
 
 use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::preparer::StrainPreparer;
+use crate::record::TickRecord;
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::{Settings, check_node, refuse_unless};
-use crate::strain::PreparerEnd;
+use crate::strain::{PreparerEnd, StrainAnswer};
 
 /// Ticks after which a strain response comes: about as many as the thread beside a running loop takes.
 const PREPARATION_TICKS: usize = 16;
@@ -34,23 +35,6 @@ pub struct Script<'a> {
     pub watch: &'a [(usize, u32)],
 }
 
-/// A contact at one tick; vectors are in the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RecordedContact {
-    /// The tick.
-    pub tick: usize,
-    /// Index of the tool.
-    pub tool: usize,
-    /// Index of the body.
-    pub body: usize,
-    /// Whether it presses or holds on.
-    pub mode: Mode,
-    /// Contact point on the untouched surface, m.
-    pub point: DVec3,
-    /// Force on the body as computed, N: on the device it comes made safe.
-    pub force: DVec3,
-}
-
 /// What a script did.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
@@ -60,8 +44,6 @@ pub struct Recording {
     pub torques: Vec<DVec3>,
     /// For each body that moves its index, and its energies at each tick.
     pub energies: Vec<(usize, Vec<Energy>)>,
-    /// All contacts, in the order of ticks.
-    pub contacts: Vec<RecordedContact>,
     /// Displacements of the watched nodes at each tick (ticks x nodes), m, in their body's frame.
     pub displacements: Vec<DVec3>,
     /// Whether the limit of strain kept each tool from following its device (ticks x tools).
@@ -72,7 +54,7 @@ pub struct Recording {
     pub fault: Option<Fault>,
 }
 
-/// Ticks through a script, settings unchanged but for its strikes.
+/// Ticks through a script, settings unchanged but for its strikes, and hands out a record of each tick.
 ///
 /// # Errors
 /// See [`ForceLoop::new`]; a script of the wrong shape, or with a body or node that the model does not have.
@@ -82,6 +64,7 @@ pub fn run(
     settings: Settings,
     strain: &StrainPreparer,
     script: &Script<'_>,
+    mut each: impl FnMut(&TickRecord),
 ) -> Result<Recording> {
     check(model, script)?;
     let tools = model.tools.len();
@@ -89,6 +72,7 @@ pub fn run(
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
     force_loop.limit_strain_of(strain.known());
     let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
+    let mut records = handle.begin_recording()?;
     let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
     let moving = (0..model.bodies.len()).filter(|&body| model.bodies[body].moves());
@@ -104,6 +88,7 @@ pub fn run(
         force_loop.tick((1e9 * script.period * tick as f64).round() as u64, script.period);
         recording.compute_ns.push(computed_ns() - begun);
         preparation.prepare(tick);
+        records.pop().iter().for_each(&mut each);
         let published = handle.latest();
         let (status, state) = (&published.status, &published.state);
         recording.fault = recording.fault.or(status.fault);
@@ -113,7 +98,6 @@ pub fn run(
         for (body, energies) in &mut recording.energies {
             energies.extend(state.energy(*body));
         }
-        recording.contacts.extend(contacts(model, state, tick));
         for &(body, node) in script.watch {
             recording.displacements.extend(state.displacements_of(model, body, &[node]));
         }
@@ -125,7 +109,7 @@ pub fn run(
 struct Preparation<'a> {
     end: PreparerEnd,
     strain: &'a StrainPreparer,
-    due: VecDeque<(usize, (usize, Box<StrainWatch>))>,
+    due: VecDeque<(usize, StrainAnswer)>,
 }
 
 impl Preparation<'_> {
@@ -157,20 +141,6 @@ fn check(model: &Model, script: &Script<'_>) -> Result<()> {
         format!("a strike comes after the last of {} ticks", poses / tools)
     })?;
     script.watch.iter().try_for_each(|&(body, node)| check_node(model, body, node))
-}
-
-fn contacts<'a>(model: &'a Model, state: &'a Snapshot, tick: usize) -> impl Iterator<Item = RecordedContact> + 'a {
-    state.contacts.iter().map(move |(contact, _)| {
-        let placement = &model.bodies[contact.body].placement;
-        RecordedContact {
-            tick,
-            tool: contact.tool,
-            body: contact.body,
-            mode: contact.mode,
-            point: placement.point_to_world(contact.point),
-            force: placement.vector_to_world(contact.force),
-        }
-    })
 }
 
 /// The device of one tool of a script. Its pose is commanded: it may jump.

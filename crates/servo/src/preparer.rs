@@ -4,12 +4,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use palpate_core::simulation::{MAX_BODIES, Model, StrainWatch};
+#[cfg(feature = "offline")]
+use palpate_core::simulation::StrainWatch;
+use palpate_core::simulation::{MAX_BODIES, Model};
 #[cfg(feature = "offline")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
 
-use crate::strain::{PreparerEnd, StrainRequest};
+use crate::strain::{PreparerEnd, StrainAnswer, StrainRequest};
 
 /// What measures the strain of the bodies of a model, as far as it is known. Measuring belongs to the offline part of the
 /// core: built without it, the strain of no body is limited.
@@ -41,11 +43,11 @@ impl StrainPreparer {
     }
 
     /// `None` for a body without a measure, or contacts whose strain cannot be prepared: the bound of the tick then stays.
-    fn prepare(&self, request: &StrainRequest) -> Option<(usize, Box<StrainWatch>)> {
-        let (measure, body) = (self.measures[request.body].as_ref()?, self.model.bodies.get(request.body)?);
+    pub(crate) fn prepare(&self, request: &StrainRequest) -> Option<StrainAnswer> {
+        let (measure, body) = (self.measures[request.asked.body].as_ref()?, self.model.bodies.get(request.asked.body)?);
         let patches: Vec<_> = request.patches[..request.count].iter().map(|p| (p.nodes(), p.weights())).collect();
         let response = measure.prepare(body.green(), &patches, request.limit).ok()?;
-        Some((request.body, Box::new(StrainWatch { response, serials: request.serials })))
+        Some((request.asked, Box::new(StrainWatch { response, serials: request.serials })))
     }
 }
 
@@ -60,7 +62,7 @@ impl StrainPreparer {
         [false; MAX_BODIES]
     }
 
-    fn prepare(&self, _request: &StrainRequest) -> Option<(usize, Box<StrainWatch>)> {
+    pub(crate) fn prepare(&self, _request: &StrainRequest) -> Option<StrainAnswer> {
         None
     }
 }
@@ -68,17 +70,17 @@ impl StrainPreparer {
 impl PreparerEnd {
     /// Answers one request, if there is one: of those for one body that wait behind each other the latest, for a contact that
     /// slides asks again and again.
-    pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<(usize, Box<StrainWatch>)>> {
+    pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<StrainAnswer>> {
         while self.replaced.pop().is_ok() {}
         let mut request = self.requests.pop().ok()?;
-        while self.requests.peek().is_ok_and(|next| next.body == request.body) {
+        while self.requests.peek().is_ok_and(|next| next.asked.body == request.asked.body) {
             request = self.requests.pop().ok()?;
         }
         Some(preparer.prepare(&request))
     }
 
     /// Hands a response to the loop. One that finds no room is lost; the tick keeps its own bound then.
-    pub fn hand_over(&mut self, response: (usize, Box<StrainWatch>)) {
+    pub fn hand_over(&mut self, response: StrainAnswer) {
         let _ = self.responses.push(response);
     }
 }

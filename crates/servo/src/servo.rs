@@ -3,54 +3,56 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use palpate_core::simulation::Model;
 use palpate_core::{Error, Result};
 use palpate_devices::Device;
+use rtrb::Consumer;
 
-use crate::clock::{lock_memory, next_deadline, now_ns, request_realtime_priority, sleep_until_ns};
+use crate::clock::{next_deadline, now_ns, sleep_until_ns};
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::{LogRow, RealtimeStatus};
 use crate::preparer::{StrainPreparer, StrainWorker};
+use crate::record::TickRecord;
 use crate::safety::SafetyLimits;
-use crate::settings::{Settings, refuse_unless};
+use crate::scheduling::Scheduling;
+use crate::settings::Settings;
 
-/// Rates that the thread can keep, Hz.
-const RATES: std::ops::RangeInclusive<f64> = 100.0..=10_000.0;
+/// How long, and how often at most, the end of a recording is waited for: a loop that ticks takes note within one.
+const WAIT: Duration = Duration::from_millis(1);
+const MOST_WAITS: u32 = 1000;
 
 /// A running loop.
 pub struct Servo {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     handle: LoopHandle,
+    realtime: RealtimeStatus,
     /// Prepares strain responses while the loop runs.
     _worker: StrainWorker,
 }
 
 impl Servo {
-    /// Ticks a second where nothing else is asked for, Hz.
-    pub const DEFAULT_RATE: f64 = 1000.0;
-
-    /// Starts the loop with one device a tool, `rate` ticks a second (100 to 10000 Hz), and beside it a thread that prepares
-    /// the strain of contacts.
+    /// Starts the loop with one device a tool on a thread scheduled as told, and beside it a thread that prepares the strain
+    /// of contacts.
     ///
     /// # Errors
-    /// See [`ForceLoop::new`]; a rate out of range or beyond what a device takes; no thread from the operating system.
+    /// See [`ForceLoop::new`] and [`Scheduling::check`]; a rate beyond what a device takes; no thread from the operating
+    /// system. A priority that the system refuses is none: see [`Servo::realtime`].
     pub fn start(
         model: Arc<Model>,
         devices: Vec<Box<dyn Device>>,
         limits: SafetyLimits,
         settings: Settings,
-        rate: f64,
+        scheduling: Scheduling,
         strain: StrainPreparer,
     ) -> Result<Self> {
-        refuse_unless(RATES.contains(&rate), || {
-            format!("the loop ticks at {} to {} Hz, got {rate}", RATES.start(), RATES.end())
-        })?;
+        scheduling.check()?;
         let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings)?;
         let worker = force_loop.limit_strain(&mut handle, strain)?;
-        let period = 1.0 / rate;
+        let period = 1.0 / scheduling.rate;
         force_loop.check_period(period)?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
@@ -58,17 +60,24 @@ impl Servo {
         // start is seen by a running loop.
         let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
         let ticks = move || {
-            // Locked first: at real-time priority it would keep other programs from the processor for a tenth of a second.
-            let locked_memory = lock_memory();
-            let priority = request_realtime_priority();
-            force_loop.set_realtime(RealtimeStatus { priority, locked_memory });
-            let _ = ready_in.send(());
-            run(&mut force_loop, period, &stopped);
+            let granted = scheduling.apply();
+            let realtime = granted.as_ref().copied().unwrap_or_default();
+            force_loop.set_realtime(realtime);
+            let refused = granted.is_err();
+            let _ = ready_in.send(granted);
+            if !refused {
+                run(&mut force_loop, period, &stopped);
+            }
         };
         let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(ticks);
         let thread = thread.map_err(|source| Error::Io { path: "palpate-servo".into(), source })?;
-        let _ = ready_out.recv();
-        Ok(Self { stop, thread: Some(thread), handle, _worker: worker })
+        let realtime = ready_out.recv().unwrap_or_else(|_| Ok(RealtimeStatus::default()))?;
+        Ok(Self { stop, thread: Some(thread), handle, realtime, _worker: worker })
+    }
+
+    /// What the operating system granted the loop's thread.
+    pub fn realtime(&self) -> RealtimeStatus {
+        self.realtime
     }
 
     /// Changes the settings; wait-free.
@@ -87,6 +96,25 @@ impl Servo {
     /// Hands out the rows of the log since the last call.
     pub fn drain_log(&mut self, each: impl FnMut(LogRow)) {
         self.handle.drain_log(each);
+    }
+
+    /// See [`LoopHandle::begin_recording`].
+    ///
+    /// # Errors
+    /// A loop that is being recorded already.
+    pub fn begin_recording(&mut self) -> Result<Consumer<TickRecord>> {
+        self.handle.begin_recording()
+    }
+
+    /// Ends the recording and waits until the loop has taken note of it: how many ticks it made meanwhile.
+    pub fn end_recording(&mut self) -> u64 {
+        self.handle.end_recording();
+        let mut left = MOST_WAITS;
+        while self.handle.latest().status.recording.records && left > 0 {
+            std::thread::sleep(WAIT);
+            left -= 1;
+        }
+        self.handle.latest().status.recording.ticks
     }
 
     /// Stops the loop; the devices are left without a wrench.

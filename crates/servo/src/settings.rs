@@ -4,7 +4,7 @@ use palpate_core::simulation::{Controls, MAX_BODIES, MAX_TOOLS, Model, Strike};
 use palpate_core::{Error, Result};
 
 /// What the frame side may change while the loop runs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Contact radius of each tool's contacts that begin from now on, m.
     pub contact_radius: [f64; MAX_TOOLS],

@@ -12,34 +12,41 @@ use palpate_core::simulation::{MAX_BODIES, State, StrainWatch};
 use palpate_core::strain::MAX_CONTACTS_WATCHED;
 use rtrb::{Consumer, Producer, RingBuffer};
 
-/// Requests and responses that may be under way.
-const IN_FLIGHT: usize = 16;
+use crate::record::{IN_FLIGHT, StrainArrivals, StrainAsked};
 
 /// The contacts of one body, for which strain is to be prepared.
 #[derive(Clone)]
 #[cfg_attr(not(feature = "offline"), allow(dead_code))] // nobody answers it there
 pub(crate) struct StrainRequest {
-    pub body: usize,
+    pub asked: StrainAsked,
     pub limit: f64,
     pub serials: [u64; MAX_CONTACTS_WATCHED],
     pub patches: [Patch; MAX_CONTACTS_WATCHED],
     pub count: usize,
 }
 
+/// What answers a request.
+pub(crate) type StrainAnswer = (StrainAsked, Box<StrainWatch>);
+
 /// The loop's end.
 pub(crate) struct StrainEnd {
     requests: Producer<StrainRequest>,
-    responses: Consumer<(usize, Box<StrainWatch>)>,
+    responses: Consumer<StrainAnswer>,
     replaced: Producer<Box<StrainWatch>>,
     /// What was asked for last: contacts and limit of each body.
-    asked: [([u64; MAX_CONTACTS_WATCHED], f64); MAX_BODIES],
+    asked: [Asked; MAX_BODIES],
+    /// Requests from before this tick are of no use any more: their contacts are gone.
+    since: u64,
     worker: Arc<OnceLock<Thread>>,
 }
+
+/// Serials of the contacts of a body, and the limit of its strain.
+type Asked = ([u64; MAX_CONTACTS_WATCHED], f64);
 
 /// The end of whoever prepares.
 pub(crate) struct PreparerEnd {
     pub requests: Consumer<StrainRequest>,
-    pub responses: Producer<(usize, Box<StrainWatch>)>,
+    pub responses: Producer<StrainAnswer>,
     pub replaced: Consumer<Box<StrainWatch>>,
     pub worker: Arc<OnceLock<Thread>>,
 }
@@ -50,31 +57,44 @@ pub(crate) fn strain_ends() -> (StrainEnd, PreparerEnd) {
     let (responses_in, responses_out) = RingBuffer::new(IN_FLIGHT);
     let (replaced_in, replaced_out) = RingBuffer::new(IN_FLIGHT);
     let worker = Arc::new(OnceLock::new());
-    let asked = [([0; MAX_CONTACTS_WATCHED], 0.0); MAX_BODIES];
     let end = StrainEnd {
         requests: requests_in,
         responses: responses_out,
         replaced: replaced_in,
-        asked,
+        asked: Default::default(),
+        since: 0,
         worker: worker.clone(),
     };
     (end, PreparerEnd { requests: requests_out, responses: responses_in, replaced: replaced_out, worker })
 }
 
 impl StrainEnd {
-    /// Takes up what has come; never allocates or frees.
-    pub fn receive(&mut self, state: &mut State) {
+    /// Takes up what has come and says what that was; never allocates or frees.
+    pub fn receive(&mut self, state: &mut State, arrivals: &mut StrainArrivals) {
         while self.replaced.slots() > 0 {
-            let Ok((body, watch)) = self.responses.pop() else { return };
-            if let Some(replaced) = state.watch_strain(body, watch) {
+            let Ok((asked, watch)) = self.responses.pop() else { return };
+            let replaced = if asked.tick < self.since {
+                Some(watch)
+            } else {
+                arrivals.push(asked);
+                state.watch_strain(asked.body, watch)
+            };
+            if let Some(replaced) = replaced {
                 // There is a slot, and nobody else fills it.
                 let _ = self.replaced.push(replaced);
             }
         }
     }
 
-    /// Asks for responses where contacts or the limit have changed; never allocates or blocks.
-    pub fn ask(&mut self, state: &State, limits: &[f64; MAX_BODIES]) {
+    /// Begins anew with a state without contacts at a tick.
+    pub fn begin(&mut self, tick: u64) {
+        (self.since, self.asked) = (tick, Default::default());
+    }
+
+    /// Asks in a tick for responses where contacts or the limit have changed, but for the bodies of `withheld`; a bit for each
+    /// body whose request finds no room. Never allocates or blocks.
+    pub fn ask(&mut self, state: &State, limits: &[f64; MAX_BODIES], tick: u64, withheld: u32) -> u32 {
+        let mut unasked = 0;
         for (body, (asked, &limit)) in self.asked.iter_mut().zip(limits).enumerate() {
             let mut now = ([0; MAX_CONTACTS_WATCHED], limit);
             for (serial, (contact, _)) in now.0.iter_mut().zip(state.contacts.iter().filter(|(c, _)| c.body == body)) {
@@ -83,11 +103,12 @@ impl StrainEnd {
             if now == *asked || limit <= 0.0 || now.0[0] == 0 {
                 continue;
             }
-            if self.requests.is_full() {
+            if self.requests.is_full() || withheld & 1 << body != 0 {
+                unasked |= 1 << body;
                 continue;
             }
             let mut request = StrainRequest {
-                body,
+                asked: StrainAsked { body, tick },
                 limit,
                 serials: now.0,
                 patches: std::array::from_fn(|_| Patch::default()),
@@ -103,5 +124,6 @@ impl StrainEnd {
                 worker.unpark();
             }
         }
+        unasked
     }
 }

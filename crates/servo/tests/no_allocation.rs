@@ -18,6 +18,9 @@ use common::{PERIOD, PERIOD_NS, device, scene, settings};
 use counting_allocator::allocations;
 
 const TICKS: u64 = 2600;
+/// Ticks between two recordings, and what the ticks are in which one begins and ends: in a contact, most times.
+const RECORDED: u64 = 370;
+const RECORDING: [&str; 2] = ["recording begins", "recording ends"];
 const BAD_NUMBER: u64 = 2200;
 const RESET: u64 = 2300;
 /// Reached by the presses of the first tool.
@@ -105,9 +108,14 @@ fn contacts(state: &Snapshot) -> Vec<(u64, usize)> {
 /// Ticks and allocations by kind of tick.
 fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static str, (u64, u64)> {
     let mut counts = BTreeMap::new();
-    let mut before = Vec::new();
+    let (mut before, mut records) = (Vec::new(), None);
     for tick in 0..TICKS {
         handle.set(settings_at(tick)).expect("valid settings");
+        match tick % RECORDED {
+            0 => records = Some(handle.begin_recording().expect("no recording yet")),
+            60 => handle.end_recording(),
+            _ => {}
+        }
         if tick % BREAK == 0 {
             std::thread::sleep(std::time::Duration::from_micros(200));
         }
@@ -115,11 +123,14 @@ fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static
         force_loop.tick(tick * PERIOD_NS, PERIOD);
         let made = allocations() - start;
         let published = handle.latest();
-        for kind in kinds(tick, &before, published) {
+        let recording =
+            [0, 60].into_iter().filter(|at| tick % RECORDED == *at).map(|at| RECORDING[usize::from(at > 0)]);
+        for kind in kinds(tick, &before, published).into_iter().chain(recording) {
             let (ticks, sum) = counts.entry(kind).or_insert((0, 0));
             (*ticks, *sum) = (*ticks + 1, *sum + made);
         }
         before = contacts(&published.state);
+        assert_eq!(records.as_mut().is_some_and(|ring| ring.pop().is_ok()), tick % RECORDED < 60);
     }
     counts
 }
@@ -156,9 +167,10 @@ fn no_kind_of_tick_allocates() {
         assert!(allocating.is_empty(), "kinds of tick that allocate, with ticks and allocations: {allocating:?}");
         let all =
             ["free", "begin", "hold", "end", "grab", "two tools", "two bodies", "strike", "reset", "fault", "owed"];
+        let all = all.into_iter().chain(RECORDING);
         let kinds: Vec<_> = match limited {
             true => vec!["limited"],
-            false => all.into_iter().chain(["refused", "watch", "steep"]).chain(moving.then_some("motion")).collect(),
+            false => all.chain(["refused", "watch", "steep"]).chain(moving.then_some("motion")).collect(),
         };
         for kind in kinds {
             assert!(counts.contains_key(kind), "no tick was of the kind '{kind}': {counts:?}");

@@ -32,6 +32,8 @@ class RunOptions:
     max_size: str | None = None
     element: Element | None = None
     repair: bool = False
+    cpus: str | None = None
+    priority: int | None = None
 
     def refuse(self, file: Path, allowed: set[str], reason: str) -> None:
         """Refuse options that the kind of file does not take.
@@ -43,10 +45,12 @@ class RunOptions:
 
         """
         for field in fields(self):
-            if getattr(self, field.name) not in (None, False) and field.name not in allowed:
+            if getattr(self, field.name) not in (None, False) and field.name not in allowed | SCHEDULING:
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
+# Of the loop's thread, whatever the file.
+SCHEDULING = {"cpus", "priority"}
 FLAGS = {
     "radius": "--radius",
     "fix": "--fix",
@@ -105,7 +109,25 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
                 bodies[rank] = body.model_copy(update={name: _changed(own, values)})
     if options.radius is not None:
         update["tools"] = [tool.model_copy(update=_radii(tool, options.radius)) for tool in scene.tools]
+    if options.cpus is not None or options.priority is not None:
+        update["device"] = _scheduled(scene.device, options)
     return scene.model_copy(update={**update, "bodies": bodies})
+
+
+def _scheduled(device: Any, options: RunOptions) -> Any:
+    """Table of the device with the processors and the priority that were typed."""
+    from palpate.simulation.scheduling import with_scheduling
+
+    cpus = None
+    if options.cpus is not None:
+        try:
+            cpus = [int(cpu) for cpu in options.cpus.split(",")]
+        except ValueError:
+            raise SceneError(f"--cpus: give numbers of processors, such as 1 or 2,3; got '{options.cpus}'") from None
+    try:
+        return with_scheduling(device, cpus, options.priority)
+    except SceneError as error:
+        raise SceneError(str(error).replace("device.", "--", 1)) from None
 
 
 def _changed(table: Any, values: Mapping[str, Any]) -> Any:
@@ -165,7 +187,8 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     green = palpate.precompute(body)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
-    built = BuiltScene.of(scene_with(scene, RunOptions(radius=options.radius)), body, green)
+    of_run = RunOptions(radius=options.radius, cpus=options.cpus, priority=options.priority)
+    built = BuiltScene.of(scene_with(scene, of_run), body, green)
     if options.radius is None:
         told.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
     print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(told)}" if told else ""))

@@ -25,6 +25,12 @@ Out = Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the viewer; 0 takes a free one.")]
 Host = Annotated[str, typer.Option(help="Address to listen on; others than 127.0.0.1 let other machines in.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]
+Cpus = Annotated[
+    str | None, typer.Option(help="Processors that the loop's thread keeps to, such as 1 or 2,3; default: any.")
+]
+Priority = Annotated[
+    int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
+]
 PORT = 8642
 
 
@@ -90,6 +96,8 @@ def run(
     surface_map: Annotated[
         Path | None, typer.Option("--map", help="Map of 'palpate palpate' to show: stiffness.vtu or detection.vtu.")
     ] = None,
+    cpus: Cpus = None,
+    priority: Priority = None,
     headless: Headless = None,
     out: Out = Path(),
     port: Port = PORT,
@@ -114,7 +122,8 @@ def run(
 
     lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
-    built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
+    scheduling = {"cpus": cpus, "priority": priority}
+    built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths, **scheduling))
     if headless is not None:
         _scripted(built, file.stem, headless, out)
         return
@@ -183,8 +192,12 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     for title, row in (("computing", compute), ("wake-up", wakeup)):
         print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")
     print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
-    if not all(statistics["realtime"]):
-        print("palpate: note: the system granted no real-time priority or locked memory", file=sys.stderr)
+    priority, locked_memory = statistics["realtime"]
+    if not (locked_memory and (priority or built.scene.device.priority == 0)):
+        print(
+            "palpate: note: the system granted no real-time priority or locked memory; see 'palpate doctor'",
+            file=sys.stderr,
+        )
     if record.interrupted:
         print("palpate: interrupted", file=sys.stderr)
         raise typer.Exit(130)

@@ -61,6 +61,10 @@ class Scene(SceneTables):
             scene._check_tables(rank)
         return scene
 
+    def start_paths_in(self, folder: str | os.PathLike[str]) -> None:
+        """Let the paths of a scene made by a program start in a folder."""
+        self._source = (Path(folder) / self.name, "")
+
     def _check_tables(self, rank: int) -> None:
         """Refuse a mesh without supports, and a store with tables that it cannot obey."""
         body, (path, text) = self.bodies[rank], self.source

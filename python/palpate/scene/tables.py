@@ -132,14 +132,27 @@ class ToolTable(ShapeTable):
         return self
 
 
+_CPUS = one_of(
+    "a list of processors, such as [1]",
+    lambda v: isinstance(v, (list, tuple)) and all(map(is_whole, v)) and len(set(v)) == len(v),
+)
+
+
 class DeviceTable(Table):
-    """Limits of the device, kept by the safety stage, and ticks a second."""
+    """Limits of the device, kept by the safety stage, ticks a second, and how the loop's thread is scheduled.
+
+    ``cpus`` are the processors that the thread keeps to, by their numbers; none for any. ``priority`` is that under
+    ``SCHED_FIFO``, 1 to 99, where the system grants it, or 0 for ordinary scheduling; one that is given and not granted
+    is warned of, the default is only told in the statistics.
+    """
 
     max_force: Force = 8.0
     max_slew: Annotated[float, Field(gt=0)] = 500.0
     ramp: Time = 0.25
     max_stiffness: Stiffness = 5000.0
     rate: Annotated[float, Field(ge=100, le=10_000)] = 1000.0
+    cpus: Annotated[tuple[int, ...], _CPUS] = ()
+    priority: Annotated[int, Field(ge=0, le=99)] = 80
 
 
 class ViewTable(Table):

@@ -1,7 +1,20 @@
 """The force loop of a scene, what is read of it, and what it leaves behind."""
 
 from palpate.simulation.frame import BodyFrame, Contact, Frame
-from palpate.simulation.recording import Recording
+from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
+from palpate.simulation.replay import Difference, Replayed, replay, simulation_of
 from palpate.simulation.simulation import Simulation
 
-__all__ = ["BodyFrame", "Contact", "Frame", "Recording", "Simulation"]
+__all__ = [
+    "CONTACT_DTYPE",
+    "BodyFrame",
+    "Contact",
+    "Difference",
+    "Frame",
+    "Recording",
+    "RecordingStatus",
+    "Replayed",
+    "Simulation",
+    "replay",
+    "simulation_of",
+]

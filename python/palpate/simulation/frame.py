@@ -126,9 +126,11 @@ class Frame(ComparedByValue, Exported):
     bodies
         One a body of the scene.
     statistics
-        ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, ``refused`` (for each
-        tool None or why no contact began), ``fault`` (None or what is wrong), ``realtime`` (priority granted, memory
-        locked) and ``port_energy`` (for each tool J given to the hand, owed by the safety stage, and never paid back).
+        ``compute_us`` and ``wakeup_us`` (p50, p99, p999, max), ``ticks``, ``missed_deadlines``, of them
+        ``missed_computing`` (by ticks that took longer than a period, the others by waking up late), ``refused``
+        (for each tool None or why no contact began), ``fault`` (None or what is wrong), ``realtime`` (priority
+        granted, memory locked) and ``port_energy`` (for each tool J given to the hand, owed by the safety stage, and
+        never paid back).
 
     """
 

@@ -1,37 +1,96 @@
-"""What ticks leave behind: the log of a running loop, the recording of an offline run."""
+"""What is kept of many ticks: rows of the log of a running loop, recordings of runs and of sessions."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from palpate import _native
+from palpate.atomic import written_beside
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
+from palpate.simulation.about import shown_of
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
     + [("watched", "f8", 3), ("body_time", "f8")]
     + [(name, "f8") for name in ("kinetic", "strain", "coupling", "dissipated", "work")]
 )
+CONTACT_DTYPE = np.dtype(
+    [("tick", "u8"), ("tool", "u1"), ("body", "u1"), ("grab", "?"), ("slipping", "?"), ("limited", "?")]
+    + [(name, "f4", 3) for name in ("point", "normal", "force", "torque")]
+    + [(name, "f4") for name in ("radius", "depth", "stiffness")]
+)
+# Columns of tools, and how many numbers they have a tool.
+VECTORS = {
+    "positions": 3,
+    "orientations": 4,
+    "velocities": 3,
+    "angular_velocities": 3,
+    "forces": 3,
+    "torques": 3,
+    "computed_forces": 3,
+    "computed_torques": 3,
+    "port_energy": 3,
+}
+
+
+@dataclass(frozen=True)
+class RecordingStatus:
+    """How the recording of a running loop is doing.
+
+    Attributes
+    ----------
+    path
+        The file.
+    ticks
+        Written so far.
+    size
+        Of the file, bytes.
+    dropped
+        Ticks that could not be written.
+    error
+        Why nothing is written any more; None if all is well.
+
+    """
+
+    path: Path
+    ticks: int
+    size: int
+    dropped: int
+    error: str | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(ComparedByValue):
-    """Ticks of an offline run. Compared by value, number by number; not hashable.
+    """Ticks of an offline run or of a recorded session. Compared by value, number by number; not hashable.
+
+    Arrays of tools are (t, ...) where the positions were given as (t, 3), or the scene has one tool, and else
+    (t, tools, ...).
 
     Attributes
     ----------
     time
-        (t,) s.
+        (t,) s, at the end of each tick.
     forces, torques
-        On the device, (t, 3) N and N m about the tip, for positions (t, 3); (t, tools, 3) for positions (t, tools, 3).
+        On the device after the safety stage, (t, 3) or (t, tools, 3), N and N m about the tip.
     displacements
-        (t, watched nodes, 3) m, in the frames of the bodies.
+        (t, watched nodes, 3) m, in the frames of the bodies; of a run that was watched, not kept in a file.
     limited
         (t,) or (t, tools): whether the limit of strain kept a tool from following its device.
     energies
         For each body over the ticks; None for one that does not move.
+    dropped
+        Ticks that could not be written; None for a file that was cut short.
+    source
+        The file, or its bytes.
 
     """
 
@@ -41,13 +100,171 @@ class Recording(ComparedByValue):
     displacements: np.ndarray
     limited: np.ndarray
     energies: tuple[Energy | None, ...]
+    dropped: int | None = field(default=0, compare=False)
+    source: bytes | Path = field(default=b"", compare=False)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Recording:
+        """Read a recording (MCAP); of one that was cut short, all up to there.
+
+        Raises
+        ------
+        Error
+            A file that cannot be read, or is no recording.
+
+        """
+        source = Path(path)
+        columns = _native.read_recording(source)
+        number = columns["number"]
+        shaped = _Shaped(columns)
+        rate = float(columns["about"]["rate"])
+        if columns["about"]["clock"] == "0":
+            time = np.arange(1, len(number) + 1) / rate
+        else:
+            due = columns["due_ns"]
+            time = 1e-9 * (due - due[:1]) + 1 / rate
+        energies = _energies(columns, len(number))
+        forces, torques = shaped.vector("forces"), shaped.vector("torques")
+        watched = np.zeros((len(number), 0, 3))
+        made = cls(time, forces, torques, watched, shaped.column("limited"), energies, columns["dropped"], source)
+        made.__dict__["_columns"] = columns
+        return made
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file (MCAP) that Foxglove, the tools of ROS 2 and :meth:`load` read.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written; nothing is left of it.
+
+        """
+        data = self.source if isinstance(self.source, bytes) else self.source.read_bytes()
+        with written_beside(Path(path)) as partial:
+            partial.write_bytes(data)
 
     @property
     def energy(self) -> Energy | None:
         """Of the first body that moves; None if none does."""
         return next((energy for energy in self.energies if energy is not None), None)
 
+    @property
+    def about(self) -> Mapping[str, str]:
+        """What the recording says of itself: scene, version, keys of the bodies."""
+        return self._columns["about"]
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """Rows of CONTACT_DTYPE in the order of ticks: vectors in the scene, m and N on the body, to five digits."""
+        state = self._columns["contact_state"].reshape(-1, 6)
+        numbers = self._columns["contact_numbers"].reshape(-1, 15)
+        rows = np.zeros(len(state), CONTACT_DTYPE)
+        for rank, name in enumerate(("tick", "tool", "body")):
+            rows[name] = state[:, rank]
+        rows["grab"], rows["slipping"], rows["limited"] = state[:, 3] == 2, state[:, 4] > 0, state[:, 5] > 0
+        for rank, name in enumerate(("point", "normal", "force", "torque")):
+            rows[name] = numbers[:, 3 * rank : 3 * rank + 3]
+        for rank, name in enumerate(("radius", "depth", "stiffness")):
+            rows[name] = numbers[:, 12 + rank]
+        return rows
+
+    @property
+    def ticks(self) -> np.ndarray:
+        """(t,) number of each tick since the recording began; where some were dropped, they are missing."""
+        return self._columns["number"]
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Of the tips as the devices said, (t, 3) or (t, tools, 3), m."""
+        return _Shaped(self._columns).vector("positions")
+
+    @property
+    def orientations(self) -> np.ndarray:
+        """Of the tools, (t, 4) or (t, tools, 4), unit quaternions w x y z."""
+        return _Shaped(self._columns).vector("orientations")
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Of the tips as the devices said, (t, 3) or (t, tools, 3), m/s."""
+        return _Shaped(self._columns).vector("velocities")
+
+    @property
+    def angular_velocities(self) -> np.ndarray:
+        """Of the tools as the devices said, (t, 3) or (t, tools, 3), rad/s."""
+        return _Shaped(self._columns).vector("angular_velocities")
+
+    @property
+    def computed_forces(self) -> np.ndarray:
+        """Before the safety stage, (t, 3) or (t, tools, 3), N."""
+        return _Shaped(self._columns).vector("computed_forces")
+
+    @property
+    def computed_torques(self) -> np.ndarray:
+        """Before the safety stage, (t, 3) or (t, tools, 3), N m about the tips."""
+        return _Shaped(self._columns).vector("computed_torques")
+
+    @property
+    def port_energy(self) -> np.ndarray:
+        """Given to the hand, owed and never paid, (t, 3) or (t, tools, 3), J."""
+        return _Shaped(self._columns).vector("port_energy")
+
+    @property
+    def buttons(self) -> np.ndarray:
+        """(t,) or (t, tools): a bit for each button held."""
+        return _Shaped(self._columns).column("buttons")
+
+    @property
+    def active(self) -> np.ndarray:
+        """(t,) or (t, tools): whether a tool is in the scene."""
+        return _Shaped(self._columns).column("active")
+
+    @property
+    def compute_us(self) -> np.ndarray:
+        """(t,) that the ticks took, us; 0 without a clock."""
+        return self._columns["compute_us"]
+
+    @property
+    def wakeup_us(self) -> np.ndarray:
+        """(t,) from when each tick was due to when it began, us; 0 without a clock."""
+        return self._columns["delay_us"]
+
+    @property
+    def events(self) -> Sequence[tuple[int, str]]:
+        """Ticks and what happened in them: resets, strikes, faults."""
+        return self._columns["events"]
+
+    @cached_property
+    def _columns(self) -> dict[str, Any]:
+        return _native.read_recording(self.source)
+
     def __repr__(self) -> str:
         largest = np.linalg.norm(self.forces, axis=-1).max(initial=0.0)
         watched = f"{self.displacements.shape[1]} nodes watched"
         return f"Recording({len(self.time)} ticks, largest force {largest:.4g} N, {watched})"
+
+
+class _Shaped:
+    """Columns of tools in the shape of the positions that were given."""
+
+    def __init__(self, columns: dict[str, Any]):
+        self._columns, self._tools = columns, int(columns["about"]["tools"])
+        self._given, self._single = shown_of(columns["about"])
+
+    def vector(self, name: str) -> np.ndarray:
+        return self._of_tools(self._columns[name].reshape(-1, self._tools, VECTORS[name]))
+
+    def column(self, name: str) -> np.ndarray:
+        return self._of_tools(self._columns[name].reshape(-1, self._tools))
+
+    def _of_tools(self, values: np.ndarray) -> np.ndarray:
+        return values[:, 0] if self._single else values[:, : self._given]
+
+
+def _energies(columns: dict[str, Any], ticks: int) -> tuple[Energy | None, ...]:
+    """For each body; None for one that has none in any tick."""
+    rows = columns["bodies"].reshape(-1, 8)
+    energies: list[Energy | None] = []
+    for body in range(len(json.loads(columns["about"]["keys"]))):
+        own = rows[rows[:, 1] == body]
+        energies.append(Energy(*own[:, 3:].T) if len(own) == ticks and ticks else None)
+    return tuple(energies)

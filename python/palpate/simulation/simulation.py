@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -15,10 +17,12 @@ from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltScene, Scene
-from palpate.simulation import settings
+from palpate.simulation.about import about
+from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.frame import BodyFrame, Contact, Frame
-from palpate.simulation.recording import LOG_DTYPE, Recording
+from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
+from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
@@ -26,7 +30,7 @@ PERCENTILES = ("p50", "p99", "p999", "max")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-class Simulation:
+class Simulation(Adjustable):
     """Force loop of a scene.
 
     As a context manager it runs at 1 kHz on a thread of its own; :meth:`run` needs no clock.
@@ -35,6 +39,8 @@ class Simulation:
     ----------
     scene
         What to touch, and with what.
+    cpus, priority
+        Processors and priority of the loop's thread, in place of those of ``scene.device``.
 
     Attributes
     ----------
@@ -46,12 +52,12 @@ class Simulation:
     Raises
     ------
     Error
-        A body that cannot be solved, or a contact radius that covers too many nodes.
+        A body that cannot be solved, a contact radius that covers too many nodes, or ``cpus`` that there are not.
 
     """
 
-    def __init__(self, scene: Scene | BuiltScene):
-        built = scene if isinstance(scene, BuiltScene) else scene.build()
+    def __init__(self, scene: Scene | BuiltScene, *, cpus: Sequence[int] | None = None, priority: int | None = None):
+        built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
         device, tools = self.scene.device, self.scene.tools
         self._scales = [1.0] * len(self.bodies)
@@ -64,10 +70,11 @@ class Simulation:
             [tool_arguments(self.scene, rank) for rank in range(len(tools))],
             (device.max_force, device.max_slew, device.ramp),
             self.scene.view.strain_limit,
-            device.rate,
+            (device.rate, device.cpus, device.priority),
         )
         self._strain_limit, self._armed = self.scene.view.strain_limit, False
         self._running = False
+        self._to_record: Path | None = None
 
     def __repr__(self) -> str:
         tools = f"{len(self._radii)} tool{'s' if len(self._radii) > 1 else ''}"
@@ -99,16 +106,63 @@ class Simulation:
         return self.bodies[0].motion
 
     def start(self) -> None:
-        """Start the loop; tools are out of the scene until moved."""
+        """Start the loop; tools are out of the scene until moved.
+
+        A priority that was asked for and is not granted gives a :class:`SchedulingWarning`.
+
+        Raises
+        ------
+        SceneError
+            Processors of ``scene.device`` that this process may not run on.
+
+        """
         if not self._running:
             self._arm_strain_limit()
-            self._core.start()
+            start_loop(self._core, self.scene.device)
             self._running = True
+            if self._to_record is not None:
+                path, self._to_record = self._to_record, None
+                self._core.begin_recording(path, self._about((len(self._radii), len(self._radii) == 1), clock=True))
 
     def stop(self) -> None:
         """Stop the loop; devices are left at zero force."""
         self._core.stop()
         self._running = False
+
+    def record(self, path: str | os.PathLike[str]) -> None:
+        """Record every tick from now on, or from the start of the loop, in a new file (MCAP).
+
+        The loop begins anew: everything is let go of, bodies come to rest, and forces ramp in, for only from a known
+        state can a recording be made again bit for bit. What was written is safe after a tenth of a second.
+
+        Raises
+        ------
+        Error
+            A file that exists or cannot be written, or a loop that is being recorded already.
+
+        """
+        where = Path(path)
+        if where.exists():
+            raise SceneError(f"{where}: exists: give another name, or delete it first")
+        if self._running:
+            self._core.begin_recording(where, self._about((len(self._radii), len(self._radii) == 1), clock=True))
+        else:
+            self._to_record = where
+
+    @property
+    def recording(self) -> RecordingStatus | None:
+        """How the recording is doing; None where there is none."""
+        status = self._core.recording()
+        return None if status is None else RecordingStatus(*status)
+
+    def stop_recording(self) -> RecordingStatus | None:
+        """End the recording, if there is one, and tell how it went."""
+        self._to_record = None
+        status = self._core.end_recording()
+        return None if status is None else RecordingStatus(*status)
+
+    def _about(self, shown: tuple[int, bool], clock: bool) -> dict[str, str]:
+        return about(self.scene, self.bodies, shown, clock)
 
     def move(
         self,
@@ -166,150 +220,6 @@ class Simulation:
         feet = self._core.feet(body, asked).reshape(-1, 7)
         return placed.points_to_scene(feet[:, :3]), placed.vectors_to_scene(feet[:, 3:6]), feet[:, 6]
 
-    def set_radius(self, contact_radius: float | str, tool: int | None = None) -> None:
-        """Contact radius of contacts that begin from now on, m, of one tool or of all.
-
-        Raises
-        ------
-        Error
-            A radius under which a contact would cover more nodes than a tick can weigh.
-
-        """
-        tools = range(len(self._radii)) if tool is None else [self._tool(tool)]
-        radius = settings.checked_radius(contact_radius)
-        for changed in tools:
-            self._core.set_contact_radius(changed, radius)
-            self._radii[changed] = radius
-
-    def set_friction(self, friction: float, tool: int | None = None) -> None:
-        """Coulomb's coefficient of friction from now on, of one tool or of all; 0 slides freely.
-
-        Raises
-        ------
-        SceneError
-            A coefficient that is negative, or greater than 10.
-
-        """
-        coefficient = settings.checked_friction(friction)
-        tools = range(len(self._friction)) if tool is None else [self._tool(tool)]
-        for changed in tools:
-            self._core.set_friction(changed, coefficient)
-            self._friction[changed] = coefficient
-
-    def friction_of(self, tool: int = 0) -> float:
-        """Coulomb's coefficient of friction of a tool."""
-        return self._friction[self._tool(tool)]
-
-    def contact_radius_of(self, tool: int = 0) -> float:
-        """Contact radius of contacts of a tool that begin from now on, m."""
-        return self._radii[self._tool(tool)]
-
-    @property
-    def contact_radius(self) -> float:
-        """Contact radius of contacts of the first tool that begin from now on, m."""
-        return self._radii[0]
-
-    def largest_contact_radius(self, limit: float) -> float:
-        """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
-        return min(body.green.largest_contact_radius(limit) for body in self.bodies)
-
-    def youngs_modulus_of(self, body: int = 0) -> float | None:
-        """Young's modulus of a body now, Pa; None for one of several materials, with loads, or in motion."""
-        reference = self.bodies[self._body(body)].green.youngs_modulus
-        fixed = reference is None or self.bodies[body].motion is not None
-        return None if fixed else reference * self._scales[body]
-
-    @property
-    def youngs_modulus(self) -> float | None:
-        """Young's modulus of the first body now, Pa, as of :meth:`youngs_modulus_of`."""
-        return self.youngs_modulus_of()
-
-    def stiffness_scale_of(self, body: int = 0) -> float:
-        """Young's modulus of a body now over that of its Green's function."""
-        return self._scales[self._body(body)]
-
-    @property
-    def stiffness_scale(self) -> float:
-        """Young's modulus of the first body now over that of its Green's function."""
-        return self._scales[0]
-
-    def set_youngs_modulus(self, youngs_modulus: float | str, body: int = 0) -> None:
-        """Change the stiffness of a body of one material at rest, without loads, Pa: it only scales the compliance.
-
-        Raises
-        ------
-        SceneError
-            A body whose stiffness is part of what was computed, or a modulus that is not positive.
-
-        """
-        reference = self.bodies[self._body(body)].green.youngs_modulus
-        if reference is None or self.bodies[body].motion is not None:
-            raise SceneError(
-                "the body has several materials, or loads, or moves: its stiffness cannot be changed while running"
-            )
-        self._scales[body] = settings.checked_modulus(youngs_modulus) / reference
-        self._core.set_stiffness_scale(body, self._scales[body])
-
-    def set_strain_limit(self, strain_limit: float) -> None:
-        """Largest strain to which tools may take the bodies from now on; 0 takes the limit away.
-
-        Raises
-        ------
-        SceneError
-            A limit below 0 or above 1.
-
-        """
-        self._strain_limit = settings.checked_strain_limit(strain_limit)
-        self._arm_strain_limit()
-        self._core.set_strain_limit(self._strain_limit)
-
-    def _arm_strain_limit(self) -> None:
-        """Give the loop what measures strain, once it is asked to limit it: it takes a factor of every body."""
-        if self._strain_limit > 0 and not self._armed:
-            for rank, body in enumerate(self.bodies):
-                self._core.set_strain_measure(rank, body.green.native_strain_measure)
-            self._armed = True
-
-    def strike(
-        self, point: Sequence[float], impulse: Sequence[float], duration: float = 0.0, body: int | None = None
-    ) -> None:
-        """Strike a body in motion: an impulse (3,), N s, on the patch around the surface point closest to ``point``, m.
-
-        The patch has the contact radius of the first tool. The force is half a wave of ``duration``, s; it takes one
-        time step at least and a thousand at most. ``body`` is the first that moves unless it is given.
-
-        Raises
-        ------
-        SceneError
-            A body that does not move, or numbers that are not finite.
-
-        """
-        struck = self._moving_body("strike", body)
-        self._core.strike(struck, *strike_of(point, impulse, duration), self._radii[0])
-
-    def set_time_scale(self, time_scale: float) -> None:
-        """Seconds that bodies in motion advance in a second, in (0, 1]: below one is slow motion.
-
-        Raises
-        ------
-        SceneError
-            No body moves, or a scale outside of (0, 1].
-
-        """
-        self._moving_body("slow motion", None)
-        self._core.set_time_scale(settings.checked_time_scale(time_scale))
-
-    def watch(self, node: int, body: int = 0) -> None:
-        """Log the displacement of a surface node (mesh index) from now on; at first it is the lowest one's.
-
-        Raises
-        ------
-        SceneError
-            A node that is not on the surface.
-
-        """
-        self._core.watch(self._body(body), self._rank_of(node, body))
-
     def reset(self) -> None:
         """Let go of everything and clear a latched fault; forces ramp in anew."""
         self._core.reset()
@@ -326,8 +236,8 @@ class Simulation:
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
-        names = ("ticks", "missed_deadlines", "dropped_rows", "fault", "realtime", "refused", "port_energy")
-        statistics = {name: raw[name] for name in names}
+        names = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
+        statistics = {name: raw[name] for name in (*names, "port_energy")}
         for name in ("compute_us", "wakeup_us"):
             statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
         bodies = tuple(
@@ -442,7 +352,8 @@ class Simulation:
         self._arm_strain_limit()
         ticks, given, tools = *path.shape[:2], len(self._radii)
         everything = for_all_tools(path, turned, held, tools)
-        raw = self._core.run(*everything, sorted(struck, key=lambda strike: strike[0]), ranks)
+        happens = (sorted(struck, key=lambda strike: strike[0]), ranks)
+        raw = self._core.run(*everything, happens, self._about((given, np.ndim(positions) == 2), clock=False))
         if raw["fault"] is not None:
             raise SimulationError(raw["fault"])
         shape = (ticks, 3) if np.ndim(positions) == 2 else (ticks, given, 3)
@@ -452,33 +363,10 @@ class Simulation:
         limited = raw["limited"].astype(bool).reshape(ticks, tools)[:, :given].reshape(shape[:-1])
         energies = tuple(Energy(*rows.reshape(-1, 5).T) if len(rows) else None for rows in raw["energies"])
         time = np.arange(1, ticks + 1) / self.scene.device.rate
-        return Recording(time, forces, torques, raw["watched"].reshape(ticks, len(ranks), 3), limited, energies)
-
-    def _rank_of(self, node: int, body: int) -> int:
-        surface = self.bodies[body].green.surface_nodes
-        rank = int(np.searchsorted(surface, node))
-        if rank == len(surface) or surface[rank] != node:
-            raise SceneError(f"node {node} is not on the surface: it cannot be watched")
-        return rank
-
-    def _moving_body(self, what: str, body: int | None) -> int:
-        moving = [rank for rank, one in enumerate(self.bodies) if one.motion is not None]
-        chosen = next(iter(moving), None) if body is None else self._body(body)
-        if chosen not in moving:
-            raise SceneError(f"{what}: the body does not move; give the scene a [dynamics] table")
-        return chosen
+        watched = raw["watched"].reshape(ticks, len(ranks), 3)
+        return Recording(time, forces, torques, watched, limited, energies, source=raw["file"])
 
     def _contact(self, record: tuple[Any, ...]) -> Contact:
         tool, body, mode, vectors, flags, numbers, nodes, weights = record
         nodes = self.bodies[body].green.surface_nodes[nodes]
         return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights))
-
-    def _tool(self, tool: int) -> int:
-        if not 0 <= tool < len(self._radii):
-            raise SceneError(f"there is no tool {tool}: the scene has {len(self._radii)}")
-        return tool
-
-    def _body(self, body: int) -> int:
-        if not 0 <= body < len(self.bodies):
-            raise SceneError(f"there is no body {body}: the scene has {len(self.bodies)}")
-        return body

@@ -17,8 +17,8 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
-def test_example(example, tmp_path):
-    result = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+def test_example(example, tmp_path, shared_cache):
+    result = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr
 
 
@@ -27,16 +27,16 @@ CHUNKS = [text.split("```")[0] for text in (ROOT / "docs" / "dynamics.md").read_
 
 @pytest.mark.parametrize("code", CHUNKS, ids=["scene", "newmark"])
 def test_the_examples_of_the_page_on_motion(code):
-    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr
     assert "kinetic=" in result.stdout
 
 
 @pytest.fixture(scope="module")
-def two_bodies(tmp_path_factory):
-    """The example with both its bodies, in a cache of this module's."""
+def two_bodies(cache):
+    """The example with both its bodies."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("XDG_CACHE_HOME", str(cache))
         return palpate.Scene.read(ROOT / "examples" / "two_bodies.toml").build(progress=False)
 
 
@@ -61,11 +61,11 @@ def test_two_fingers_on_two_bodies(two_bodies):
     assert 0.5 * apart[0, 2] < beside[0, 2] < 0.95 * apart[0, 2] and beside[1, 2] > 0.03
 
 
-def test_two_bodies_run_headless(tmp_path):
+def test_two_bodies_run_headless(tmp_path, shared_cache):
     for name in ("two_bodies.toml", "block.obj"):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     command = [sys.executable, "-m", "palpate", "run", "two_bodies.toml", "--headless", "1"]
-    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr
     log = np.genfromtxt(tmp_path / "two_bodies.csv", delimiter=",", names=True)
     assert log["fz_N"].max() > 0.05
@@ -84,7 +84,7 @@ def test_the_scenes_of_the_page_on_scene_files_are_read(tmp_path):
 
 def test_the_example_of_the_readme():
     code = (ROOT / "README.md").read_text().split("```python\n")[1].split("```")[0]
-    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr
     body, device = (float(line.split("]")[0].split()[-1]) for line in result.stdout.splitlines())
     assert body < 0 < device  # pushed down, the body pushes the device up

@@ -58,7 +58,7 @@ def test_the_log_is_kept_on_ctrl_c(tmp_path):
     assert child.stdout.readline() == "running\n"
     time.sleep(1.5)
     child.send_signal(signal.SIGINT)
-    said, complained = child.communicate(timeout=60)
+    said, complained = child.communicate(timeout=280)
     assert child.returncode == 130, complained
     assert complained.strip().splitlines()[-1] == "palpate: interrupted" and "Traceback" not in complained
     assert "wrote a.csv and .png" in said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -57,20 +58,33 @@ def contrasts(tool: float, radius: float, moduli: list[float], aside: float = 0.
 
 
 @pytest.fixture(scope="module")
-def plain():
+def with_nodule(cache):
+    """A scene with a nodule of a Young's modulus, Pa, and a radius, m, of which each is solved once."""
+
+    @functools.cache
+    def build(youngs_modulus: float, radius: float) -> BuiltScene:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("XDG_CACHE_HOME", str(cache))
+            return scene(youngs_modulus, radius).build(progress=False)
+
+    return build
+
+
+@pytest.fixture(scope="module")
+def plain(with_nodule):
     """The tissue of the example without what is hidden in it."""
-    return scene(5e3, NODULES[0][1]).build(progress=False)
+    return with_nodule(5e3, NODULES[0][1])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("radius", sorted({radius for _, radius in NODULES}))
-def test_a_nodule_is_felt_as_the_direct_solution_says(plain, radius):
+def test_a_nodule_is_felt_as_the_direct_solution_says(plain, with_nodule, radius):
     line = np.linspace(0.02, 0.06, 81)
     middle = len(line) // 2
     without = felt(plain, line)
     moduli = [modulus for modulus, other in NODULES if other == radius]
     for modulus, expected in zip(moduli, contrasts(plain.scene.tools[0].radius, radius, moduli), strict=True):
-        gain = felt(scene(modulus, radius).build(progress=False), line) / without - 1
+        gain = felt(with_nodule(modulus, radius), line) / without - 1
         print(f"E {modulus:g} Pa, radius {radius:g} m: {gain[middle]}, direct {expected}")
         assert np.abs(gain[middle] - expected).max() < POINTS
         # It is felt where it is, and is gone twenty millimetres away.
@@ -82,18 +96,18 @@ def test_a_nodule_is_felt_as_the_direct_solution_says(plain, radius):
 
 
 @pytest.mark.slow
-def test_beside_the_nodule_the_force_is_that_of_the_direct_solution(plain):
+def test_beside_the_nodule_the_force_is_that_of_the_direct_solution(plain, with_nodule):
     aside, (modulus, radius) = 5e-3, NODULES[1]
     (expected,) = contrasts(plain.scene.tools[0].radius, radius, [modulus], aside)
     line = np.array([MIDDLE - aside, MIDDLE + aside])
-    gain = felt(scene(modulus, radius).build(progress=False), line) / felt(plain, line) - 1
+    gain = felt(with_nodule(modulus, radius), line) / felt(plain, line) - 1
     print(f"{aside:g} m beside: {gain}, direct {expected}")
     assert np.abs(gain - expected).max() < POINTS
 
 
 @pytest.mark.slow
-def test_the_profile_is_the_same_there_and_back():
-    built = scene(*NODULES[1]).build(progress=False)
+def test_the_profile_is_the_same_there_and_back(with_nodule):
+    built = with_nodule(*NODULES[1])
     line = np.linspace(0.03, 0.05, 201)
     there, back = felt(built, line)[:, 0], felt(built, line[::-1])[::-1, 0]
     # Without friction the force is one of the place alone; one of the tick before would lie 0.2 mm apart.

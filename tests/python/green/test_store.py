@@ -121,7 +121,7 @@ try:
 except OSError as error:
     print(error)
 """
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr
     assert "cut.palpate'" in result.stdout
     assert os.listdir(tmp_path) == []

@@ -18,7 +18,7 @@ MAIN = [sys.executable, "-c", "from palpate.cli import main; main()"]
 
 
 def command(*arguments, cwd) -> subprocess.CompletedProcess:
-    options = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "timeout": 200}
+    options = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "timeout": 280}
     return subprocess.run([*MAIN, *arguments], cwd=cwd, check=False, **options)
 
 
@@ -68,7 +68,7 @@ def test_commands_ask_in_one_line_and_print_the_size(millimetres):
 def test_on_a_terminal_the_unit_is_asked_for(millimetres):
     terminal, end = pty.openpty()
     os.write(terminal, b"mm\n")
-    options = {"stdin": end, "stderr": end, "stdout": subprocess.PIPE, "text": True, "timeout": 200}
+    options = {"stdin": end, "stderr": end, "stdout": subprocess.PIPE, "text": True, "timeout": 280}
     arguments = ("mesh", "box.stl", "out.vtu", "--max-size", "2cm")
     made = subprocess.run([*MAIN, *arguments], cwd=millimetres, check=False, **options)
     assert made.returncode == 0

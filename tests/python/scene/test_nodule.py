@@ -16,8 +16,10 @@ TOP, RADIUS, PRESS = 0.04, 0.005, 1e-3
 
 
 @pytest.fixture(scope="module")
-def nodule():
-    return palpate.Scene.read(EXAMPLE).build()
+def nodule(cache):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        return palpate.Scene.read(EXAMPLE).build()
 
 
 def patch_weights(mesh, point, radius, split=24):

@@ -48,7 +48,7 @@ def test_the_same_bits_again_and_with_any_number_of_threads(block_green, tmp_pat
     for threads in ("1", "2"):
         paths = [os.fspath(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = {**os.environ, "RAYON_NUM_THREADS": threads, "PYTHONPATH": os.pathsep.join(paths)}
-        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
+        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=280)
         assert run.returncode == 0, run.stderr
         assert run.stdout.strip() == digest(recording)
 
@@ -67,7 +67,7 @@ def test_the_same_bits_from_a_store_of_any_number_of_threads(block, tmp_path):
     for threads in ("1", "2"):
         command = [sys.executable, "-c", code, f"{threads}.palpate"]
         environment = {**os.environ, "RAYON_NUM_THREADS": threads}
-        run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+        run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=280, cwd=tmp_path)
         assert run.returncode == 0, run.stderr
         digests.add(run.stdout.strip())
     assert len(digests) == 1

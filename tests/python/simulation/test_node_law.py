@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from conftest import box_mesh
+from running import settle
 
 import palpate
 from palpate.scene import BuiltScene
@@ -63,10 +62,9 @@ def test_the_whole_surface_is_that_of_the_prescribed_node(body, tmp_path):
     place = body.mesh.nodes[node] + RADIUS * UP
     with simulation:
         simulation.move(place + 0.002 * UP)
-        time.sleep(0.05)
+        settle(simulation)
         simulation.move(place - 0.002 * UP)
-        time.sleep(0.3)
-        frame = simulation.frame()
+        frame = settle(simulation, lambda frame: frame.contacts)
     (contact,) = frame.contacts
     assert contact.nodes.tolist() == [node] and contact.weights.tolist() == [1.0]
     answer = simulation.green.solve(displacements={node: contact.displacement})
@@ -93,18 +91,15 @@ def test_a_node_outside_the_touch_region_is_refused_with_a_reason(body, tmp_path
     assert simulation.run(inside)[39, 2] > 0.01
     with simulation:
         simulation.move(path[39])
-        time.sleep(0.1)
-        frame = simulation.frame()
+        frame = settle(simulation, lambda frame: frame.statistics["refused"] != [None])
         assert frame.statistics["refused"] == ["the contact reaches outside the touch region"]
         assert frame.contacts == [] and np.abs(frame.forces).max() == 0 and np.abs(frame.displacements).max() == 0
         assert frame.statistics["fault"] is None
         # Out of the scene, and where it may touch, the reason is gone.
         simulation.remove()
-        time.sleep(0.1)
-        assert simulation.frame().statistics["refused"] == [None]
+        settle(simulation, lambda frame: frame.statistics["refused"] == [None])
         simulation.move(inside[39])
-        time.sleep(0.1)
-        frame = simulation.frame()
+        frame = settle(simulation, lambda frame: frame.contacts)
         assert frame.statistics["refused"] == [None] and len(frame.contacts) == 1
 
 

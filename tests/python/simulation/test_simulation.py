@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import itertools
-import time
 
 import numpy as np
 import pytest
 from conftest import box_mesh
+from running import settle
 
 import palpate
 
@@ -84,7 +84,7 @@ def test_grab_holds_in_both_directions(scene):
     with palpate.Simulation(scene) as simulation:
         simulation.move(TOP + [0, 0, RADIUS])
         simulation.grab(True)
-        time.sleep(0.1)
+        settle(simulation)
         simulation.move(TOP + [0, 0, RADIUS + 0.003])
         frame = settle(simulation, lambda f: f.contacts and abs(f.forces[0, 2]) > 0)
         assert frame.contacts[0].mode == "grab"
@@ -93,23 +93,10 @@ def test_grab_holds_in_both_directions(scene):
         assert np.abs(settle(simulation, lambda f: not f.contacts).forces).max() == 0
 
 
-def settle(simulation, condition, seconds=5.0):
-    """Latest frame in which the condition holds and the tool has come to rest."""
-    end, previous = time.monotonic() + seconds, None
-    while time.monotonic() < end:
-        time.sleep(0.05)
-        frame = simulation.frame()
-        still = previous is not None and np.abs(frame.positions - previous).max() < 1e-9
-        previous = frame.positions
-        if still and condition(frame):
-            return frame
-    raise AssertionError(f"did not settle: {frame.positions} {frame.forces} {frame.contacts} {frame.statistics}")
-
-
 def test_running_loop_agrees_with_the_offline_answer_and_scales_with_stiffness(scene):
     with palpate.Simulation(scene) as simulation:
         simulation.move(TOP + [0, 0, RADIUS + 0.002])
-        time.sleep(0.1)
+        settle(simulation)
         simulation.move(TOP + [0, 0, RADIUS - 0.003])
         frame = settle(simulation, lambda f: len(f.contacts) == 1)
         contact = frame.contacts[0]

@@ -40,7 +40,7 @@ def press(request, tmp_path):
         yield simulation
 
 
-def settle(simulation: palpate.Simulation, seconds: float = 10.0) -> palpate.Frame:
+def settle(simulation: palpate.Simulation, seconds: float = 60.0) -> palpate.Frame:
     """Frame once the simulated hand has arrived and the limit has been found."""
     end, before, same = time.monotonic() + seconds, None, 0
     while time.monotonic() < end:

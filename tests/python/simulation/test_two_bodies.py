@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from conftest import box_mesh
 from direct import patch_at, solve_with_patches
+from running import settle
 
 import palpate
 from palpate.scene import BuiltBody, BuiltScene
@@ -121,10 +120,9 @@ def test_contacts_of_a_running_loop_are_in_the_world(blocks):
     path = placed.path(END)
     with placed.simulation as simulation:
         simulation.move(path[0])
-        time.sleep(0.1)
+        settle(simulation)
         simulation.move(path[-1])
-        time.sleep(0.4)
-        frame = simulation.frame()
+        frame = settle(simulation, lambda frame: len(frame.contacts) == 2)
     assert [(contact.tool, contact.body) for contact in frame.contacts] == [(0, 0), (0, 1)]
     total = np.zeros(3)
     for contact, built, (body, green) in zip(frame.contacts, placed.bodies, blocks, strict=True):

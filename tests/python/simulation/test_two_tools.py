@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from conftest import box_mesh
 from direct import patch_at, solve_with_patches
+from running import settle
 
 import palpate
 from palpate.scene import BuiltScene
@@ -130,9 +129,8 @@ def test_the_running_loop_has_both_contacts(body, green, simulation):
         for depth in (-0.002, 0.003):
             for tool, centre in enumerate(centres(np.full(2, depth))):
                 simulation.move(centre, tool=tool)
-            time.sleep(0.1)
-        time.sleep(0.4)
-        frame = simulation.frame()
+            settle(simulation)
+        frame = settle(simulation, lambda frame: len(frame.contacts) == 2)
     assert [contact.tool for contact in frame.contacts] == [0, 1]
     patches = [(contact.nodes, contact.weights) for contact in frame.contacts]
     moved = np.array([contact.displacement for contact in frame.contacts])

@@ -87,7 +87,7 @@ def input_deck(mesh, forces, boundary) -> str:
 def solved_by_calculix(deck: str, nodes: int, folder) -> tuple[np.ndarray, np.ndarray]:
     """Displacements and `K u` of all nodes."""
     (folder / "body.inp").write_text(deck)
-    made = subprocess.run(["ccx", "body"], cwd=folder, capture_output=True, text=True, timeout=120)
+    made = subprocess.run(["ccx", "body"], cwd=folder, capture_output=True, text=True, timeout=280)
     assert "*ERROR" not in made.stdout, made.stdout
     blocks = {"displacements": np.full((nodes, 3), np.nan), "forces": np.full((nodes, 3), np.nan)}
     table = None

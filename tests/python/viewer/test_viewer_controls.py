@@ -6,20 +6,13 @@ import time
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, press, settled_force, state, until
+from browser import MARKS, Program, drawn, press, settled_force, state, until
 
 import palpate
 
 pytestmark = MARKS
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
-
-
-@pytest.fixture(scope="module")
-def program(cache):
-    started = Program(cache, "liver", "--paper")
-    yield started
-    assert started.stop() == 0
 
 
 @pytest.fixture
@@ -39,7 +32,7 @@ def fill(page, name: str, text: str) -> None:
 
 
 def shows(page, name: str, text: str) -> None:
-    until(page, lambda _: page.get_by_test_id(f"{name}-value").input_value() == text, 10)
+    until(page, lambda _: page.get_by_test_id(f"{name}-value").input_value() == text)
 
 
 def slide(page, name: str, value: float) -> None:
@@ -95,7 +88,7 @@ def test_escape_leaves_a_number_as_it_was(page):
     number = page.get_by_test_id("friction-value")
     number.fill("0.9")
     number.press("Escape")
-    time.sleep(0.2)
+    drawn(page)
     assert number.input_value() == "0.30"
 
 
@@ -114,6 +107,7 @@ def test_reset_puts_all_sliders_back_at_once(page):
     }.items():
         shows(page, name, text)
     time.sleep(0.6)
+    drawn(page)
     # Nothing that was on its way has come after it.
     for name, text in {"stiffness": "8.00 kPa", "friction": "0.30", "strain-limit": "30 %"}.items():
         assert page.get_by_test_id(f"{name}-value").input_value() == text
@@ -240,7 +234,7 @@ def test_the_body_stays_in_sight_when_the_sheet_goes(phone):
     ends = nodes[np.concatenate([nodes.argmin(axis=0), nodes.argmax(axis=0)])]
 
     def seen() -> np.ndarray:
-        time.sleep(0.5)
+        drawn(phone)
         return np.array([phone.evaluate("p => window.palpate.project(p)", end.tolist()) for end in ends])
 
     first = seen()
@@ -300,7 +294,7 @@ def test_two_fingers_turn_and_zoom_and_three_move_where_the_body_fills_the_scree
     fingers.down((x - 30, y), (x + 30, y))
     fingers.move([(-90, 0), (90, 0)])
     fingers.up()
-    time.sleep(0.3)
+    drawn(phone)
     # Four times as far apart.
     close = view(phone)
     assert close["distance"] == pytest.approx(before["distance"] / 4, rel=0.3)
@@ -319,7 +313,7 @@ def test_two_fingers_turn_and_zoom_and_three_move_where_the_body_fills_the_scree
     until(phone, lambda s: s["contacts"] == 0)
     fingers.move([(80, 30), (80, 30)])
     fingers.up()
-    time.sleep(0.3)
+    drawn(phone)
     turned = view(phone)
     assert turned["towards"] @ close["towards"] < 0.95
     assert turned["distance"] == pytest.approx(close["distance"], rel=0.05)
@@ -328,7 +322,7 @@ def test_two_fingers_turn_and_zoom_and_three_move_where_the_body_fills_the_scree
     fingers.down((x - 40, y), (x, y), (x + 40, y))
     fingers.move([(30, -40)] * 3)
     fingers.up()
-    time.sleep(0.3)
+    drawn(phone)
     moved = view(phone)
     assert moved["towards"] @ turned["towards"] > 1 - 1e-6
     now = np.array(phone.evaluate("p => window.palpate.project(p)", turned["target"].tolist()))

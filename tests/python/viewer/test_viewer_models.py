@@ -28,7 +28,7 @@ def test_another_model_is_shown_when_it_is_ready(built):
             assert welcome["models"] == [{"name": "beam", "title": "Beam"}]
             await client.receive("scene")
             await client.say(type="model", name="beam")
-            scene, arrays = await client.receive("scene", 30)
+            scene, arrays = await client.receive("scene")
             assert scene["name"] == "beam"
             _, arrays = await client.receive("frame")
             assert len(arrays["0/displacements"]) == scene["bodies"][0]["surface_nodes"]
@@ -65,7 +65,7 @@ def test_long_work_is_cancelled(built, monkeypatch, tmp_path, phase):
             await client.say(type="model", name="long")
             status, _ = await client.receive("status")
             while not status["text"].startswith(phase):
-                status, _ = await client.receive("status", 60)
+                status, _ = await client.receive("status")
                 assert status["text"], "the work was over too soon"
             await client.say(type="cancel")
             error, _ = await client.receive("error")
@@ -79,7 +79,7 @@ def test_long_work_is_cancelled(built, monkeypatch, tmp_path, phase):
             # A cancel with nothing under way is not kept for the next one.
             await client.say(type="cancel")
             await client.say(type="model", name="beam")
-            scene, _ = await client.receive("scene", 60)
+            scene, _ = await client.receive("scene")
             assert scene["name"] == "beam"
             assert servo_threads() in {None, 1}
 

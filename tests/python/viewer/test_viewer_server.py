@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import socket
 import urllib.request
@@ -125,14 +124,14 @@ def test_watchers_watch_and_take_over(built):
 
 
 def test_a_silent_controller_lets_go(built, monkeypatch):
-    monkeypatch.setattr("palpate.viewer.server.LOST_AFTER", 0.3)
+    monkeypatch.setattr("palpate.viewer.server.LOST_AFTER", 1.0)
 
     async def session():
         async with serving(built) as server, page(server) as client:
             await client.receive("scene")
             await client.say(type="press", tool=0, position=TOP, grab=False)
             await client.frame_where(lambda h: len(h["contacts"]) == 1)
-            await asyncio.sleep(1.0)  # no acknowledgement, no pointer
+            await asyncio.sleep(2.0)  # no acknowledgement, no pointer
             header, _ = await client.frame_where(lambda h: h["contacts"] == [])
             assert not header["tools"][0]["active"]
 
@@ -286,11 +285,18 @@ def test_frames_wait_for_the_client(built):
     async def session():
         async with serving(built) as server, page(server) as client:
             received = []
-            with contextlib.suppress(asyncio.TimeoutError):
+
+            async def take():
                 while True:
-                    raw = await asyncio.wait_for(client.socket.recv(), 0.5)
+                    raw = await client.socket.recv()
                     if isinstance(raw, bytes):
                         received.append(messages.decode(raw)[0]["type"])
+
+            taking = asyncio.create_task(take())
+            while len(received) < 2 and not taking.done():
+                await asyncio.sleep(0.02)
+            await asyncio.sleep(0.5)
+            taking.cancel()
             assert received == ["scene", "frame"]
 
     asyncio.run(session())

@@ -38,7 +38,7 @@ def test_every_closed_shape_is_offered_in_the_size_of_the_tools_radius(block, bl
             sizes = {}
             for name in ("ellipsoid", "capsule", "punch", "sphere"):
                 await client.say(type="shape", tool=0, name=name)
-                scene, _ = await client.receive("scene", 60)
+                scene, _ = await client.receive("scene")
                 (tool,) = scene["tools"]
                 assert tool["shape"] == name and tool["friction"] == 0.7
                 sizes[name] = np.array(tool["lengths"]) / RADIUS
@@ -108,10 +108,10 @@ def test_a_scenes_own_surface_is_offered_and_sent_whole(block, block_green, tmp_
             volume = np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
             assert volume == pytest.approx(1e-9 * probe.volume, rel=1e-5)
             await client.say(type="shape", tool=0, name="sphere")
-            scene, arrays = await client.receive("scene", 60)
+            scene, arrays = await client.receive("scene")
             assert scene["tools"][0]["lengths"][0] == tool["radius"] and len(arrays["tools/0/vertices"]) == 0
             await client.say(type="shape", tool=0, name="surface")
-            scene, arrays = await client.receive("scene", 60)
+            scene, arrays = await client.receive("scene")
             assert scene["tools"][0]["shape"] == "surface" and len(arrays["tools/0/triangles"]) == len(probe.faces)
 
     asyncio.run(session())

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, opened, press, settled_force, state, until
+from browser import MARKS, PATIENCE, Program, opened, press, settled_force, state, until
 
 import palpate
 from palpate.viewer.server import ViewerServer
@@ -55,16 +55,11 @@ class Pair:
 
 @pytest.fixture(scope="module")
 def pair(cache):
-    started = Pair(cache)
-    yield started
-    started.stop()
-
-
-@pytest.fixture(scope="module")
-def liver(cache):
-    started = Program(cache, "liver", "--paper")
-    yield started
-    assert started.stop() == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("palpate.viewer.server.LOST_AFTER", PATIENCE)
+        started = Pair(cache)
+        yield started
+        started.stop()
 
 
 def test_two_tools_on_two_bodies(chromium, pair):
@@ -93,33 +88,32 @@ def test_two_tools_on_two_bodies(chromium, pair):
         until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
 
 
-def test_a_second_finger_feels_the_dent_of_the_first(chromium, liver):
+def test_a_second_finger_feels_the_dent_of_the_first(page):
     """By `f2 = delta / (c22 - c21 c12 / c11)`: the first finger holds the body against the second.
 
     ``delta`` is how far the second finger goes below the dent that it meets; without the first one it is
     `f2 = delta / c22`.
     """
-    with opened(chromium, liver) as page:
-        x, y = page.evaluate("window.palpate.pickPoint()")
-        beside = x - 40, y + 40
-        press(page, place=beside)
-        alone = settled_force(page)
-        page.mouse.up()
-        until(page, lambda s: s["contacts"] == 0)
-        press(page, place=(x, y))
-        first = settled_force(page)
-        page.keyboard.press("n")
-        until(page, lambda s: s["pinned"] == [0])
-        page.mouse.up()
-        press(page, place=beside, contacts=2)
-        second = settled_force(page)
-        assert np.linalg.norm(second) > 1.01 * np.linalg.norm(alone)
-        # What the second finger presses away, the first one need not.
-        assert np.linalg.norm(state(page)["tools"][0]["force"]) < 0.99 * np.linalg.norm(first)
-        page.mouse.up()
-        until(page, lambda s: s["contacts"] == 1)
-        page.keyboard.press("n")
-        until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
+    x, y = page.evaluate("window.palpate.pickPoint()")
+    beside = x - 40, y + 40
+    press(page, place=beside)
+    alone = settled_force(page)
+    page.mouse.up()
+    until(page, lambda s: s["contacts"] == 0)
+    press(page, place=(x, y))
+    first = settled_force(page)
+    page.keyboard.press("n")
+    until(page, lambda s: s["pinned"] == [0])
+    page.mouse.up()
+    press(page, place=beside, contacts=2)
+    second = settled_force(page)
+    assert np.linalg.norm(second) > 1.01 * np.linalg.norm(alone)
+    # What the second finger presses away, the first one need not.
+    assert np.linalg.norm(state(page)["tools"][0]["force"]) < 0.99 * np.linalg.norm(first)
+    page.mouse.up()
+    until(page, lambda s: s["contacts"] == 1)
+    page.keyboard.press("n")
+    until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
 
 
 def test_a_pinned_tool_by_buttons(chromium, pair):

@@ -65,11 +65,6 @@ impl Newmark {
         Ok(Self { dt, alpha, delta })
     }
 
-    /// Whether any step is stable: `2 alpha >= delta`.
-    pub fn is_unconditional(&self) -> bool {
-        self.alpha >= 0.5 * self.delta
-    }
-
     /// Largest stable step, s, for a body whose largest eigenvalue is `k`; infinite where every step is stable.
     ///
     /// The amplification matrix leaves the unit circle through -1, where

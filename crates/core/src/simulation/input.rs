@@ -63,7 +63,7 @@ pub struct ToolInput {
 }
 
 /// An impulse for a body in motion.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Strike {
     /// Which body.
     pub body: usize,

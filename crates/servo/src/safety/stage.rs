@@ -9,7 +9,7 @@ use super::vector::{LimitedVector, clamped};
 use super::{FaultReason, SafetyLimits};
 
 /// What a tick computed for one device.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Computed {
     /// By the contact laws, before the limit of strain: the reference of the energy balance.
     pub law: Wrench,

@@ -3,6 +3,7 @@
 from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.validation.plots.accuracy import plot_convergence, plot_felt_stiffness
 from palpate.validation.plots.contact import plot_contact, plot_partial_slip, plot_pressing
+from palpate.validation.plots.loop import plot_envelope, plot_wakeups
 from palpate.validation.plots.sessions import plot_history, plot_log, write_columns, write_log
 
 __all__ = [
@@ -10,11 +11,13 @@ __all__ = [
     "empty_figure",
     "plot_contact",
     "plot_convergence",
+    "plot_envelope",
     "plot_felt_stiffness",
     "plot_history",
     "plot_log",
     "plot_partial_slip",
     "plot_pressing",
+    "plot_wakeups",
     "write_columns",
     "write_figure",
     "write_log",

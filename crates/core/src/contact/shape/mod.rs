@@ -192,11 +192,6 @@ impl ToolShape {
             Self::Surface(ref surface) => surface.long_axis(),
         }
     }
-
-    /// Whether its points between any two lie inside, as closed forms assume.
-    pub fn is_convex(&self) -> bool {
-        !matches!(self, Self::Surface(_))
-    }
 }
 
 /// Refuses numbers that no length can be.

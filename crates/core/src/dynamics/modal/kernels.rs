@@ -57,6 +57,20 @@ impl NullaryFnOnce for Correct<'_> {
     }
 }
 
+/// `v . v` and `q . k q`, added to sums so far.
+///
+/// A loop a sum, here and below: together, the compiler mixes their lanes and takes twice as long.
+#[inline(always)]
+fn add_energies(q: &[Lanes], v: &[Lanes], stiffness: &[Lanes], mut kinetic: Lanes, mut strain: Lanes) -> [Lanes; 2] {
+    for v in v {
+        kinetic = kinetic.plus(v, v);
+    }
+    for (q, k) in q.iter().zip(stiffness) {
+        strain = strain.plus(&q.times(k), q);
+    }
+    [kinetic, strain]
+}
+
 /// `v . v`, `q . k q` and `w . c w` with `w = before + v`, added to sums so far.
 pub struct EnergySums<'a> {
     pub q: &'a [Lanes],
@@ -71,14 +85,8 @@ impl NullaryFnOnce for EnergySums<'_> {
     type Output = [Lanes; 3];
     #[inline(always)]
     fn call(self) -> [Lanes; 3] {
-        // A loop a sum: together, the compiler mixes their lanes and takes twice as long.
-        let [mut kinetic, mut strain, mut power] = self.sums;
-        for v in self.v {
-            kinetic = kinetic.plus(v, v);
-        }
-        for (q, k) in self.q.iter().zip(self.stiffness) {
-            strain = strain.plus(&q.times(k), q);
-        }
+        let [kinetic, strain, mut power] = self.sums;
+        let [kinetic, strain] = add_energies(self.q, self.v, self.stiffness, kinetic, strain);
         for ((v, before), c) in self.v.iter().zip(self.before).zip(self.damping) {
             let twice = v.plus_scaled(1.0, before);
             power = power.plus(&twice.times(c), &twice);
@@ -102,13 +110,8 @@ impl NullaryFnOnce for WorkSums<'_> {
     type Output = [Lanes; 3];
     #[inline(always)]
     fn call(self) -> [Lanes; 3] {
-        let [mut kinetic, mut strain, mut work] = self.sums;
-        for v in self.v {
-            kinetic = kinetic.plus(v, v);
-        }
-        for (q, k) in self.q.iter().zip(self.stiffness) {
-            strain = strain.plus(&q.times(k), q);
-        }
+        let [kinetic, strain, mut work] = self.sums;
+        let [kinetic, strain] = add_energies(self.q, self.v, self.stiffness, kinetic, strain);
         let [p0, p1] = self.loads;
         for (((q, before), p0), p1) in self.q.iter().zip(self.before).zip(p0).zip(p1) {
             let moved = q.plus_scaled(-1.0, before);

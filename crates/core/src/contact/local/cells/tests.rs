@@ -303,9 +303,10 @@ fn nothing_touches_from_outside() {
             let contact = cold(&pressed(&shape, angles, depth));
             assert_eq!((contact.force, contact.energy), (DVec3::ZERO, 0.0), "{shape:?} {depth}");
         }
-        // Just below: a force that is small and finite.
+        // Just below: a force that is small and finite, and beyond zero where the shape is convex.
         let force = cold(&pressed(&shape, angles, 1e-9)).force;
-        assert!(force.is_finite() && (force.z > 0.0 || !shape.is_convex()) && force.z < 1e-3, "{shape:?} {force}");
+        let convex = !matches!(shape, ToolShape::Surface(_));
+        assert!(force.is_finite() && (force.z > 0.0 || !convex) && force.z < 1e-3, "{shape:?} {force}");
     }
 }
 

@@ -1,0 +1,256 @@
+//! Recordings read as columns, and made again tick by tick.
+
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read};
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use numpy::IntoPyArray;
+use palpate_core::simulation::Mode;
+use palpate_core::{Error, Result};
+use palpate_devices::DeviceLimits;
+use palpate_recording::Ticks;
+use palpate_servo::{Owner, TickRecord};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors::to_python;
+use crate::frame::frame;
+use crate::scene::{energy_array, wxyz};
+use crate::simulation::SimulationCore;
+
+/// Ticks between two looks for an interrupt.
+const INTERRUPT_TICKS: usize = 256;
+
+/// A recording's place: a file, or its bytes.
+#[derive(FromPyObject)]
+pub enum Source {
+    /// A file.
+    Path(PathBuf),
+    /// Bytes.
+    Bytes(Vec<u8>),
+}
+
+type AnyTicks = Ticks<Box<dyn Read + Send>>;
+
+fn open(source: Source) -> Result<AnyTicks> {
+    let (read, name): (Box<dyn Read + Send>, String) = match source {
+        Source::Path(path) => {
+            let file = File::open(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
+            (Box::new(BufReader::new(file)), format!("{}: ", path.display()))
+        }
+        Source::Bytes(bytes) => (Box::new(Cursor::new(bytes)), String::new()),
+    };
+    Ticks::new(read).map_err(|reason| Error::Invalid(format!("{name}{reason}")))
+}
+
+/// Columns under construction.
+#[derive(Default)]
+struct Columns {
+    number: Vec<u64>,
+    due_ns: Vec<u64>,
+    /// Numbers of all tools, a tick after the other.
+    vectors: [Vec<f64>; 10],
+    buttons: Vec<u32>,
+    active: Vec<bool>,
+    limited: Vec<bool>,
+    faults: Vec<Option<String>>,
+    events: Vec<(u64, String)>,
+    delay_us: Vec<f64>,
+    compute_us: Vec<f64>,
+    /// Tick, tool, body, mode (2 holds on), whether it slips and is limited.
+    contact_state: Vec<u64>,
+    contact_numbers: Vec<f32>,
+    /// Tick, body, time and energies.
+    bodies: Vec<f64>,
+}
+
+/// Names of the vectors of tools, in order.
+const VECTORS: [&str; 10] = [
+    "positions",
+    "orientations",
+    "velocities",
+    "angular_velocities",
+    "forces",
+    "torques",
+    "computed_forces",
+    "computed_torques",
+    "law_forces",
+    "port_energy",
+];
+
+impl Columns {
+    fn push(&mut self, record: &TickRecord, tools: usize) {
+        self.number.push(record.tick);
+        self.due_ns.push(record.input.due_ns);
+        self.delay_us.push(1e-3 * record.delay_ns as f64);
+        self.compute_us.push(1e-3 * record.took_ns as f64);
+        for (said, got) in record.input.readings.iter().zip(&record.output.tools).take(tools) {
+            let reading = said.unwrap_or_default();
+            let (pose, twist, computed) = (&reading.pose, &reading.twist, &got.computed);
+            let port = got.port.map(f64::from);
+            let numbers: [&[f64]; 10] = [
+                &pose.position.to_array(),
+                &wxyz(pose.orientation),
+                &twist.linear.to_array(),
+                &twist.angular.to_array(),
+                &got.wrench.force.to_array(),
+                &got.wrench.torque.to_array(),
+                &computed.limited.force.to_array(),
+                &computed.limited.torque.to_array(),
+                &computed.law.force.to_array(),
+                &port,
+            ];
+            self.vectors.iter_mut().zip(numbers).for_each(|(to, numbers)| to.extend(numbers));
+            self.buttons.push(reading.buttons.0);
+            self.active.push(reading.active);
+            self.limited.push(got.limited);
+        }
+        self.tell(record, tools);
+        let tick = record.tick;
+        for c in record.output.contacts.iter() {
+            let grab = if c.mode == Mode::Grab { 2 } else { 1 };
+            self.contact_state.extend([tick, c.tool.into(), c.body.into(), grab, c.slipping.into(), c.limited.into()]);
+            for vector in [c.point, c.normal, c.force, c.torque, [c.radius, c.depth, c.stiffness]] {
+                self.contact_numbers.extend(vector);
+            }
+        }
+        for (body, said) in record.output.bodies.iter().enumerate() {
+            if let Some((time, energy)) = said {
+                self.bodies.extend([tick as f64, body as f64, *time]);
+                self.bodies.extend(energy_array(energy));
+            }
+        }
+    }
+
+    /// What people want to know of a tick.
+    fn tell(&mut self, record: &TickRecord, tools: usize) {
+        let of_tools = record.output.tools.iter().take(tools).enumerate();
+        let now = of_tools.map(|(tool, said)| said.fault.map(|fault| format!("tool {tool}: {fault}")));
+        let now: Vec<_> = now.chain([record.input.fault.map(|fault| fault.to_string())]).collect();
+        let input = &record.input;
+        let mut tell = |what: String| self.events.push((record.tick, what));
+        if input.reset {
+            tell("reset".into());
+        }
+        if input.strike {
+            tell(format!(
+                "strike of {} N s on body {}",
+                input.settings.strike.impulse.length(),
+                input.settings.strike.body
+            ));
+        }
+        for (rank, fault) in now.iter().enumerate() {
+            if let Some(fault) = fault.as_ref().filter(|_| self.faults.get(rank) != Some(fault)) {
+                tell(fault.clone());
+            }
+        }
+        self.faults = now;
+    }
+}
+
+/// Columns of a recording: what was recorded, numbers of the ticks and of their contacts, and how it ended.
+#[pyfunction]
+pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDict>> {
+    let mut ticks = open(source).map_err(|e| to_python(py, e))?;
+    let tools = ticks.about.get("tools").and_then(|tools| tools.parse().ok()).unwrap_or(1);
+    let mut columns = Columns::default();
+    loop {
+        let pushed = py.detach(|| -> Result<usize> {
+            let mut pushed = 0;
+            for record in ticks.by_ref().take(INTERRUPT_TICKS) {
+                columns.push(&record?, tools);
+                pushed += 1;
+            }
+            Ok(pushed)
+        });
+        py.check_signals()?;
+        if pushed.map_err(|e| to_python(py, e))? < INTERRUPT_TICKS {
+            break;
+        }
+    }
+    let answer = PyDict::new(py);
+    answer.set_item("about", &ticks.about)?;
+    answer.set_item("dropped", ticks.ending.map(|ending| ending.dropped))?;
+    answer.set_item("number", columns.number.into_pyarray(py))?;
+    answer.set_item("due_ns", columns.due_ns.into_pyarray(py))?;
+    for (name, numbers) in VECTORS.into_iter().zip(columns.vectors) {
+        answer.set_item(name, numbers.into_pyarray(py))?;
+    }
+    answer.set_item("buttons", columns.buttons.into_pyarray(py))?;
+    answer.set_item("active", columns.active.into_pyarray(py))?;
+    answer.set_item("limited", columns.limited.into_pyarray(py))?;
+    answer.set_item("delay_us", columns.delay_us.into_pyarray(py))?;
+    answer.set_item("compute_us", columns.compute_us.into_pyarray(py))?;
+    answer.set_item("events", columns.events)?;
+    answer.set_item("contact_state", columns.contact_state.into_pyarray(py))?;
+    answer.set_item("contact_numbers", columns.contact_numbers.into_pyarray(py))?;
+    answer.set_item("bodies", columns.bodies.into_pyarray(py))?;
+    Ok(answer)
+}
+
+/// Tick, whose, quantity, numbers recorded and now.
+type DifferenceRecord = (u64, String, &'static str, Vec<f64>, Vec<f64>);
+
+/// A recording made again, tick by tick.
+#[pyclass(module = "palpate._native")]
+pub struct Replay {
+    parts: Mutex<(AnyTicks, palpate_servo::Replay)>,
+    model: std::sync::Arc<palpate_core::simulation::Model>,
+    tools: usize,
+}
+
+#[pymethods]
+impl Replay {
+    /// Of a recording, with the simulation that it was made with.
+    #[new]
+    fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> PyResult<Self> {
+        let ticks = open(source).map_err(|e| to_python(py, e))?;
+        let tools = core.model.tools.len();
+        let devices = vec![DeviceLimits::UNLIMITED; tools];
+        let (limits, settings, strain) = (core.limits, core.settings, core.strain.clone());
+        let replay = palpate_servo::Replay::new(&core.model, &devices, limits, settings, strain);
+        let replay = replay.map_err(|e| to_python(py, e))?;
+        Ok(Self { parts: Mutex::new((ticks, replay)), model: core.model.clone(), tools })
+    }
+
+    /// Makes up to so many ticks again: how many there were, and what is not as recorded.
+    fn step(&self, py: Python<'_>, count: usize) -> PyResult<(usize, Vec<DifferenceRecord>)> {
+        let (mut made, mut differences) = (0, Vec::new());
+        while made < count {
+            let ticks = INTERRUPT_TICKS.min(count - made);
+            let now = py.detach(|| -> Result<usize> {
+                let mut parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                let (recorded, replay) = &mut *parts;
+                let mut now = 0;
+                for record in recorded.take(ticks) {
+                    differences.extend(replay.tick(&record?)?);
+                    now += 1;
+                }
+                Ok(now)
+            });
+            py.check_signals()?;
+            let now = now.map_err(|e| to_python(py, e))?;
+            made += now;
+            if now < ticks {
+                break;
+            }
+        }
+        let owner = |of| match of {
+            Owner::Scene => String::new(),
+            Owner::Tool(tool) => format!("tool {tool}"),
+            Owner::Body(body) => format!("body {body}"),
+        };
+        let record = |d: palpate_servo::Difference| (d.tick, owner(d.of), d.quantity, d.recorded, d.replayed);
+        Ok((made, differences.into_iter().map(record).collect()))
+    }
+
+    /// The latest tick made again, as a dictionary.
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let published = {
+            let mut parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            parts.1.latest().clone()
+        };
+        frame(py, &self.model, self.tools, published)
+    }
+}

@@ -1,0 +1,184 @@
+//! How a recording begins and ends within a running loop.
+//!
+//! A recording can be made again bit for bit if it begins from a known state: at rest, nothing touched, at the start of the
+//! safety ramp. That state is made beside the loop, handed in through a ring, and exchanged for the loop's own within one
+//! tick; what it replaces goes back through another ring, for memory must not be freed in a tick. The same way the ring of
+//! records comes in and goes out.
+
+use palpate_core::simulation::{Model, State};
+use palpate_core::{Error, Result};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::record::{RecordedContacts, RecordedInput, RecordedTool, TickRecord, recorded_bodies};
+use crate::safety::{FaultReason, SafetyStage};
+
+/// Ticks that a recorder may be behind: four seconds at 1 kHz, about 20 MB.
+const RECORDS: usize = 4096;
+/// Exchanges that may be under way.
+const EXCHANGES: usize = 2;
+
+/// What a recording begins with.
+pub(crate) struct Beginning {
+    pub state: State,
+    pub stages: Vec<SafetyStage>,
+    pub records: Option<Producer<TickRecord>>,
+}
+
+/// What comes in, and goes back.
+pub(crate) enum Exchange {
+    Begin(Box<Beginning>),
+    End,
+    /// On its way to where its memory may be freed.
+    Ended(#[expect(dead_code)] Producer<TickRecord>),
+}
+
+/// The loop's end.
+pub(crate) struct RecorderEnd {
+    incoming: Consumer<Exchange>,
+    outgoing: Producer<Exchange>,
+    records: Option<Producer<TickRecord>>,
+    /// The record of the tick under way.
+    record: TickRecord,
+    /// Number of the tick under way, and of the first one recorded.
+    number: u64,
+    first: u64,
+    progress: RecordingProgress,
+}
+
+/// How far a recording has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RecordingProgress {
+    /// Whether ticks are being recorded.
+    pub records: bool,
+    /// Ticks since it began.
+    pub ticks: u64,
+    /// Those of them that found no room, for the recorder was too far behind.
+    pub dropped: u64,
+}
+
+/// Everybody else's end.
+pub(crate) struct RecorderHandle {
+    incoming: Producer<Exchange>,
+    outgoing: Consumer<Exchange>,
+    /// As at the start of a loop.
+    stages: Vec<SafetyStage>,
+    begun: bool,
+}
+
+/// Both ends.
+pub(crate) fn recorder_ends(stages: &[SafetyStage]) -> (RecorderEnd, RecorderHandle) {
+    let (incoming_in, incoming_out) = RingBuffer::new(EXCHANGES);
+    let (outgoing_in, outgoing_out) = RingBuffer::new(EXCHANGES);
+    let end = RecorderEnd {
+        incoming: incoming_out,
+        outgoing: outgoing_in,
+        records: None,
+        record: TickRecord::empty(),
+        number: 0,
+        first: 0,
+        progress: RecordingProgress::default(),
+    };
+    (end, RecorderHandle { incoming: incoming_in, outgoing: outgoing_out, stages: stages.to_vec(), begun: false })
+}
+
+impl RecorderHandle {
+    /// Has the loop begin anew and push a record of each tick into the ring whose other end this is.
+    pub fn begin(&mut self, model: &Model) -> Result<Consumer<TickRecord>> {
+        if std::mem::replace(&mut self.begun, true) {
+            return Err(Error::Invalid("the loop is being recorded already".into()));
+        }
+        while self.outgoing.pop().is_ok() {}
+        let (producer, consumer) = RingBuffer::new(RECORDS);
+        let beginning = Beginning { state: State::new(model), stages: self.stages.clone(), records: Some(producer) };
+        match self.incoming.push(Exchange::Begin(Box::new(beginning))) {
+            Ok(()) => Ok(consumer),
+            Err(_) => {
+                self.begun = false;
+                Err(Error::Invalid("the loop has not yet ended the last recording: try again".into()))
+            }
+        }
+    }
+
+    /// Has the loop stop recording.
+    pub fn end(&mut self) {
+        if std::mem::replace(&mut self.begun, false) {
+            while self.outgoing.pop().is_ok() {}
+            let _ = self.incoming.push(Exchange::End);
+        }
+    }
+}
+
+impl RecorderEnd {
+    /// Begins or ends recording if that was asked for; whether it began, with a new state. A fault stays. Never allocates or
+    /// frees.
+    pub fn exchange(&mut self, state: &mut State, stages: &mut Vec<SafetyStage>) -> bool {
+        let mut began = false;
+        // What comes out must find room, or it would be freed here.
+        while self.outgoing.slots() > 0 {
+            match self.incoming.pop() {
+                Ok(Exchange::Begin(mut beginning)) => {
+                    for (new, old) in beginning.stages.iter_mut().zip(&*stages) {
+                        old.fault().into_iter().for_each(|fault| new.latch(fault));
+                    }
+                    std::mem::swap(state, &mut beginning.state);
+                    std::mem::swap(stages, &mut beginning.stages);
+                    std::mem::swap(&mut self.records, &mut beginning.records);
+                    let _ = self.outgoing.push(Exchange::Begin(beginning));
+                    self.progress = RecordingProgress { records: true, ..RecordingProgress::default() };
+                    (self.first, began) = (self.number, true);
+                }
+                Ok(Exchange::End) => {
+                    self.progress.records = false;
+                    if let Some(records) = self.records.take() {
+                        let _ = self.outgoing.push(Exchange::Ended(records));
+                    }
+                }
+                Ok(Exchange::Ended(_)) | Err(_) => break,
+            }
+        }
+        began
+    }
+
+    /// How far the recording has come.
+    pub fn progress(&self) -> RecordingProgress {
+        self.progress
+    }
+
+    /// The number of the tick under way, since the loop was made.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// A tick begins that is due at a time, ns, after a period, s.
+    pub fn begin_tick(&mut self, (due_ns, period): (u64, f64), fault: Option<FaultReason>, stages: &[SafetyStage]) {
+        let input = &mut self.record.input;
+        (input.due_ns, input.period, input.fault) = (due_ns, period, fault);
+        for (to, stage) in input.tool_faults.iter_mut().zip(stages) {
+            *to = stage.fault();
+        }
+    }
+
+    /// What came into the tick.
+    pub fn input(&mut self) -> &mut RecordedInput {
+        &mut self.record.input
+    }
+
+    /// What came out for one tool.
+    pub fn tool(&mut self, tool: usize) -> &mut RecordedTool {
+        &mut self.record.output.tools[tool]
+    }
+
+    /// The tick is over, and took a time, ns, after a delay: pushes its record.
+    pub fn end_tick(&mut self, model: &Model, state: &State, delay_ns: u64, took_ns: u64) {
+        if let Some(records) = &mut self.records {
+            self.record.tick = self.number - self.first;
+            self.record.input.strain.count_from(self.first);
+            self.record.output.contacts = RecordedContacts::of(model, &state.contacts);
+            self.record.output.bodies = recorded_bodies(state);
+            (self.record.delay_ns, self.record.took_ns) = (delay_ns, took_ns);
+            self.progress.ticks += 1;
+            self.progress.dropped += u64::from(records.push(self.record).is_err());
+        }
+        self.number += 1;
+    }
+}

@@ -1,0 +1,240 @@
+//! Recorded ticks made again, and what differs.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::sync::Arc;
+
+use palpate_core::Result;
+use palpate_core::dynamics::Energy;
+use palpate_core::simulation::{Model, Wrench};
+use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading};
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::force_loop::ForceLoop;
+use crate::handoff::{LoopHandle, Published};
+use crate::preparer::StrainPreparer;
+use crate::record::{RecordedContact, RecordedInput, RecordedOutput, RecordedTool, StrainAsked, TickRecord};
+use crate::safety::SafetyLimits;
+use crate::settings::Settings;
+use crate::strain::{PreparerEnd, StrainRequest};
+
+/// A quantity that came out otherwise than recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The tick.
+    pub tick: u64,
+    /// The tool or body, if it is of one.
+    pub of: Owner,
+    /// What it is.
+    pub quantity: &'static str,
+    /// Its numbers, as recorded.
+    pub recorded: Vec<f64>,
+    /// Its numbers now.
+    pub replayed: Vec<f64>,
+}
+
+/// Whose a quantity is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// Of the whole scene.
+    Scene,
+    /// Of a tool.
+    Tool(usize),
+    /// Of a body.
+    Body(usize),
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = match self.of {
+            Owner::Scene => String::new(),
+            Owner::Tool(tool) => format!("tool {tool}: "),
+            Owner::Body(body) => format!("body {body}: "),
+        };
+        let (tick, quantity) = (self.tick, self.quantity);
+        write!(f, "tick {tick}: {of}{quantity} was {:?}, is {:?}", self.recorded, self.replayed)
+    }
+}
+
+/// A loop that makes recorded ticks again, in order from the first.
+pub struct Replay {
+    force_loop: ForceLoop,
+    handle: LoopHandle,
+    readings: Vec<Producer<Result<Reading, DeviceFault>>>,
+    records: Consumer<TickRecord>,
+    strain: StrainPreparer,
+    end: PreparerEnd,
+    requests: VecDeque<StrainRequest>,
+    settings: Settings,
+    tools: usize,
+}
+
+impl Replay {
+    /// With what the loop of the recording was made of.
+    ///
+    /// # Errors
+    /// See [`ForceLoop::new`].
+    pub fn new(
+        model: &Arc<Model>,
+        devices: &[DeviceLimits],
+        limits: SafetyLimits,
+        settings: Settings,
+        strain: StrainPreparer,
+    ) -> Result<Self> {
+        let settings = Settings { resets: 0, strikes: 0, ..settings };
+        let (mut readings, mut replayed) = (Vec::new(), Vec::new());
+        for &limits in devices {
+            let (producer, consumer) = RingBuffer::new(1);
+            readings.push(producer);
+            replayed.push(Box::new(Replayed { readings: consumer, limits }) as Box<dyn Device>);
+        }
+        let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), replayed, limits, settings, || 0)?;
+        force_loop.limit_strain_of(strain.known());
+        let (records, end) = (handle.begin_recording()?, handle.take_strain()?);
+        let tools = model.tools.len();
+        Ok(Self { force_loop, handle, readings, records, strain, end, requests: VecDeque::new(), settings, tools })
+    }
+
+    /// Makes a tick again, and says what is not as recorded: nothing, if every bit is.
+    ///
+    /// # Errors
+    /// Settings that the model refuses.
+    pub fn tick(&mut self, recorded: &TickRecord) -> Result<Vec<Difference>> {
+        let replayed = self.tick_again(&recorded.input)?;
+        let Some(replayed) = replayed else { return Ok(Vec::new()) };
+        let mut differences = Differences { tick: recorded.tick, of: Owner::Scene, found: Vec::new() };
+        differences.compare(&recorded.output, &replayed.output, self.tools);
+        Ok(differences.found)
+    }
+
+    /// The latest tick.
+    pub fn latest(&mut self) -> &Published {
+        self.handle.latest()
+    }
+
+    fn tick_again(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {
+        let resets = self.settings.resets.wrapping_add(u32::from(input.reset));
+        let strikes = self.settings.strikes.wrapping_add(u32::from(input.strike));
+        self.settings = Settings { resets, strikes, ..input.settings };
+        self.handle.set(self.settings)?;
+        for (readings, said) in self.readings.iter_mut().zip(&input.readings) {
+            let _ = readings.push(*said);
+        }
+        for &asked in input.strain.arrived() {
+            self.hand_over(asked);
+        }
+        self.force_loop.prepare_again(input);
+        self.force_loop.tick(input.due_ns, input.period);
+        while let Ok(request) = self.end.requests.pop() {
+            self.requests.push_back(request);
+        }
+        Ok(self.records.pop().ok())
+    }
+
+    /// Answers the request that was answered then. Those before it never were, and never will be.
+    fn hand_over(&mut self, asked: StrainAsked) {
+        while self.end.replaced.pop().is_ok() {}
+        let answer = self.requests.iter().find(|request| request.asked == asked);
+        if let Some(answer) = answer.and_then(|request| self.strain.prepare(request)) {
+            self.end.hand_over(answer);
+        }
+        self.requests.retain(|request| request.asked.body != asked.body || request.asked.tick > asked.tick);
+    }
+}
+
+/// A device that says what was recorded.
+struct Replayed {
+    readings: Consumer<Result<Reading, DeviceFault>>,
+    limits: DeviceLimits,
+}
+
+impl Device for Replayed {
+    fn read(&mut self, _now_ns: u64, _period: f64) -> Result<Reading, DeviceFault> {
+        self.readings.pop().unwrap_or(Err(DeviceFault::Disconnected))
+    }
+
+    /// What a device refused then is a fault of the next recorded tick.
+    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceFault> {
+        Ok(())
+    }
+
+    fn limits(&self) -> DeviceLimits {
+        self.limits
+    }
+}
+
+/// Compares bit by bit.
+struct Differences {
+    tick: u64,
+    of: Owner,
+    found: Vec<Difference>,
+}
+
+impl Differences {
+    fn compare(&mut self, recorded: &RecordedOutput, replayed: &RecordedOutput, tools: usize) {
+        for (tool, (was, is)) in recorded.tools.iter().zip(&replayed.tools).enumerate().take(tools) {
+            self.of = Owner::Tool(tool);
+            self.compare_tool(was, is);
+        }
+        self.of = Owner::Scene;
+        let (was, is) = (recorded.contacts.iter(), replayed.contacts.iter());
+        self.numbers("number of contacts", &[was.len() as f64], &[is.len() as f64]);
+        for (was, is) in was.zip(is) {
+            self.of = Owner::Tool(was.tool.into());
+            self.compare_contact(was, is);
+        }
+        for (body, (was, is)) in recorded.bodies.iter().zip(&replayed.bodies).enumerate() {
+            self.of = Owner::Body(body);
+            let numbers = |energies: &Option<(f64, Energy)>| match energies {
+                Some((time, e)) => vec![*time, e.kinetic, e.strain, e.coupling, e.dissipated, e.work],
+                None => Vec::new(),
+            };
+            self.numbers("time and energies", &numbers(was), &numbers(is));
+        }
+    }
+
+    fn compare_tool(&mut self, was: &RecordedTool, is: &RecordedTool) {
+        let of = |wrench: &Wrench| (wrench.force.to_array(), wrench.torque.to_array());
+        for (names, was, is) in [
+            (["force of the contact law", "torque of the contact law"], &was.computed.law, &is.computed.law),
+            (["computed force", "computed torque"], &was.computed.limited, &is.computed.limited),
+            (["force on the device", "torque on the device"], &was.wrench, &is.wrench),
+        ] {
+            let ((force_was, torque_was), (force_is, torque_is)) = (of(was), of(is));
+            self.numbers(names[0], &force_was, &force_is);
+            self.numbers(names[1], &torque_was, &torque_is);
+        }
+        self.numbers("energy at the port", &was.port.map(f64::from), &is.port.map(f64::from));
+        self.numbers("limit of strain", &[f64::from(was.limited)], &[f64::from(is.limited)]);
+        self.numbers("fault", &[f64::from(was.fault.is_some())], &[f64::from(is.fault.is_some())]);
+    }
+
+    fn compare_contact(&mut self, was: &RecordedContact, is: &RecordedContact) {
+        let state = |c: &RecordedContact| {
+            [c.tool.into(), c.body.into(), f64::from(c.mode as u8), c.slipping.into(), c.limited.into()]
+        };
+        self.numbers("state of a contact", &state(was), &state(is));
+        let vector = |v: [f32; 3]| v.map(f64::from);
+        for (name, was, is) in [
+            ("contact point", was.point, is.point),
+            ("contact normal", was.normal, is.normal),
+            ("contact force", was.force, is.force),
+            ("contact torque", was.torque, is.torque),
+            (
+                "contact radius, depth and stiffness",
+                [was.radius, was.depth, was.stiffness],
+                [is.radius, is.depth, is.stiffness],
+            ),
+        ] {
+            self.numbers(name, &vector(was), &vector(is));
+        }
+    }
+
+    fn numbers(&mut self, quantity: &'static str, was: &[f64], is: &[f64]) {
+        let bits = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect::<Vec<_>>();
+        if bits(was) != bits(is) {
+            let (recorded, replayed) = (was.to_vec(), is.to_vec());
+            self.found.push(Difference { tick: self.tick, of: self.of, quantity, recorded, replayed });
+        }
+    }
+}

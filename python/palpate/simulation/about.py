@@ -1,0 +1,84 @@
+"""What a recording says of itself: enough to build the same simulation again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from palpate import _native
+from palpate.errors import SceneError
+from palpate.scene import BuiltBody, BuiltScene, Scene
+from palpate.scene.tables import SceneTables
+
+# Raised when what is recorded, or what follows from it, changes.
+FORMAT = 1
+
+
+def about(scene: SceneTables, bodies: Sequence[BuiltBody], shown: tuple[int, bool], clock: bool) -> dict[str, str]:
+    """Tables of the scene, where its paths start, and keys of what was computed for its bodies.
+
+    ``shown`` is the number of tools of which a recording speaks, and whether it speaks of one without an axis of tools.
+    """
+    keys = [[body.green.key, None if body.motion is None else body.motion.basis.key] for body in bodies]
+    return {
+        "format": str(FORMAT),
+        "version": _native.__version__,
+        "scene": scene.model_dump_json(by_alias=True, exclude_unset=True),
+        "name": scene.name,
+        "folder": str(scene.folder.absolute()),
+        "bodies": json.dumps([body.name for body in bodies]),
+        "keys": json.dumps(keys),
+        "rate": repr(scene.device.rate),
+        "tools": str(len(scene.tools)),
+        "shown": json.dumps(shown),
+        "clock": str(int(clock)),
+    }
+
+
+def scene_of(about: dict[str, str]) -> Scene:
+    """Scene of a recording.
+
+    Raises
+    ------
+    SceneError
+        One of a later version of Palpate.
+
+    """
+    if int(about["format"]) > FORMAT:
+        raise SceneError(f"the recording was made by Palpate {about['version']}, which is newer: update this one")
+    scene = Scene(**json.loads(about["scene"]))
+    scene.start_paths_in(Path(about["folder"]))
+    return scene
+
+
+def require_same(about: dict[str, str], built: BuiltScene) -> None:
+    """Refuse bodies that are not those of the recording.
+
+    Raises
+    ------
+    SceneError
+        The first body that differs, or another number of bodies or tools.
+
+    """
+    keys, names = json.loads(about["keys"]), json.loads(about["bodies"])
+    counts = (len(keys), int(about["tools"]))
+    given = (len(built.bodies), len(built.scene.tools))
+    if counts != given:
+        raise SceneError(
+            f"the recording has {counts[0]} bodies and {counts[1]} tools, the scene {given[0]} and {given[1]}"
+        )
+    for (green, basis), name, body in zip(keys, names, built.bodies, strict=True):
+        now = None if body.motion is None else body.motion.basis.key
+        if green != body.green.key or basis != now:
+            what = "mesh, material, supports or precision" if green != body.green.key else "modes"
+            raise SceneError(
+                f"'{name}' is not the body that was recorded: its {what} differ (made by Palpate {about['version']}); "
+                f"give the scene as it was then"
+            )
+
+
+def shown_of(about: dict[str, str]) -> tuple[int, bool]:
+    """Tell the number of tools of which a recording speaks, and whether it speaks of one without an axis of tools."""
+    given, single = json.loads(about["shown"])
+    return given, single

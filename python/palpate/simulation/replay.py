@@ -1,0 +1,133 @@
+"""Recordings made again, tick by tick, and what differs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from palpate import _native
+from palpate.progress import progress_reporter
+from palpate.scene import BuiltScene, Scene
+from palpate.simulation.about import require_same, scene_of
+from palpate.simulation.recording import Recording
+from palpate.simulation.simulation import Simulation
+
+# Ticks between two reports of progress.
+STEP = 1000
+# Differences that are kept: the first is the one to look at.
+MOST_DIFFERENCES = 100
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A quantity that came out otherwise than recorded.
+
+    Attributes
+    ----------
+    tick
+        Since the recording began.
+    of
+        ``"tool 0"``, ``"body 1"``; empty for what is of the whole scene.
+    quantity
+        What it is.
+    recorded, replayed
+        Its numbers then and now.
+
+    """
+
+    tick: int
+    of: str
+    quantity: str
+    recorded: tuple[float, ...]
+    replayed: tuple[float, ...]
+
+    def __str__(self) -> str:
+        of = f"{self.of}: " if self.of else ""
+        numbers = [" ".join(f"{number:.17g}" for number in row) or "none" for row in (self.recorded, self.replayed)]
+        return f"tick {self.tick}: {of}{self.quantity} was {numbers[0]}, is {numbers[1]}"
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A recording made again.
+
+    Attributes
+    ----------
+    ticks
+        How many were made.
+    differences
+        The first of them, in the order of ticks; none if every bit is the same.
+    whole
+        Whether the recording is: none were dropped, and its file was not cut short.
+
+    """
+
+    ticks: int
+    differences: tuple[Difference, ...]
+    whole: bool
+
+    @property
+    def same(self) -> bool:
+        """Whether every bit is."""
+        return not self.differences
+
+
+def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:
+    """Build the simulation that made a recording, or that of a scene which should give the same.
+
+    Raises
+    ------
+    Error
+        Bodies that cannot be built, or are not those of the recording.
+
+    """
+    given = scene_of(dict(recording.about)) if scene is None else scene
+    built = given if isinstance(given, BuiltScene) else given.build()
+    require_same(dict(recording.about), built)
+    simulation = Simulation(built)
+    simulation._arm_strain_limit()
+    return simulation
+
+
+def replay(
+    recording: Recording | str | os.PathLike[str],
+    scene: Scene | BuiltScene | None = None,
+    progress: bool | Callable[[int, int], None] = False,
+) -> Replayed:
+    """Make a recording again and compare every bit of every tick.
+
+    Parameters
+    ----------
+    recording
+        The recording, or its file.
+    scene
+        The scene that should give the same; None takes that of the recording.
+    progress
+        Shown, or told of done and expected ticks.
+
+    Raises
+    ------
+    Error
+        A file that is no recording, or bodies that are not those of the recording.
+
+    """
+    recorded = recording if isinstance(recording, Recording) else Recording.load(Path(recording))
+    again = _native.Replay(simulation_of(recorded, scene)._core, recorded.source)
+    # Behind the first tick that was dropped nothing can be the same.
+    missing = [rank for rank, number in enumerate(recorded.ticks.tolist()) if rank != number]
+    expected = missing[0] if missing else len(recorded.ticks)
+    differences: list[Difference] = []
+    done = 0
+    with progress_reporter("replaying", progress) as report:
+        while done < expected:
+            made, found = again.step(min(STEP, expected - done))
+            room = MOST_DIFFERENCES - len(differences)
+            differences += [Difference(*of[:3], *map(tuple, of[3:])) for of in found[:room]]
+            done += made
+            if made == 0:
+                break
+            if report is not None:
+                report(done, expected)
+    return Replayed(done, tuple(differences), not missing and recorded.dropped == 0)
