@@ -11,7 +11,6 @@ import numpy as np
 
 from palpate.body import Material
 from palpate.palpation import Nodule, StiffnessMap, compare, stiffness_map
-from palpate.palpation.press import value_and_slope
 from palpate.scene import BuiltScene, Scene
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact.hidden_ball import HiddenBall
@@ -24,15 +23,16 @@ SOFT, MODULUS, BALL, BELOW, TOOL = Material(5e3, 0.45), 40e3, 0.005, 0.01, 0.005
 # Where the map is measured, from the middle of the top, m: 25 points, of which six are no mirror images of others.
 OFFSETS = 0.01 * np.arange(-2, 3)
 DEPTHS = (1.5e-3, 3e-3)
-# Direct forces at these parts of the depth tell its slope, by a parabola.
-PARTS = np.array([0.85, 1.0, 1.15])
+# Direct forces at these parts of the depth tell its slope.
+PARTS = np.linspace(0.7, 1.3, 7)
 # The one over the nodule.
 OVER = 12
 # Nodules that are looked for: place on the top, depth of the middle, radius, m; and the grid, m.
 HIDDEN = (((0.04, 0.04), 0.010, 0.005), ((0.033, 0.046), 0.010, 0.005), ((0.052, 0.029), 0.014, 0.007))
 GRID = 0.01
 # Largest error of the map; so far from the truth a coordinate of a place may be, m: 2 mm both together.
-TOLERANCE, PLACE = 0.02, 1.4e-3
+# A slope is less well known on both sides: the direct forces are rough by 0.4 %, as a contact grows over its elements.
+TOLERANCE, SLOPE_TOLERANCE, PLACE = 0.02, 0.04, 1.4e-3
 
 
 def palpation() -> Outcome:
@@ -44,15 +44,15 @@ def palpation() -> Outcome:
         built = slab(Path(folder), (SIZE, SIZE), BELOW, BALL, _line()).build(progress=False)
         for depth, truths in zip(DEPTHS, direct.swapaxes(0, 1), strict=True):
             found = map_at_points(built, depth)
-            for name, computed, truth in (
-                ("F/d", found.secant_stiffness, truths[:, 0] / depth),
-                ("dF/dd", found.stiffness, truths[:, 1]),
+            for name, computed, truth, tolerance in (
+                ("F/d", found.secant_stiffness, truths[:, 0] / depth, TOLERANCE),
+                ("dF/dd", found.stiffness, truths[:, 1], SLOPE_TOLERANCE),
             ):
                 off, what = np.abs(computed / truth - 1), f"{name}, {1e3 * depth:g} mm deep"
                 nodule = (float(computed[OVER]), float(truth[OVER]))
                 checks += [
-                    Check(f"{what}: over the nodule", *nodule, source, TOLERANCE, "N/m"),
-                    Check(f"{what}: largest error, 25 points", float(off.max()), 0.0, source, TOLERANCE),
+                    Check(f"{what}: over the nodule", *nodule, source, tolerance, "N/m"),
+                    Check(f"{what}: largest error, 25 points", float(off.max()), 0.0, source, tolerance),
                 ]
     return Outcome(checks + [check for hidden in HIDDEN for check in _found(*hidden)])
 
@@ -75,7 +75,16 @@ def direct_presses(x: float, y: float) -> np.ndarray:
     ball = HiddenBall(BELOW, BALL, (x, y), SIZE)
     (forces,) = ball.pressed(TOOL, depths.ravel().tolist(), SOFT, [MODULUS])
     pairs = zip(depths, forces.reshape(depths.shape), DEPTHS, strict=True)
-    return np.array([value_and_slope(deep, force, depth) for deep, force, depth in pairs])
+    return np.array([smooth_at(deep, force, depth) for deep, force, depth in pairs])
+
+
+def smooth_at(depths: np.ndarray, forces: np.ndarray, at: float) -> tuple[float, float]:
+    """Force, N, and slope, N/m, at a depth, from direct forces (n,) around it.
+
+    Hertz's power is taken out, `F = g(d) d^(3/2)`, and a parabola fitted to `g`, which the growing contact makes rough.
+    """
+    _, first, value = np.polyfit(depths / at - 1, forces / depths**1.5, 2)
+    return value * at**1.5, (1.5 * value + first) * at**0.5
 
 
 def slab(
