@@ -1,6 +1,16 @@
 """The command line."""
 
-from palpate.cli import benchmarks, caching, doctor, envelope, palpating, running, verification  # noqa: F401  they register their commands
+from palpate.cli import (  # noqa: F401  they register their commands
+    benchmarks,
+    caching,
+    doctor,
+    envelope,
+    recordings,
+    palpating,
+    running,
+    session_bench,
+    verification,
+)
 from palpate.cli.app import main
 
 __all__ = ["main"]

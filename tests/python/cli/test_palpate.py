@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 
 import pytest
-from command_line import refused, run
+from command_line import run
 from palpated import TOP, block_body
 
 import palpate
+from palpate.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -44,14 +45,37 @@ def test_a_grid_is_pressed_and_written(folder):
         (("--grid", "10mm", "--depth", "1mm", "--against", "no.toml"), ("no.toml: no such file",)),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_one_line(folder, words, told):
-    refused(run("palpate", "block.palpate", *words, "--out", "refused", cwd=folder), *told)
+def test_what_makes_no_sense_is_refused_in_one_line(folder, words, told, monkeypatch, capsys):
+    complaint(["palpate", "block.palpate", *words, "--out", "refused"], told, folder, monkeypatch, capsys)
     assert not (folder / "refused").exists()
 
 
-def test_what_is_not_there_is_refused(folder):
-    asked = ("--grid", "10mm", "--depth", "1mm")
-    refused(run("palpate", "no.stl", *asked, cwd=folder), "no.stl: no such file")
-    refused(run("palpate", "lung", *asked, cwd=folder), "lung: no such file", "models are doll, kidney, liver, beam")
-    refused(run("palpate", "liver", *asked, "--unit", "mm", cwd=folder), "--unit is not for this file")
-    refused(run("run", "block.palpate", "--map", "no.vtu", cwd=folder), "no.vtu: no such file")
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("palpate", "no.stl"), ("no.stl: no such file",)),
+        (("palpate", "lung"), ("lung: no such file", "models are doll, kidney, liver, beam")),
+        (("palpate", "liver", "--unit", "mm"), ("--unit is not for this file",)),
+    ],
+)
+def test_what_is_not_there_is_refused(folder, words, told, monkeypatch, capsys):
+    complaint([*words, "--grid", "10mm", "--depth", "1mm"], told, folder, monkeypatch, capsys)
+
+
+def test_a_map_that_is_none_is_refused(folder, monkeypatch, capsys):
+    complaint(["run", "block.palpate", "--map", "no.vtu"], ("no.vtu: no such file",), folder, monkeypatch, capsys)
+    (folder / "text.vtu").write_text("no mesh")
+    told = ("text.vtu: not a map that can be read",)
+    complaint(["run", "block.palpate", "--map", "text.vtu"], told, folder, monkeypatch, capsys)
+
+
+def complaint(words, told, folder, monkeypatch, capsys) -> None:
+    """The command ends with code 2 and one line; in this process, for it is quick to refuse."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.argv", ["palpate", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert stop.value.code == 2 and len(lines) == 1, lines
+    for word in told:
+        assert word in lines[0], lines[0]
