@@ -28,6 +28,7 @@ from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.pages import headers, host_is_ours, load_pages
 from palpate.viewer.session import Session, Wants, choices
+from palpate.viewer.surface_map import SurfaceMap
 
 DEFAULT_PORT = 8642
 FRAME_RATE = 60.0
@@ -78,6 +79,8 @@ class ViewerServer:
         Scene of a model.
     record
         New file in which what is shown first is recorded.
+    maps
+        What a palpation has left of each body.
 
     Raises
     ------
@@ -95,11 +98,12 @@ class ViewerServer:
         models: Sequence[str] = (),
         scene_of: Callable[[str], Scene] | None = None,
         record: Path | None = None,
+        maps: Sequence[SurfaceMap | None] | None = None,
     ):
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
-        self._session = Session(built)
+        self._session = Session(built, maps=maps)
         if record is not None:
             self._session.simulation.record(record)
         self._session.start()
@@ -329,7 +333,7 @@ class ViewerServer:
         built = await self._worker.call(before.reshaped, message)
         if built is None:
             return
-        make = lambda: Session(built, before.own_tools)  # noqa: E731
+        make = lambda: Session(built, before.own_tools, before.maps)  # noqa: E731
         building = self._begin_building()
         self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
 
