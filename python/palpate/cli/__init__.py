@@ -6,7 +6,10 @@ from palpate.cli import (  # noqa: F401  they register their commands
     doctor,
     envelope,
     examining,
+    palpating,
+    recordings,
     running,
+    session_bench,
     verification,
 )
 from palpate.cli.app import main

@@ -20,7 +20,10 @@ from palpate.viewer.session import Session, Wants
 from palpate.viewer.tool_shapes import by_tool, outline
 
 # The only field, always zero.
-NOTHING = {"name": "displacement", "title": "Displacement", "unit": "mm", "signed": False, "max": 1.0, "largest": 0.0}
+NOTHING = {
+    **{"name": "displacement", "title": "Displacement", "unit": "mm", "signed": False},
+    **{"gaps": False, "min": 0.0, "max": 1.0, "largest": 0.0},
+}
 # What a page is not told of a tool.
 SILENT = {"limited": False, "wanted": None, "force": [0.0, 0.0, 0.0], "refused": None}
 # Messages of a client that this session takes; settings would change what is felt.

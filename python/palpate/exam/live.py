@@ -14,6 +14,7 @@ from palpate.exam.hidden_session import HiddenSession
 from palpate.exam.plot import plot_exam
 from palpate.exam.record import Record
 from palpate.exam.result import Result
+from palpate.scene import BuiltScene
 from palpate.viewer.background import LongWork
 from palpate.viewer.server import Client, ViewerServer
 
@@ -51,14 +52,16 @@ class ExamServer(ViewerServer):
     def __init__(self, course: Course, folder: Path, *, host: str, port: int):
         trial = course.trial
         assert trial is not None, "the exam is over"
-        loud_force = LOUDEST * float(course.library.plain_forces.max())
-        self.session_type = lambda built: HiddenSession(built, loud_force)
+        self._loud_force = LOUDEST * float(course.library.plain_forces.max())
         super().__init__(course.library.built(trial.nodule), host=host, port=port)
         self._course, self._folder, self._record = course, folder, Record(folder / "exam.csv")
         self._shown = trial.number
         # When the trial could first be answered; None until somebody is there.
         self._began: float | None = None
         self.result: Result | None = None
+
+    def _make_session(self, built: BuiltScene) -> HiddenSession:
+        return HiddenSession(built, self._loud_force)
 
     async def _greet(self, client: Client) -> None:
         await super()._greet(client)
@@ -109,7 +112,7 @@ class ExamServer(ViewerServer):
         if trial is None:
             await self._conclude(building)
         else:
-            make = lambda: self.session_type(self._course.library.built(trial.nodule))  # noqa: E731
+            make = lambda: self._make_session(self._course.library.built(trial.nodule))  # noqa: E731
             await self._switch("Next trial", make, self._show_next, building)
         await self._tell_all(self._exam_message())
 
