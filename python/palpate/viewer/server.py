@@ -35,7 +35,7 @@ FRAME_RATE = 60.0
 # Bounds on what a client may send and how many there may be.
 MAX_MESSAGE = 4096
 MAX_RATE = 1500.0
-MAX_CLIENTS = 8
+MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
