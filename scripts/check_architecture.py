@@ -34,8 +34,9 @@ FORBIDDEN = {
 # Folders of the Python package, lowest first: each imports from those before it. The modules at its top come before
 # all of them, the package itself, which exports the public names, where its name stands.
 PYTHON_ORDER = (
-    *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "simulation", "sessions", "palpate"),
-    *("viewer", "validation/plots", "validation/verify", "validation/bench", "validation/doctor", "cli"),
+    *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "simulation", "palpation", "sessions"),
+    *("palpate", "viewer", "validation/plots", "exam", "validation/verify", "validation/bench", "validation/doctor"),
+    "cli",
 )
 
 # What in backquotes can only be a name of code: with `::` or a dot, in CamelCase, or words joined by underscores;

@@ -4,6 +4,7 @@
 import type { ConnectionState } from "./net/connection";
 import type {
   Choice,
+  ExamMessage,
   FrameMessage,
   Role,
   SceneMessage,
@@ -50,6 +51,10 @@ export interface State {
   /** The newest one that is drawn. */
   frame: FrameMessage | null;
   notices: readonly string[];
+  /** null where nothing is examined. */
+  exam: ExamMessage | null;
+  /** Whether an answer is on its way: the next body is not there yet. */
+  answering: boolean;
 
   layers: Readonly<Record<Layer, boolean>>;
   /** The axis across which the body is cut open, and the share of its extent that is taken away. */
@@ -79,6 +84,15 @@ export interface State {
   pinNext: boolean;
 }
 
+/** What is shown in an exam: nothing that an eye could read it from. */
+export const NO_LAYERS: Readonly<Record<Layer, boolean>> = {
+  colors: false,
+  wireframe: false,
+  supports: false,
+  cutaway: false,
+  plots: false,
+};
+
 export function initialState(): State {
   return {
     connection: "connecting",
@@ -91,6 +105,8 @@ export function initialState(): State {
     settings: null,
     frame: null,
     notices: [],
+    exam: null,
+    answering: false,
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
     cut: { axis: "y", share: CUT_SHARE },
     shownScale: 1,

@@ -23,6 +23,9 @@ def replay(
     scene: Annotated[
         Path | None, typer.Option(help="Scene file that should give the same; default: the scene of the recording.")
     ] = None,
+    headless: Annotated[
+        bool, typer.Option("--headless", help="No viewer: only tell whether every bit is the same.")
+    ] = False,
 ) -> None:
     """Make a recording again, tick by tick, and compare every bit.
 

@@ -16,6 +16,7 @@ from palpate.cli.completion import models, units
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
     from palpate.scene import BuiltScene, Scene
+    from palpate.viewer.surface_map import SurfaceMap
 
 Headless = Annotated[
     float | None, typer.Option(min=0.1, help="No viewer: this many seconds of a scripted press at 1 kHz.")
@@ -96,6 +97,9 @@ def run(
     max_size: MaxSize = None,
     element: ElementChoice = None,
     repair: Repair = False,
+    surface_map: Annotated[
+        Path | None, typer.Option("--map", help="Map of 'palpate palpate' to show: stiffness.vtu or detection.vtu.")
+    ] = None,
     cpus: Cpus = None,
     priority: Priority = None,
     record: Record = None,
@@ -118,6 +122,7 @@ def run(
     Example: palpate run scene.toml --headless 3 --out results
 
     Example: palpate run scene.toml --record press.mcap
+    Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
     """
     from palpate.cli.run_file import RunOptions, built_from
 
@@ -128,7 +133,12 @@ def run(
     if headless is not None:
         _scripted(built, file.stem, headless, out, record)
         return
-    _view(built, host, port, browser, record=record)
+    maps = None
+    if surface_map is not None:
+        from palpate.viewer.surface_map import read_map
+
+        maps = read_map(surface_map, built)
+    _view(built, host, port, browser, record=record, maps=maps)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -146,13 +156,13 @@ def _view(
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
     record: Path | None = None,
+    maps: Sequence[SurfaceMap | None] | None = None,
 ) -> None:
     from palpate.viewer.live import open_viewer
     from palpate.viewer.server import ViewerServer
 
-    open_viewer(
-        ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of, record=record), browser=browser
-    )
+    server = ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of, record=record, maps=maps)
+    open_viewer(server, browser=browser)
 
 
 def _force_line(record: PressRecord, max_force: float) -> str:

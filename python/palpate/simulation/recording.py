@@ -16,6 +16,8 @@ from palpate import _native
 from palpate.atomic import written_beside
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
+from palpate.errors import SceneError
+from palpate.input_file import require_file
 from palpate.simulation.about import shown_of
 
 LOG_DTYPE = np.dtype(
@@ -113,7 +115,9 @@ class Recording(ComparedByValue):
             A file that cannot be read, or is no recording.
 
         """
-        return cls._of(Path(path))
+        source = Path(path)
+        require_file(source, SceneError)
+        return cls._of(source)
 
     @classmethod
     def _of(cls, source: bytes | Path) -> Recording:

@@ -28,13 +28,14 @@ from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.pages import headers, host_is_ours, load_pages
 from palpate.viewer.session import Session, Wants, choices
+from palpate.viewer.surface_map import SurfaceMap
 
 DEFAULT_PORT = 8642
 FRAME_RATE = 60.0
 # Bounds on what a client may send and how many there may be.
 MAX_MESSAGE = 4096
 MAX_RATE = 1500.0
-MAX_CLIENTS = 8
+MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
@@ -78,6 +79,8 @@ class ViewerServer:
         Scene of a model.
     record
         New file in which what is shown first is recorded.
+    maps
+        What a palpation has left of each body.
 
     Raises
     ------
@@ -95,11 +98,13 @@ class ViewerServer:
         models: Sequence[str] = (),
         scene_of: Callable[[str], Scene] | None = None,
         record: Path | None = None,
+        maps: Sequence[SurfaceMap | None] | None = None,
     ):
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
-        self._session = Session(built)
+        self._maps = maps
+        self._session = self._make_session(built)
         if record is not None:
             self._session.simulation.record(record)
         self._session.start()
@@ -120,6 +125,10 @@ class ViewerServer:
         """All that a person may open: a server bound to every address is reached from other machines too."""
         names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
         return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
+
+    def _make_session(self, built: BuiltScene) -> Session:
+        """Session of what is shown first; a derived class may have a kind of its own."""
+        return Session(built, maps=self._maps)
 
     async def start(self) -> None:
         """Listen.
@@ -196,9 +205,7 @@ class ViewerServer:
         try:
             if self._controller is None:
                 self._controller = client
-            role = "control" if self._controller is client else "watch"
-            models = choices(self._models)
-            await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
+            await self._greet(client)
             client.may_send.set()
             sender = asyncio.create_task(self._send_frames(client))
             async for text in connection:
@@ -210,6 +217,12 @@ class ViewerServer:
                 sender.cancel()
             self._clients.remove(client)
             await self._lose_control(client)
+
+    async def _greet(self, client: Client) -> None:
+        """Tell a page what it needs to know before its first scene."""
+        role = "control" if self._controller is client else "watch"
+        models = choices(self._models)
+        await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
 
     async def _welcome(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
@@ -329,7 +342,7 @@ class ViewerServer:
         built = await self._worker.call(before.reshaped, message)
         if built is None:
             return
-        make = lambda: Session(built, before.own_tools)  # noqa: E731
+        make = lambda: Session(built, before.own_tools, before.maps)  # noqa: E731
         building = self._begin_building()
         self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
 

@@ -17,6 +17,7 @@ from palpate.viewer.fields import Fields
 from palpate.viewer.messages import by_body, encode, index, number, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.shown_body import ShownBody, titled
+from palpate.viewer.surface_map import SurfaceMap, maps_or_none
 from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices, with_shape
 
 # The contact radius slider ends at this part of the body's longest side.
@@ -48,14 +49,22 @@ class Session:
         Scene with its Green's function.
     own_tools
         Tools as the scene file has them, where the scene's have been given other shapes since.
+    maps
+        What a palpation has left of each body.
 
     """
 
-    def __init__(self, built: BuiltScene, own_tools: Sequence[ToolTable] | None = None):
+    def __init__(
+        self,
+        built: BuiltScene,
+        own_tools: Sequence[ToolTable] | None = None,
+        maps: Sequence[SurfaceMap | None] | None = None,
+    ):
         self.built = built
         scene = built.scene
         self.own_tools = scene.tools if own_tools is None else own_tools
         self.simulation = Simulation(built)
+        self.maps = maps_or_none(maps, len(built.bodies))
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
         low, high = placed.min(axis=0), placed.max(axis=0)
@@ -79,7 +88,7 @@ class Session:
         built, scene = self.built.bodies[body], self.built.scene
         material = scene.bodies[body].material or scene.material
         ratio = None if built.body is None else material.poissons_ratio
-        return ShownBody(built, Fields(self.simulation, self._extent(body), body), ratio)
+        return ShownBody(built, Fields(self.simulation, self._extent(body), body, self.maps[body]), ratio)
 
     def start(self) -> None:
         """Start the loop."""

@@ -1,10 +1,10 @@
-// Messages of the websocket, version 7. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 8. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
-export const PROTOCOL_VERSION = 7;
+export const PROTOCOL_VERSION = 8;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -159,14 +159,16 @@ export interface ContactMessage {
 }
 
 /**
- * What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa; what is beyond it
- * is at the end. `largest` is the largest magnitude in the frame.
+ * What the colours show. `scalar` goes from min (or from -max if signed) to max, in the unit; what is beyond it is at the
+ * end. With gaps it begins at 1, and 0 stands where nothing is known. `largest` is the largest magnitude in the frame.
  */
 export interface FieldMessage {
   name: string;
   title: string;
-  unit: "mm" | "%" | "Pa";
+  unit: "mm" | "%" | "Pa" | "N/m";
   signed: boolean;
+  gaps: boolean;
+  min: number;
   max: number;
   largest: number;
 }
@@ -206,6 +208,8 @@ export interface FrameMessage {
   /** For each body, what its colours show and whether all of its nodes are sent. */
   fields: FieldMessage[];
   interior: boolean[];
+  /** In an exam, of the tone that stands for the force, from 0 to 1 in proportion to it. */
+  loudness?: number;
 }
 
 /** Of one body; a row of displacements and scalar is a surface node, or any node if the inside is shown. */
@@ -250,11 +254,24 @@ export interface StatusMessage {
   left_s: number | null;
 }
 
+/** Where an exam stands. */
+export interface ExamMessage {
+  type: "exam";
+  /** From 1. */
+  trial: number;
+  trials: number;
+  /** Points of the surface, one of which may be above a nodule, in the frame of the scene; none where they are not told. */
+  places: Vec3[];
+  /** After the last answer: what it comes to in words, and a picture as an address with its content. */
+  result: { lines: string[]; plot: string } | null;
+}
+
 export type TextMessage =
   | { type: "welcome"; role: Role; version: string; models: Choice[] }
   | { type: "role"; role: Role }
   | SettingsMessage
   | StatusMessage
+  | ExamMessage
   | { type: "error"; text: string };
 
 export type ClientMessage =
@@ -275,9 +292,10 @@ export type ClientMessage =
   | { type: "cancel" }
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string; max?: number }
+  | { type: "answer"; found: boolean }
   | { type: "ack"; frame: number };
 
-const TEXT_TYPES = ["welcome", "role", "settings", "status", "error"];
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "exam", "error"];
 const BODY_ARRAYS = {
   nodes: Float32Array,
   tets: Uint32Array,
