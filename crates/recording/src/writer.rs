@@ -20,7 +20,7 @@ const EVENTS: &str = "/events";
 pub(crate) const ABOUT: &str = "palpate";
 pub(crate) const END: &str = "palpate_end";
 /// Poses and wrenches a second in the messages that every viewer of ROS 2 knows; the ticks have all of them.
-const VIEW_RATE: f64 = 100.0;
+const VIEW_RATE: f64 = 50.0;
 /// Little-endian CDR without parameters.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 /// Levels of `rcl_interfaces/Log`.

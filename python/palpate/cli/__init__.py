@@ -1,6 +1,15 @@
 """The command line."""
 
-from palpate.cli import benchmarks, caching, doctor, envelope, running, verification  # noqa: F401  they register their commands
+from palpate.cli import (  # noqa: F401  they register their commands
+    benchmarks,
+    caching,
+    doctor,
+    envelope,
+    recordings,
+    running,
+    session_bench,
+    verification,
+)
 from palpate.cli.app import main
 
 __all__ = ["main"]

@@ -27,6 +27,9 @@ Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether t
 Cpus = Annotated[
     str | None, typer.Option(help="Processors that the loop's thread keeps to, such as 1 or 2,3; default: any.")
 ]
+Record = Annotated[
+    Path | None, typer.Option(help="Record every tick in a new file (.mcap), for 'palpate replay' and Foxglove.")
+]
 Priority = Annotated[
     int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
 ]
@@ -41,6 +44,7 @@ def demo(
     impulse: Annotated[
         bool, typer.Option("--impulse", help="A moving body of hard rubber, struck at its free end with 10 N for 1 ms.")
     ] = False,
+    record: Record = None,
     headless: Headless = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the CSV and PNG of --headless and --impulse.")] = None,
     port: Port = PORT,
@@ -70,9 +74,9 @@ def demo(
         return
     built = _build(scene_of(model))
     if headless is not None:
-        _scripted(built, f"{model}-paper" if paper else model, headless, out or Path())
+        _scripted(built, f"{model}-paper" if paper else model, headless, out or Path(), record)
         return
-    _view(built, host, port, browser, NAMES, scene_of)
+    _view(built, host, port, browser, NAMES, scene_of, record)
 
 
 @app.command()
@@ -94,6 +98,7 @@ def run(
     repair: Repair = False,
     cpus: Cpus = None,
     priority: Priority = None,
+    record: Record = None,
     headless: Headless = None,
     out: Out = Path(),
     port: Port = PORT,
@@ -111,6 +116,8 @@ def run(
     Example: palpate run organ.stl --unit mm --fix "z < min + 5mm" -E 10kPa --radius 8mm
 
     Example: palpate run scene.toml --headless 3 --out results
+
+    Example: palpate run scene.toml --record press.mcap
     """
     from palpate.cli.run_file import RunOptions, built_from
 
@@ -119,9 +126,9 @@ def run(
     scheduling = {"cpus": cpus, "priority": priority}
     built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths, **scheduling))
     if headless is not None:
-        _scripted(built, file.stem, headless, out)
+        _scripted(built, file.stem, headless, out, record)
         return
-    _view(built, host, port, browser)
+    _view(built, host, port, browser, record=record)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -138,11 +145,14 @@ def _view(
     browser: bool,
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
+    record: Path | None = None,
 ) -> None:
     from palpate.viewer.live import open_viewer
     from palpate.viewer.server import ViewerServer
 
-    open_viewer(ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of), browser=browser)
+    open_viewer(
+        ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of, record=record), browser=browser
+    )
 
 
 def _force_line(record: PressRecord, max_force: float) -> str:
@@ -164,12 +174,12 @@ def _strain_line(record: PressRecord, strain_limit: float) -> str:
     return line
 
 
-def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
+def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording: Path | None) -> None:
     from palpate.cli.scripted import scripted_press
     from palpate.validation.plots import plot_log, write_log
 
     out.mkdir(parents=True, exist_ok=True)
-    record = scripted_press(built, seconds)
+    record = scripted_press(built, seconds, recording)
     log, statistics = record.log, record.last.statistics
     write_log(log, record.depth, record.strain, out / f"{name}.csv")
     plot_log(log, out / f"{name}.png", f"{name}: scripted press at 1 kHz")
@@ -180,6 +190,8 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path) -> None:
     for title, row in (("computing", compute), ("wake-up", wakeup)):
         print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")
     print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
+    if recording is not None:
+        print(f"recorded {recording}: 'palpate replay {recording}' makes it again")
     priority, locked_memory = statistics["realtime"]
     if not (locked_memory and (priority or built.scene.device.priority == 0)):
         print(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -54,13 +55,16 @@ class PressRecord:
     interrupted: bool
 
 
-def scripted_press(built: BuiltScene, seconds: float) -> PressRecord:
-    """Press for so many seconds, within the scene's limit of strain, or until Ctrl-C."""
+def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = None) -> PressRecord:
+    """Press for so many seconds, within the scene's limit of strain, or until Ctrl-C; recorded in a new file."""
     rest, depth = _target(built)
     logs, depths, sampled = [], [], []
     limited: list[Frame] = []
     interrupted = False
-    with Simulation(built) as simulation:
+    simulation = Simulation(built)
+    if recording is not None:
+        simulation.record(recording)
+    with simulation:
         hardest = simulation.frame()
         start = time.monotonic()
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from palpate import _native
 from palpate.errors import SceneError
@@ -24,7 +25,7 @@ def about(scene: SceneTables, bodies: Sequence[BuiltBody], shown: tuple[int, boo
     return {
         "format": str(FORMAT),
         "version": _native.__version__,
-        "scene": scene.model_dump_json(by_alias=True, exclude_unset=True),
+        "scene": json.dumps(_tables(scene)),
         "name": scene.name,
         "folder": str(scene.folder.absolute()),
         "bodies": json.dumps([body.name for body in bodies]),
@@ -34,6 +35,14 @@ def about(scene: SceneTables, bodies: Sequence[BuiltBody], shown: tuple[int, boo
         "shown": json.dumps(shown),
         "clock": str(int(clock)),
     }
+
+
+def _tables(scene: SceneTables) -> dict[str, Any]:
+    """Tables as they were given; the law of each tool is named, for its default follows from other keys."""
+    tables = scene.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    tools = [tool.model_dump(mode="json", by_alias=True, exclude_unset=True) for tool in scene.tools]
+    tables["tool"] = [{**given, "contact": tool.contact} for given, tool in zip(tools, scene.tools, strict=True)]
+    return tables
 
 
 def scene_of(about: dict[str, str]) -> Scene:

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from websockets.asyncio.server import Server, ServerConnection, serve
@@ -75,6 +76,8 @@ class ViewerServer:
         Names the page may choose from, each made a scene by ``scene_of``.
     scene_of
         Scene of a model.
+    record
+        New file in which what is shown first is recorded.
 
     Raises
     ------
@@ -91,11 +94,14 @@ class ViewerServer:
         port: int = DEFAULT_PORT,
         models: Sequence[str] = (),
         scene_of: Callable[[str], Scene] | None = None,
+        record: Path | None = None,
     ):
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
         self._session = Session(built)
+        if record is not None:
+            self._session.simulation.record(record)
         self._session.start()
         self._worker = Worker()
         self._models, self._scene_of = list(models), scene_of

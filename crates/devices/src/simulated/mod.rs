@@ -7,10 +7,19 @@ use triple_buffer::{Input, Output, triple_buffer};
 
 use self::hand::Hand;
 pub use self::hand::TIME_CONSTANT;
-use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Wrench};
+use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Twist, Wrench};
 
 /// Longest time for which a target goes on at its velocity, s: a pointer that says nothing more has stopped.
 const EXTRAPOLATION: f64 = 0.1;
+
+/// What the device resolves, as the encoders of a real one do, only finer: 2^-30 m (1 nm), and 2^-20 m/s and rad/s. The digits
+/// below would only fill recordings.
+const POSITION_GRID: f64 = 1.0 / (1 << 30) as f64;
+const VELOCITY_GRID: f64 = 1.0 / (1 << 20) as f64;
+
+fn on_grid(vector: DVec3, grid: f64) -> DVec3 {
+    (vector / grid).round() * grid
+}
 
 /// What the other side asks of the simulated device.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,9 +74,11 @@ impl Device for SimulatedDevice {
         } else {
             self.hand.follow(target.pose, period);
         }
+        let Hand { pose, twist } = self.hand;
+        let linear = on_grid(twist.linear, VELOCITY_GRID);
         Ok(Reading {
-            pose: self.hand.pose,
-            twist: self.hand.twist,
+            pose: Pose { position: on_grid(pose.position, POSITION_GRID), ..pose },
+            twist: Twist { linear, angular: on_grid(twist.angular, VELOCITY_GRID) },
             buttons: if target.grab { Buttons::GRAB } else { Buttons::default() },
             active: target.active,
             timestamp_ns: now_ns,
@@ -112,10 +123,10 @@ mod tests {
             for _ in 0..ticks {
                 tip = read(&mut device, period);
             }
-            assert!((tip.pose.position.x - step_response(0.02)).abs() < 1e-12);
+            assert!((tip.pose.position.x - step_response(0.02)).abs() < 1e-9);
             let turned = DQuat::from_rotation_z(2.0 * step_response(0.02));
             assert!(tip.pose.orientation.angle_between(turned) < 1e-7);
-            assert!((tip.twist.angular.z / tip.twist.linear.x - 2.0).abs() < 1e-9);
+            assert!((tip.twist.angular.z - 2.0 * tip.twist.linear.x).abs() < 3e-6);
         }
     }
 

@@ -1,0 +1,62 @@
+"""Commands on recordings: made again, in the page or headless."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.app import app
+
+if TYPE_CHECKING:
+    from palpate.simulation import Recording, Replayed
+
+RecordingFile = Annotated[Path, typer.Argument(help="Recording (.mcap) of 'palpate run --record' or of a program.")]
+# Differences that are printed; more are only counted.
+SHOWN = 10
+
+
+@app.command()
+def replay(
+    file: RecordingFile,
+    scene: Annotated[
+        Path | None, typer.Option(help="Scene file that should give the same; default: the scene of the recording.")
+    ] = None,
+) -> None:
+    """Make a recording again, tick by tick, and compare every bit.
+
+    The exit code is 0 if all are the same, 1 if one is not, and 2 if the recording cannot be made again.
+
+    Example: palpate replay press.mcap
+    """
+    import palpate
+    from palpate.errors import SceneError
+
+    recording = palpate.Recording.load(file)
+    given = None if scene is None else palpate.Scene.read(scene)
+    try:
+        made = palpate.replay(recording, given, progress=True)
+    except SceneError as error:
+        raise SceneError(f"{file}: {error}") from error
+    print(_said_of(file, recording, made))
+    if not made.same:
+        raise typer.Exit(1)
+
+
+def _said_of(file: Path, recording: Recording, made: Replayed) -> str:
+    lines = [str(difference) for difference in made.differences[:SHOWN]]
+    if len(made.differences) > SHOWN:
+        lines.append(f"and {len(made.differences) - SHOWN} more, of which the first is what to look at")
+    if not lines:
+        lines = [f"{file}: {made.ticks} ticks made again: every bit is as recorded"]
+    if not made.whole:
+        lines.append(_gap(recording, made.ticks))
+    return "\n".join(lines)
+
+
+def _gap(recording: Recording, ticks: int) -> str:
+    """Say why a recording could not be made again to its end."""
+    if recording.dropped is None:
+        return f"note: the file was cut short, by a crash or a full disk; it has {len(recording.ticks)} ticks"
+    return f"note: {recording.dropped} ticks were not recorded; what follows tick {ticks - 1} was not made again"

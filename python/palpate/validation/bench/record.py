@@ -1,0 +1,154 @@
+"""A scripted session recorded at its real rate: what the recorder loses and writes, and whether it is made again.
+
+Every tool comes, presses, holds, slides, lifts and rests, one after the other; bodies in motion are struck; now and
+then everything is let go of. Targets come at the rate of a pointer, as in the page.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate.scene import BuiltScene
+from palpate.simulation import Recording, Simulation, replay
+
+POINTER_RATE = 120.0
+# Seconds of each part of a cycle: come, press, hold, slide there and back, lift, rest.
+PARTS = {"come": 0.5, "press": 1.0, "hold": 1.5, "slide": 2.0, "lift": 0.5, "rest": 2.5}
+CYCLE = sum(PARTS.values())
+# Depth of the press and length of the slide over the body's longest side.
+DEPTH, SLIDE = 0.03, 0.1
+# Seconds between two strikes of a body in motion, and between two resets.
+STRIKE_EVERY, RESET_EVERY = 5.0, 60.0
+STRIKE = 2e-3  # N s
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """What a session left.
+
+    Attributes
+    ----------
+    scene
+        Its name.
+    seconds
+        How long it was.
+    ticks, dropped
+        Written, and left out.
+    missed_computing, missed_waking
+        Deadlines that passed while a tick computed, and because one began late.
+    not_finite
+        Ticks with a force or torque that is not a number.
+    contacts
+        Ticks with a contact.
+    mb_per_minute
+        Size of the file.
+    same
+        Whether every bit came out again; None if that was not asked.
+
+    """
+
+    scene: str
+    seconds: float
+    ticks: int
+    dropped: int
+    missed_computing: int
+    missed_waking: int
+    not_finite: int
+    contacts: int
+    mb_per_minute: float
+    same: bool | None
+
+
+class Script:
+    """Targets of the tools of a scene over the time."""
+
+    def __init__(self, simulation: Simulation):
+        self._simulation = simulation
+        self._tools = simulation.scene.tools
+        self._places = [self._place(rank) for rank in range(len(self._tools))]
+
+    def _place(self, tool: int) -> tuple[int, np.ndarray, np.ndarray, float]:
+        """Body, point on it that the tool begins at, m, direction of its slide, and longest side of the body, m."""
+        bodies = self._simulation.bodies
+        body = tool % len(bodies)
+        nodes = bodies[body].points_to_scene(bodies[body].green.surface_positions)
+        size = float(np.ptp(nodes, axis=0).max())
+        top = np.flatnonzero(nodes[:, 2] > nodes[:, 2].max() - 0.05 * size)
+        # Tools on one body keep apart.
+        along = nodes[top, 0]
+        share = (1 + tool // len(bodies)) / (2 + (len(self._tools) - 1) // len(bodies))
+        wanted = along.min() + share * np.ptp(along)
+        point = nodes[top[np.abs(along - wanted).argmin()]]
+        return body, point, np.array([0.0, 1.0, 0.0]), size
+
+    def move(self, at: float) -> None:
+        """Send every tool where it is at a time, s."""
+        for tool in range(len(self._tools)):
+            self._move(tool, (at + tool * CYCLE / len(self._tools)) % CYCLE)
+
+    def _move(self, tool: int, phase: float) -> None:
+        body, point, direction, size = self._places[tool]
+        parts = iter(PARTS.items())
+        name, length = next(parts)
+        while phase >= length:
+            phase, (name, length) = phase - length, next(parts)
+        share = phase / length
+        if name == "rest":
+            self._simulation.remove(tool)
+            return
+        depth = {"come": 0.2 * (share - 1), "press": share, "hold": 1.0, "slide": 1.0, "lift": 1 - 1.2 * share}[name]
+        slid = 0.5 * (1 - np.cos(2 * np.pi * share)) if name == "slide" else 0.0
+        over = point + slid * SLIDE * size * direction
+        foot, normal, _ = self._simulation.closest(over[None], body)
+        sticks = not np.isfinite(foot).all()
+        foot, normal = (over, np.array([0.0, 0.0, 1.0])) if sticks else (foot[0], normal[0])
+        self._simulation.move(foot + (self._tools[tool].reach - depth * DEPTH * size) * normal, tool=tool)
+
+
+def run_session(
+    built: BuiltScene,
+    name: str,
+    path: Path,
+    seconds: float,
+    again: bool = True,
+    report: Callable[[int, int], None] | None = None,
+) -> SessionResult:
+    """Record a scripted session of a scene in a new file, at its real rate, and make it again."""
+    with Simulation(built) as simulation:
+        simulation.record(path)
+        script, start, struck, resets = Script(simulation), time.monotonic(), 0, 0
+        moves = any(body.motion is not None for body in built.bodies)
+        while (at := time.monotonic() - start) < seconds:
+            script.move(at)
+            if moves and at > (struck + 1) * STRIKE_EVERY:
+                struck += 1
+                simulation.strike(
+                    built.bodies[0].points_to_scene(built.bodies[0].green.surface_positions)[0], (0, 0, -STRIKE)
+                )
+            if at > (resets + 1) * RESET_EVERY:
+                resets += 1
+                simulation.reset()
+            if report is not None:
+                report(int(at), int(seconds))
+            time.sleep(1.0 / POINTER_RATE)
+        statistics = simulation.frame().statistics
+        done = simulation.stop_recording()
+    recording = Recording.load(path)
+    finite = np.isfinite(recording.forces).all(axis=-1) & np.isfinite(recording.torques).all(axis=-1)
+    return SessionResult(
+        scene=name,
+        seconds=seconds,
+        ticks=len(recording.ticks),
+        dropped=-1 if done is None else done.dropped,
+        missed_computing=statistics["missed_computing"],
+        missed_waking=statistics["missed_deadlines"] - statistics["missed_computing"],
+        not_finite=int((~finite).sum()),
+        contacts=len(np.unique(recording.contacts["tick"])),
+        mb_per_minute=path.stat().st_size / 1e6 / seconds * 60,
+        same=replay(recording, built).same if again else None,
+    )
