@@ -2,6 +2,7 @@
 // it, change it by `update`, and hear of changes of the keys they name.
 
 import type { ConnectionState } from "./net/connection";
+import type { RecordedMessage } from "./net/session_messages";
 import type {
   Choice,
   FrameMessage,
@@ -50,6 +51,8 @@ export interface State {
   /** The newest one that is drawn. */
   frame: FrameMessage | null;
   notices: readonly string[];
+  /** The recording that ended last, until it is dismissed. */
+  recorded: RecordedMessage | null;
 
   layers: Readonly<Record<Layer, boolean>>;
   /** The axis across which the body is cut open, and the share of its extent that is taken away. */
@@ -91,6 +94,7 @@ export function initialState(): State {
     settings: null,
     frame: null,
     notices: [],
+    recorded: null,
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
     cut: { axis: "y", share: CUT_SHARE },
     shownScale: 1,

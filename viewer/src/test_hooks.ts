@@ -3,6 +3,7 @@
 import * as THREE from "three";
 
 import type { Pointer } from "./input/pointer";
+import type { RecordingStatus, ReplayFrame } from "./net/session_messages";
 import type { FieldMessage, MotionFrame, ToolFrame, Vec3 } from "./net/protocol";
 import type { BodyView } from "./scene/body_view";
 import type { Stage } from "./scene/stage";
@@ -37,6 +38,8 @@ export interface ViewerState {
   field: FieldMessage | null;
   fault: string | null;
   /** Of a body in motion, with the newest row of its history. */
+  recording: RecordingStatus | null;
+  replay: ReplayFrame | null;
   motion: (MotionFrame & ReturnType<HistoryLog["latest"]>) | null;
 }
 
@@ -105,6 +108,8 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     strain: frame?.strain ?? 0,
     field: frame?.fields[state.body] ?? null,
     fault: frame?.fault ?? null,
+    recording: frame?.recording ?? null,
+    replay: frame?.replay ?? null,
     motion: frame?.motion ? { ...frame.motion, ...history.latest() } : null,
   };
 }

@@ -192,8 +192,8 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
 /// Tick, whose, quantity, numbers recorded and now.
 type DifferenceRecord = (u64, String, &'static str, Vec<f64>, Vec<f64>);
 
-/// Contact radii, coefficients of friction, stiffness scales, limit of strain, time scale.
-type SettingsRecord = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64);
+/// Contact radii, coefficients of friction, stiffness scales, limit of strain, time scale, body and rank of a node.
+type SettingsRecord = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64, Option<(usize, u32)>);
 
 /// A recording made again, tick by tick.
 #[pyclass(module = "palpate._native")]
@@ -268,12 +268,14 @@ impl Replay {
     }
 
     /// Settings of the latest tick: contact radius, m, and friction of each tool, stiffness of each body over that of its
-    /// Green's function, limit of strain, and how much slower bodies move.
+    /// Green's function, limit of strain, how much slower bodies move, and the body and rank of the watched node.
     fn settings(&self) -> SettingsRecord {
         let parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let Settings { contact_radius, friction, stiffness_scale, strain_limit, time_scale, .. } = parts.1.settings();
+        let settings = parts.1.settings();
+        let Settings { contact_radius, friction, stiffness_scale, .. } = settings;
         let bodies = self.model.bodies.len();
         let (radii, friction) = (contact_radius[..self.tools].to_vec(), friction[..self.tools].to_vec());
-        (radii, friction, stiffness_scale[..bodies].to_vec(), strain_limit, time_scale)
+        let Settings { strain_limit, time_scale, watch, .. } = settings;
+        (radii, friction, stiffness_scale[..bodies].to_vec(), strain_limit, time_scale, watch)
     }
 }

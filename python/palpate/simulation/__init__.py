@@ -3,6 +3,7 @@
 from palpate.simulation.frame import BodyFrame, Contact, Frame
 from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
 from palpate.simulation.replay import Difference, Replayed, replay, simulation_of
+from palpate.simulation.replayed import ReplayedSimulation
 from palpate.simulation.simulation import Simulation
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Recording",
     "RecordingStatus",
     "Replayed",
+    "ReplayedSimulation",
     "Simulation",
     "replay",
     "simulation_of",

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from palpate import _native
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
@@ -74,8 +76,8 @@ class Replayed:
         return not self.differences
 
 
-def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:
-    """Build the simulation that made a recording, or that of a scene which should give the same.
+def built_scene_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> BuiltScene:
+    """Build the scene of a recording, or one that should give the same.
 
     Raises
     ------
@@ -86,9 +88,27 @@ def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None)
     given = scene_of(dict(recording.about)) if scene is None else scene
     built = given if isinstance(given, BuiltScene) else given.build()
     require_same(dict(recording.about), built)
-    simulation = Simulation(built)
+    return built
+
+
+def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:
+    """Build the simulation that made a recording, or that of a scene which should give the same.
+
+    Raises
+    ------
+    Error
+        As :func:`built_scene_of` has them.
+
+    """
+    simulation = Simulation(built_scene_of(recording, scene))
     simulation._arm_strain_limit()
     return simulation
+
+
+def ticks_without_gap(recording: Recording) -> int:
+    """How many ticks can be made again: behind the first one that was dropped nothing can be the same."""
+    missing = np.flatnonzero(recording.ticks != np.arange(len(recording.ticks)))
+    return int(missing[0]) if len(missing) else len(recording.ticks)
 
 
 def replay(
@@ -115,9 +135,7 @@ def replay(
     """
     recorded = recording if isinstance(recording, Recording) else Recording.load(Path(recording))
     again = _native.Replay(simulation_of(recorded, scene)._core, recorded.source)
-    # Behind the first tick that was dropped nothing can be the same.
-    missing = [rank for rank, number in enumerate(recorded.ticks.tolist()) if rank != number]
-    expected = missing[0] if missing else len(recorded.ticks)
+    expected = ticks_without_gap(recorded)
     differences: list[Difference] = []
     done = 0
     with progress_reporter("replaying", progress) as report:
@@ -130,4 +148,4 @@ def replay(
                 break
             if report is not None:
                 report(done, expected)
-    return Replayed(done, tuple(differences), not missing and recorded.dropped == 0)
+    return Replayed(done, tuple(differences), expected == len(recorded.ticks) and recorded.dropped == 0)

@@ -236,6 +236,9 @@ class Simulation(Adjustable):
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
+        return self._frame_of(raw)
+
+    def _frame_of(self, raw: dict[str, Any]) -> Frame:
         names = ("ticks", "missed_deadlines", "missed_computing", "dropped_rows", "fault", "realtime", "refused")
         statistics = {name: raw[name] for name in (*names, "port_energy")}
         for name in ("compute_us", "wakeup_us"):

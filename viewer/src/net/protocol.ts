@@ -1,10 +1,12 @@
-// Messages of the websocket, version 7. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 8. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
-export const PROTOCOL_VERSION = 7;
+import type { RecordedMessage, RecordingStatus, ReplayFrame, ReplayScene, SessionCommand } from "./session_messages";
+
+export const PROTOCOL_VERSION = 8;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -40,6 +42,8 @@ export interface SceneMessage {
   tools: ToolMessage[];
   motion: MotionScene | null;
   view: { position: Vec3; target: Vec3 } | null;
+  /** Where a recording is shown and nothing runs. */
+  replay: ReplayScene | null;
 }
 
 export interface BodyMessage {
@@ -206,6 +210,9 @@ export interface FrameMessage {
   /** For each body, what its colours show and whether all of its nodes are sent. */
   fields: FieldMessage[];
   interior: boolean[];
+  recording: RecordingStatus | null;
+  /** With the settings of the tick. */
+  replay: (ReplayFrame & { settings: SettingsMessage }) | null;
 }
 
 /** Of one body; a row of displacements and scalar is a surface node, or any node if the inside is shown. */
@@ -255,6 +262,7 @@ export type TextMessage =
   | { type: "role"; role: Role }
   | SettingsMessage
   | StatusMessage
+  | RecordedMessage
   | { type: "error"; text: string };
 
 export type ClientMessage =
@@ -275,9 +283,10 @@ export type ClientMessage =
   | { type: "cancel" }
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string; max?: number }
-  | { type: "ack"; frame: number };
+  | { type: "ack"; frame: number }
+  | SessionCommand;
 
-const TEXT_TYPES = ["welcome", "role", "settings", "status", "error"];
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "error"];
 const BODY_ARRAYS = {
   nodes: Float32Array,
   tets: Uint32Array,
