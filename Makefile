@@ -48,6 +48,8 @@ demo: $(VENV)/.installed $(PAGE)
 # each of them takes on, and in which order.
 test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace
+# What the release build has recorded, a build without optimisation makes again bit for bit.
+	cargo test --quiet --config profile.dev.opt-level=0 -p palpate-servo --no-default-features --test across_builds
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder $(ARGS)
 
 lint: $(VENV)/.installed viewer/node_modules/.checks

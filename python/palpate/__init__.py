@@ -5,7 +5,7 @@ SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
 
 from importlib.metadata import version
 
-from palpate import models
+from palpate import models, palpation
 from palpate.body import Body, Loads, Material
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
@@ -76,6 +76,7 @@ __all__ = [
     "ViewerError",
     "models",
     "modes",
+    "palpation",
     "plan",
     "precompute",
     "rayleigh_from_ratios",

@@ -16,6 +16,7 @@ DENSITY_UNITS = {"kg/m3": 1.0, "kg/m^3": 1.0, "g/cm3": 1e3, "g/cm^3": 1e3}
 STIFFNESS_UNITS = {"N/m": 1.0, "N/mm": 1e3}
 FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 ACCELERATION_UNITS = {"m/s2": 1.0, "m/s^2": 1.0}
+SPEED_UNITS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
 MEMORY_UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
 
@@ -95,6 +96,11 @@ def acceleration(value: str | float) -> float:
 def time(value: str | float) -> float:
     """Time in s."""
     return quantity(value, TIME_UNITS, "time")
+
+
+def speed(value: str | float) -> float:
+    """Speed in m/s."""
+    return quantity(value, SPEED_UNITS, "speed")
 
 
 def memory(value: str | float) -> float:

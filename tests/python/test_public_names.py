@@ -16,6 +16,7 @@ from palpate.scene import BuiltScene
 
 NAMES = [*palpate.__all__, *(f"shapes.{n}" for n in ("Sphere", "Box", "Cylinder", "HalfSpace"))]
 NAMES += [f"models.{name}" for name in palpate.models.__all__ if callable(getattr(palpate.models, name))]
+NAMES += [f"palpation.{name}" for name in palpate.palpation.__all__]
 
 
 def find(name: str):

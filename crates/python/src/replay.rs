@@ -248,6 +248,12 @@ impl Replay {
         Ok((made, differences.into_iter().map(record).collect()))
     }
 
+    /// What the longest tick so far took of the thread's own time, us.
+    #[getter]
+    fn longest_us(&self) -> f64 {
+        1e-3 * self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner).1.longest_ns() as f64
+    }
+
     /// The latest tick made again, as a dictionary.
     fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let published = {

@@ -221,7 +221,8 @@ impl ForceLoop {
             self.ends.recorder.input().readings[tool] = said;
             let admitted = stage.admit(said, now_ns, period);
             let reading = &mut self.status.readings[tool];
-            match admitted {
+            // What is published stays a place: a number that is none would end every picture of the scene.
+            match admitted.filter(|said| said.pose.is_finite()) {
                 Some(said) => *reading = said,
                 None => reading.active = false,
             }

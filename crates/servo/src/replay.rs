@@ -10,6 +10,7 @@ use palpate_core::simulation::{Model, Wrench};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading};
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::LogRow;
@@ -68,6 +69,7 @@ pub struct Replay {
     requests: VecDeque<StrainRequest>,
     settings: Settings,
     tools: usize,
+    longest_ns: u64,
 }
 
 impl Replay {
@@ -93,7 +95,18 @@ impl Replay {
         force_loop.limit_strain_of(strain.known());
         let (records, end) = (handle.begin_recording()?, handle.take_strain()?);
         let tools = model.tools.len();
-        Ok(Self { force_loop, handle, readings, records, strain, end, requests: VecDeque::new(), settings, tools })
+        Ok(Self {
+            force_loop,
+            handle,
+            readings,
+            records,
+            strain,
+            end,
+            requests: VecDeque::new(),
+            settings,
+            tools,
+            longest_ns: 0,
+        })
     }
 
     /// Makes a tick again, and says what is not as recorded: nothing, if every bit is.
@@ -106,6 +119,11 @@ impl Replay {
         let mut differences = Differences { tick: recorded.tick, of: Owner::Scene, found: Vec::new() };
         differences.compare(&recorded.output, &replayed.output, self.tools);
         Ok(differences.found)
+    }
+
+    /// What the longest tick so far took of the thread's own time, ns: what other programs take of the processor is not in it.
+    pub fn longest_ns(&self) -> u64 {
+        self.longest_ns
     }
 
     /// The latest tick.
@@ -135,7 +153,9 @@ impl Replay {
             self.hand_over(asked);
         }
         self.force_loop.prepare_again(input);
+        let begun = computed_ns();
         self.force_loop.tick(input.due_ns, input.period);
+        self.longest_ns = self.longest_ns.max(computed_ns() - begun);
         while let Ok(request) = self.end.requests.pop() {
             self.requests.push_back(request);
         }

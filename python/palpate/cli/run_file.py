@@ -79,18 +79,18 @@ def built_from(file: Path, options: RunOptions) -> BuiltScene:
 
     if file.suffix == ".palpate":
         options.refuse(file, {"radius"}, "a store carries its material and supports; 'palpate precompute' takes them")
-        scene = _with_options(Scene.of_store(file), options)
+        scene = scene_with(Scene.of_store(file), options)
     elif file.suffix == ".toml":
         places = {"radius", "fix", "youngs_modulus", "poissons_ratio", "density"}
         options.refuse(file, places, "it stands in the table [body] of the scene")
-        scene = _with_options(Scene.read(file), options)
+        scene = scene_with(Scene.read(file), options)
     else:
         return _bare(file, options)
     with narrated(f"preparing {scene.name}"):
         return scene.build()
 
 
-def _with_options(scene: Scene, options: RunOptions) -> Scene:
+def scene_with(scene: Scene, options: RunOptions) -> Scene:
     """Scene in which what was typed stands instead of what was written, in the tables of its bodies too."""
     names = ("youngs_modulus", "poissons_ratio", "density")
     given = {name: value for name, value in asdict(options).items() if name in names and value is not None}
@@ -188,7 +188,7 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
     of_run = RunOptions(radius=options.radius, cpus=options.cpus, priority=options.priority)
-    built = BuiltScene.of(_with_options(scene, of_run), body, green)
+    built = BuiltScene.of(scene_with(scene, of_run), body, green)
     if options.radius is None:
         told.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
     print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(told)}" if told else ""))

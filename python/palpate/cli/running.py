@@ -17,6 +17,7 @@ from palpate.cli.completion import models, units
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
     from palpate.scene import BuiltScene, Scene
+    from palpate.viewer.surface_map import SurfaceMap
 
 Headless = Annotated[
     float | None, typer.Option(min=0.1, help="No viewer: this many seconds of a scripted press at 1 kHz.")
@@ -99,6 +100,9 @@ def run(
     max_size: MaxSize = None,
     element: ElementChoice = None,
     repair: Repair = False,
+    surface_map: Annotated[
+        Path | None, typer.Option("--map", help="Map of 'palpate palpate' to show: stiffness.vtu or detection.vtu.")
+    ] = None,
     cpus: Cpus = None,
     priority: Priority = None,
     record: Record = None,
@@ -122,6 +126,7 @@ def run(
     Example: palpate run scene.toml --headless 3 --out results
 
     Example: palpate run scene.toml --record press.mcap
+    Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
     """
     from palpate.cli.run_file import RunOptions, built_from
 
@@ -132,7 +137,12 @@ def run(
     if headless is not None:
         _scripted(built, file.stem, headless, out, record)
         return
-    _view(built, _Page(host, port, browser, recordings), record=record)
+    maps = None
+    if surface_map is not None:
+        from palpate.viewer.surface_map import read_map
+
+        maps = read_map(surface_map, built)
+    _view(built, _Page(host, port, browser, recordings), record=record, maps=maps)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -158,12 +168,13 @@ def _view(
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
     record: Path | None = None,
+    maps: Sequence[SurfaceMap | None] | None = None,
 ) -> None:
     from palpate.viewer.live import open_viewer
     from palpate.viewer.server import ViewerServer
 
     page.recordings.mkdir(parents=True, exist_ok=True)
-    files = {"record": record, "recordings": page.recordings}
+    files = {"record": record, "recordings": page.recordings, "maps": maps}
     server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
     open_viewer(server, browser=page.browser)
 

@@ -37,10 +37,14 @@ def record(
     if as_json:
         print(json.dumps([asdict(result) for result in results], indent=2))
         return
-    row = "{:16s} {:>8s} {:>8s} {:>8s} {:>10s} {:>9s} {:>10s} {:>8s} {:>6s}"
-    print(row.format("scene", "ticks", "touching", "dropped", "computing", "waking", "not finite", "MB/min", "same"))
+    row = "{:16s} {:>8s} {:>8s} {:>8s} {:>10s} {:>9s} {:>10s} {:>8s} {:>8s} {:>6s}"
+    head = ("scene", "ticks", "touching", "dropped", "computing", "waking", "not finite", "longest", "MB/min", "same")
+    print(row.format(*head))
     for r in results:
-        same = "-" if r.same is None else "yes" if r.same else "NO"
+        same = "yes" if r.same else "NO"
         numbers = [r.ticks, r.contacts, r.dropped, r.missed_computing, r.missed_waking, r.not_finite]
-        print(row.format(r.scene, *map(str, numbers), f"{r.mb_per_minute:.2f}", same))
-    print("computing, waking: deadlines missed while a tick computed, and because one began late")
+        print(row.format(r.scene, *map(str, numbers), f"{r.longest_us:.0f} us", f"{r.mb_per_minute:.2f}", same))
+    print(
+        "computing, waking: deadlines missed while a tick computed, and because one began late; by other programs too"
+    )
+    print("longest: what the longest tick takes of its own thread's time when the session is made again")

@@ -1,7 +1,7 @@
 """Displacement, strain and stress of a body from the displacements of its surface."""
 
 from palpate.fields.element_strain import ElementStrain
-from palpate.fields.export import placed, together
+from palpate.fields.export import placed, together, write_result
 from palpate.fields.exported import Exported
 from palpate.fields.interior import Interior
 from palpate.fields.picture import DeformedSurface
@@ -29,4 +29,5 @@ __all__ = [
     "largest_magnitude",
     "placed",
     "together",
+    "write_result",
 ]

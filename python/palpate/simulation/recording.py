@@ -16,6 +16,8 @@ from palpate import _native
 from palpate.atomic import written_beside
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
+from palpate.errors import SceneError
+from palpate.input_file import require_file
 from palpate.simulation.about import shown_of
 
 LOG_DTYPE = np.dtype(
@@ -114,6 +116,7 @@ class Recording(ComparedByValue):
 
         """
         source = Path(path)
+        require_file(source, SceneError)
         columns = _native.read_recording(source)
         number = columns["number"]
         shaped = _Shaped(columns)

@@ -63,12 +63,15 @@ class Replayed:
         The first of them, in the order of ticks; none if every bit is the same.
     whole
         Whether the recording is: none were dropped, and its file was not cut short.
+    longest_us
+        Time of its thread that the longest tick took, us: what other programs took of the processor is not in it.
 
     """
 
     ticks: int
     differences: tuple[Difference, ...]
     whole: bool
+    longest_us: float
 
     @property
     def same(self) -> bool:
@@ -148,4 +151,5 @@ def replay(
                 break
             if report is not None:
                 report(done, expected)
-    return Replayed(done, tuple(differences), expected == len(recorded.ticks) and recorded.dropped == 0)
+    whole = expected == len(recorded.ticks) and recorded.dropped == 0
+    return Replayed(done, tuple(differences), whole, again.longest_us)

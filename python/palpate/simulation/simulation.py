@@ -16,6 +16,7 @@ from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
+from palpate.input_file import require_writable
 from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
@@ -142,6 +143,7 @@ class Simulation(Adjustable):
 
         """
         where = Path(path)
+        require_writable(where, SceneError)
         if where.exists():
             raise SceneError(f"{where}: exists: give another name, or delete it first")
         if self._running:

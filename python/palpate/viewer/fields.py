@@ -20,22 +20,29 @@ from palpate.fields import (
     largest_magnitude,
 )
 from palpate.simulation import Simulation
+from palpate.viewer.surface_map import SurfaceMap
 
 # A range never spans less than this part of the body's size, as a strain, or of Young's modulus: rest is not noise
 # blown up.
 LEAST = 0.005
+# Per cent of a map's values between which its colours change; a range that is typed spans at least this part of it.
+MAP_RANGE, LEAST_SPAN = (2.0, 98.0), 1e-3
 # A range grows at once, so that no colour is cut off, and comes down with this time constant, s.
 DECAY = 0.8
 
 
 @dataclass(frozen=True)
 class Field:
-    """What the page may show: its name in messages, its title, its unit; a signed field is zero in the middle."""
+    """What the page may show: its name in messages, its title, its unit; a signed field is zero in the middle.
+
+    One with gaps is not known everywhere.
+    """
 
     name: str
     title: str
     unit: str
     signed: bool = False
+    gaps: bool = False
 
 
 DISPLACEMENT = Field("displacement", "Displacement", "mm")
@@ -43,11 +50,16 @@ STRAIN = Field("strain", "Largest principal strain", "%")
 SURFACE_STRAIN = Field("strain", "Strain in the surface", "%")
 VON_MISES = Field("von_mises", "Von Mises stress", "Pa")
 PRINCIPAL = Field("principal_stress", "First principal stress", "Pa", signed=True)
+PALPATED = Field("palpated_stiffness", "Palpated stiffness", "N/m", gaps=True)
+PALPATED_CHANGE = Field("palpated_change", "Palpated change", "%", signed=True, gaps=True)
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A field over a pose: displacements in m and values from 0 to 255 at the surface nodes, or at all (interior)."""
+    """A field over a pose: displacements in m and values from 0 to 255 at the surface nodes, or at all (interior).
+
+    Of a field with gaps they are from 1 to 255, and 0 where nothing is known.
+    """
 
     header: dict[str, Any]
     displacements: np.ndarray
@@ -66,10 +78,12 @@ class Fields:
         Of the body, m.
     body
         Which of the simulation's bodies.
+    surface_map
+        What a palpation has left of it: shown before all else.
 
     """
 
-    def __init__(self, simulation: Simulation, size: float, body: int = 0):
+    def __init__(self, simulation: Simulation, size: float, body: int = 0, surface_map: SurfaceMap | None = None):
         self._simulation, self._size, self._body = simulation, size, body
         self._measure = measure = simulation.bodies[body].green.strain_measure
         self._surface = measure if isinstance(measure, SurfaceStrain) else None
@@ -77,6 +91,10 @@ class Fields:
         self.offered = [DISPLACEMENT, SURFACE_STRAIN] if self._recovery is None else [DISPLACEMENT, STRAIN]
         if self._recovery is not None:
             self.offered += [VON_MISES, PRINCIPAL]
+        self._map = surface_map
+        if surface_map is not None:
+            known = [PALPATED] if surface_map.change is None else [PALPATED_CHANGE, PALPATED]
+            self.offered = [*known, *self.offered]
         self._ranges: dict[str, tuple[float, float]] = {}
         self._pose = _Pose(np.full((1, 3), np.nan))
         self._inside: StressRecovery | None = None
@@ -98,14 +116,36 @@ class Fields:
         inside = interior and self._recovery is not None
         pose = self._of(displacements)
         shown = self._extended(pose) if inside else displacements
-        values = self._values(field, pose, shown, inside)
-        largest = float(np.abs(values).max())
-        followed = self._range(field, largest)
-        end = followed if full_scale is None else full_scale
-        scaled = 127.5 + 127.5 * values / end if field.signed else 255.0 * values / end
-        told = {"name": field.name, "title": field.title, "unit": field.unit, "signed": field.signed}
-        header = {**told, "max": end, "largest": largest}
-        return Picture(header, shown, np.rint(np.clip(scaled, 0.0, 255.0)), inside)
+        values = self._mapped(field, inside) if field.gaps else self._values(field, pose, shown, inside)
+        largest = float(np.nanmax(np.abs(values)))
+        low, followed = self._fixed_range(field, values) if field.gaps else (0.0, self._range(field, largest))
+        end = followed if full_scale is None else max(full_scale, low + LEAST_SPAN * (followed - low))
+        part = 0.5 + 0.5 * values / end if field.signed else (values - low) / (end - low)
+        part = np.clip(part, 0.0, 1.0)
+        scaled = np.where(np.isnan(part), 0.0, 1.0 + 254.0 * part) if field.gaps else 255.0 * part
+        told = {name: getattr(field, name) for name in ("name", "title", "unit", "signed", "gaps")}
+        header = {**told, "min": low, "max": end, "largest": largest}
+        return Picture(header, shown, np.rint(scaled), inside)
+
+    def _mapped(self, field: Field, inside: bool) -> np.ndarray:
+        """Values of the map at the nodes that are drawn; NaN inside of the body."""
+        assert self._map is not None
+        values = self._map.stiffness if field is PALPATED else self._map.change
+        assert values is not None
+        if not inside:
+            return values
+        green = self._simulation.bodies[self._body].green
+        assert green.body is not None
+        everywhere = np.full(len(green.body.mesh.nodes), np.nan)
+        everywhere[green.surface_nodes] = values
+        return everywhere
+
+    def _fixed_range(self, field: Field, values: np.ndarray) -> tuple[float, float]:
+        """Find the ends of a map's colours: all of it, but for a stray place or two."""
+        if field.signed:
+            return 0.0, max(float(np.nanmax(np.abs(values))), 1.0)
+        low, high = np.nanpercentile(values, MAP_RANGE).tolist()
+        return low, max(high, low + LEAST * abs(low))
 
     def _values(self, field: Field, pose: _Pose, displacements: np.ndarray, inside: bool) -> np.ndarray:
         """Values in the field's unit at the nodes that are drawn."""

@@ -28,13 +28,14 @@ from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.pages import headers, host_is_ours, load_pages
 from palpate.viewer.session import Session, Wants, choices
+from palpate.viewer.surface_map import SurfaceMap
 
 DEFAULT_PORT = 8642
 FRAME_RATE = 60.0
 # Bounds on what a client may send and how many there may be.
 MAX_MESSAGE = 4096
 MAX_RATE = 1500.0
-MAX_CLIENTS = 8
+MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
@@ -80,6 +81,8 @@ class ViewerServer:
         New file in which what is shown first is recorded.
     recordings
         Folder of the recordings that the page begins.
+    maps
+        What a palpation has left of each body.
 
     Raises
     ------
@@ -98,12 +101,13 @@ class ViewerServer:
         scene_of: Callable[[str], Scene] | None = None,
         record: Path | None = None,
         recordings: Path = Path(),
+        maps: Sequence[SurfaceMap | None] | None = None,
     ):
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
         self._recordings = recordings
-        self._session = built if isinstance(built, Session) else Session(built, folder=recordings)
+        self._session = built if isinstance(built, Session) else Session(built, maps=maps, folder=recordings)
         if record is not None:
             self._session.simulation.record(record)
         self._session.start()
@@ -343,7 +347,7 @@ class ViewerServer:
         built = await self._worker.call(before.reshaped, message)
         if built is None:
             return
-        make = lambda: Session(built, before.own_tools, self._recordings)  # noqa: E731
+        make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
         building = self._begin_building()
         self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
 

@@ -19,6 +19,7 @@ from palpate.viewer.messages import by_body, encode, index, number, quaternion, 
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.recorder import SessionRecorder
 from palpate.viewer.shown_body import ShownBody, titled
+from palpate.viewer.surface_map import SurfaceMap, maps_or_none
 from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices, with_shape
 
 # The contact radius slider ends at this part of the body's longest side.
@@ -49,6 +50,8 @@ class Session:
         Scene with its Green's function.
     own_tools
         Tools as the scene file has them, where the scene's have been given other shapes since.
+    maps
+        What a palpation has left of each body.
     folder
         Where recordings go.
     simulation
@@ -66,6 +69,7 @@ class Session:
         self,
         built: BuiltScene,
         own_tools: Sequence[ToolTable] | None = None,
+        maps: Sequence[SurfaceMap | None] | None = None,
         folder: Path = Path(),
         simulation: Simulation | None = None,
     ):
@@ -74,6 +78,7 @@ class Session:
         self.own_tools = scene.tools if own_tools is None else own_tools
         self.simulation = Simulation(built) if simulation is None else simulation
         self.recorder = SessionRecorder(self.simulation, folder)
+        self.maps = maps_or_none(maps, len(built.bodies))
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
         low, high = placed.min(axis=0), placed.max(axis=0)
@@ -97,7 +102,7 @@ class Session:
         built, scene = self.built.bodies[body], self.built.scene
         material = scene.bodies[body].material or scene.material
         ratio = None if built.body is None else material.poissons_ratio
-        return ShownBody(built, Fields(self.simulation, self._extent(body), body), ratio)
+        return ShownBody(built, Fields(self.simulation, self._extent(body), body, self.maps[body]), ratio)
 
     def start(self) -> None:
         """Start the loop."""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conforming import HiddenBall
 
 import palpate
 from palpate.scene import BuiltScene
+from palpate.validation.verify.contact.hidden_ball import HiddenBall
 from palpate.validation.verify.contact.loop import UNLIMITED, straight
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "nodule.toml"
@@ -52,7 +52,7 @@ def force_and_stiffness(forces: np.ndarray) -> np.ndarray:
 def contrasts(tool: float, radius: float, moduli: list[float], aside: float = 0.0) -> list[np.ndarray]:
     """How much larger force and stiffness are by the direct solution, for each nodule of a radius."""
     depths = [DEPTH - DEEPER, DEPTH, DEPTH + DEEPER]
-    forces = HiddenBall(0.01, radius, aside).pressed(tool, depths, SOFT, [SOFT.youngs_modulus, *moduli])
+    forces = HiddenBall(0.01, radius, (aside, 0.0)).pressed(tool, depths, SOFT, [SOFT.youngs_modulus, *moduli])
     base, *hard = (force_and_stiffness(row) for row in forces)
     return [found / base - 1 for found in hard]
 

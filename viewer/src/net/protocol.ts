@@ -163,14 +163,16 @@ export interface ContactMessage {
 }
 
 /**
- * What the colours show. `scalar` goes from 0 (or from -max if signed) to max, in units of mm, % or Pa; what is beyond it
- * is at the end. `largest` is the largest magnitude in the frame.
+ * What the colours show. `scalar` goes from min (or from -max if signed) to max, in the unit; what is beyond it is at the
+ * end. With gaps it begins at 1, and 0 stands where nothing is known. `largest` is the largest magnitude in the frame.
  */
 export interface FieldMessage {
   name: string;
   title: string;
-  unit: "mm" | "%" | "Pa";
+  unit: "mm" | "%" | "Pa" | "N/m";
   signed: boolean;
+  gaps: boolean;
+  min: number;
   max: number;
   largest: number;
 }

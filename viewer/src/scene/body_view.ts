@@ -47,6 +47,8 @@ export interface Pose {
   arrays: PoseArrays;
   interior: boolean;
   signed: boolean;
+  /** Whether a value of 0 stands for none. */
+  gaps: boolean;
   touched: boolean;
   /** A mode shape is drawn in place of its motion. */
   showsMode: boolean;
@@ -95,6 +97,7 @@ export class BodyView {
       colorMap: { value: ColorMap.sequential.texture },
       regionColors: { value: regionTexture([tissue]) },
       coloring: { value: FIELD },
+      gaps: { value: false },
     };
     const [w, x, y, z] = header.orientation;
     this.placed.position.set(...header.position);
@@ -166,12 +169,13 @@ export class BodyView {
     const { arrays, drawn } = this;
     const expected = pose.interior ? arrays.nodes.length : arrays.surface_nodes.length * 3;
     if (displacements.length !== expected || displacements.length !== 3 * scalar.length) return false;
-    if (drawn?.signed === pose.signed && same(drawn.arrays.displacements, displacements)) {
+    if (drawn?.signed === pose.signed && drawn.gaps === pose.gaps && same(drawn.arrays.displacements, displacements)) {
       if (same(drawn.arrays.scalar, scalar)) return false;
     }
     this.drawn = pose;
     this.touched = pose.touched;
     this.uniforms.colorMap.value = (pose.signed ? ColorMap.diverging : ColorMap.sequential).texture;
+    this.uniforms.gaps.value = pose.gaps;
     // A mode shape has a size of its own.
     const scale = pose.showsMode ? 1 : this.scale;
     this.surface.displace(displacements, pose.interior ? arrays.surface_nodes : null, scale);

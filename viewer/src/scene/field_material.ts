@@ -13,6 +13,8 @@ export interface FieldUniforms {
   colorMap: { value: THREE.DataTexture };
   regionColors: { value: THREE.DataTexture };
   coloring: { value: typeof TISSUE | typeof FIELD | typeof REGION };
+  /** Whether a value of 0 stands for none: a triangle with such a corner shows the tissue. */
+  gaps: { value: boolean };
 }
 
 /** What lies beyond normal . x = w, at rest, is not drawn: the normal, and w. */
@@ -51,6 +53,7 @@ attribute float region;
 attribute vec3 rest;
 uniform vec4 cutPlane;
 varying float vField;
+varying float vKnown;
 varying float vShade;
 varying float vRegion;
 varying float vBeyond;
@@ -58,6 +61,7 @@ varying float vBeyond;
 const VERTEX_BEGIN = /* glsl */ `
 vec3 transformed = vec3(position);
 vField = scalar;
+vKnown = step(0.5 / 255.0, scalar);
 vShade = shade;
 vRegion = region;
 vBeyond = dot(rest, cutPlane.xyz) - cutPlane.w;
@@ -67,7 +71,9 @@ const FRAGMENT_HEAD = /* glsl */ `
 uniform sampler2D colorMap;
 uniform sampler2D regionColors;
 uniform int coloring;
+uniform bool gaps;
 varying float vField;
+varying float vKnown;
 varying float vShade;
 varying float vRegion;
 varying float vBeyond;
@@ -77,8 +83,11 @@ varying float vBeyond;
 // cut. vShade varies the tissue a little, so that shape can be read where light alone would leave it flat.
 const FRAGMENT_COLOR = /* glsl */ `
 if (vBeyond > fwidth(vBeyond)) discard;
-if (coloring == ${TISSUE}) diffuseColor.rgb *= vShade;
-else if (coloring == ${FIELD}) diffuseColor.rgb = texture2D(colorMap, vec2(vField, 0.5)).rgb;
+if (coloring == ${TISSUE} || (coloring == ${FIELD} && gaps && vKnown < 0.999)) diffuseColor.rgb *= vShade;
+else if (coloring == ${FIELD}) {
+  float part = gaps ? (vField * 255.0 - 1.0) / 254.0 : vField;
+  diffuseColor.rgb = texture2D(colorMap, vec2(part, 0.5)).rgb;
+}
 else diffuseColor.rgb = texelFetch(regionColors, ivec2(int(vRegion + 0.5), 0), 0).rgb;
 `;
 

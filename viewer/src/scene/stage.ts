@@ -78,6 +78,7 @@ export class Stage {
         arrays,
         interior: header.interior[i] ?? false,
         signed: field.signed,
+        gaps: field.gaps,
         touched: header.contacts.some((contact) => contact.body === i),
         showsMode: motion?.mode != null && this.watched?.body === i,
       });

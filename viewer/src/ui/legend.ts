@@ -64,12 +64,12 @@ export class Legend {
     this.told = told;
     this.drawBar(field.signed ? ColorMap.diverging : ColorMap.sequential);
     const { unit, factor } = unitOf(field);
-    const max = field.max / factor;
+    const [min, max] = [field.min / factor, field.max / factor];
     const text = (value: number) => value.toFixed(max >= 100 ? 0 : max >= 10 ? 1 : max >= 0.1 ? 2 : 3);
     setText(byId("legend-name"), field.title);
     setText(byId("legend-unit"), unit);
-    setText(byId("legend-min"), field.signed ? MINUS + text(max) : "0");
-    setText(byId("legend-middle"), field.signed ? "0" : text(max / 2));
+    setText(byId("legend-min"), field.signed ? MINUS + text(max) : min === 0 ? "0" : text(min));
+    setText(byId("legend-middle"), field.signed ? "0" : text((min + max) / 2));
     if (document.activeElement !== this.max) this.max.value = (field.signed ? "+" : "") + text(max);
     press("legend-lock", locked);
     byId("legend-lock").title = locked ? "Let the range follow the largest value again" : "Keep this range";

@@ -15,7 +15,8 @@ export class RecordButton {
     store.subscribe(["frame"], ({ frame }) => showStatus(frame?.recording ?? null));
     store.subscribe(["recorded"], ({ recorded }) => showEnd(recorded));
     store.subscribe(["scene", "role", "connection"], (state) => {
-      byId("record").hidden = Boolean(state.scene?.replay);
+      byId("record").hidden = state.scene?.replay != null || state.role !== "control";
+      byId("recording-stop").hidden = state.role !== "control";
       for (const id of ["record", "recording-stop"]) byId<HTMLButtonElement>(id).disabled = !inControl(state);
     });
   }

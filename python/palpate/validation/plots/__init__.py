@@ -1,10 +1,10 @@
 """Plots of sessions and measurements, as PNG."""
 
+from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.validation.plots.accuracy import plot_convergence, plot_felt_stiffness
 from palpate.validation.plots.contact import plot_contact, plot_partial_slip, plot_pressing
 from palpate.validation.plots.loop import plot_envelope, plot_wakeups
 from palpate.validation.plots.sessions import plot_history, plot_log, write_columns, write_log
-from palpate.validation.plots.style import COLORS, empty_figure, write_figure
 
 __all__ = [
     "COLORS",

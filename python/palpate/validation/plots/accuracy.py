@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.validation.plots.style import COLORS, empty_figure, write_figure
+from palpate.figures import COLORS, empty_figure, write_figure
 
 
 def plot_convergence(

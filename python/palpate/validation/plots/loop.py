@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.validation.plots.style import COLORS, empty_figure, write_figure
+from palpate.figures import COLORS, empty_figure, write_figure
 
 # A fifth kind needs a fifth colour.
 SHADES = (*COLORS, "tab:orange")

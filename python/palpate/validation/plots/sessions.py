@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.atomic import written_beside
-from palpate.validation.plots.style import empty_figure, write_figure
+from palpate.figures import empty_figure, write_figure
 
 
 def plot_log(log: np.ndarray, path: Path, title: str) -> None:

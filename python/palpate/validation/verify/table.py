@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.errors import Error
-from palpate.validation.verify import bending, curved, exactness, felt, half_space, vibration
+from palpate.validation.verify import bending, curved, exactness, felt, half_space, palpation, vibration
 from palpate.validation.verify.check import Benchmark
 from palpate.validation.verify.contact import balance, beside, energy, friction, groove, pressing, shapes, sliding
 
@@ -37,6 +37,7 @@ BENCHMARKS = {
         Benchmark("friction", "Coulomb's cone, Mindlin's partial slip", friction.friction, slow=True),
         Benchmark("energy", "Work given out over random closed paths", energy.closed_paths, slow=True),
         Benchmark("balance", "All forces on a body, tick by tick", balance.balance),
+        Benchmark("palpation", "A stiffness map over a nodule, E = 5 and 40 kPa", palpation.palpation, slow=True),
     )
 }
 

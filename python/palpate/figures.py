@@ -24,9 +24,9 @@ def empty_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def write_figure(figure: Figure, path: Path) -> None:
-    """Light grid, open frame; written beside and renamed."""
-    for axes in figure.axes:
+def write_figure(figure: Figure, path: Path, *, grid: bool = True) -> None:
+    """Light grid where one helps, open frame; written beside and renamed."""
+    for axes in figure.axes if grid else ():
         _lighten(axes)
     with written_beside(path) as partial:
         figure.savefig(partial, format="png")

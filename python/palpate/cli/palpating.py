@@ -1,0 +1,189 @@
+"""The command that palpates by a protocol."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from palpate.cli.app import app
+from palpate.cli.bodies import ElementChoice, MaxSize, Repair
+from palpate.cli.completion import units
+
+if TYPE_CHECKING:
+    from palpate.palpation import Detection, StiffnessMap
+    from palpate.scene import BuiltScene
+
+# What keeps finished presses, in the folder of the results.
+PARTIAL, PLAIN_PARTIAL = "palpation.partial", "palpation-plain.partial"
+
+
+@app.command("palpate")
+def palpate_command(
+    file: Annotated[
+        Path, typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, surface, or a model's name.")
+    ],
+    grid: Annotated[str, typer.Option(help="Distance of the points, or of the strokes, such as 10mm.")],
+    depth: Annotated[str, typer.Option(help="Depth of a press from first touch, such as 3mm.")],
+    speed: Annotated[str, typer.Option(help="Of a press, or along a stroke.")] = "10mm/s",
+    on: Annotated[
+        str | None, typer.Option(help="Where, such as 'z > max - 1mm'; default: all that may be touched.")
+    ] = None,
+    strokes: Annotated[
+        bool, typer.Option("--strokes", help="Slide over lines at the depth instead of pressing.")
+    ] = False,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="Scene to compare with; default, where a body has regions: the same without them."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; default: <name>-palpation.")] = None,
+    radius: Annotated[str | None, typer.Option(help="Radius of the tool; default: a sixteenth of the body.")] = None,
+    fix: Annotated[
+        str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest tenth.")
+    ] = None,
+    youngs_modulus: Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")] = None,
+    poissons_ratio: Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")] = None,
+    unit: Annotated[
+        str | None,
+        typer.Option(help="Unit of length of a mesh; default: the one that fits its size.", autocompletion=units),
+    ] = None,
+    max_size: MaxSize = None,
+    element: ElementChoice = None,
+    repair: Repair = False,
+) -> None:
+    """Press a grid of points on a body, without a hand, and map its stiffness and what lies hidden in it.
+
+    The tool is the scene's first. Curves, the map and pictures are written into a folder; Ctrl-C keeps what is
+    finished, and the same command goes on from there. 'palpate run FILE --map DIR/stiffness.vtu' shows the map.
+
+    Example: palpate palpate scene.toml --grid 10mm --depth 3mm --speed 10mm/s
+
+    Example: palpate palpate nodule.toml --grid 8mm --depth 1.5mm --on "z > max - 1mm" --out found
+
+    Example: palpate palpate liver --grid 15mm --depth 2mm --strokes
+    """
+    from palpate.cli.run_file import RunOptions
+
+    length, quickness = _quantities()
+    given = {"spacing": length("--grid", grid), "depth": length("--depth", depth), "speed": quickness("--speed", speed)}
+    lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
+    material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio}
+    built = _built(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
+    folder = out if out is not None else Path(f"{file.stem}-palpation")
+    with _folder(folder):
+        found, detection = _palpate(built, folder, given, on, strokes, against)
+    _tell(found, detection, folder)
+
+
+def _quantities() -> tuple[Callable[[str, str], float], Callable[[str, str], float]]:
+    """Readers of positive lengths and speeds that name the option of a mistake."""
+    from palpate import units as quantities
+    from palpate.errors import UnitError
+
+    def reader(read: Callable[[str], float]) -> Callable[[str, str], float]:
+        def named(option: str, text: str) -> float:
+            try:
+                value = read(text)
+            except UnitError as error:
+                raise UnitError(f"{option}: {error}") from None
+            if not 0 < value < float("inf"):
+                raise UnitError(f"{option} must be positive, got {text}")
+            return value
+
+        return named
+
+    return reader(quantities.length), reader(quantities.speed)
+
+
+def _built(file: Path, options: Any) -> BuiltScene:
+    """Scene of a file, or of a built-in model by its name."""
+    from palpate.cli.run_file import built_from, scene_with
+    from palpate.errors import SceneError
+    from palpate.models import NAMES
+    from palpate.progress import narrated
+    from palpate.scene import model_scene
+
+    if file.exists() or file.suffix:
+        return built_from(file, options)
+    if str(file) not in NAMES:
+        raise SceneError(f"{file}: no such file, and no model of that name; models are {', '.join(NAMES)}")
+    options.refuse(file, {"radius", "fix", "youngs_modulus", "poissons_ratio"}, "a model has its own mesh")
+    with narrated(f"preparing {file}"):
+        return scene_with(model_scene(str(file)), options).build()
+
+
+@contextlib.contextmanager
+def _folder(folder: Path) -> Any:
+    """Make a folder, and take it away again if nothing was put into it."""
+    from palpate.errors import Error
+
+    if folder.exists() and not folder.is_dir():
+        raise Error(f"{folder} is a file: --out names a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    except Error:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        raise
+
+
+def _palpate(
+    built: BuiltScene, folder: Path, given: dict[str, float], on: str | None, strokes: bool, against: Path | None
+) -> tuple[StiffnessMap, Detection | None]:
+    """Palpate, write, and forget what was kept for going on."""
+    from palpate.palpation import compare, stiffness_map
+    from palpate.palpation.detection import has_several_materials
+    from palpate.scene import Scene
+
+    other = None if against is None else Scene.read(against)
+    try:
+        kept = (folder / PARTIAL).exists()
+        found = stiffness_map(built, **given, on=on, strokes=strokes, partial=folder / PARTIAL, progress=True)
+        if kept:
+            told = (
+                f"{found.resumed} of {len(found.curves)} known" if found.resumed else "of another palpation: not used"
+            )
+            print(f"{folder / PARTIAL}: {told}")
+        detection = None
+        if other is not None or any(has_several_materials(body.body) for body in built.bodies):
+            detection = compare(found, other, partial=folder / PLAIN_PARTIAL, progress=True)
+    except KeyboardInterrupt:
+        print(f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on", file=sys.stderr)
+        raise typer.Exit(130) from None
+    found.save(folder)
+    if detection is not None:
+        detection.save(folder)
+    for name in (PARTIAL, PLAIN_PARTIAL):
+        (folder / name).unlink(missing_ok=True)
+    return found, detection
+
+
+def _tell(found: StiffnessMap, detection: Detection | None, folder: Path) -> None:
+    """Say what was found, what was left out, and what held the tool."""
+    import numpy as np
+
+    left_out = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items())
+    strokes = f" on {found.strokes.max() + 1} strokes" if found.strokes.max() >= 0 else ""
+    print(f"{len(found.points)} points{strokes}" + (f"; left out: {left_out}" if left_out else ""))
+    low, high = int(np.nanargmin(found.stiffness)), int(np.nanargmax(found.stiffness))
+    places = ", ".join(f"{found.stiffness[k]:.4g} N/m at {_millimetres(found.points[k])}" for k in (low, high))
+    print(f"stiffness at {1e3 * found.depth:.3g} mm: from {places}; median {np.nanmedian(found.stiffness):.4g} N/m")
+    for reason in dict.fromkeys(found.held_by[found.held_by != ""]):
+        held = found.held_by == reason
+        reached = f" from {1e3 * np.nanmin(found.reached_depth[held]):.2g} mm on" if "limit" in reason else ""
+        print(f"palpate: note: {held.sum()} points have no stiffness ({reason}{reached})", file=sys.stderr)
+    for nodule in detection.nodules if detection is not None else ():
+        change = f"{100 * abs(nodule.ratio - 1):.1f} % {'stiffer' if nodule.ratio > 1 else 'softer'}"
+        print(f"nodule under {_millimetres(nodule.place)}: {change}, half of it {1e3 * nodule.half_width:.2g} mm away")
+    if detection is not None and not detection.nodules:
+        print("no nodule: nothing differs by more than 2 %")
+    print(f"wrote {folder}: " + ", ".join(sorted(path.name for path in folder.iterdir())))
+
+
+def _millimetres(place: Any) -> str:
+    return "(" + ", ".join(f"{1e3 * x:.1f}" for x in place) + ") mm"

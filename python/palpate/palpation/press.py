@@ -1,0 +1,107 @@
+"""One press: the path of the tool, and what its force tells of the surface.
+
+The tool comes along the inward normal until it has gone `d` beyond first touch. With the component `F` of its force
+along the outward normal,
+
+    stiffness          dF/dd at the depth, by a parabola through the last fifth of the press
+    secant stiffness   F/d
+
+Hertz's sphere on a half-space has `F = 4/3 E* sqrt(R) d^(3/2)`: `dF/dd = 2 E* sqrt(R d)`, 3/2 of the secant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from palpate.palpation.protocol import Protocol
+    from palpate.simulation import Simulation
+
+# A press begins this part of its depth above the surface. Force so early, of this part of the largest, is that of
+# another place of the body.
+CLEARANCE, EARLY, EARLY_FORCE = 0.25, 0.1, 0.02
+# The slope is that of the last part of the depth.
+LAST_PART = 0.2
+
+STRAIN_LIMIT, FORCE_LIMIT, OTHER_PLACE, NO_CONTACT = "strain limit", "force limit", "other place", "no contact"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What one press tells; a stiffness that it does not tell is NaN.
+
+    Attributes
+    ----------
+    force, stiffness, secant_stiffness
+        At the depth: N along the normal, N/m, N/m. NaN where something held the tool before.
+    held_by
+        What did: "strain limit" or "force limit"; "other place" where the tool touched beside its point first, "no
+        contact" where it lost the surface; else empty.
+    reached_depth, reached_force
+        m and N, where nothing held it yet.
+
+    """
+
+    force: float
+    stiffness: float
+    secant_stiffness: float
+    held_by: str
+    reached_depth: float
+    reached_force: float
+
+
+def depths_of(protocol: Protocol, rate: float) -> np.ndarray:
+    """Depth at each tick of a press (t,), m, below zero before the touch; the last one is the protocol's."""
+    start = -CLEARANCE * protocol.depth
+    return np.linspace(start, protocol.depth, int(np.ceil((protocol.depth - start) * rate / protocol.speed)) + 1)
+
+
+def standing_on(simulation: Simulation, normals: np.ndarray) -> tuple[np.ndarray, float]:
+    """Orientations (n, 4), unit quaternions w x y z, of a first tool whose front faces a surface, and its reach, m.
+
+    Its axis is turned from z to the normal by the smallest rotation; the reach is from its origin to its front.
+    """
+    tool = simulation.scene.tools[0]
+    x, y, z = np.asarray(normals, dtype=float).T
+    half = np.sqrt(np.maximum((1 + z) / 2, 0.0))
+    # Of a normal straight down every axis across is as near: x.
+    down = half < 1e-6
+    safe = np.where(down, 1.0, 2 * half)
+    turned = np.column_stack([half, np.where(down, 1.0, -y / safe), np.where(down, 0.0, x / safe), np.zeros_like(half)])
+    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    kind, _, vertices, _ = tool.shape_arguments(simulation.scene.folder)
+    return turned, (-float(np.min(vertices, axis=0)[2]) if kind == "surface" else tool.reach)
+
+
+def measured(
+    depths: np.ndarray, normal_forces: np.ndarray, limited: np.ndarray, clamped: np.ndarray, depth: float
+) -> Measured:
+    """Read a press: forces along the normal (t,), N, where strain and where force was limited (t,)."""
+    early = normal_forces[depths < -EARLY * depth]
+    if np.abs(early).max(initial=0.0) > EARLY_FORCE * np.abs(normal_forces).max():
+        return _nothing(OTHER_PLACE, 0.0, 0.0)
+    if normal_forces[-1] <= 0:
+        return _nothing(NO_CONTACT, 0.0, 0.0)
+    held = limited | clamped
+    window = depths >= (1 - LAST_PART) * depth
+    if held[window].any():
+        free = np.flatnonzero(~held[depths > 0]) + int((depths <= 0).sum())
+        last = int(free[-1]) if len(free) else 0
+        reached = (float(depths[last]), float(normal_forces[last])) if len(free) else (0.0, 0.0)
+        return _nothing(STRAIN_LIMIT if limited[window].any() else FORCE_LIMIT, *reached)
+    force, stiffness = value_and_slope(depths[window], normal_forces[window], depth)
+    return Measured(force, stiffness, force / depth, "", depth, force)
+
+
+def value_and_slope(depths: np.ndarray, forces: np.ndarray, at: float) -> tuple[float, float]:
+    """Value, N, and slope, N/m, of a parabola through a curve."""
+    scaled = (depths - at) / np.ptp(depths)
+    _, slope, value = np.polyfit(scaled, forces, 2)
+    return float(value), float(slope / np.ptp(depths))
+
+
+def _nothing(held_by: str, depth: float, force: float) -> Measured:
+    return Measured(np.nan, np.nan, np.nan, held_by, depth, force)

@@ -1,0 +1,119 @@
+"""What a palpation leaves, as records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from palpate.equality import ComparedByValue
+from palpate.palpation.interpolation import SurfaceField, node_normals
+from palpate.palpation.sides import SurfaceShape
+from palpate.scene import BuiltScene
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PressCurve(ComparedByValue):
+    """Force against depth of one press, or along one stroke. Compared by value, number by number; not hashable.
+
+    Attributes
+    ----------
+    time
+        (t,) s, since the first tick.
+    depth
+        (t,) m, below zero before the touch.
+    position
+        (t,) m along a stroke; zeros of a press.
+    force
+        (t, 3) N on the tool, in the scene.
+    normal_force
+        (t,) N along the outward normal.
+    limited
+        (t,) whether the limit of strain or that of force held the tool.
+
+    """
+
+    time: np.ndarray
+    depth: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    normal_force: np.ndarray
+    limited: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MapRecord(ComparedByValue):
+    """What a map holds; :class:`palpate.palpation.StiffnessMap` tells of each field."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    bodies: np.ndarray
+    strokes: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    secant_stiffness: np.ndarray
+    held_by: np.ndarray
+    reached_depth: np.ndarray
+    reached_force: np.ndarray
+    curves: tuple[PressCurve, ...]
+    skipped: dict[str, int]
+    spacing: float
+    depth: float
+    speed: float
+    scene: BuiltScene = field(compare=False)
+    resumed: int = field(default=0, compare=False)
+
+    def at(self, points: np.ndarray, normals: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
+        """Stiffness (n,), N/m, interpolated at points (n, 3), m, with outward normals (n, 3); NaN far from all points.
+
+        ``values`` (p,) takes other values at the points in its place.
+        """
+        known = self.stiffness if values is None else values
+        return SurfaceField(self.points, self.normals, known, self.spacing).at(points, normals)
+
+    def surfaces(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Of each body, in the scene: positions (s, 3), m, normals (s, 3), and triangles (t, 3) as rows of them."""
+        found = []
+        for body in self.scene.bodies:
+            shape = SurfaceShape(body.green)
+            normals = body.vectors_to_scene(node_normals(shape.positions, shape.triangles))
+            found.append((body.points_to_scene(shape.positions), normals, shape.triangles))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Nodule(ComparedByValue):
+    """Something hidden, as it is felt. Compared by value, number by number; not hashable.
+
+    Attributes
+    ----------
+    place
+        (3,) m on the surface, in the scene: where the fitted bump is highest.
+    body
+        Number of the body.
+    point
+        The point of the map with the largest change.
+    ratio, difference
+        Of the stiffness there to that without it, and N/m more than that.
+    half_width
+        Distance at which half of the change is left, m.
+
+    """
+
+    place: np.ndarray
+    body: int
+    point: int
+    ratio: float
+    difference: float
+    half_width: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DetectionRecord(ComparedByValue):
+    """What a comparison holds; :class:`palpate.palpation.Detection` tells of each field."""
+
+    found: MapRecord
+    plain: MapRecord
+    ratio: np.ndarray
+    difference: np.ndarray
+    nodules: tuple[Nodule, ...]

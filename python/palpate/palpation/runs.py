@@ -1,0 +1,96 @@
+"""All runs of a palpation, one after the other, those that are finished already left out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from palpate.errors import SimulationError
+from palpate.palpation.partial import PartialFile, Run
+from palpate.progress import progress_reporter
+from palpate.scene import BodyMotion, BuiltScene
+from palpate.simulation import Simulation
+
+# What of a device is for a hand alone: a palpation has none. The limit of force stands, and what it holds is told.
+WITHOUT_A_HAND = {"ramp": 0.0, "max_slew": 1e12}
+# Nor is a body at rest to be made softer than it is. In motion the coupling is part of the scheme.
+ANY_STIFFNESS = 1e9
+
+
+@dataclass(frozen=True)
+class Path3D:
+    """Where a tool goes: positions (t, 3), m, and orientations (t, 4), unit quaternions w x y z, tick by tick."""
+
+    positions: np.ndarray
+    orientations: np.ndarray
+
+
+def probe(built: BuiltScene) -> BuiltScene:
+    """Scene with its first tool alone, on a device that a protocol drives."""
+    device = dict(WITHOUT_A_HAND)
+    if not any(body.motion for body in built.bodies):
+        device["max_stiffness"] = ANY_STIFFNESS
+    scene = built.scene
+    changed = {"tools": scene.tools[:1], "device": scene.device.model_copy(update=device)}
+    return replace(built, scene=scene.model_copy(update=changed))
+
+
+def run_all(
+    simulation: Simulation,
+    paths: Sequence[Path3D],
+    partial: Path | None,
+    progress: bool | Callable[[int, int], None],
+) -> tuple[list[Run], int]:
+    """Run each path from a body at rest; how many runs were known already is told too.
+
+    A run is the forces on the device (t, 3), N, and whether strain was limited (t,).
+
+    Raises
+    ------
+    SimulationError
+        A fault that latched, with the run that it latched in.
+
+    """
+    with PartialFile(partial, key_of(simulation, paths)) as kept, progress_reporter("palpating", progress) as report:
+        for rank, path in enumerate(paths):
+            if rank not in kept.runs:
+                try:
+                    recording = simulation.play(path.positions, path.orientations)
+                except SimulationError as error:
+                    raise SimulationError(f"run {rank} of the palpation: {error}") from None
+                kept.keep(rank, (recording.forces, recording.limited))
+            if report is not None:
+                report(rank + 1, len(paths))
+        runs = [kept.runs[rank] for rank in range(len(paths))]
+    return runs, kept.found
+
+
+def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:
+    """Hash of everything that determines the forces: bodies, tool, limits, version, and every position."""
+    scene = simulation.scene
+    motions = [_motion_of(body.motion) for body in simulation.bodies]
+    told = {
+        "version": version("palpate"),
+        "bodies": [(body.green.key, body.position, body.orientation) for body in simulation.bodies],
+        "motions": repr(motions),
+        "tools": [tool.model_dump() for tool in scene.tools],
+        "shape": repr(scene.tools[0].shape_arguments(scene.folder)),
+        "device": scene.device.model_dump(),
+        "strain_limit": scene.view.strain_limit,
+        "ticks": [len(path.positions) for path in paths],
+    }
+    digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
+    for path in paths:
+        digest.update(np.ascontiguousarray(path.positions).tobytes())
+        digest.update(np.ascontiguousarray(path.orientations).tobytes())
+    return digest.hexdigest()
+
+
+def _motion_of(motion: BodyMotion | None) -> tuple[object, ...] | None:
+    return None if motion is None else (motion.basis.key, motion.scheme, motion.exact, motion.coupling)

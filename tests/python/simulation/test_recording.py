@@ -1,0 +1,174 @@
+"""Recordings: of runs and of sessions, in files, made again bit for bit."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from running import settle
+
+import palpate
+from palpate.scene import BuiltScene
+from palpate.simulation import CONTACT_DTYPE
+
+TOOLS = [{"radius": "6mm", "friction": 0.3}, {"radius": "5mm"}]
+
+
+@pytest.fixture(scope="module")
+def built(block, block_green) -> BuiltScene:
+    scene = palpate.Scene(body={"model": "beam"}, tool=TOOLS, view={"strain_limit": 0.1})
+    return BuiltScene.of(scene, block, block_green)
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory) -> str:
+    """A scene that can be built anew from its file alone, in motion."""
+    path = tmp_path_factory.mktemp("scene") / "beam.toml"
+    path.write_text(
+        '[body]\nmodel = "beam"\npaper = true\n[[tool]]\nradius = "5mm"\nfriction = 0.3\n[[tool]]\nradius = "4mm"\n'
+        "[dynamics]\nmodes = 20\ndamping_ratios = [0.05, 0.05]\n"
+    )
+    return str(path)
+
+
+def paths(ticks: int = 600) -> np.ndarray:
+    """Two tools that press the free end of the block and slide over it."""
+    t = np.linspace(0, 2 * np.pi, ticks)
+    x = 0.08 + 0.0055 - 0.002 * (1 - np.cos(t))
+    first = np.stack([x, 0.015 + 0.003 * np.sin(2 * t), np.full(ticks, 0.025)], axis=1)
+    second = np.stack([x - 0.001, 0.036 + 0 * t, np.full(ticks, 0.025)], axis=1)
+    return np.stack([first, second], axis=1)
+
+
+def test_a_run_is_saved_loaded_and_made_again(built, tmp_path):
+    simulation = palpate.Simulation(built)
+    recording = simulation.play(paths())
+    recording.save(tmp_path / "press.mcap")
+    loaded = palpate.Recording.load(tmp_path / "press.mcap")
+    assert loaded == recording and loaded.dropped == 0
+    assert np.array_equal(loaded.positions, paths()) and loaded.orientations.shape == (600, 2, 4)
+    # The safety stage only takes away.
+    assert (np.linalg.norm(loaded.computed_forces, axis=2) >= np.linalg.norm(loaded.forces, axis=2) - 1e-12).all()
+    assert np.linalg.norm(loaded.forces, axis=2).max(axis=0).min() > 0.01
+    contacts = loaded.contacts
+    assert contacts.dtype == CONTACT_DTYPE and set(contacts["tool"]) == {0, 1}
+    # By Newton's third law, tool by tool, to the digits that contacts are kept in.
+    for tool in (0, 1):
+        total = np.zeros((600, 3))
+        own = contacts[contacts["tool"] == tool]
+        np.add.at(total, own["tick"], own["force"])
+        assert np.abs(total + loaded.computed_forces[:, tool]).max() < 3e-5 * np.abs(total).max()
+    made = palpate.replay(loaded, built)
+    assert made.same and made.whole and made.ticks == 600
+
+
+def test_one_tool_keeps_its_shape(built, tmp_path):
+    recording = palpate.Simulation(built).play(paths()[:50, 0])
+    recording.save(tmp_path / "one.mcap")
+    loaded = palpate.Recording.load(tmp_path / "one.mcap")
+    assert loaded == recording and loaded.forces.shape == loaded.positions.shape == (50, 3)
+
+
+def session(simulation: palpate.Simulation, seconds: float = 0.5) -> None:
+    """Press by hand, as it were."""
+    begun = time.monotonic()
+    for rank in range(2):
+        simulation.move(paths()[300, rank], tool=rank)
+    while time.monotonic() - begun < seconds:
+        simulation.set_friction(0.2 + 0.1 * np.sin(10 * time.monotonic()), tool=0)
+        time.sleep(0.01)
+    settle(simulation)
+
+
+def test_a_session_is_recorded_and_made_again(built, tmp_path):
+    first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
+    with palpate.Simulation(built) as simulation:
+        assert simulation.recording is None
+        session(simulation, 0.1)
+        # In the middle of a press: it begins anew, and so does what is recorded.
+        simulation.record(first)
+        session(simulation)
+        status = simulation.recording
+        assert status.path == first and status.ticks > 400 and status.error is None and status.dropped == 0
+        with pytest.raises(palpate.Error, match=r"is being recorded already"):
+            simulation.record(second)
+        done = simulation.stop_recording()
+        assert simulation.recording is None and simulation.stop_recording() is None
+        simulation.record(second)
+        session(simulation, 0.1)
+    assert done.size == first.stat().st_size
+    recording = palpate.Recording.load(first)
+    assert len(recording.ticks) == done.ticks and recording.dropped == 0
+    assert np.linalg.norm(recording.forces, axis=2).max(axis=0).min() > 0.01
+    assert np.allclose(np.diff(recording.time) * 1e3, np.round(np.diff(recording.time) * 1e3), atol=1e-3)
+    assert recording.compute_us.min() > 0 and (recording.limited.any() or len(recording.contacts) > 400)
+    for file in (first, second):
+        made = palpate.replay(file, built)
+        assert made.same and made.whole and made.ticks > 50, [str(difference) for difference in made.differences[:3]]
+
+
+def test_a_recording_asked_for_before_the_start_has_the_first_tick(built, tmp_path):
+    simulation = palpate.Simulation(built)
+    simulation.record(tmp_path / "whole.mcap")
+    with simulation:
+        session(simulation, 0.1)
+        ticks = simulation.frame().statistics["ticks"]
+    recording = palpate.Recording.load(tmp_path / "whole.mcap")
+    assert recording.ticks[0] == 0 and len(recording.ticks) >= ticks - 20
+    assert palpate.replay(recording, built).same
+    with pytest.raises(palpate.SceneError, match=r"whole\.mcap: exists: give another name"):
+        simulation.record(tmp_path / "whole.mcap")
+    with palpate.Simulation(built) as running, pytest.raises(palpate.Error, match="nowhere"):
+        running.record(tmp_path / "nowhere" / "a.mcap")
+
+
+def test_the_scene_of_a_recording_is_built_from_the_file_alone(scene_file, tmp_path):
+    """In another process, by the command, with one thread and two."""
+    simulation = palpate.Simulation(palpate.Scene.read(scene_file))
+    top = simulation.body.mesh.nodes[simulation.green.surface_nodes]
+    end = top[np.argmax(top[:, 0] + 0.1 * top[:, 2])]
+    ticks = np.linspace(0, 2 * np.pi, 400)[:, None]
+    path = end + [0, 0, 0.005] - [0, 0, 0.0008] * (1 - np.cos(ticks))
+    recording = simulation.play(path, strikes=[(100, tuple(end), (0, 0, -1e-3))])
+    assert recording.energy.work[-1] > 0 and next(what for _, what in recording.events).startswith("strike of 0.001")
+    file = tmp_path / "beam.mcap"
+    recording.save(file)
+    for threads in ("1", "2"):
+        env = {**os.environ, "RAYON_NUM_THREADS": threads}
+        run = subprocess.run(
+            [sys.executable, "-m", "palpate", "replay", str(file)], env=env, capture_output=True, text=True
+        )
+        assert run.returncode == 0 and "400 ticks made again: every bit is as recorded" in run.stdout, run.stderr
+
+
+def test_a_changed_coefficient_is_found_and_named(built, scene_file, tmp_path):
+    recording = palpate.Simulation(built).play(paths())
+    touched = int(np.flatnonzero(np.linalg.norm(recording.computed_forces, axis=2).any(axis=1))[0])
+    tool = built.scene.tools[0].model_copy(update={"radius": built.scene.tools[0].radius * (1 + 1e-9)})
+    changed = built.scene.model_copy(update={"tools": [tool, built.scene.tools[1]]})
+    made = palpate.replay(recording, BuiltScene(changed, built.bodies))
+    first = made.differences[0]
+    assert (first.of, first.quantity) == ("tool 0", "force of the contact law") and first.tick >= touched
+    assert str(first).startswith(f"tick {first.tick}: tool 0: force of the contact law was ")
+    # Another body is not compared at all.
+    with pytest.raises(palpate.SceneError, match=r"is not the body that was recorded: its mesh, material"):
+        palpate.replay(recording, palpate.Scene.read(scene_file).model_copy(update={"dynamics": None}))
+
+
+def test_what_is_no_recording_is_refused(built, tmp_path):
+    (tmp_path / "a.mcap").write_bytes(b"solid ascii")
+    with pytest.raises(palpate.Error, match=r"a\.mcap: this is no recording"):
+        palpate.Recording.load(tmp_path / "a.mcap")
+    with pytest.raises(palpate.Error, match=r"none\.mcap"):
+        palpate.Recording.load(tmp_path / "none.mcap")
+    recording = palpate.Simulation(built).play(paths())
+    (tmp_path / "cut.mcap").write_bytes(recording.source[: int(0.9 * len(recording.source))])
+    cut = palpate.Recording.load(tmp_path / "cut.mcap")
+    assert cut.dropped is None and 100 < len(cut.ticks) < 600
+    assert np.array_equal(cut.forces, recording.forces[: len(cut.ticks)])
+    made = palpate.replay(cut, built)
+    assert made.same and not made.whole and made.ticks == len(cut.ticks)
