@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test lint viewer check-tools clean
+.PHONY: demo test sanitize lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -51,6 +51,11 @@ test: $(VENV)/.installed $(PAGE) lint
 # What the release build has recorded, a build without optimisation makes again bit for bit.
 	cargo test --quiet --config profile.dev.opt-level=0 -p palpate-servo --no-default-features --test across_builds
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder $(ARGS)
+
+# Unordered accesses between the loop's thread and others; after `make test`, with a nightly toolchain of Rust.
+sanitize:
+	RUSTFLAGS="-Zsanitizer=thread -Cunsafe-allow-abi-mismatch=sanitizer" cargo +nightly test --quiet --config profile.dev.opt-level=1 \
+		--target $$(rustc -vV | sed -n 's/host: //p') -p palpate-servo --no-default-features --test handoff
 
 lint: $(VENV)/.installed viewer/node_modules/.checks
 	cargo fmt --all --check

@@ -35,7 +35,7 @@ FORBIDDEN = {
 # all of them, the package itself, which exports the public names, where its name stands.
 PYTHON_ORDER = (
     *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "simulation", "palpation", "palpate"),
-    *("viewer", "validation/plots", "validation/verify", "validation/bench", "validation/doctor", "cli"),
+    *("viewer", "validation/plots", "exam", "validation/verify", "validation/bench", "validation/doctor", "cli"),
 )
 
 # What in backquotes can only be a name of code: with `::` or a dot, in CamelCase, or words joined by underscores;

@@ -100,6 +100,8 @@ def _about(file: Path, leftover: bool) -> str:
         return "interrupted; the same computation goes on from here"
     if file.suffix != ".palpate":
         return "mesh of a benchmark"
+    if file.name.endswith(".felt.palpate"):
+        return "forces over the nodules of an exam"
     try:
         made_of = _metadata(file)
     except (OSError, ValueError, KeyError, TypeError):

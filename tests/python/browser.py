@@ -63,8 +63,8 @@ class Program:
 
 
 @contextlib.contextmanager
-def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
-    """The page with a scene on it; anything on its console is a failure."""
+def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None):
+    """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends."""
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
     context.set_default_timeout(1e3 * PATIENCE)
     page = context.new_page()
@@ -73,6 +73,13 @@ def opened(chromium, program, size: tuple[int, int] = (1280, 720)):
         "console", lambda message: complaints.append(message.text) if message.type in {"error", "warning"} else None
     )
     page.on("pageerror", lambda error: complaints.append(str(error)))
+
+    def hear(message: str | bytes) -> None:
+        """Playwright marks its listeners, which a method of a list does not let it."""
+        listen(message)
+
+    if listen is not None:
+        page.on("websocket", lambda socket: socket.on("framereceived", hear))
     try:
         page.goto(program.address)
         until(page, lambda s: s["frames"] > 3)

@@ -4,6 +4,7 @@
 import { RateLimit } from "./net/rate_limit";
 import type {
   ClientMessage,
+  ExamMessage,
   FrameMessage,
   Quaternion,
   Role,
@@ -14,7 +15,7 @@ import type {
   Vec3,
 } from "./net/protocol";
 import { groupings } from "./regions";
-import { drivenTool, inControl } from "./store";
+import { NO_LAYERS, drivenTool, inControl } from "./store";
 import type { Axis, Layer, Posture, Store, Theme } from "./store";
 
 /** A slider dragged quickly sends no more often than this. */
@@ -52,7 +53,10 @@ export class Control {
         return this.store.update({ status: message });
       case "recorded":
         return this.store.update({ recorded: message });
+      case "exam":
+        return this.takeExam(message);
       case "error":
+        this.store.update({ answering: false });
         return this.notice(message.text);
     }
   }
@@ -77,6 +81,7 @@ export class Control {
         time_scale: scene.motion?.time_scale ?? null,
       },
       frame: null,
+      answering: false,
       postures: scene.tools.map(posture),
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,
@@ -118,7 +123,8 @@ export class Control {
   // What is shown.
 
   toggleLayer(layer: Layer): void {
-    const { layers, scene } = this.store.get();
+    const { layers, scene, exam } = this.store.get();
+    if (exam) return;
     const on = !layers[layer];
     if (layer === "cutaway") {
       if (on && !(scene && hasInside(scene))) return this.notice(NO_INSIDE);
@@ -246,6 +252,14 @@ export class Control {
     if (inControl(this.store.get()) && wanted !== shown) this.send({ type: "mode", number: wanted });
   }
 
+  /** The nodule is where the tool touches, or did last; or there is none. */
+  answer(found: boolean): void {
+    const state = this.store.get();
+    if (!inControl(state) || !state.exam || state.exam.result || state.answering) return;
+    this.store.update({ answering: true, notices: [] });
+    this.send({ type: "answer", found });
+  }
+
   // Settings and long work.
 
   setStiffness(modulus: number): void {
@@ -352,6 +366,12 @@ export class Control {
   private tellField(name: string): void {
     const max = this.store.get().ranges[name];
     this.send({ type: "field", name, ...(max !== undefined && { max }) });
+  }
+
+  private takeExam(exam: ExamMessage): void {
+    // The next trial begins with its scene.
+    const { answering } = this.store.get();
+    this.store.update({ exam, answering: answering && !exam.result, layers: NO_LAYERS, coloring: "field" });
   }
 
   private takeRole(role: Role): void {

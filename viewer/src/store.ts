@@ -5,6 +5,7 @@ import type { ConnectionState } from "./net/connection";
 import type { RecordedMessage } from "./net/session_messages";
 import type {
   Choice,
+  ExamMessage,
   FrameMessage,
   Role,
   SceneMessage,
@@ -53,6 +54,10 @@ export interface State {
   notices: readonly string[];
   /** The recording that ended last, until it is dismissed. */
   recorded: RecordedMessage | null;
+  /** null where nothing is examined. */
+  exam: ExamMessage | null;
+  /** Whether an answer is on its way: the next body is not there yet. */
+  answering: boolean;
 
   layers: Readonly<Record<Layer, boolean>>;
   /** The axis across which the body is cut open, and the share of its extent that is taken away. */
@@ -82,6 +87,15 @@ export interface State {
   pinNext: boolean;
 }
 
+/** What is shown in an exam: nothing that an eye could read it from. */
+export const NO_LAYERS: Readonly<Record<Layer, boolean>> = {
+  colors: false,
+  wireframe: false,
+  supports: false,
+  cutaway: false,
+  plots: false,
+};
+
 export function initialState(): State {
   return {
     connection: "connecting",
@@ -95,6 +109,8 @@ export function initialState(): State {
     frame: null,
     notices: [],
     recorded: null,
+    exam: null,
+    answering: false,
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
     cut: { axis: "y", share: CUT_SHARE },
     shownScale: 1,

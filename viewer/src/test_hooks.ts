@@ -37,6 +37,8 @@ export interface ViewerState {
   /** Of the body that is chosen. */
   field: FieldMessage | null;
   fault: string | null;
+  /** Where an exam stands, whether the next body is awaited, and how loud its tone is. */
+  exam: { trial: number; finished: boolean; answering: boolean; loudness: number } | null;
   /** Of a body in motion, with the newest row of its history. */
   recording: RecordingStatus | null;
   replay: ReplayFrame | null;
@@ -110,6 +112,12 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     fault: frame?.fault ?? null,
     recording: frame?.recording ?? null,
     replay: frame?.replay ?? null,
+    exam: state.exam && {
+      trial: state.exam.trial,
+      finished: state.exam.result !== null,
+      answering: state.answering,
+      loudness: frame?.loudness ?? 0,
+    },
     motion: frame?.motion ? { ...frame.motion, ...history.latest() } : null,
   };
 }

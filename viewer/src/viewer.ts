@@ -14,6 +14,7 @@ import { Viewport } from "./scene/viewport";
 import { Store } from "./store";
 import { installTestHooks } from "./test_hooks";
 import { byId } from "./ui/dom";
+import { ExamPanel } from "./ui/exam_panel";
 import { fillHelp, toggleHelp } from "./ui/help";
 import { showHint } from "./ui/hint";
 import { Legend } from "./ui/legend";
@@ -75,6 +76,7 @@ export class Viewer {
     new MotionPanel(store, control);
     new RecordButton(store, control);
     new TimeLine(store, control);
+    new ExamPanel(store, control);
     followNotices(store, control);
     installTestHooks({ store, stage: this.stage, pointer, statistics, history: this.plots.history });
   }

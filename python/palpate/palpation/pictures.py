@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Points that look the same way within this cosine are seen from there, as a plane.
 ONE_WAY = np.cos(np.radians(10.0))
 # Triangles of a picture are no longer than this part of the spacing; where that would be too many, they stay larger.
-FINE, MOST_TRIANGLES = 0.2, 120_000
+FINE, MOST_TRIANGLES = 0.25, 40_000
 # Per cent of the values between which colours change: one rim of a hole would take them all.
 RANGE = (2.0, 98.0)
 # Surface without a value, and light that shapes it: from the viewer's left above.

@@ -1,6 +1,6 @@
 """Scenes: what to touch and with what, as read from a file."""
 
-from palpate.scene.build import BuiltBody, BuiltScene
+from palpate.scene.build import BuiltBody, BuiltScene, unsolved_body
 from palpate.scene.dynamics import BodyMotion, DynamicsTable, StrikeTable
 from palpate.scene.model_scenes import MODES, TOOLS, YOUNGS_MODULUS, model_scene
 from palpate.scene.scene import Scene
@@ -20,4 +20,5 @@ __all__ = [
     "StrikeTable",
     "ToolTable",
     "model_scene",
+    "unsolved_body",
 ]

@@ -98,6 +98,18 @@ def build(scene: SceneTables, progress: Progress, modes_progress: Progress | Non
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
+def unsolved_body(scene: SceneTables, rank: int = 0) -> Body:
+    """Mesh of a body of a scene with its materials, supports and loads, before anything is computed of it.
+
+    Raises
+    ------
+    Error
+        A mesh that cannot be read or made, a region or supports that hold nothing.
+
+    """
+    return _Builder(scene, rank).body()
+
+
 class _Builder:
     """Builds one body of a scene."""
 
@@ -110,7 +122,7 @@ class _Builder:
         place = (table.title, table.position, table.orientation)
         if table.store is not None:
             return BuiltBody(None, GreensFunction.load(self._scene.folder / table.store), None, *place)
-        body = self._body()
+        body = self.body()
         green = precompute(body, precision=table.precision, progress=progress)
         dynamics, where = self._own("dynamics")
         if dynamics is None:
@@ -127,7 +139,7 @@ class _Builder:
             return own, ["body", self._rank, key]
         return getattr(self._scene, key), [key]
 
-    def _body(self) -> Body:
+    def body(self) -> Body:
         table, mesh = self._table, self._mesh()
         if table.element == "linear" and mesh.is_quadratic:
             source = table.mesh or table.title

@@ -157,7 +157,7 @@ class ReplaySession(Session):
         }
 
     def _note(self) -> str | None:
-        """What there is to say about a recording that is not whole."""
+        """Say what is to be known about a recording that is not whole."""
         recorded, ticks = self._replayed.recorded, self._replayed.ticks
         if recorded.dropped is None:
             return "The file was cut short; this is what it has."
@@ -183,5 +183,5 @@ class ReplaySession(Session):
 
 
 def _kind(what: str) -> str:
-    """What a mark on the time line stands for."""
+    """Name what a mark on the time line stands for."""
     return next((kind for kind in ("reset", "strike") if what.startswith(kind)), "fault")

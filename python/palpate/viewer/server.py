@@ -106,8 +106,8 @@ class ViewerServer:
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
-        self._recordings = recordings
-        self._session = built if isinstance(built, Session) else Session(built, maps=maps, folder=recordings)
+        self._maps, self._recordings = maps, recordings
+        self._session = built if isinstance(built, Session) else self._make_session(built)
         if record is not None:
             self._session.simulation.record(record)
         self._session.start()
@@ -128,6 +128,10 @@ class ViewerServer:
         """All that a person may open: a server bound to every address is reached from other machines too."""
         names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
         return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
+
+    def _make_session(self, built: BuiltScene) -> Session:
+        """Session of what is shown first; a derived class may have a kind of its own."""
+        return Session(built, maps=self._maps, folder=self._recordings)
 
     async def start(self) -> None:
         """Listen.
@@ -206,9 +210,7 @@ class ViewerServer:
         try:
             if self._controller is None and self._session.controllable:
                 self._controller = client
-            role = "control" if self._controller is client else "watch"
-            models = choices(self._models)
-            await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
+            await self._greet(client)
             client.may_send.set()
             sender = asyncio.create_task(self._send_frames(client))
             async for text in connection:
@@ -220,6 +222,12 @@ class ViewerServer:
                 sender.cancel()
             self._clients.remove(client)
             await self._lose_control(client)
+
+    async def _greet(self, client: Client) -> None:
+        """Tell a page what it needs to know before its first scene."""
+        role = "control" if self._controller is client else "watch"
+        models = choices(self._models)
+        await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
 
     async def _welcome(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""

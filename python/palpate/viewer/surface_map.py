@@ -46,7 +46,7 @@ def read_map(path: Path, built: BuiltScene) -> list[SurfaceMap | None]:
 
     require_file(path, ViewerError)
     try:
-        mesh = meshio.read(path)
+        mesh = (meshio.vtk if path.suffix.lower() == ".vtk" else meshio.vtu).read(path)
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on what it does not know
         raise ViewerError(
             f"{path}: not a map that can be read: {str(error).splitlines()[0] if str(error) else 'damaged'}"

@@ -17,6 +17,8 @@ export const KEYS: readonly (readonly [key: string, what: string])[] = [
   ["x", "cut open"],
   ["p", "plots"],
   ["v", "look from the front again"],
+  ["m", "in an exam: the nodule is where the tool touches"],
+  ["0", "in an exam: there is none"],
   ["?", "this help"],
 ];
 
@@ -33,6 +35,8 @@ export function listenToKeys(control: Control, viewport: Viewport, toggleHelp: (
     g: () => control.toggleGrab(),
     k: () => control.toggleStrike(),
     n: () => control.togglePin(),
+    m: () => control.answer(true),
+    "0": () => control.answer(false),
     "?": toggleHelp,
     Escape: () => {
       control.release();

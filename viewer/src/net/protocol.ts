@@ -215,6 +215,8 @@ export interface FrameMessage {
   recording: RecordingStatus | null;
   /** With the settings of the tick. */
   replay: (ReplayFrame & { settings: SettingsMessage }) | null;
+  /** In an exam, of the tone that stands for the force, from 0 to 1 in proportion to it. */
+  loudness?: number;
 }
 
 /** Of one body; a row of displacements and scalar is a surface node, or any node if the inside is shown. */
@@ -259,12 +261,25 @@ export interface StatusMessage {
   left_s: number | null;
 }
 
+/** Where an exam stands. */
+export interface ExamMessage {
+  type: "exam";
+  /** From 1. */
+  trial: number;
+  trials: number;
+  /** Points of the surface, one of which may be above a nodule, in the frame of the scene; none where they are not told. */
+  places: Vec3[];
+  /** After the last answer: what it comes to in words, and a picture as an address with its content. */
+  result: { lines: string[]; plot: string } | null;
+}
+
 export type TextMessage =
   | { type: "welcome"; role: Role; version: string; models: Choice[] }
   | { type: "role"; role: Role }
   | SettingsMessage
   | StatusMessage
   | RecordedMessage
+  | ExamMessage
   | { type: "error"; text: string };
 
 export type ClientMessage =
@@ -285,10 +300,11 @@ export type ClientMessage =
   | { type: "cancel" }
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string; max?: number }
+  | { type: "answer"; found: boolean }
   | { type: "ack"; frame: number }
   | SessionCommand;
 
-const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "error"];
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "error"];
 const BODY_ARRAYS = {
   nodes: Float32Array,
   tets: Uint32Array,

@@ -9,6 +9,7 @@ import { contactsOf } from "../tool_contacts";
 import { BodyView } from "./body_view";
 import type { Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
+import { ExamPlaces } from "./exam_places";
 import { FIELD, TISSUE } from "./field_material";
 import { toolShape } from "./tool_shape";
 import type { ToolShape } from "./tool_shape";
@@ -21,6 +22,7 @@ export class Stage {
   shapes: ToolShape[] = [];
   readonly bounds = new THREE.Box3();
   private tools: ToolView[] = [];
+  private readonly examPlaces = new ExamPlaces();
   private watched: { view: WatchedView; body: number } | null = null;
 
   constructor(readonly viewport: Viewport, private readonly store: Store) {
@@ -37,6 +39,11 @@ export class Stage {
     // Drawn with the next frame.
     store.subscribe(["shownScale"], ({ shownScale }) => {
       for (const body of this.bodies) body.exaggerate(shownScale);
+    });
+    viewport.scene.add(this.examPlaces.group);
+    store.subscribe(["exam", "scene"], ({ exam, scene }) => {
+      this.examPlaces.show(exam?.places ?? [], scene?.size ?? 0);
+      viewport.invalidate();
     });
     store.subscribe(["pinned"], ({ frame }) => {
       if (frame && this.updateTools(frame)) viewport.invalidate();

@@ -14,8 +14,8 @@ export class RecordButton {
     byId("recorded-close").onclick = () => store.update({ recorded: null });
     store.subscribe(["frame"], ({ frame }) => showStatus(frame?.recording ?? null));
     store.subscribe(["recorded"], ({ recorded }) => showEnd(recorded));
-    store.subscribe(["scene", "role", "connection"], (state) => {
-      byId("record").hidden = state.scene?.replay != null || state.role !== "control";
+    store.subscribe(["scene", "exam", "role", "connection"], (state) => {
+      byId("record").hidden = state.scene?.replay != null || state.exam !== null || state.role !== "control";
       byId("recording-stop").hidden = state.role !== "control";
       for (const id of ["record", "recording-stop"]) byId<HTMLButtonElement>(id).disabled = !inControl(state);
     });

@@ -1,0 +1,154 @@
+"""The course of an exam: which nodule comes next, what was answered, and how to go on after an interruption.
+
+Everything follows from the seed and the answers: where the nodules of each trial lie is drawn from the seed and the
+trial's number alone, and its contrast by the staircase from the answers before. So rows that are read back lead to the
+trial at which an exam was interrupted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.exam.library import Library
+from palpate.exam.psychometric import Estimate, Psychometrics
+from palpate.exam.staircase import Staircase
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One question.
+
+    Attributes
+    ----------
+    number
+        From 1.
+    nodule
+        Number of the nodule in the library; None for a trial with nothing hidden.
+
+    """
+
+    number: int
+    nodule: int | None
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A trial and its answer, as a row of the table holds them.
+
+    Attributes
+    ----------
+    trial
+        What was asked.
+    marked
+        Point of the surface (3,), m, in the frame of the body; None for "none".
+    place
+        Number of the place closest to the mark; None without one.
+    distance
+        From the mark to the place of the nodule, m; None without either.
+    score
+        1 for a right answer, 0 for a wrong one; "none" over a nodule is scored as a guess, `1/m`.
+    seconds
+        From when the body could be touched to the answer.
+
+    """
+
+    trial: Trial
+    marked: tuple[float, float, float] | None
+    place: int | None
+    distance: float | None
+    score: float
+    seconds: float
+
+    @property
+    def correct(self) -> bool:
+        """Whether the answer is right."""
+        return self.score == 1.0
+
+
+class Course:
+    """An exam of one person.
+
+    Parameters
+    ----------
+    library
+        The bodies.
+    seed
+        Of places and depths.
+
+    Attributes
+    ----------
+    answers
+        So far.
+
+    """
+
+    def __init__(self, library: Library, seed: int):
+        self.library, self.seed = library, seed
+        question = library.exam.question
+        self._count = question.trials + question.blanks
+        order = np.random.default_rng([seed, 0]).permutation(self._count)
+        self._blank = set(order[: question.blanks].tolist())
+        felt = library.staircase_contrasts
+        self._staircase = Staircase(float(felt.min()), float(felt.max()), question.target)
+        self.answers: list[Answered] = []
+
+    @property
+    def count(self) -> int:
+        """How many trials there are, those with nothing hidden too."""
+        return self._count
+
+    @property
+    def trial(self) -> Trial | None:
+        """The question that is to be answered; None at the end."""
+        rank = len(self.answers)
+        if rank == self._count:
+            return None
+        return Trial(rank + 1, None if rank in self._blank else self._chosen(rank))
+
+    def _chosen(self, rank: int) -> int:
+        """Nodule of a random place, radius and depth whose felt contrast is next to the staircase's."""
+        library = self.library
+        group = library.groups[int(np.random.default_rng([self.seed, 1, rank]).integers(len(library.groups)))]
+        distance = np.abs(np.log(library.staircase_contrasts[group] / self._staircase.contrast))
+        return int(group[distance.argmin()])
+
+    def answer(self, marked: Sequence[float] | None, seconds: float) -> Answered:
+        """Take the answer of the trial that is to be answered, and go on to the next."""
+        answered = self.scored(marked, seconds)
+        self.take(answered)
+        return answered
+
+    def take(self, answered: Answered) -> None:
+        """Go on to the next trial."""
+        if answered.trial.nodule is not None:
+            self._staircase.answered(answered.score)
+        self.answers.append(answered)
+
+    def scored(self, marked: Sequence[float] | None, seconds: float) -> Answered:
+        """Score an answer of the trial that is to be answered, which stays that."""
+        trial, places = self.trial, self.library.places
+        assert trial is not None, "the exam is over"
+        point = None if marked is None else np.array(marked, dtype=float)
+        place = None if point is None else places.closest(point)
+        distance, score = None, float(point is None)
+        if trial.nodule is not None:
+            hidden = self.library.nodules[trial.nodule].place
+            score = 1.0 / len(places.points) if place is None else float(place == hidden)
+            distance = None if point is None else float(np.linalg.norm(point - places.points[hidden]))
+        where = None if marked is None else (float(marked[0]), float(marked[1]), float(marked[2]))
+        return Answered(trial, where, place, distance, score, seconds)
+
+    def estimate(self, psychometrics: Psychometrics | None = None) -> Estimate:
+        """Weber fraction by the answers so far, over nodules; ``psychometrics`` of the library saves work."""
+        prepared = psychometrics or psychometrics_of(self.library)
+        asked = [(answer.trial.nodule, answer.score) for answer in self.answers if answer.trial.nodule is not None]
+        which, scores = np.array([nodule for nodule, _ in asked], dtype=int), np.array([score for _, score in asked])
+        return prepared.estimate(which, scores)
+
+
+def psychometrics_of(library: Library) -> Psychometrics:
+    """Likelihoods of answers over every nodule of a library."""
+    return Psychometrics(library.felt_contrasts, len(library.places.points))

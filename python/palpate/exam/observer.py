@@ -1,0 +1,53 @@
+"""A hand of known Weber fraction, to test an exam with: it feels the engine's own forces, with noise.
+
+It presses every place to the exam's depth and feels the force `F_i (1 + w n_i)`, `n_i` standard normal and independent:
+at a given depth that is the stiffness `K_i = F_i / d` with noise in proportion to it. It knows the body without nodules
+well, and takes the place where the force is the largest part of what it is there. The standard deviation of one look
+over what is looked at is `w`: that is the Weber fraction that :mod:`palpate.exam.psychometric` is to find.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.exam.course import Course, psychometrics_of
+from palpate.exam.library import Library
+from palpate.exam.psychometric import Estimate
+
+
+class Observer:
+    """Answers trials.
+
+    Parameters
+    ----------
+    weber_fraction
+        Standard deviation of what is felt, over what there is to be felt.
+    seed
+        Of its noise.
+
+    """
+
+    def __init__(self, weber_fraction: float, seed: int):
+        self._weber_fraction = weber_fraction
+        self._noise = np.random.default_rng([seed, 2])
+
+    def place(self, library: Library, nodule: int | None) -> int:
+        """Place at which it marks a body."""
+        forces = library.plain_forces if nodule is None else library.forces[nodule]
+        felt = forces * (1.0 + self._weber_fraction * self._noise.standard_normal(len(forces)))
+        return int(np.argmax(felt / library.plain_forces))
+
+
+def observed(library: Library, weber_fraction: float, seed: int) -> Course:
+    """Take a whole exam by an observer."""
+    course, observer = Course(library, seed), Observer(weber_fraction, seed)
+    while (trial := course.trial) is not None:
+        place = observer.place(library, trial.nodule)
+        course.answer(library.places.points[place].tolist(), 0.0)
+    return course
+
+
+def observed_many(library: Library, weber_fraction: float, exams: int, seed: int = 0) -> list[Estimate]:
+    """Estimates of so many exams by an observer, with seeds that follow each other."""
+    prepared = psychometrics_of(library)
+    return [observed(library, weber_fraction, seed + rank).estimate(prepared) for rank in range(exams)]
