@@ -17,7 +17,7 @@ from palpate.viewer.session import FRAME_AGE, Session
 # Recorded seconds shown in a second.
 SLOWEST, FASTEST = 0.01, 1.0
 # Computing between two frames, s: while playing, and on the way to another place of the time line.
-PLAYING, SEEKING = 0.05, 0.1
+PLAYING, SEEKING = 0.05, 0.2
 # Time between two frames that counts, s: nothing is skipped where nobody looked for longer.
 LONGEST_PAUSE = 0.1
 
