@@ -160,3 +160,47 @@ describe("what is shown", () => {
     expect(sent).toEqual([]);
   });
 });
+
+describe("an exam", () => {
+  const exam = { type: "exam", trial: 1, trials: 2, places: [], result: null } as const;
+  let store: Store;
+  let sent: ClientMessage[];
+  let control: Control;
+
+  beforeEach(() => {
+    store = new Store();
+    sent = [];
+    control = new Control(store, (message) => sent.push(message));
+    store.update({ connection: "open", role: "control" });
+    control.takeText({ ...exam, places: [] });
+    control.takeScene(scene(1));
+  });
+
+  it("shows nothing that an eye could read it from, whatever key is hit", () => {
+    for (const layer of ["colors", "wireframe", "supports", "cutaway", "plots"] as const) control.toggleLayer(layer);
+    expect(Object.values(store.get().layers)).toEqual([false, false, false, false, false]);
+    expect(sent).toEqual([]);
+  });
+
+  it("takes one answer a trial, and the next one with the next scene", () => {
+    control.answer(true);
+    control.answer(false);
+    expect(sent).toEqual([{ type: "answer", found: true }]);
+    control.takeText({ ...exam, trial: 2, places: [] });
+    expect(store.get().answering).toBe(true);
+    control.takeScene(scene(1));
+    control.answer(false);
+    expect(sent.at(-1)).toEqual({ type: "answer", found: false });
+  });
+
+  it("takes the answer again where the server refused it, and none when it is over", () => {
+    control.answer(true);
+    control.takeText({ type: "error", text: "touch the body first" });
+    control.answer(true);
+    expect(sent).toHaveLength(2);
+    control.takeText({ ...exam, places: [], result: { lines: [], plot: "" } });
+    control.answer(true);
+    expect(sent).toHaveLength(2);
+    expect(store.get().answering).toBe(false);
+  });
+});

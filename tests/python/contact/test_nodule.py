@@ -18,6 +18,8 @@ MIDDLE, TOP, DEPTH, DEEPER = 0.04, 0.04, 1.5e-3, 0.2e-3
 SOFT = palpate.Material(5e3, 0.45)
 # Young's modulus of the nodule, Pa, and its radius, m, 10 mm deep: contrasts of 6, 12 and 27 per cent.
 NODULES = ((11e3, 5e-3), (26e3, 5e-3), (13.5e3, 7e-3))
+# What `contrasts` finds for the last one: its elements take a minute, and are none of ours.
+LARGE = [np.array([0.266, 0.293])]
 # Largest difference from the direct contrasts.
 POINTS = 0.02
 
@@ -83,7 +85,8 @@ def test_a_nodule_is_felt_as_the_direct_solution_says(plain, with_nodule, radius
     middle = len(line) // 2
     without = felt(plain, line)
     moduli = [modulus for modulus, other in NODULES if other == radius]
-    for modulus, expected in zip(moduli, contrasts(plain.scene.tools[0].radius, radius, moduli), strict=True):
+    direct = LARGE if radius == NODULES[2][1] else contrasts(plain.scene.tools[0].radius, radius, moduli)
+    for modulus, expected in zip(moduli, direct, strict=True):
         gain = felt(with_nodule(modulus, radius), line) / without - 1
         print(f"E {modulus:g} Pa, radius {radius:g} m: {gain[middle]}, direct {expected}")
         assert np.abs(gain[middle] - expected).max() < POINTS
