@@ -51,6 +51,8 @@ export class Control {
         return this.takeSettings(message);
       case "status":
         return this.store.update({ status: message });
+      case "recorded":
+        return this.store.update({ recorded: message });
       case "exam":
         return this.takeExam(message);
       case "error":
@@ -99,6 +101,7 @@ export class Control {
     const { pinned, frame: before } = this.store.get();
     const left = (tool: number) => before?.tools[tool]?.active && !frame.tools[tool]?.active;
     this.store.update({ frame, pinned: pinned.some(left) ? pinned.filter((tool) => !left(tool)) : pinned });
+    if (frame.replay) this.takeReplayedSettings(frame.replay.settings);
   }
 
   /** What this page looks at, told again after a connection was lost. */
@@ -333,6 +336,27 @@ export class Control {
       shownScale: 1,
     });
     this.send({ type: "reset" });
+  }
+
+  // Recordings and replays.
+
+  /** Lets go and records, or ends the recording. */
+  toggleRecord(): void {
+    const state = this.store.get();
+    if (!inControl(state)) return;
+    const on = !state.frame?.recording;
+    if (on) this.release();
+    this.send({ type: "record", on });
+  }
+
+  /** Goes to a tick, plays, pauses, or changes the speed; a line that is dragged sends no more often than a slider. */
+  replay(change: { tick?: number; play?: boolean; speed?: number }): void {
+    this.sendLimited(`replay ${Object.keys(change).join()}`, { type: "replay", ...change });
+  }
+
+  /** A replay carries its settings with every frame; most change nothing. */
+  private takeReplayedSettings(settings: SettingsMessage): void {
+    if (JSON.stringify(settings) !== JSON.stringify(this.store.get().settings)) this.store.update({ settings });
   }
 
   private pin(tool: number): void {

@@ -1,6 +1,7 @@
 // Starts the page with the token of its address. The token stands behind `#`, which browsers never send to a server.
 
 import "./ui/style.css";
+import "./ui/session.css";
 
 import { showConnection, showPageMessage } from "./ui/notices";
 import { Viewer } from "./viewer";

@@ -2,6 +2,7 @@
 // it, change it by `update`, and hear of changes of the keys they name.
 
 import type { ConnectionState } from "./net/connection";
+import type { RecordedMessage } from "./net/session_messages";
 import type {
   Choice,
   ExamMessage,
@@ -51,6 +52,8 @@ export interface State {
   /** The newest one that is drawn. */
   frame: FrameMessage | null;
   notices: readonly string[];
+  /** The recording that ended last, until it is dismissed. */
+  recorded: RecordedMessage | null;
   /** null where nothing is examined. */
   exam: ExamMessage | null;
   /** Whether an answer is on its way: the next body is not there yet. */
@@ -105,6 +108,7 @@ export function initialState(): State {
     settings: null,
     frame: null,
     notices: [],
+    recorded: null,
     exam: null,
     answering: false,
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },

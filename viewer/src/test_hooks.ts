@@ -3,6 +3,7 @@
 import * as THREE from "three";
 
 import type { Pointer } from "./input/pointer";
+import type { RecordingStatus, ReplayFrame } from "./net/session_messages";
 import type { FieldMessage, MotionFrame, ToolFrame, Vec3 } from "./net/protocol";
 import type { BodyView } from "./scene/body_view";
 import type { Stage } from "./scene/stage";
@@ -39,6 +40,8 @@ export interface ViewerState {
   /** Where an exam stands, whether the next body is awaited, and how loud its tone is. */
   exam: { trial: number; finished: boolean; answering: boolean; loudness: number } | null;
   /** Of a body in motion, with the newest row of its history. */
+  recording: RecordingStatus | null;
+  replay: ReplayFrame | null;
   motion: (MotionFrame & ReturnType<HistoryLog["latest"]>) | null;
 }
 
@@ -107,6 +110,8 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     strain: frame?.strain ?? 0,
     field: frame?.fields[state.body] ?? null,
     fault: frame?.fault ?? null,
+    recording: frame?.recording ?? null,
+    replay: frame?.replay ?? null,
     exam: state.exam && {
       trial: state.exam.trial,
       finished: state.exam.result !== null,

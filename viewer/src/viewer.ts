@@ -22,10 +22,12 @@ import { MotionPanel } from "./ui/motion_panel";
 import { followNotices } from "./ui/notices";
 import { Panel } from "./ui/panel";
 import { Plots } from "./ui/plots";
+import { RecordButton } from "./ui/record_button";
 import { Readout } from "./ui/readout";
 import { ScaleView } from "./ui/scale_view";
 import { SettingsPanel } from "./ui/settings_panel";
 import { Statistics } from "./ui/statistics";
+import { TimeLine } from "./ui/time_line";
 import { followTheme } from "./ui/theme";
 import { ToolPanel } from "./ui/tool_panel";
 
@@ -72,6 +74,8 @@ export class Viewer {
     new SettingsPanel(store, control);
     new ToolPanel(store, control);
     new MotionPanel(store, control);
+    new RecordButton(store, control);
+    new TimeLine(store, control);
     new ExamPanel(store, control);
     followNotices(store, control);
     installTestHooks({ store, stage: this.stage, pointer, statistics, history: this.plots.history });

@@ -2,7 +2,7 @@
 
 use numpy::IntoPyArray;
 use palpate_core::simulation::{Model, Snapshot};
-use palpate_servo::Published;
+use palpate_servo::{LogRow, Published};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -44,6 +44,18 @@ pub fn frame<'py>(py: Python<'py>, model: &Model, tools: usize, published: Publi
     frame.set_item("fault", status.fault.map(|fault| fault.to_string()))?;
     frame.set_item("realtime", (status.realtime.priority, status.realtime.locked_memory))?;
     Ok(frame)
+}
+
+/// A row of the log (18 numbers): time, position and force of the first tool, computing time, wake-up delay, displacement
+/// of the watched node, and time and energies of the watched body.
+pub fn push_row(rows: &mut Vec<f64>, row: &LogRow, body: usize) {
+    rows.push(row.time);
+    rows.extend(row.position.to_array());
+    rows.extend(row.force.to_array());
+    rows.extend([row.compute_us, row.wakeup_us]);
+    rows.extend(row.watched.unwrap_or_default().to_array());
+    rows.push(row.body_time[body]);
+    rows.extend(energy_array(&row.energy[body]));
 }
 
 /// For each tool why no contact began, or None.

@@ -5,8 +5,8 @@ use std::io::{BufReader, Cursor, Read};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use numpy::IntoPyArray;
-use palpate_core::simulation::Mode;
+use numpy::{IntoPyArray, PyArray1};
+use palpate_core::simulation::{MAX_BODIES, Mode};
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
 use palpate_recording::{Ticks, same_settings};
@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::to_python;
-use crate::frame::frame;
+use crate::frame::{frame, push_row};
 use crate::scene::{energy_array, wxyz};
 use crate::simulation::SimulationCore;
 
@@ -222,6 +222,9 @@ fn settings_dict<'py>(py: Python<'py>, tick: u64, settings: &Settings, tools: us
 /// Tick, whose, quantity, numbers recorded and now.
 type DifferenceRecord = (u64, String, &'static str, Vec<f64>, Vec<f64>);
 
+/// Contact radii, coefficients of friction, stiffness scales, limit of strain, time scale, body and rank of a node.
+type SettingsRecord = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64, Option<(usize, u32)>);
+
 /// A recording made again, tick by tick.
 #[pyclass(module = "palpate._native")]
 pub struct Replay {
@@ -288,5 +291,27 @@ impl Replay {
             parts.1.latest().clone()
         };
         frame(py, &self.model, self.tools, published)
+    }
+
+    /// Rows of the log since the last call, as of a running loop; their computing times are not those of the recording.
+    fn drain_log<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let mut rows = Vec::new();
+        let mut parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let replay = &mut parts.1;
+        let body = replay.settings().watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
+        replay.drain_log(|row| push_row(&mut rows, &row, body));
+        rows.into_pyarray(py)
+    }
+
+    /// Settings of the latest tick: contact radius, m, and friction of each tool, stiffness of each body over that of its
+    /// Green's function, limit of strain, how much slower bodies move, and the body and rank of the watched node.
+    fn settings(&self) -> SettingsRecord {
+        let parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let settings = parts.1.settings();
+        let Settings { contact_radius, friction, stiffness_scale, .. } = settings;
+        let bodies = self.model.bodies.len();
+        let (radii, friction) = (contact_radius[..self.tools].to_vec(), friction[..self.tools].to_vec());
+        let Settings { strain_limit, time_scale, watch, .. } = settings;
+        (radii, friction, stiffness_scale[..bodies].to_vec(), strain_limit, time_scale, watch)
     }
 }

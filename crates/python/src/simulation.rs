@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::to_python;
-use crate::frame::frame;
+use crate::frame::{frame, push_row};
 use crate::recording::{Recorded, Recording, RecordingStatus, header};
 use crate::scene::{
     BodyArguments, ContactRecord, ToolArguments, body_parts, contact_records, energy_array, poses, quaternion, tool,
@@ -235,15 +235,7 @@ impl SimulationCore {
         let mut rows = Vec::new();
         let body = self.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
         if let Some(servo) = self.servo() {
-            servo.drain_log(|row| {
-                rows.push(row.time);
-                rows.extend(row.position.to_array());
-                rows.extend(row.force.to_array());
-                rows.extend([row.compute_us, row.wakeup_us]);
-                rows.extend(row.watched.unwrap_or_default().to_array());
-                rows.push(row.body_time[body]);
-                rows.extend(energy_array(&row.energy[body]));
-            });
+            servo.drain_log(|row| push_row(&mut rows, &row, body));
         }
         rows.into_pyarray(py)
     }

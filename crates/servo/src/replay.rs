@@ -13,6 +13,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
+use crate::log::LogRow;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedContact, RecordedInput, RecordedOutput, RecordedTool, StrainAsked, TickRecord};
 use crate::safety::SafetyLimits;
@@ -128,6 +129,16 @@ impl Replay {
     /// The latest tick.
     pub fn latest(&mut self) -> &Published {
         self.handle.latest()
+    }
+
+    /// Those of the latest tick.
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Hands out the rows of the log since the last call, as of a running loop.
+    pub fn drain_log(&mut self, each: impl FnMut(LogRow)) {
+        self.handle.drain_log(each);
     }
 
     fn tick_again(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {

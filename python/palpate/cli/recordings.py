@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from palpate.cli.app import app
+from palpate.cli.running import PORT, Browser, Host, Port
 
 if TYPE_CHECKING:
     from palpate.simulation import Recording, Replayed
@@ -26,12 +27,18 @@ def replay(
     headless: Annotated[
         bool, typer.Option("--headless", help="No viewer: only tell whether every bit is the same.")
     ] = False,
+    port: Port = PORT,
+    host: Host = "127.0.0.1",
+    browser: Browser = True,
 ) -> None:
-    """Make a recording again, tick by tick, and compare every bit.
+    """Make a recording again, tick by tick, and compare every bit: in the browser with a time line, or headless.
 
-    The exit code is 0 if all are the same, 1 if one is not, and 2 if the recording cannot be made again.
+    With --headless the exit code is 0 if all bits are the same, 1 if one is not, and 2 if the recording cannot be made
+    again.
 
     Example: palpate replay press.mcap
+
+    Example: palpate replay press.mcap --headless
     """
     import palpate
     from palpate.errors import SceneError
@@ -39,6 +46,11 @@ def replay(
     recording = palpate.Recording.load(file)
     given = None if scene is None else palpate.Scene.read(scene)
     try:
+        if not headless:
+            from palpate.viewer.live import open_replay
+
+            open_replay(recording, given, host=host, port=port, browser=browser)
+            return
         made = palpate.replay(recording, given, progress=True)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -34,6 +35,7 @@ Record = Annotated[
 Priority = Annotated[
     int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
 ]
+Recordings = Annotated[Path, typer.Option(help="Folder of what the page records; default: this one.")]
 PORT = 8642
 
 
@@ -46,6 +48,7 @@ def demo(
         bool, typer.Option("--impulse", help="A moving body of hard rubber, struck at its free end with 10 N for 1 ms.")
     ] = False,
     record: Record = None,
+    recordings: Recordings = Path(),
     headless: Headless = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the CSV and PNG of --headless and --impulse.")] = None,
     port: Port = PORT,
@@ -77,7 +80,7 @@ def demo(
     if headless is not None:
         _scripted(built, f"{model}-paper" if paper else model, headless, out or Path(), record)
         return
-    _view(built, host, port, browser, NAMES, scene_of, record)
+    _view(built, _Page(host, port, browser, recordings), NAMES, scene_of, record)
 
 
 @app.command()
@@ -103,6 +106,7 @@ def run(
     cpus: Cpus = None,
     priority: Priority = None,
     record: Record = None,
+    recordings: Recordings = Path(),
     headless: Headless = None,
     out: Out = Path(),
     port: Port = PORT,
@@ -138,7 +142,7 @@ def run(
         from palpate.viewer.surface_map import read_map
 
         maps = read_map(surface_map, built)
-    _view(built, host, port, browser, record=record, maps=maps)
+    _view(built, _Page(host, port, browser, recordings), record=record, maps=maps)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -148,11 +152,19 @@ def _build(scene: Scene) -> BuiltScene:
         return scene.build()
 
 
+@dataclass(frozen=True)
+class _Page:
+    """Where the page is served, whether it is opened, and where it puts recordings."""
+
+    host: str
+    port: int
+    browser: bool
+    recordings: Path
+
+
 def _view(
     built: BuiltScene,
-    host: str,
-    port: int,
-    browser: bool,
+    page: _Page,
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
     record: Path | None = None,
@@ -161,8 +173,10 @@ def _view(
     from palpate.viewer.live import open_viewer
     from palpate.viewer.server import ViewerServer
 
-    server = ViewerServer(built, host=host, port=port, models=models, scene_of=scene_of, record=record, maps=maps)
-    open_viewer(server, browser=browser)
+    page.recordings.mkdir(parents=True, exist_ok=True)
+    files = {"record": record, "recordings": page.recordings, "maps": maps}
+    server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
+    open_viewer(server, browser=page.browser)
 
 
 def _force_line(record: PressRecord, max_force: float) -> str:

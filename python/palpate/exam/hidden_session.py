@@ -74,6 +74,7 @@ class HiddenSession(Session):
             "tools": [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(shapes)],
             "motion": None,
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
+            "replay": None,
         }
         return encode(header, {**by_body([shown.arrays()]), **by_tool([arrays for _, arrays in shapes])})
 
@@ -94,6 +95,8 @@ class HiddenSession(Session):
             "motion": None,
             "fields": [NOTHING],
             "interior": [False],
+            "recording": None,
+            "replay": None,
             "loudness": min(float(np.linalg.norm(frame.forces[0])) / self._loud_force, 1.0),
         }
         still = {"displacements": ("f4", np.zeros((self._count, 3))), "scalar": ("u1", np.zeros(self._count))}

@@ -4,6 +4,7 @@ from palpate.simulation.about import scene_of, shown_of
 from palpate.simulation.frame import BodyFrame, Contact, Frame, frame_of
 from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
 from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, unbroken
+from palpate.simulation.replayed import ReplayedSimulation
 from palpate.simulation.simulation import Simulation
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Recording",
     "RecordingStatus",
     "Replayed",
+    "ReplayedSimulation",
     "Simulation",
     "frame_of",
     "replay",

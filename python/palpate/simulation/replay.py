@@ -79,8 +79,8 @@ class Replayed:
         return not self.differences
 
 
-def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:
-    """Build the simulation that made a recording, or that of a scene which should give the same.
+def built_scene_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> BuiltScene:
+    """Build the scene of a recording, or one that should give the same.
 
     Raises
     ------
@@ -91,7 +91,19 @@ def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None)
     given = scene_of(dict(recording.about)) if scene is None else scene
     built = given if isinstance(given, BuiltScene) else given.build()
     require_same(dict(recording.about), built)
-    simulation = Simulation(built)
+    return built
+
+
+def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:
+    """Build the simulation that made a recording, or that of a scene which should give the same.
+
+    Raises
+    ------
+    Error
+        As :func:`built_scene_of` has them.
+
+    """
+    simulation = Simulation(built_scene_of(recording, scene))
     simulation._arm_strain_limit()
     return simulation
 

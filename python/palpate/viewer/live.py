@@ -8,22 +8,43 @@ import signal
 import sys
 import webbrowser
 
+from palpate.scene import Scene
+from palpate.simulation import Recording, ReplayedSimulation
+from palpate.viewer.replay_session import ReplaySession
 from palpate.viewer.server import ViewerServer
 
+PRESS = "Hold the left mouse button on the body to press, drag to slide. Ctrl-C here ends."
+REPLAY = "The time line is below the body: space plays and pauses. Ctrl-C here ends."
 
-def open_viewer(server: ViewerServer, *, browser: bool = True) -> None:
+
+def open_viewer(server: ViewerServer, *, browser: bool = True, hint: str = PRESS) -> None:
     """Serve until Ctrl-C; the address is printed, and opened where there is a desktop."""
-    asyncio.run(_serve(server, browser))
+    asyncio.run(_serve(server, browser, hint))
 
 
-async def _serve(server: ViewerServer, browser: bool) -> None:
+def open_replay(
+    recording: Recording, scene: Scene | None = None, *, host: str, port: int, browser: bool = True
+) -> None:
+    """Show a recording in the page until Ctrl-C, made again by the scene given or its own.
+
+    Raises
+    ------
+    Error
+        A recording that cannot be made again, or a port in use.
+
+    """
+    session = ReplaySession(ReplayedSimulation(recording, scene))
+    open_viewer(ViewerServer(session, host=host, port=port), browser=browser, hint=REPLAY)
+
+
+async def _serve(server: ViewerServer, browser: bool, hint: str) -> None:
     await server.start()
     try:
         address, *others = server.addresses
         print(f"Palpate is at {address}", flush=True)
         for other in others:
             print(f"from other machines at {other}", flush=True)
-        print("Hold the left mouse button on the body to press, drag to slide. Ctrl-C here ends.", flush=True)
+        print(hint, flush=True)
         if browser and _has_desktop():
             await asyncio.to_thread(webbrowser.open, server.address)
         finished = asyncio.Event()
@@ -32,7 +53,10 @@ async def _serve(server: ViewerServer, browser: bool) -> None:
             loop.add_signal_handler(number, finished.set)
         await finished.wait()
     finally:
-        await server.stop()
+        ended = await server.stop()
+        if ended is not None:
+            failed = "" if ended["error"] is None else f" up to where it failed ({ended['error']})"
+            print(f"recorded {ended['path']}{failed}: show it by: {ended['replay']}", flush=True)
 
 
 def _has_desktop() -> bool:

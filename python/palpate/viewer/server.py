@@ -70,7 +70,7 @@ class ViewerServer:
     Parameters
     ----------
     built
-        What is shown first.
+        What is shown first: a scene, or a session with one.
     host, port
         Where it listens; port 0 takes a free one.
     models
@@ -79,6 +79,8 @@ class ViewerServer:
         Scene of a model.
     record
         New file in which what is shown first is recorded.
+    recordings
+        Folder of the recordings that the page begins.
     maps
         What a palpation has left of each body.
 
@@ -91,20 +93,21 @@ class ViewerServer:
 
     def __init__(
         self,
-        built: BuiltScene,
+        built: BuiltScene | Session,
         *,
         host: str = "127.0.0.1",
         port: int = DEFAULT_PORT,
         models: Sequence[str] = (),
         scene_of: Callable[[str], Scene] | None = None,
         record: Path | None = None,
+        recordings: Path = Path(),
         maps: Sequence[SurfaceMap | None] | None = None,
     ):
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
-        self._maps = maps
-        self._session = self._make_session(built)
+        self._maps, self._recordings = maps, recordings
+        self._session = built if isinstance(built, Session) else self._make_session(built)
         if record is not None:
             self._session.simulation.record(record)
         self._session.start()
@@ -128,7 +131,7 @@ class ViewerServer:
 
     def _make_session(self, built: BuiltScene) -> Session:
         """Session of what is shown first; a derived class may have a kind of its own."""
-        return Session(built, maps=self._maps)
+        return Session(built, maps=self._maps, folder=self._recordings)
 
     async def start(self) -> None:
         """Listen.
@@ -167,8 +170,8 @@ class ViewerServer:
         gc.freeze()
         self._watch = asyncio.create_task(self._watchdog())
 
-    async def stop(self) -> None:
-        """Close all connections and stop the loop."""
+    async def stop(self) -> dict[str, Any] | None:
+        """Close all connections and stop the loop: what is told of the recording that this ends, if it ends one."""
         if self._server is not None:
             gc.unfreeze()
             sys.setswitchinterval(self._interval)
@@ -177,11 +180,13 @@ class ViewerServer:
             await self._server.wait_closed()
         if self._building is not None:
             self._building.cancel()
-        self._close_session()
+        return self._close_session()
 
-    def _close_session(self) -> None:
+    def _close_session(self) -> dict[str, Any] | None:
         self._worker.close()
+        ended = self._session.recorder.stop()
         self._session.close()
+        return ended
 
     def _request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Serve the page, let the websocket through, refuse everything else."""
@@ -203,7 +208,7 @@ class ViewerServer:
         self._clients.append(client)
         sender = None
         try:
-            if self._controller is None:
+            if self._controller is None and self._session.controllable:
                 self._controller = client
             await self._greet(client)
             client.may_send.set()
@@ -259,7 +264,7 @@ class ViewerServer:
             elif message["type"] == "field":
                 name, full_scale = messages.word(message, "name"), messages.positive_or_none(message, "max")
                 client.wants = replace(client.wants, field=name, full_scale=full_scale)
-            elif client is not self._controller:
+            elif client is not self._controller and message["type"] not in self._session.from_all:
                 raise ViewerError("another viewer has control; this one watches")
             else:
                 await self._command(message)
@@ -275,6 +280,8 @@ class ViewerServer:
             await self._choose(message.get("name"))
         elif message["type"] == "shape":
             await self._reshape(message)
+        elif message["type"] == "record":
+            await self._tell_end(await self._worker.call(self._session.record, message))
         else:
             session = self._session
             if await self._worker.call(session.handle, message):
@@ -321,6 +328,12 @@ class ViewerServer:
             controller = self._controller
             if controller is None or time.monotonic() - controller.heard > LOST_AFTER:
                 await self._worker.call(self._session.release)
+            await self._tell_end(await self._worker.call(self._session.recorder.stop_failed))
+
+    async def _tell_end(self, ended: dict[str, Any] | None) -> None:
+        """Tell of a recording that has ended."""
+        if ended is not None:
+            await self._tell_all(ended)
 
     async def _tell_all(self, message: dict[str, Any]) -> None:
         for client in list(self._clients):
@@ -333,7 +346,7 @@ class ViewerServer:
         scene, building = self._scene_of(name), self._begin_building()
         solving = self._reporter(f"Solving the {name}", building)
         modes = self._reporter(f"Computing the modes of the {name}", building)
-        make = lambda: Session(scene.build(solving, modes))  # noqa: E731
+        make = lambda: Session(scene.build(solving, modes), folder=self._recordings)  # noqa: E731
         self._build_task = asyncio.create_task(self._switch(f"Loading the {name}", make, self._exchange, building))
 
     async def _reshape(self, message: dict[str, Any]) -> None:
@@ -342,7 +355,7 @@ class ViewerServer:
         built = await self._worker.call(before.reshaped, message)
         if built is None:
             return
-        make = lambda: Session(built, before.own_tools, before.maps)  # noqa: E731
+        make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
         building = self._begin_building()
         self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
 
@@ -361,6 +374,8 @@ class ViewerServer:
             await self._worker.call(self._session.release)
             session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
+            why = "a recording is of one scene, and this one has another now"
+            await self._tell_end(await self._worker.call(self._session.recorder.stop, why))
             await self._worker.call(exchange, session)
             await self._tell_all(await self._worker.call(session.settings))
         except Error as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
 from palpate.viewer.messages import by_body, encode, index, number, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
+from palpate.viewer.recorder import SessionRecorder
 from palpate.viewer.shown_body import ShownBody, titled
 from palpate.viewer.surface_map import SurfaceMap, maps_or_none
 from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices, with_shape
@@ -24,9 +26,8 @@ from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices,
 LARGEST_RADIUS = 0.12
 # Tool targets farther than this many body sizes from the body are refused.
 REACH = 10.0
-# Rows of the 1 kHz log kept for slow clients, and at most sent with a frame.
+# Rows of the 1 kHz log kept for slow clients.
 LOG_KEPT = 4000
-LOG_SENT = 64
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -51,19 +52,32 @@ class Session:
         Tools as the scene file has them, where the scene's have been given other shapes since.
     maps
         What a palpation has left of each body.
+    folder
+        Where recordings go.
+    simulation
+        What is shown; None makes the loop of the scene.
 
     """
+
+    # Whether a page may press and change things; types of messages that pages may send which only watch.
+    controllable = True
+    from_all: frozenset[str] = frozenset()
+    # Rows of the log that are sent with a frame at most.
+    log_sent = 64
 
     def __init__(
         self,
         built: BuiltScene,
         own_tools: Sequence[ToolTable] | None = None,
         maps: Sequence[SurfaceMap | None] | None = None,
+        folder: Path = Path(),
+        simulation: Simulation | None = None,
     ):
         self.built = built
         scene = built.scene
         self.own_tools = scene.tools if own_tools is None else own_tools
-        self.simulation = Simulation(built)
+        self.simulation = Simulation(built) if simulation is None else simulation
+        self.recorder = SessionRecorder(self.simulation, folder)
         self.maps = maps_or_none(maps, len(built.bodies))
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
@@ -151,6 +165,23 @@ class Session:
             raise ViewerError(f"unknown message '{message['type'][:40]}'")
         return handler(message)
 
+    def record(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Begin a recording, or end it: the message that tells of its end.
+
+        Raises
+        ------
+        Error
+            A recording that cannot be written.
+
+        """
+        if not isinstance(message.get("on"), bool):
+            raise ViewerError("record: on must be true or false")
+        if not message["on"]:
+            return self.recorder.stop()
+        self.release()
+        self.recorder.start()
+        return None
+
     def reshaped(self, message: Mapping[str, Any]) -> BuiltScene | None:
         """Scene with the same bodies, a tool of which has the shape of a message; None if it has that now.
 
@@ -200,6 +231,7 @@ class Session:
             "tools": [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(outlines)],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
+            "replay": self._replay_scene(),
         }
         bodies, tools = by_body([body.arrays() for body in self._bodies]), by_tool([arrays for _, arrays in outlines])
         return encode(header, {**bodies, **tools})
@@ -235,10 +267,20 @@ class Session:
             "motion": None if self._moving is None else self._moving.frame_header(),
             "fields": [picture.header for picture in pictures],
             "interior": [picture.interior for picture in pictures],
+            "recording": self.recorder.header(),
+            "replay": self._replay_header(),
         }
         arrays = by_body([{"displacements": ("f4", p.displacements), "scalar": ("u1", p.scalar)} for p in pictures])
-        rows = {"log": ("f4", _thin(log, 2)), "history": ("f4", _thin(moved))}
+        rows = {"log": ("f4", _thin(log, self.log_sent, 2)), "history": ("f4", _thin(moved, self.log_sent))}
         return encode(header, {**arrays, **rows}), (self._log.end, self._history.end)
+
+    def _replay_scene(self) -> dict[str, Any] | None:
+        """Part of the scene message that tells of a replay."""
+        return None
+
+    def _replay_header(self) -> dict[str, Any] | None:
+        """Part of a frame message that tells of a replay."""
+        return None
 
     def _pose(self, frame: Frame, body: int) -> np.ndarray:
         """Displacements (s, 3), m, that are drawn of a body."""
@@ -417,13 +459,16 @@ class _Tail:
         self._rows = np.vstack([self._rows, rows])[-LOG_KEPT:]
         self.end += len(rows)
 
+    def clear(self) -> None:
+        self._rows = self._rows[:0]
+
     def since(self, seen: int) -> np.ndarray:
         return self._rows[max(len(self._rows) - max(self.end - seen, 0), 0) :]
 
 
-def _thin(rows: np.ndarray, peaks: int | None = None) -> np.ndarray:
+def _thin(rows: np.ndarray, most: int, peaks: int | None = None) -> np.ndarray:
     """Rows that a frame may carry, evenly; of the column ``peaks`` the largest value of each group is kept."""
-    stride = -(-len(rows) // LOG_SENT) or 1
+    stride = -(-len(rows) // most) or 1
     thin = rows[::stride].copy()
     if peaks is not None and stride > 1 and len(rows):
         thin[:, peaks] = np.maximum.reduceat(rows[:, peaks], np.arange(0, len(rows), stride))

@@ -4,6 +4,8 @@
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
+import type { RecordedMessage, RecordingStatus, ReplayFrame, ReplayScene, SessionCommand } from "./session_messages";
+
 export const PROTOCOL_VERSION = 8;
 
 export type Vec3 = [number, number, number];
@@ -40,6 +42,8 @@ export interface SceneMessage {
   tools: ToolMessage[];
   motion: MotionScene | null;
   view: { position: Vec3; target: Vec3 } | null;
+  /** Where a recording is shown and nothing runs. */
+  replay: ReplayScene | null;
 }
 
 export interface BodyMessage {
@@ -208,6 +212,9 @@ export interface FrameMessage {
   /** For each body, what its colours show and whether all of its nodes are sent. */
   fields: FieldMessage[];
   interior: boolean[];
+  recording: RecordingStatus | null;
+  /** With the settings of the tick. */
+  replay: (ReplayFrame & { settings: SettingsMessage }) | null;
   /** In an exam, of the tone that stands for the force, from 0 to 1 in proportion to it. */
   loudness?: number;
 }
@@ -271,6 +278,7 @@ export type TextMessage =
   | { type: "role"; role: Role }
   | SettingsMessage
   | StatusMessage
+  | RecordedMessage
   | ExamMessage
   | { type: "error"; text: string };
 
@@ -293,9 +301,10 @@ export type ClientMessage =
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string; max?: number }
   | { type: "answer"; found: boolean }
-  | { type: "ack"; frame: number };
+  | { type: "ack"; frame: number }
+  | SessionCommand;
 
-const TEXT_TYPES = ["welcome", "role", "settings", "status", "exam", "error"];
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "error"];
 const BODY_ARRAYS = {
   nodes: Float32Array,
   tets: Uint32Array,

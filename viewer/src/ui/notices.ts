@@ -36,8 +36,9 @@ export function followNotices(store: Store, control: Control): void {
   byId("status-cancel").onclick = () => control.cancel();
   store.subscribe(["connection"], ({ connection }) => showConnection(connection));
   store.subscribe(["version"], ({ version }) => setText(byId("version"), version));
-  store.subscribe(["role", "version"], ({ role, version }) => {
+  store.subscribe(["role", "version", "scene"], ({ role, version, scene }) => {
     byId("watching").hidden = version === "" || role !== "watch";
+    setText(byId("watching"), scene?.replay ? "replay" : "watching");
   });
   store.subscribe(["status"], ({ status }) => showStatus(status));
   store.subscribe(["status", "role", "connection"], (state) => {

@@ -15,6 +15,12 @@ export function threeDigits(value: number): string {
   return value.toFixed(value >= 9.995 ? 1 : 2);
 }
 
+/** A size of a file, with its unit. */
+export function bytes(value: number): string {
+  if (value >= 0.9995e6) return `${(value / 1e6).toPrecision(3)} MB`;
+  return `${(value / 1e3).toFixed(value >= 9950 ? 0 : 1)} kB`;
+}
+
 /** A frequency, with its unit. */
 export function hertz(value: number): string {
   return `${value >= 999.5 ? value.toFixed(0) : value.toPrecision(3)} Hz`;

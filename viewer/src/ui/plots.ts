@@ -43,6 +43,7 @@ export class Plots {
   private readonly plots: Record<"force" | "press" | "compute" | "displacement" | "energy", uPlot>;
   private drawnMs = 0;
   private driven: number | null = null;
+  private restarts = 0;
 
   constructor(store: Store) {
     const recent = { range: (): [number, number] => [-WINDOW_S, 0], label: () => "time before now (s)" };
@@ -73,6 +74,12 @@ export class Plots {
 
   /** Takes in what a frame carries, drawn or not. */
   append({ header, log, history }: FrameData): void {
+    // A replay that went back makes rows again that were shown before.
+    const restarts = header.replay?.restarts ?? 0;
+    if (restarts !== this.restarts) {
+      for (const rows of [this.log, this.press, this.history]) rows.clear();
+      this.restarts = restarts;
+    }
     this.log.append(log);
     this.press.append(header, this.driven);
     this.history.append(history);

@@ -1,0 +1,84 @@
+"""Recordings begun from the page: where their files go, how they are doing, and what is told when they end."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import ViewerError
+from palpate.simulation import RecordingStatus, Simulation
+
+# Names are told apart by seconds; so many recordings may begin within one.
+MOST_IN_A_SECOND = 100
+
+
+class SessionRecorder:
+    """The recording of a running scene.
+
+    Parameters
+    ----------
+    simulation
+        The running loop.
+    folder
+        Where files go.
+
+    """
+
+    def __init__(self, simulation: Simulation, folder: Path):
+        self._simulation, self._folder = simulation, folder
+
+    def start(self) -> None:
+        """Record in a new file, named by scene and time; no file is ever written over.
+
+        Raises
+        ------
+        Error
+            The file cannot be written, or the loop is being recorded already.
+
+        """
+        if self._simulation.recording is not None:
+            raise ViewerError("record: this session is being recorded already")
+        path = self._free_path()
+        try:
+            self._simulation.record(path)
+        except OSError as error:
+            raise ViewerError(f"cannot record in {path}: {error.strerror or error}") from None
+
+    def stop(self, reason: str | None = None) -> dict[str, Any] | None:
+        """End the recording, if there is one: the message that tells of it, with the reason if nobody asked for it."""
+        status = self._simulation.stop_recording()
+        if status is None:
+            return None
+        replay = f"palpate replay {shlex.quote(str(status.path))}"
+        return {"type": "recorded", **self._told(status), "replay": replay, "reason": reason}
+
+    def stop_failed(self) -> dict[str, Any] | None:
+        """End a recording that cannot go on: the message that tells why."""
+        status = self._simulation.recording
+        return None if status is None or status.error is None else self.stop()
+
+    def header(self) -> dict[str, Any] | None:
+        """Part of a frame message: how the recording is doing."""
+        status = self._simulation.recording
+        return None if status is None else self._told(status)
+
+    def _free_path(self) -> Path:
+        stem = f"{self._simulation.scene.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+        names = [f"{stem}.mcap", *(f"{stem}-{number}.mcap" for number in range(2, MOST_IN_A_SECOND + 1))]
+        paths = (self._folder.absolute() / name.replace("/", "-") for name in names)
+        free = next((path for path in paths if not path.exists()), None)
+        if free is None:
+            raise ViewerError(f"{self._folder}: too many recordings within this second: try again")
+        return free
+
+    def _told(self, status: RecordingStatus) -> dict[str, Any]:
+        return {
+            "path": str(status.path.absolute()),
+            "ticks": status.ticks,
+            "seconds": status.ticks / self._simulation.scene.device.rate,
+            "size": status.size,
+            "dropped": status.dropped,
+            "error": status.error,
+        }
