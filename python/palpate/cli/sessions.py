@@ -144,11 +144,9 @@ def _write(out: Path, both: tuple[Recording, Recording], files: tuple[Path, Path
 
 def _loaded(file: Path) -> Recording:
     """Read a recording, and tell of one that is not whole."""
-    from palpate.errors import Error, RecordingWarning
-    from palpate.input_file import require_file
+    from palpate.errors import RecordingWarning
     from palpate.simulation import Recording
 
-    require_file(file, Error)
     recording = Recording.load(file)
     if recording.dropped is None:
         length = f"{recording.time[-1]:.3f} s" if len(recording.time) else "nothing"

@@ -185,16 +185,12 @@ class _Pair:
 
 def differing_settings(a: Recording, b: Recording) -> Iterator[tuple[str, Any, Any]]:
     """Keys of scenes, versions, bodies and settings that differ, with their values in both."""
-    flat = [_flat(json.loads(one.about["scene"])) for one in (a, b)]
-    flat = [{**{key: text for key, text in one.about.items() if key not in ASIDE}, **keys}
-            for one, keys in zip((a, b), flat, strict=True)]  # fmt: skip
-    yield from _differing(*flat)
+    yield from _differing(*(_told(one) for one in (a, b)))
     keys = [json.loads(one.about["keys"]) for one in (a, b)]
     for body, ((green, modes), (other, others)) in enumerate(zip(*keys, strict=False)):
-        for name, was, now in ((f"body[{body}]: mesh, material, supports or precision", green, other),
-                               (f"body[{body}]: modes", modes, others)):  # fmt: skip
+        for what, was, now in (("mesh, material, supports or precision", green, other), ("modes", modes, others)):
             if was != now:
-                yield name, None if was is None else was[:12], None if now is None else now[:12]
+                yield f"body[{body}]: {what}", was and was[:12], now and now[:12]
     for was, now in zip(a.settings, b.settings, strict=False):
         if was != now:
             tick = min(was["tick"], now["tick"])
@@ -203,6 +199,12 @@ def differing_settings(a: Recording, b: Recording) -> Iterator[tuple[str, Any, A
             return
     if len(a.settings) != len(b.settings):
         yield "changes of settings", len(a.settings) - 1, len(b.settings) - 1
+
+
+def _told(recording: Recording) -> dict[str, Any]:
+    """Collect what a recording says of itself and of its scene, by key."""
+    own = {key: text for key, text in recording.about.items() if key not in ASIDE}
+    return own | _flat(json.loads(recording.about["scene"]))
 
 
 def _differing(a: dict[str, Any], b: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:

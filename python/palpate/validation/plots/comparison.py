@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.simulation import Recording
-from palpate.validation.plots.style import COLORS, empty_figure, write_figure
 
 
 def plot_comparison(a: Recording, b: Recording, names: tuple[str, str], path: Path) -> None:
