@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test sanitize lint viewer check-tools clean
+.PHONY: demo test other-build sanitize lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -48,14 +48,17 @@ demo: $(VENV)/.installed $(PAGE)
 # each of them takes on, and in which order.
 test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace
-# What the release build has recorded, a build without optimisation makes again bit for bit.
-	cargo test --quiet --config profile.dev.opt-level=0 -p palpate-servo --no-default-features --test across_builds
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder $(ARGS)
 
-# Unordered accesses between the loop's thread and others; after `make test`, with a nightly toolchain of Rust.
+# After `make test`: what the release build has recorded, a build that is not optimised makes again bit for bit.
+OTHER_BUILD := -p palpate-servo --no-default-features --test across_builds
+other-build:
+	cargo test --quiet --config profile.dev.opt-level=0 $(OTHER_BUILD)
+
+# The same, and unordered accesses between the loop's thread and others, by ThreadSanitizer of a nightly toolchain.
 sanitize:
-	RUSTFLAGS="-Zsanitizer=thread -Cunsafe-allow-abi-mismatch=sanitizer" cargo +nightly test --quiet --config profile.dev.opt-level=1 \
-		--target $$(rustc -vV | sed -n 's/host: //p') -p palpate-servo --no-default-features --test handoff
+	RUSTFLAGS="-Zsanitizer=thread -Cunsafe-allow-abi-mismatch=sanitizer" cargo +nightly test --quiet --config profile.dev.opt-level=0 \
+		--target $$(rustc -vV | sed -n 's/host: //p') $(OTHER_BUILD) --test handoff
 
 lint: $(VENV)/.installed viewer/node_modules/.checks
 	cargo fmt --all --check

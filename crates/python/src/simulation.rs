@@ -215,12 +215,16 @@ impl SimulationCore {
         self.change(py, |settings| settings.watch = Some((body, node)))
     }
 
-    /// The latest tick as a dictionary; None if the loop does not run.
-    fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let (model, tools) = (self.model.clone(), self.targets.len());
-        let Some(servo) = self.servo() else { return Ok(None) };
-        let published = servo.latest().clone();
-        frame(py, &model, tools, published).map(Some)
+    /// The latest tick as a dictionary; None if the loop does not run. Others may call meanwhile: it is worked out after the
+    /// tick has been taken.
+    fn frame<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let (model, tools, published) = {
+            let mut core = slf.try_borrow_mut()?;
+            let (model, tools) = (core.model.clone(), core.targets.len());
+            let Some(servo) = core.servo() else { return Ok(None) };
+            (model, tools, servo.latest().clone())
+        };
+        frame(slf.py(), &model, tools, published).map(Some)
     }
 
     /// Contacts of the latest tick, as in `frame` but without the rest of it; None if the loop does not run.

@@ -71,7 +71,9 @@ def test_a_command_that_is_interrupted_leaves_the_same_files(store, tmp_path):
     # So many presses that most are still to be made when the signal comes.
     words = ["palpate", str(store), "--grid", "10mm", "--depth", "0.5mm", "--speed", "1mm/s", "--radius", "4mm"]
     command = [sys.executable, "-m", "palpate", *words, "--on", TOP, "--out"]
-    process = subprocess.Popen([*command, str(tmp_path / "resumed")], stderr=subprocess.PIPE, text=True)
+    # A shell's background job is born with Ctrl-C ignored.
+    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+    process = subprocess.Popen([*command, str(tmp_path / "resumed")], stderr=subprocess.PIPE, text=True, **heeding)
     partial, end = tmp_path / "resumed" / "palpation.partial", time.monotonic() + 60
     while time.monotonic() < end and not (partial.exists() and partial.stat().st_size > 1000):
         time.sleep(0.005)

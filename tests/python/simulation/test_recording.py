@@ -140,7 +140,10 @@ def test_the_scene_of_a_recording_is_built_from_the_file_alone(scene_file, tmp_p
     for threads in ("1", "2"):
         env = {**os.environ, "RAYON_NUM_THREADS": threads}
         run = subprocess.run(
-            [sys.executable, "-m", "palpate", "replay", str(file)], env=env, capture_output=True, text=True
+            [sys.executable, "-m", "palpate", "replay", str(file), "--headless"],
+            env=env,
+            capture_output=True,
+            text=True,
         )
         assert run.returncode == 0 and "400 ticks made again: every bit is as recorded" in run.stdout, run.stderr
 
