@@ -268,7 +268,7 @@ impl SimulationCore {
 
     /// Moves the tools through positions (ticks, tools, 3), NaN where one is out of the scene, orientations (ticks, tools,
     /// 4) and grabs (ticks, tools) offline, with strikes in order of time and watched nodes as pairs of body and rank; `about` is
-    /// what the recording says of itself.
+    /// what a recording of it says of itself, None for no recording.
     fn run<'py>(
         &self,
         py: Python<'py>,
@@ -276,7 +276,7 @@ impl SimulationCore {
         orientations: PyReadonlyArray3<'py, f64>,
         grabs: PyReadonlyArray2<'py, bool>,
         extras: (Vec<StrikeArguments>, Vec<(usize, u32)>),
-        about: BTreeMap<String, String>,
+        about: Option<BTreeMap<String, String>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let poses = poses(positions.as_slice()?, orientations.as_slice()?);
         let grabs = grabs.as_slice()?.to_vec();
@@ -297,12 +297,12 @@ impl SimulationCore {
         };
         let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
         let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
-        let mut file =
-            Recorded::new(header(about, &self.model, self.scheduling.rate, false)).map_err(|e| to_python(py, e))?;
-        let each = |record: &TickRecord| file.push(record);
+        let begin = |about| Recorded::new(header(about, &self.model, self.scheduling.rate, false));
+        let mut file = about.map(begin).transpose().map_err(|e| to_python(py, e))?;
+        let each = |record: &TickRecord| file.iter_mut().for_each(|file| file.push(record));
         let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script, each));
         let recording = recording.map_err(|e| to_python(py, e))?;
-        let file = file.finish().map_err(|e| to_python(py, e))?;
+        let file = file.map(Recorded::finish).transpose().map_err(|e| to_python(py, e))?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
         let mut energies: Vec<Vec<f64>> = vec![Vec::new(); self.model.bodies.len()];
         for (body, of_body) in recording.energies {
@@ -315,7 +315,7 @@ impl SimulationCore {
         answer.set_item("limited", recording.limited.into_pyarray(py))?;
         answer.set_item("energies", energies.into_iter().map(|e| e.into_pyarray(py)).collect::<Vec<_>>())?;
         answer.set_item("compute_ns", recording.compute_ns.into_pyarray(py))?;
-        answer.set_item("file", PyBytes::new(py, &file))?;
+        answer.set_item("file", file.map(|file| PyBytes::new(py, &file)))?;
         answer.set_item("fault", recording.fault.map(|fault| fault.to_string()))?;
         debug_assert_eq!(poses.len(), ticks * self.model.tools.len());
         Ok(answer)

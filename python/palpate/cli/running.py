@@ -126,6 +126,7 @@ def run(
     Example: palpate run scene.toml --headless 3 --out results
 
     Example: palpate run scene.toml --record press.mcap
+
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
     """
     from palpate.cli.run_file import RunOptions, built_from

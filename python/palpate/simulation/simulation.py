@@ -122,7 +122,7 @@ class Simulation(Adjustable):
             self._running = True
             if self._to_record is not None:
                 path, self._to_record = self._to_record, None
-                self._core.begin_recording(path, self._about((len(self._radii), len(self._radii) == 1), clock=True))
+                self._begin_recording(path)
 
     def stop(self) -> None:
         """Stop the loop; devices are left at zero force."""
@@ -146,7 +146,7 @@ class Simulation(Adjustable):
         if where.exists():
             raise SceneError(f"{where}: exists: give another name, or delete it first")
         if self._running:
-            self._core.begin_recording(where, self._about((len(self._radii), len(self._radii) == 1), clock=True))
+            self._begin_recording(where)
         else:
             self._to_record = where
 
@@ -161,6 +161,10 @@ class Simulation(Adjustable):
         self._to_record = None
         status = self._core.end_recording()
         return None if status is None else RecordingStatus(*status)
+
+    def _begin_recording(self, path: Path) -> None:
+        tools = len(self._radii)
+        self._core.begin_recording(path, self._about((tools, tools == 1), clock=True))
 
     def _about(self, shown: tuple[int, bool], clock: bool) -> dict[str, str]:
         return about(self.scene, self.bodies, shown, clock)
@@ -300,7 +304,8 @@ class Simulation(Adjustable):
         bad = np.argwhere(~np.isfinite(path).all(axis=2))
         if len(bad):
             raise SceneError(f"position {bad[0, 0]} is not finite")
-        return self.play(positions, orientations).forces
+        # Nobody sees a recording of it: none is written.
+        return self._play(positions, orientations, records=False).forces
 
     def play(
         self,
@@ -334,6 +339,17 @@ class Simulation(Adjustable):
             A fault that latched within the run.
 
         """
+        return self._play(positions, orientations, strikes, watch, grabs)
+
+    def _play(
+        self,
+        positions: np.ndarray,
+        orientations: np.ndarray | None,
+        strikes: Sequence[tuple] = (),
+        watch: Sequence[int | tuple[int, int]] = (),
+        grabs: np.ndarray | None = None,
+        records: bool = True,
+    ) -> Recording:
         path = positions_of(positions, len(self._radii))
         turned, held = orientations_of(orientations, path), grabs_of(grabs, path)
         body = self._moving_body("strike", None) if strikes else 0
@@ -344,7 +360,8 @@ class Simulation(Adjustable):
         ticks, given, tools = *path.shape[:2], len(self._radii)
         everything = for_all_tools(path, turned, held, tools)
         happens = (sorted(struck, key=lambda strike: strike[0]), ranks)
-        raw = self._core.run(*everything, happens, self._about((given, np.ndim(positions) == 2), clock=False))
+        about = self._about((given, np.ndim(positions) == 2), clock=False) if records else None
+        raw = self._core.run(*everything, happens, about)
         if raw["fault"] is not None:
             raise SimulationError(raw["fault"])
         shape = (ticks, 3) if np.ndim(positions) == 2 else (ticks, given, 3)
@@ -355,4 +372,4 @@ class Simulation(Adjustable):
         energies = tuple(Energy(*rows.reshape(-1, 5).T) if len(rows) else None for rows in raw["energies"])
         time = np.arange(1, ticks + 1) / self.scene.device.rate
         watched = raw["watched"].reshape(ticks, len(ranks), 3)
-        return Recording(time, forces, torques, watched, limited, energies, source=raw["file"])
+        return Recording(time, forces, torques, watched, limited, energies, source=raw["file"] or b"")

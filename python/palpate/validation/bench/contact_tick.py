@@ -119,7 +119,7 @@ def compute_us(simulation: Simulation, path: np.ndarray, orientation: Sequence[f
     """Measure the computing time of every tick of a path (t, 3) or (t, tools, 3), us."""
     positions = np.ascontiguousarray(path.reshape(len(path), -1, 3))
     upright = np.broadcast_to(np.array(orientation), (*positions.shape[:2], 4)).copy()
-    raw = simulation._core.run(positions, upright, np.zeros(positions.shape[:2], dtype=bool), ([], []), {})
+    raw = simulation._core.run(positions, upright, np.zeros(positions.shape[:2], dtype=bool), ([], []), None)
     return 1e-3 * np.array(raw["compute_ns"], dtype=float)
 
 

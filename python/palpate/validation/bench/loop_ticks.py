@@ -91,7 +91,7 @@ def played(simulation: Simulation, path: np.ndarray, plays: int) -> np.ndarray:
     grabs = np.zeros(path.shape[:2], dtype=bool)
     times = []
     for _ in range(plays):
-        raw = simulation._core.run(path, upright, grabs, ([], []), {})
+        raw = simulation._core.run(path, upright, grabs, ([], []), None)
         if raw["fault"] is not None:
             raise SimulationError(raw["fault"])
         times.append(1e-3 * np.array(raw["compute_ns"], dtype=float))

@@ -152,7 +152,7 @@ def _costs(simulation: Simulation, ticks: Sequence[tuple], kinds: Sequence[str])
     press = np.stack([*(np.stack(tick, axis=1) for tick in ticks), rest], axis=1)
     path = np.ascontiguousarray(np.repeat(press, TIMES, axis=0).reshape(-1, 2, 3))
     upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (*path.shape[:2], 4)).copy()
-    raw = simulation._core.run(path, upright, np.zeros(path.shape[:2], dtype=bool), ([], []), {})
+    raw = simulation._core.run(path, upright, np.zeros(path.shape[:2], dtype=bool), ([], []), None)
     times = 1e-3 * np.array(raw["compute_ns"], dtype=float).reshape(PLACES, TIMES, len(ticks) + 1)
     shortest = times.min(axis=1)
     return {
