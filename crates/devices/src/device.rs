@@ -120,6 +120,9 @@ impl DeviceLimits {
 /// One haptic device. `read` and `write` belong to the tick: they never allocate, lock or block, and never panic. A driver
 /// that must wait for its hardware does so on a thread of its own and hands the latest reading over.
 pub trait Device: Send {
+    /// What a person knows it by: maker, model, and which one.
+    fn name(&self) -> &str;
+
     /// The device's state now: `now_ns` is the tick's time, ns, `period` the time between two ticks, s.
     ///
     /// # Errors

@@ -1,10 +1,15 @@
-//! Haptic devices behind one trait. A driver knows poses and wrenches in world coordinates, nothing of bodies.
+//! Haptic devices behind one trait. A driver knows poses and wrenches, nothing of bodies: in the frame of the person in front
+//! of it ([`Frame`]), which a scene maps to its own.
 
 mod device;
+mod frame;
 pub mod known;
+mod opening;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
+pub use frame::Frame;
+pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 
 // All that a driver knows of the core; `scripts/check_architecture.py` checks it.
 pub use palpate_core::simulation::{Pose, Twist, Wrench};

@@ -204,6 +204,10 @@ impl Scripted {
 }
 
 impl Device for Scripted {
+    fn name(&self) -> &str {
+        "script"
+    }
+
     fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
         let before = self.latest;
         let pose = self.poses.next().ok_or(DeviceFault::Disconnected)?;

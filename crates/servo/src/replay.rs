@@ -188,6 +188,10 @@ impl Replayed {
 }
 
 impl Device for Replayed {
+    fn name(&self) -> &str {
+        "recording"
+    }
+
     fn read(&mut self, _now_ns: u64, _period: f64) -> Result<Reading, DeviceFault> {
         self.readings.pop().unwrap_or(Err(DeviceFault::Disconnected))
     }

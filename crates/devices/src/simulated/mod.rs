@@ -62,6 +62,10 @@ pub fn simulated() -> (Handle, SimulatedDevice) {
 }
 
 impl Device for SimulatedDevice {
+    fn name(&self) -> &str {
+        "simulated"
+    }
+
     fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
         self.age = if self.targets.update() { 0.0 } else { self.age + period };
         let mut target = *self.targets.output_buffer_mut();

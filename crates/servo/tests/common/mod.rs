@@ -97,6 +97,10 @@ where
     R: FnMut(u64) -> Result<Reading, DeviceFault> + Send,
     W: FnMut(Wrench) -> Result<(), DeviceFault> + Send,
 {
+    fn name(&self) -> &str {
+        "scripted"
+    }
+
     fn read(&mut self, now_ns: u64, _period: f64) -> Result<Reading, DeviceFault> {
         (self.read)(now_ns)
     }
