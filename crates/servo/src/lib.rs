@@ -23,7 +23,6 @@ mod strain;
 mod subnormals;
 mod timing;
 
-pub use change::SceneChange;
 pub use clock::now_ns;
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
@@ -38,6 +37,6 @@ pub use recorder::RecordingProgress;
 pub use replay::{Difference, Owner, Replay};
 pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
 pub use scheduling::Scheduling;
-pub use servo::Servo;
+pub use servo::{SceneChange, Servo};
 pub use settings::Settings;
 pub use statistics::{Histogram, Summary};

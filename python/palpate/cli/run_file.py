@@ -122,7 +122,7 @@ def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
 
     tools = list(scene.tools)
     if len(devices) > len(tools):
-        raise SceneError(f"--device: given {len(devices)} times, the scene has {len(tools)} tool{'s'[len(tools) == 1 :]}")
+        raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(tools)} of [[tool]]")
     for rank, device in enumerate(devices):
         tools[rank] = tools[rank].model_copy(update={"device": device})
     try:
