@@ -3,8 +3,8 @@
 use glam::DVec3;
 use triple_buffer::{Input, Output, triple_buffer};
 
-use super::hand::{Hand, Wanted};
-use super::tip::{Mechanics, Tip};
+use super::hand::Wanted;
+use super::tip::Tip;
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Twist, Wrench};
 
 /// What the other side asks of an emulated device.
@@ -64,25 +64,13 @@ pub struct EmulatedDevice {
     read_ns: Option<u64>,
 }
 
-/// An emulated device of a name with its handle, its tip at rest at a place, m. The limits are what it says of itself, its own
-/// damping and delay included: it may be wrong.
-pub fn emulated(
-    name: &str,
-    mechanics: Mechanics,
-    limits: DeviceLimits,
-    position: DVec3,
-    hand: Option<Hand>,
-) -> (Handle, EmulatedDevice) {
+/// An emulated device of a name with its handle. The limits are what it says of itself, its own damping and delay included: it
+/// may be wrong.
+pub fn emulated(name: &str, tip: Tip, limits: DeviceLimits) -> (Handle, EmulatedDevice) {
     let (commands, received) = triple_buffer(&Command::default());
-    let (published, truths) = triple_buffer(&Truth { position, ..Truth::default() });
-    let device = EmulatedDevice {
-        name: name.to_owned(),
-        tip: Tip::new(mechanics, position, hand),
-        limits,
-        commands: received,
-        truths: published,
-        read_ns: None,
-    };
+    let (published, truths) = triple_buffer(&Truth { position: tip.position(), ..Truth::default() });
+    let device =
+        EmulatedDevice { name: name.to_owned(), tip, limits, commands: received, truths: published, read_ns: None };
     (Handle { commands, truths }, device)
 }
 
@@ -133,7 +121,8 @@ impl Device for EmulatedDevice {
 
 #[cfg(test)]
 mod tests {
-    use super::super::hand::Waypoint;
+    use super::super::hand::{Hand, Waypoint};
+    use super::super::tip::Mechanics;
     use super::*;
 
     const MECHANICS: Mechanics =
@@ -148,7 +137,7 @@ mod tests {
     #[test]
     fn a_force_moves_it_and_saturates_along_its_direction() {
         let limits = DeviceLimits { max_force: 3.0, ..DeviceLimits::UNLIMITED };
-        let (mut handle, mut device) = emulated("emulated", MECHANICS, limits, DVec3::ZERO, None);
+        let (mut handle, mut device) = emulated("emulated", Tip::new(MECHANICS, DVec3::ZERO, None), limits);
         let push = DVec3::new(30.0, 0.0, -40.0);
         let readings: Vec<Reading> = (0..100).map(|k| tick(&mut device, k, push)).collect();
         assert_eq!(readings[0].pose, Pose::default());
@@ -165,8 +154,8 @@ mod tests {
     fn the_hand_goes_where_it_is_sent() {
         for wanted in [Wanted::At(DVec3::ZERO), Wanted::Along(vec![Waypoint { time: 0.0, position: DVec3::ZERO }; 3])] {
             let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 200.0, wanted };
-            let (mut handle, mut device) =
-                emulated("emulated", MECHANICS, DeviceLimits::UNLIMITED, DVec3::ZERO, Some(hand));
+            let tip = Tip::new(MECHANICS, DVec3::ZERO, Some(hand));
+            let (mut handle, mut device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
             handle.set(Command { wanted: Some(DVec3::Y), buttons: Buttons::GRAB, active: true });
             let last = (0..3000).map(|k| tick(&mut device, k, DVec3::ZERO)).last().expect("a reading");
             assert!((last.pose.position - DVec3::Y).length() < 1e-9);

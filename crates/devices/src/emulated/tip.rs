@@ -77,6 +77,12 @@ impl Tip {
         }
     }
 
+    /// The same tip at a velocity, m/s.
+    pub fn moving(mut self, velocity: DVec3) -> Self {
+        self.axes.iter_mut().zip(velocity.to_array()).for_each(|(axis, velocity)| axis.velocity = velocity);
+        self
+    }
+
     /// What it is made of.
     pub fn mechanics(&self) -> &Mechanics {
         &self.mechanics
