@@ -5,6 +5,7 @@
 //! in all of them.
 
 mod clock;
+mod emulated;
 mod force_loop;
 mod handoff;
 mod log;
@@ -23,6 +24,7 @@ mod subnormals;
 mod timing;
 
 pub use clock::now_ns;
+pub use emulated::{EmulatedTick, run_emulated};
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};

@@ -19,6 +19,7 @@
 mod axis;
 mod device;
 mod hand;
+pub mod known;
 mod tip;
 
 pub use device::{Command, EmulatedDevice, Handle, Truth, emulated};
