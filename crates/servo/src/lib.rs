@@ -26,7 +26,7 @@ mod timing;
 
 pub use change::SceneChange;
 pub use clock::now_ns;
-pub use emulated::{EmulatedTick, run_emulated};
+pub use emulated::{EmulatedTick, Emulation};
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};

@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use num_complex::Complex64;
-use palpate_core::simulation::{LawKind, MAX_BODIES, Model, Pose};
+use palpate_core::simulation::{LawKind, MAX_BODIES, Model, Pose, ToolModel};
 use palpate_devices::emulated::{Command, Hand, Mechanics, Tip, Wanted, emulated};
 use palpate_devices::{Buttons, DeviceLimits};
-use palpate_servo::{SafetyLimits, Script, Settings, StrainPreparer, run, run_emulated};
+use palpate_servo::{EmulatedTick, Emulation, SafetyLimits, Script, Settings, StrainPreparer, run};
 
 use common::{TOOL, settings, single_with};
 
@@ -45,7 +45,7 @@ struct Held {
 impl Held {
     /// Under a tool that asks for at most `max_stiffness`, N/m.
     fn new(max_stiffness: f64) -> Self {
-        let tool = palpate_core::simulation::ToolModel { law: LawKind::Patch, max_stiffness, ..TOOL };
+        let tool = ToolModel { law: LawKind::Patch, max_stiffness, ..TOOL };
         let model = single_with(tool);
         let step = 1e-4;
         let poses: Vec<Pose> =
@@ -59,8 +59,18 @@ impl Held {
         Self { model, stiffness, largest: direction.dot(stiffness * direction), direction }
     }
 
-    fn settings(&self, stiffness: f64) -> Settings {
-        Settings { stiffness_scale: [stiffness / self.largest; MAX_BODIES], ..settings() }
+    /// Ticks of a tip that holds on, on a body of a stiffness, N/m.
+    fn run(&self, tip: Tip, period: f64, stiffness: f64, mut each: impl FnMut(&EmulatedTick) -> ControlFlow<()>) {
+        let settings = Settings { stiffness_scale: [stiffness / self.largest; MAX_BODIES], ..settings() };
+        let strain = StrainPreparer::new(&self.model);
+        let emulation = Emulation { model: &self.model, limits: BARE, settings, strain: &strain, period };
+        let (mut handle, device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
+        handle.set(Command { buttons: Buttons::GRAB, ..Command::default() });
+        let ran = emulation.run(vec![(handle, device)], |tick, _| {
+            assert_eq!(tick.fault, None);
+            each(tick)
+        });
+        ran.expect("a run");
     }
 
     /// Whether a tip that is struck along the stiffest direction loses energy in the long run.
@@ -68,16 +78,13 @@ impl Held {
         // At the edge of stability energy grows or fades with (b - K tau) / m.
         let ticks = (40.0 * mechanics.mass / mechanics.damping / period).max(400.0) as usize;
         let tip = Tip::new(mechanics, PLACE, None).moving(1e-2 * self.direction);
-        let (mut handle, device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
-        handle.set(Command { buttons: Buttons::GRAB, ..Command::default() });
         let scaled = self.stiffness * (stiffness / self.largest);
         let (mut middle, mut end) = (0.0, 0.0);
-        let look = |tick: usize, happened: &palpate_servo::EmulatedTick, _: &mut [_]| {
-            assert_eq!(happened.fault, None);
-            let truth = happened.truths[0];
+        self.run(tip, period, stiffness, |tick| {
+            let truth = tick.truths[0];
             let x = truth.position - PLACE;
             let energy = mechanics.mass * truth.velocity.length_squared() + x.dot(scaled * x);
-            match 5 * tick / ticks {
+            match 5 * tick.number / ticks {
                 2 => middle += energy,
                 4 => end += energy,
                 _ => {}
@@ -85,9 +92,8 @@ impl Held {
             // Beyond any doubt, before it overflows.
             let runs_away = x.length() > 1.0;
             end = if runs_away { f64::INFINITY } else { end };
-            if runs_away || tick == ticks { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        run_emulated(&self.model, vec![(handle, device)], BARE, self.settings(stiffness), period, look).expect("a run");
+            if runs_away || tick.number == ticks { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
         end < middle
     }
 
@@ -196,15 +202,11 @@ fn speed_at_the_end(held: &Held, mechanics: Mechanics, stiffness: f64, push: f64
     // Muscles so soft that the force is steady.
     let hand = Hand { mass: 0.0, damping: 0.0, stiffness: 1.0, wanted: Wanted::At(PLACE - push * DVec3::Z) };
     let tip = Tip::new(mechanics, PLACE, Some(hand));
-    let (mut handle, device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
-    handle.set(Command { buttons: Buttons::GRAB, ..Command::default() });
     let mut speed = 0.0_f64;
-    let look = |tick: usize, happened: &palpate_servo::EmulatedTick, _: &mut [_]| {
-        assert_eq!(happened.fault, None);
-        speed = if tick < 1000 { 0.0 } else { speed.max(happened.truths[0].velocity.z.abs()) };
-        if tick == 2000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    run_emulated(&held.model, vec![(handle, device)], BARE, held.settings(stiffness), 1e-3, look).expect("a run");
+    held.run(tip, 1e-3, stiffness, |tick| {
+        speed = if tick.number < 1000 { 0.0 } else { speed.max(tick.truths[0].velocity.z.abs()) };
+        if tick.number == 2000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
     speed
 }
 
