@@ -1,11 +1,12 @@
-"""Theory of a mass on a sampled spring: a force computed from a sample acts after a delay and is held for a period.
+"""Theory of a mass on a sampled spring: a force computed from a sample acts after a delay, for a period.
 
-With mass `m`, damping `b`, muscles `k` (all with those of a hand that holds the tip), period `T` and delay `d = n T + rest`:
+With mass `m`, damping `b`, muscles `k` (all with those of a hand that holds the tip), period `T` and delay
+`d = n T + rest`:
 
     m x'' + b x' + k x = u(t),      u = -K x(j T) for t in (j T + d, (j + 1) T + d)
 
-The motion over a period is linear in position, velocity and the forces of `n` and `n + 1` periods ago, which makes a matrix:
-the loop is stable while all its eigenvalues are within the unit circle.
+The motion over a period is linear in position, velocity and the forces of `n` and `n + 1` periods ago, which makes a
+matrix: the loop is stable while all its eigenvalues are within the unit circle.
 """
 
 from __future__ import annotations

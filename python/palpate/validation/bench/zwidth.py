@@ -1,7 +1,7 @@
 """Largest stiffness that the loop holds on emulated devices, beside theory.
 
-A tool holds on to a block, which makes it a linear spring: stiffness is then one number, set by Young's modulus, and found
-by bisection in the same loop that drives real devices.
+A tool holds on to a block, which makes it a linear spring: its stiffness is set by Young's modulus, and the largest
+stable one found by bisection in the same loop that drives real devices.
 """
 
 from __future__ import annotations
@@ -104,8 +104,10 @@ class Spring:
     def __init__(self) -> None:
         body = body_on_table(Block(), (8, 8, 4), quadratic=False)
         green = green_of(body, touch=top_nodes(body, 0.03))
-        tool = {"shape": "sphere", "radius": 0.01, "contact": "patch", "contact_radius": 0.015}
-        self._loops = [loop_of(body, green, [tool], device) for device in (None, {"max_stiffness": 1e9})]
+        self.radius = 0.01
+        tool = {"shape": "sphere", "radius": self.radius, "contact": "patch", "contact_radius": 0.015}
+        self._loop = lambda device: loop_of(body, green, [tool], device)
+        self._loops = [self._loop(device) for device in (None, {"max_stiffness": 1e9})]
         low, high = body.mesh.bounds
         self.place = np.array([*(low + high)[:2] / 2, high[2]])
         self.matrix = self._measured()
@@ -120,6 +122,12 @@ class Spring:
         forces = self._loops[0].play(path, grabs=np.ones(len(path), dtype=bool)).forces
         matrix = -forces[1:].T / step
         return (matrix + matrix.T) / 2
+
+    def pressed(self, stiffness: float, max_stiffness: float) -> Simulation:
+        """Loop whose block pushes back along its normal with a stiffness, under a tool that is limited, N/m."""
+        simulation = self._loop({"max_stiffness": max_stiffness})
+        simulation.set_youngs_modulus(self._modulus * stiffness / self.matrix[2, 2])
+        return simulation
 
     def is_stable(self, device: Device, hand: Hand | None, stage: str, stiffness: float) -> bool:
         """Whether a tip that is struck along the stiffest direction ends with less energy than it began with."""
