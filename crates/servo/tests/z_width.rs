@@ -231,3 +231,33 @@ fn dry_friction_must_hold_half_a_step_of_the_encoder() {
         }
     }
 }
+
+/// Beyond the bound a cycle of amplitude `A` gains `pi (K T/2 - b) omega A^2` and dry friction takes `4 f A`: a tip that is
+/// struck comes to rest while it swings less than `4 f / (pi (K T/2 - b) omega)`, and runs away beyond.
+#[test]
+fn dry_friction_holds_more_until_the_tip_is_struck_harder() {
+    let (period, friction) = (1e-3, 0.05);
+    let tip = Mechanics { dry_friction: friction, ..mechanics(0.1, 0.8, 0.0) };
+    let stiffness = 1.5 * bound(&tip, period);
+    let held = Held::new(stiffness);
+    let comes_to_rest = |speed: f64| {
+        let mut moves = true;
+        held.run(Tip::new(tip, PLACE, None).moving(speed * DVec3::Z), period, 1e4, |tick| {
+            let truth = tick.truths[0];
+            moves = truth.velocity != DVec3::ZERO || tick.number == 0;
+            let ends = !moves || truth.position.distance(PLACE) > 0.1 || tick.number == 20_000;
+            if ends { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        !moves
+    };
+    let (mut rests, mut runs_away) = (0.01, 1.0);
+    assert!(comes_to_rest(rests) && !comes_to_rest(runs_away));
+    while runs_away > 1.005 * rests {
+        let middle = f64::sqrt(rests * runs_away);
+        if comes_to_rest(middle) { rests = middle } else { runs_away = middle }
+    }
+    // The speed of that amplitude.
+    let expected = 4.0 * friction / (std::f64::consts::PI * (0.5 * stiffness * period - tip.damping));
+    println!("struck at {rests:.4} m/s, by the balance of energy {expected:.4} m/s");
+    assert!((rests / expected - 1.0).abs() < 0.05, "{rests} {expected}");
+}
