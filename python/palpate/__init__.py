@@ -10,6 +10,8 @@ from palpate.body import Body, Loads, Material
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
+    DeviceError,
+    DeviceWarning,
     Error,
     LockingWarning,
     MeshError,
@@ -43,6 +45,8 @@ __all__ = [
     "BodyError",
     "Comparison",
     "Contact",
+    "DeviceError",
+    "DeviceWarning",
     "Difference",
     "Energy",
     "Error",

@@ -4,6 +4,7 @@
 mod device;
 pub mod emulated;
 mod frame;
+mod kinds;
 pub mod known;
 mod mounted;
 mod opening;
@@ -11,6 +12,7 @@ pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
+pub use kinds::open;
 pub use mounted::{Mounted, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 

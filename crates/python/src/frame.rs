@@ -29,6 +29,7 @@ pub fn frame<'py>(py: Python<'py>, model: &Model, tools: usize, published: Publi
     let poses = || status.readings[..tools].iter().map(|reading| reading.pose);
     frame.set_item("positions", poses().map(|pose| pose.position.to_array()).collect::<Vec<_>>())?;
     frame.set_item("orientations", poses().map(|pose| wxyz(pose.orientation)).collect::<Vec<_>>())?;
+    frame.set_item("active", status.readings[..tools].iter().map(|reading| reading.active).collect::<Vec<_>>())?;
     frame.set_item("limited", status.limited[..tools].to_vec())?;
     frame.set_item("contacts", contact_records(model, &state))?;
     frame.set_item("refused", refusals(&state, tools))?;

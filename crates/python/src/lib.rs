@@ -2,6 +2,8 @@
 //! people. The interpreter lock is released in everything long.
 
 mod body;
+mod changes;
+mod connection;
 mod dynamics;
 mod emulated;
 mod errors;
@@ -38,6 +40,13 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::SimulationCore>()?;
     module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
     module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
+    module.add_class::<connection::OpenedDevice>()?;
+    module.add_function(wrap_pyfunction!(changes::connect, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::disconnect, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::device_limits, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::tool_stiffness, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::assume_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::change, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;
