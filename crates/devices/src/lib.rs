@@ -2,6 +2,7 @@
 //! of it ([`Frame`]), which a scene maps to its own.
 
 mod device;
+pub mod emulated;
 mod frame;
 mod kinds;
 pub mod known;

@@ -5,6 +5,7 @@ mod body;
 mod changes;
 mod connection;
 mod dynamics;
+mod emulated;
 mod errors;
 mod frame;
 mod green;
@@ -37,6 +38,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
     module.add_class::<connection::OpenedDevice>()?;
     module.add_function(wrap_pyfunction!(changes::connect, module)?)?;
     module.add_function(wrap_pyfunction!(changes::disconnect, module)?)?;

@@ -11,6 +11,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     running,
     session_bench,
     sessions,
+    stability,
     verification,
 )
 from palpate.cli.app import main
