@@ -3,10 +3,13 @@
 
 mod device;
 pub mod emulated;
+pub mod forcedimension;
 mod frame;
 pub mod known;
+mod library;
 mod mounted;
 mod opening;
+pub mod openhaptics;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
