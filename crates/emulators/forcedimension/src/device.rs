@@ -38,6 +38,7 @@ pub struct Device {
     pub disturbance: Option<Disturbance>,
     /// Everything that is said is random.
     pub nonsense: bool,
+    pub uncalibrated: bool,
     pub open: bool,
     /// Unplugged while it was open: it stays so for who has it open.
     broken: bool,
@@ -66,6 +67,7 @@ impl Device {
             buttons: 0,
             disturbance: None,
             nonsense: false,
+            uncalibrated: false,
             open: false,
             broken: false,
             mode: Mode::Idle,
@@ -209,6 +211,7 @@ impl Device {
     pub fn status(&self) -> [i32; 17] {
         let mut status = [0; 17];
         (status[0], status[1], status[2]) = (1, i32::from(!self.broken && self.is_plugged()), 1);
+        status[3] = i32::from(self.uncalibrated);
         (status[4], status[5]) = (i32::from(self.mode == Mode::Idle), i32::from(self.mode == Mode::Force));
         (status[6], status[7]) = (i32::from(self.mode == Mode::Brake), i32::from(self.model.active_wrist));
         (status[8], status[10]) = (i32::from(self.model.wrist), i32::from(self.gravity));

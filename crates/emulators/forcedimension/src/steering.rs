@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, c_char};
 
-use palpate_emulators::vendor::{MOTORS_LENGTH, NONSENSE, TIP_LENGTH, disturbance, tip_of_numbers};
+use palpate_emulators::vendor::{MOTORS_LENGTH, NONSENSE, TIP_LENGTH, UNCALIBRATED, disturbance, tip_of_numbers};
 
 use crate::device::Device;
 use crate::world::{World, world};
@@ -48,6 +48,7 @@ pub unsafe extern "C" fn palpate_emulator_motors(rank: u32, numbers: *mut [f64; 
 pub extern "C" fn palpate_emulator_disturb(rank: u32, number: u32) {
     with_device(rank, |device| {
         device.nonsense = number == NONSENSE;
+        device.uncalibrated = number == UNCALIBRATED;
         device.disturb(disturbance(number));
     });
 }
