@@ -3,11 +3,14 @@
 
 mod device;
 pub mod emulated;
+pub mod forcedimension;
 mod frame;
 mod kinds;
 pub mod known;
+mod library;
 mod mounted;
 mod opening;
+pub mod openhaptics;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
