@@ -3,6 +3,7 @@
 
 mod device;
 mod frame;
+pub mod haply;
 pub mod known;
 mod opening;
 pub mod simulated;
