@@ -2,14 +2,17 @@
 //! of it ([`Frame`]), which a scene maps to its own.
 
 mod device;
+pub mod emulated;
 mod frame;
 pub mod haply;
 pub mod known;
+mod mounted;
 mod opening;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
+pub use mounted::{Mounted, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 
 // All that a driver knows of the core; `scripts/check_architecture.py` checks it.

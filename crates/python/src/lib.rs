@@ -3,6 +3,7 @@
 
 mod body;
 mod dynamics;
+mod emulated;
 mod errors;
 mod frame;
 mod green;
@@ -35,6 +36,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;

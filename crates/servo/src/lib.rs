@@ -4,7 +4,9 @@
 //! callback may call it instead, and an offline run calls it without a clock ([`run`]): the same input gives the same bits
 //! in all of them.
 
+mod change;
 mod clock;
+mod emulated;
 mod force_loop;
 mod handoff;
 mod log;
@@ -22,7 +24,9 @@ mod strain;
 mod subnormals;
 mod timing;
 
+pub use change::SceneChange;
 pub use clock::now_ns;
+pub use emulated::{EmulatedTick, Emulation};
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
