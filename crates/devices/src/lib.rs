@@ -5,6 +5,7 @@ mod device;
 pub mod emulated;
 pub mod forcedimension;
 mod frame;
+pub mod haply;
 mod kinds;
 pub mod known;
 mod library;
