@@ -5,6 +5,7 @@ mod device;
 mod frame;
 pub mod known;
 mod opening;
+pub mod programmed;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
