@@ -33,6 +33,10 @@ class SimulationError(Error):
     """A simulation that cannot go on: its loop does not run, or a fault has latched."""
 
 
+class DeviceError(Error):
+    """A haptic device that is not there, cannot be opened, or says of itself what cannot be."""
+
+
 class UnitError(Error):
     """An unknown unit, or a quantity that cannot be read."""
 
@@ -82,6 +86,10 @@ class SchedulingWarning(PalpateWarning):
 
 class TouchWarning(PalpateWarning):
     """A touch landed on the surface far from the point that was asked for."""
+
+
+class DeviceWarning(PalpateWarning):
+    """The program of a device has failed: no force on its tool until a reset."""
 
 
 class RecordingWarning(PalpateWarning):

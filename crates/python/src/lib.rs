@@ -2,10 +2,12 @@
 //! people. The interpreter lock is released in everything long.
 
 mod body;
+mod devices;
 mod dynamics;
 mod errors;
 mod frame;
 mod green;
+mod programmed;
 mod recording;
 mod replay;
 mod rerun;
@@ -35,6 +37,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_class::<programmed::ProgrammedDevice>()?;
+    module.add_class::<devices::DeviceCheck>()?;
+    module.add_function(wrap_pyfunction!(devices::device_kinds, module)?)?;
+    module.add_function(wrap_pyfunction!(devices::list_devices, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;

@@ -38,5 +38,12 @@ def checks(incomplete: str) -> list[tuple[str, str]]:
     return [(name, known.title) for name, known in BENCHMARKS.items() if name.startswith(incomplete)]
 
 
+def device_kinds(incomplete: str) -> list[str]:
+    """Kinds of haptic devices that there are drivers for."""
+    from palpate.devices import kinds
+
+    return _beginning(kinds(), incomplete)
+
+
 def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
     return [word for word in words if word.startswith(incomplete)]

@@ -49,8 +49,8 @@ pub struct ProgrammedDevice {
     said: Output<Said>,
     asked: Input<Asked>,
     gone: Arc<Gone>,
-    /// Time since the latest reading, s.
-    age: f64,
+    /// Ticks since the latest reading.
+    silent: u32,
 }
 
 /// A device whose program polls at `rate`, Hz, with the delay that polling adds to its limits, and the program's end.
@@ -60,7 +60,7 @@ pub fn programmed(name: impl Into<String>, limits: DeviceLimits, rate: f64) -> (
     let gone = Arc::new(Gone::default());
     let limits = DeviceLimits { delay: limits.delay + 1.5 / rate, ..limits };
     let device =
-        ProgrammedDevice { name: name.into(), limits, said: said_out, asked: asked_in, gone: gone.clone(), age: 0.0 };
+        ProgrammedDevice { name: name.into(), limits, said: said_out, asked: asked_in, gone: gone.clone(), silent: 0 };
     (ProgramEnd::new(said_in, asked_out, gone), device)
 }
 
@@ -70,14 +70,14 @@ impl Device for ProgrammedDevice {
     }
 
     fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
-        self.age = if self.said.update() { 0.0 } else { self.age + period };
+        self.silent = if self.said.update() { 0 } else { self.silent.saturating_add(1) };
         // Asked after the update: what a program said before it went is not missed.
         let gone = self.gone.program.load(Ordering::Acquire);
         match *self.said.output_buffer_mut() {
             Some(Err(fault)) => Err(fault),
             _ if gone => Err(DeviceFault::Disconnected),
             None => Ok(Reading { timestamp_ns: now_ns, ..Reading::default() }),
-            Some(Ok(_)) if self.age > LONGEST_SILENCE => Err(DeviceFault::Stale),
+            Some(Ok(_)) if f64::from(self.silent) * period > LONGEST_SILENCE => Err(DeviceFault::Stale),
             Some(Ok(reading)) => Ok(reading),
         }
     }

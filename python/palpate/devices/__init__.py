@@ -1,0 +1,27 @@
+"""Haptic devices: those that a program brings, those that the drivers find, and a gentle check of one."""
+
+from palpate.devices.device import Device, DeviceLimits, Reading
+from palpate.devices.listing import FoundDevice, Listing, Obstacle, kinds, listed, listings
+from palpate.devices.polling import Polling
+from palpate.devices.self_check import DIRECTIONS, Checked, Push, SelfCheck, Watched
+from palpate.devices.usb import UsbDevice, usb_devices
+
+__all__ = [
+    "DIRECTIONS",
+    "Checked",
+    "Device",
+    "DeviceLimits",
+    "FoundDevice",
+    "Listing",
+    "Obstacle",
+    "Polling",
+    "Push",
+    "Reading",
+    "SelfCheck",
+    "UsbDevice",
+    "Watched",
+    "kinds",
+    "listed",
+    "listings",
+    "usb_devices",
+]
