@@ -1,7 +1,7 @@
 """A device of one's own: the keyboard moves a fingertip, and the force is a bar in the terminal.
 
-Keys: a d left and right, w s away and towards you, r f up and down, space holds on, q ends. Without a terminal it plays a
-press by script, and checks the force. A device with motors is the same class with a `write` that drives them.
+Keys: a d left and right, w s away and towards you, r f up and down, space holds on, q ends. Without a terminal it plays
+a press by script, and checks the force. A device with motors is the same class with a `write` that drives them.
 """
 
 import contextlib
@@ -31,6 +31,7 @@ class KeyboardDevice(palpate.Device):
         self._before = time.monotonic()
 
     def read(self):
+        """Move the fingertip towards what the keys ask for."""
         for key in self.keys():
             self.target += STEP * np.array(KEYS.get(key, (0, 0, 0)))
             self.holds ^= key == " "
@@ -42,6 +43,7 @@ class KeyboardDevice(palpate.Device):
         return palpate.Reading(self.tip, velocity=velocity, buttons=int(self.holds))
 
     def write(self, force, torque):
+        """Keep the force, to be shown: there are no motors."""
         self.force = force
 
 

@@ -33,10 +33,6 @@ class SimulationError(Error):
     """A simulation that cannot go on: its loop does not run, or a fault has latched."""
 
 
-class DeviceError(Error):
-    """A haptic device that is not there, cannot be opened, or says of itself what cannot be."""
-
-
 class UnitError(Error):
     """An unknown unit, or a quantity that cannot be read."""
 
@@ -58,6 +54,10 @@ class UnclearUnitError(UnitError):
 
 class ViewerError(Error):
     """The browser viewer cannot be served, or was asked for something it cannot do."""
+
+
+class DeviceError(Error):
+    """A haptic device that cannot be found or opened, or a device of a program that does not do what it says."""
 
 
 class PalpateWarning(UserWarning):
@@ -84,12 +84,12 @@ class SchedulingWarning(PalpateWarning):
     """The system did not give the force loop the scheduling that was asked for: ticks may begin late."""
 
 
+class DeviceWarning(PalpateWarning):
+    """A haptic device that renders less than the scene asks for, or has a fault."""
+
+
 class TouchWarning(PalpateWarning):
     """A touch landed on the surface far from the point that was asked for."""
-
-
-class DeviceWarning(PalpateWarning):
-    """The program of a device has failed: no force on its tool until a reset."""
 
 
 class RecordingWarning(PalpateWarning):

@@ -3,6 +3,7 @@
 
 mod device;
 mod frame;
+mod kinds;
 pub mod known;
 mod mounted;
 mod opening;
@@ -11,6 +12,7 @@ pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
+pub use kinds::{kinds, list, open};
 pub use mounted::{Mounted, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 

@@ -2,41 +2,18 @@
 
 use std::path::PathBuf;
 
-use palpate_devices::{Connection, FoundDevice, Listing, OpenError, Opened};
+use palpate_devices::{Connection, FoundDevice, kinds, list};
 use palpate_servo::{LARGEST_FORCE, SelfCheck, Task};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::errors::{device_error, to_python};
-use crate::programmed::{LimitArguments, ProgrammedDevice, limit_arguments};
-
-/// What a driver does.
-struct Driver {
-    kind: &'static str,
-    list: fn(&Connection) -> Listing,
-    open: fn(&Connection) -> Result<Opened, OpenError>,
-}
-
-/// All of them, by the kind that a scene names.
-const DRIVERS: [Driver; 0] = [];
-
-fn driver(kind: &str) -> PyResult<&'static Driver> {
-    let found = DRIVERS.iter().find(|driver| driver.kind == kind);
-    found.ok_or_else(|| PyValueError::new_err(format!("no driver of kind '{kind}'")))
-}
-
-/// Id, address and library, each None for the driver's default.
-type ConnectionArguments = (Option<String>, Option<String>, Option<PathBuf>);
-
-fn connection((id, address, library): ConnectionArguments) -> Connection {
-    Connection { id, address, library }
-}
+use crate::connection::{LimitsArguments, OpenedDevice, device_error, limits_tuple};
+use crate::errors::to_python;
 
 /// Kinds of devices that there are drivers for.
 #[pyfunction]
 pub fn device_kinds() -> Vec<&'static str> {
-    DRIVERS.iter().map(|driver| driver.kind).collect()
+    kinds().collect()
 }
 
 /// What a driver sees: `found` with name, id, limits, obstacle and facts of each device; `missing`; `facts` of the driver. What is
@@ -45,16 +22,17 @@ pub fn device_kinds() -> Vec<&'static str> {
 pub fn list_devices<'py>(
     py: Python<'py>,
     kind: &str,
-    given: ConnectionArguments,
+    address: Option<String>,
+    library: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (driver, connection) = (driver(kind)?, connection(given));
-    let listing = py.detach(|| (driver.list)(&connection));
+    let connection = Connection { id: None, address, library };
+    let listing = py.detach(|| list(kind, &connection)).map_err(|error| device_error(py, &error))?;
     let found = PyList::empty(py);
     for FoundDevice { id, name, limits, obstacle, facts } in listing.found {
         let device = PyDict::new(py);
         device.set_item("id", id)?;
         device.set_item("name", name)?;
-        device.set_item("limits", limit_arguments(&limits))?;
+        device.set_item("limits", limits_tuple(&limits))?;
         device.set_item("obstacle", obstacle.map(|why| (why.what, why.advice)))?;
         device.set_item("facts", facts)?;
         found.append(device)?;
@@ -74,19 +52,12 @@ pub struct DeviceCheck {
 
 #[pymethods]
 impl DeviceCheck {
-    /// Opens a device and begins to watch it.
-    #[staticmethod]
-    fn of_driver(py: Python<'_>, kind: &str, given: ConnectionArguments) -> PyResult<Self> {
-        let (driver, connection) = (driver(kind)?, connection(given));
-        let opened = py.detach(|| (driver.open)(&connection)).map_err(|error| device_error(py, &error))?;
-        Self::start(py, opened)
-    }
-
-    /// Begins to watch the device of a program.
-    #[staticmethod]
-    fn of_program(py: Python<'_>, device: &mut ProgrammedDevice) -> PyResult<Self> {
-        let taken = device.take().ok_or_else(|| PyValueError::new_err("a loop has taken the device already"))?;
-        Self::start(py, taken.0)
+    /// Begins to watch a device.
+    #[new]
+    fn new(py: Python<'_>, device: &mut OpenedDevice) -> PyResult<Self> {
+        let opened = device.take(py)?;
+        let check = py.detach(|| SelfCheck::start(opened)).map_err(|error| to_python(py, error))?;
+        Ok(Self { check })
     }
 
     /// Largest force that it can be asked for, N.
@@ -100,8 +71,8 @@ impl DeviceCheck {
     }
 
     #[getter]
-    fn limits(&self) -> LimitArguments {
-        limit_arguments(&self.check.limits())
+    fn limits(&self) -> LimitsArguments {
+        limits_tuple(&self.check.limits())
     }
 
     /// Pushes along a unit vector with a force, N, that rises over `seconds`, or watches along none.
@@ -133,12 +104,5 @@ impl DeviceCheck {
     /// Ends the check; the device is left without a force.
     fn stop(&mut self, py: Python<'_>) {
         py.detach(|| self.check.stop());
-    }
-}
-
-impl DeviceCheck {
-    fn start(py: Python<'_>, opened: Opened) -> PyResult<Self> {
-        let check = py.detach(|| SelfCheck::start(opened)).map_err(|error| to_python(py, error))?;
-        Ok(Self { check })
     }
 }

@@ -1,7 +1,6 @@
-//! Errors of the core and of drivers as Python exceptions: the package's own classes, so that `except palpate.Error` catches them all.
+//! Core errors as Python exceptions: the package's own classes, so that `except palpate.Error` catches them all.
 
 use palpate_core::Error;
-use palpate_devices::OpenError;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError};
 use pyo3::prelude::*;
 
@@ -17,15 +16,7 @@ pub fn to_python(py: Python<'_>, error: Error) -> PyErr {
         Error::Precision(_) => "PrecisionError",
         Error::Singular(_) | Error::Invalid(_) | Error::Memory(_) => "BodyError",
     };
-    of_class(py, class, error.to_string())
-}
-
-/// The Python exception for a device that cannot be opened.
-pub fn device_error(py: Python<'_>, error: &OpenError) -> PyErr {
-    of_class(py, "DeviceError", error.to_string())
-}
-
-fn of_class(py: Python<'_>, class: &str, message: String) -> PyErr {
+    let message = error.to_string();
     match py.import("palpate.errors").and_then(|m| m.getattr(class)).and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),
         Err(import_error) => import_error,

@@ -51,8 +51,7 @@ pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
             Ok((eigenvalues.as_slice()?.to_vec(), shapes.as_slice()?.to_vec(), *scheme, *exact, *coupling))
         })
         .transpose()?;
-    let placement =
-        Placement { position: DVec3::from(*position), rotation: DMat3::from_quat(quaternion(*orientation)) };
+    let placement = placement((*position, *orientation));
     let moduli = moduli
         .as_ref()
         .map(|(youngs, poissons, homogeneous)| -> PyResult<_> {
@@ -99,6 +98,11 @@ fn tool_shape((kind, [a, b, c], vertices, triangles): ShapeArguments) -> Result<
             Ok(ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles)?)))
         }
     }
+}
+
+/// Where a body stands: position (m), and orientation w x y z.
+pub fn placement((position, orientation): ([f64; 3], [f64; 4])) -> Placement {
+    Placement { position: position.into(), rotation: DMat3::from_quat(quaternion(orientation)) }
 }
 
 /// From w x y z, made of length one to the last bit.

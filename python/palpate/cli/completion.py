@@ -38,11 +38,11 @@ def checks(incomplete: str) -> list[tuple[str, str]]:
     return [(name, known.title) for name, known in BENCHMARKS.items() if name.startswith(incomplete)]
 
 
-def device_kinds(incomplete: str) -> list[str]:
-    """Kinds of haptic devices that there are drivers for."""
-    from palpate.devices import kinds
+def devices(incomplete: str) -> list[str]:
+    """Kinds of devices."""
+    from palpate.scene.devices import KINDS
 
-    return _beginning(kinds(), incomplete)
+    return _beginning(KINDS, incomplete)
 
 
 def _beginning(words: Iterable[str], incomplete: str) -> list[str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.app import app
-from palpate.cli.completion import device_kinds
+from palpate.cli.completion import devices as device_names
 
 if TYPE_CHECKING:
     from palpate.devices import Checked, DeviceLimits, Listing, SelfCheck, UsbDevice, Watched
@@ -27,7 +27,7 @@ FORCE = 0.5
 def devices(
     kind: Annotated[
         str | None,
-        typer.Argument(help="Only this kind: haply, touch or forcedimension.", autocompletion=device_kinds),
+        typer.Argument(help="Only this kind: haply, touch or forcedimension.", autocompletion=device_names),
     ] = None,
     test: Annotated[
         bool, typer.Option("--test", help="Check one: rate, noise, range, buttons, then small forces.")

@@ -1,8 +1,8 @@
 """Haptic devices: those that a program brings, those that the drivers find, and a gentle check of one."""
 
-from palpate.devices.device import Device, DeviceLimits, Reading
+from palpate.devices.device import Device
 from palpate.devices.listing import FoundDevice, Listing, Obstacle, kinds, listed, listings
-from palpate.devices.polling import Polling
+from palpate.devices.reading import DeviceLimits, Reading
 from palpate.devices.self_check import DIRECTIONS, Checked, Push, SelfCheck, Watched
 from palpate.devices.usb import UsbDevice, usb_devices
 
@@ -14,7 +14,6 @@ __all__ = [
     "FoundDevice",
     "Listing",
     "Obstacle",
-    "Polling",
     "Push",
     "Reading",
     "SelfCheck",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from palpate import _native
-from palpate.devices.device import DeviceLimits
+from palpate.devices.reading import DeviceLimits
 from palpate.errors import DeviceError
 
 
@@ -108,7 +108,7 @@ def listed(kind: str, address: str | None = None, library: str | os.PathLike[str
     """
     if kind not in kinds():
         raise DeviceError(f"there is no driver of kind '{kind}': choose among {', '.join(kinds())}")
-    raw = _native.list_devices(kind, (None, address, library))
+    raw = _native.list_devices(kind, address, library)
     found = tuple(
         FoundDevice(
             device["id"],

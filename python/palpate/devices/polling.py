@@ -9,12 +9,14 @@ import contextlib
 import threading
 import time
 import warnings
+from typing import Protocol
 
 import numpy as np
 
 from palpate import _native
-from palpate.devices.device import Device, mistake_in, name_of
+from palpate.devices.reading import DeviceLimits, Reading, mistake_in
 from palpate.errors import DeviceError, DeviceWarning
+from palpate.vectors import number
 
 # How long a device may take to open and give its first reading, and to end its last call, s.
 OPENING, CLOSING = 10.0, 2.0
@@ -23,8 +25,28 @@ AGAIN = 0.1
 LOWEST_RATE, HIGHEST_RATE = 50.0, 10_000.0
 
 
+class Polled(Protocol):
+    """What is asked of a device; :class:`palpate.Device` tells what each does."""
+
+    name: str
+    limits: DeviceLimits
+    rate: float | None
+
+    def open(self) -> None:
+        """Get ready."""
+
+    def read(self) -> Reading | None:
+        """Say where the tool is."""
+
+    def write(self, force: np.ndarray, torque: np.ndarray) -> None:
+        """Put out a force, N, and a torque, N m."""
+
+    def close(self) -> None:
+        """Let go."""
+
+
 class Polling:
-    """A device of a program, opened and polled on a thread of its own from :meth:`start` to :meth:`stop`.
+    """A device of a program, opened and polled on a thread of its own from :meth:`start` to :meth:`stop`, once.
 
     Parameters
     ----------
@@ -35,32 +57,35 @@ class Polling:
 
     Attributes
     ----------
-    device
-        The device.
-    native
-        Its hand-off with a loop, which takes it once; None while it does not run.
+    name
+        What a person knows it by.
+    failure
+        Why it failed last, in one line; None if it has not.
 
     Raises
     ------
     DeviceError
-        Something else than a device; a rate out of range.
+        A rate out of range, or limits that are none.
 
     """
 
-    def __init__(self, device: Device, rate: float):
-        if not isinstance(device, Device):
-            raise DeviceError(f"a device of a program must be a palpate.Device, got {type(device).__name__}")
-        rate = float(rate if device.rate is None else device.rate)
+    def __init__(self, device: Polled, rate: float):
+        self.name = device.name or type(device).__name__
+        if not isinstance(device.limits, DeviceLimits):
+            kind = type(device.limits).__name__
+            raise DeviceError(f"{self.name}: limits must be a palpate.DeviceLimits, got {kind}")
+        rate = number(rate if device.rate is None else device.rate, f"{self.name}: rate", DeviceError)
         if not LOWEST_RATE <= rate <= HIGHEST_RATE:
-            raise DeviceError(f"{name_of(device)}: rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} Hz, got {rate:g}")
-        self.device, self.native = device, None
+            raise DeviceError(f"{self.name}: rate must be {LOWEST_RATE:g} to {HIGHEST_RATE:g} Hz, got {rate:g}")
+        self.failure: str | None = None
+        self._device = device
         self._period = 1.0 / rate
         self._ending, self._ready = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._refusal: DeviceError | None = None
 
-    def start(self) -> _native.ProgrammedDevice:
-        """Open the device and wait for its first reading.
+    def start(self) -> _native.OpenedDevice:
+        """Open the device and wait for its first reading; what a loop takes.
 
         Raises
         ------
@@ -68,35 +93,32 @@ class Polling:
             What `open` or the first `read` raised, in one line, or that they took too long.
 
         """
-        self._ending.clear()
-        self._ready.clear()
-        self._refusal = None
-        name, limits = name_of(self.device), self.device.limits.arguments
-        self.native = _native.ProgrammedDevice(name, limits, 1.0 / self._period)
-        self._thread = threading.Thread(target=self._run, name=f"palpate-device {name}", daemon=True)
+        native = _native.ProgrammedDevice(self.name, self._device.limits.arguments, 1.0 / self._period)
+        self._thread = threading.Thread(
+            target=self._run, args=(native,), name=f"palpate-device {self.name}", daemon=True
+        )
         self._thread.start()
         if not self._ready.wait(OPENING):
             self._ending.set()
-            raise DeviceError(f"{name}: open and the first read took more than {OPENING:g} s")
+            raise DeviceError(f"{self.name}: open and the first read took more than {OPENING:g} s")
         if self._refusal is not None:
             self._thread.join(CLOSING)
             raise self._refusal
-        return self.native
+        return native.opened()
 
     def stop(self) -> None:
         """Put out zero, close the device and end the thread; a call of it that does not return is left behind."""
         self._ending.set()
-        thread, self._thread, self.native = self._thread, None, None
+        thread, self._thread = self._thread, None
         if thread is None:
             return
         thread.join(CLOSING)
         if thread.is_alive():
             self._warn("a call of it does not return: it may not have been closed, nor its last force taken back")
 
-    def _run(self) -> None:
+    def _run(self, native: _native.ProgrammedDevice) -> None:
         """All that the thread does; nothing is raised out of it."""
-        native = self.native
-        opened, message = self._attempt("open", self.device.open)
+        opened, message = self._attempt("open", self._device.open)
         if message is None:
             message = self._read(native)
         if message is not None:
@@ -108,8 +130,8 @@ class Polling:
         finally:
             if opened:
                 with contextlib.suppress(Exception):
-                    self.device.write(np.zeros(3), np.zeros(3))
-                _, message = self._attempt("close", self.device.close)
+                    self._device.write(np.zeros(3), np.zeros(3))
+                _, message = self._attempt("close", self._device.close)
                 if message is not None:
                     self._warn(message)
 
@@ -119,11 +141,12 @@ class Polling:
         while not self._ending.is_set():
             message = self._write(native) or self._read(native)
             if message is not None:
-                native.fail(message)
+                self.failure = message
+                native.fail()
                 if not failed:
                     self._warn(message)
                 with contextlib.suppress(Exception):
-                    self.device.write(np.zeros(3), np.zeros(3))
+                    self._device.write(np.zeros(3), np.zeros(3))
             failed = message is not None
             now = time.monotonic()
             # Deadlines that have passed meanwhile are left out.
@@ -133,7 +156,7 @@ class Polling:
 
     def _read(self, native: _native.ProgrammedDevice) -> str | None:
         """Publish a reading; why there is none."""
-        reading, message = self._attempt("read", self.device.read)
+        reading, message = self._attempt("read", self._device.read)
         if message is not None:
             return message
         if reading is None:
@@ -143,12 +166,12 @@ class Polling:
             how = reading.orientation, reading.velocity, reading.angular_velocity, reading.buttons
             if native.publish(reading.position, *how):
                 return None
-        return f"{name_of(self.device)}.read {mistake_in(reading) or 'returned a reading that cannot be used'}"
+        return f"{self.name}.read {mistake_in(reading) or 'returned a reading that cannot be used'}"
 
     def _write(self, native: _native.ProgrammedDevice) -> str | None:
         """Put out the latest wrench; why it was not."""
         force, torque, _ = native.wrench()
-        return self._attempt("write", self.device.write, np.array(force), np.array(torque))[1]
+        return self._attempt("write", self._device.write, np.array(force), np.array(torque))[1]
 
     def _attempt(self, what: str, call, *arguments):
         """Call a method of the device: what it returned, True for nothing, and its mistake in one line."""
@@ -157,7 +180,7 @@ class Polling:
         except Exception as error:
             lines = str(error).strip().splitlines()
             said = f": {lines[0]}" if lines else ""
-            return None, f"{name_of(self.device)}.{what} raised {type(error).__name__}{said}"
+            return None, f"{self.name}.{what} raised {type(error).__name__}{said}"
         return (returned if what == "read" else True), None
 
     def _warn(self, message: str) -> None:

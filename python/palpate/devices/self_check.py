@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
-from palpate.devices.device import Device, DeviceLimits
-from palpate.devices.polling import Polling
+from palpate.devices.device import Device
+from palpate.devices.reading import DeviceLimits
 from palpate.errors import DeviceError
 
 # Directions that forces are tried in, with the words for them: x to the right, y away from the person, z up.
@@ -173,12 +173,12 @@ class SelfCheck:
         address: str | None = None,
         library: str | os.PathLike[str] | None = None,
     ):
-        self._polling = None
+        self._program = None if isinstance(device, str) else device
         if isinstance(device, str):
-            self._check = _native.DeviceCheck.of_driver(device, (id, address, library))
+            opened = _native.OpenedDevice(device, id, address, library)
         else:
-            self._polling = Polling(device, LOOP_RATE)
-            self._check = _native.DeviceCheck.of_program(self._polling.start())
+            opened = device.open_for_loop(LOOP_RATE)
+        self._check = _native.DeviceCheck(opened)
         self.name, self.limits = self._check.name, DeviceLimits(*self._check.limits)
 
     def __enter__(self) -> SelfCheck:
@@ -190,8 +190,8 @@ class SelfCheck:
     def stop(self) -> None:
         """Leave the device without a force, and close it."""
         self._check.stop()
-        if self._polling is not None:
-            self._polling.stop()
+        if self._program is not None:
+            self._program.close_for_loop()
 
     def watch(self, seconds: float, told: Callable[[dict[str, Any]], None] | None = None) -> Watched:
         """Watch it without any force; ``told`` hears of it meanwhile."""
