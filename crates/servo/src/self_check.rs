@@ -156,7 +156,7 @@ impl SelfCheck {
         Ok(())
     }
 
-    /// What has been seen of the task; wait-free. None until its first tick.
+    /// What has been seen of the task, of a push up to its end; wait-free. None until its first tick.
     pub fn seen(&mut self) -> Option<Seen> {
         Some(*self.seen.read()).filter(|seen| seen.task == self.number && seen.time > 0.0)
     }
@@ -230,10 +230,12 @@ impl Ticker {
         let said = self.device.read(now_ns, period);
         let reading =
             self.stage.admit(said, now_ns, period).filter(|reading| reading.active && reading.pose.is_finite());
-        if let Some(reading) = &reading {
+        // What is told of a push is up to its end.
+        if let Some(reading) = reading.as_ref().filter(|_| !self.seen.done) {
             self.account(reading, period);
         }
-        let wrench = self.stage.apply(self.asked(reading.is_some()), 1.0, period);
+        let asked = self.asked(reading.is_some());
+        let wrench = self.stage.apply(asked, 1.0, period);
         self.seen.largest_force = self.seen.largest_force.max(wrench.force.length());
         if let Err(fault) = self.device.write(wrench) {
             self.stage.latch(FaultReason::Device(fault));

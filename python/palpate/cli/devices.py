@@ -96,7 +96,7 @@ def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:
     from palpate.devices import Checked, SelfCheck
     from palpate.errors import DeviceError
 
-    if not yes and not sys.stdin.isatty():
+    if not yes and not is_terminal():
         raise DeviceError("a check asks before any force: run it at a terminal, or give --yes")
     kind, id = which
     with SelfCheck(kind, id) as check:
@@ -117,6 +117,11 @@ def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:
     else:
         print("\n".join(_result_lines(result)))
     return result.passed
+
+
+def is_terminal() -> bool:
+    """Whether somebody is there to be asked."""
+    return sys.stdin.isatty()
 
 
 def _pushes(check: SelfCheck) -> Iterator[Any]:

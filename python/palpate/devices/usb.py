@@ -11,7 +11,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-RULES = "/etc/udev/rules.d/80-palpate-haptics.rules"
+RULES = "/etc/udev/rules.d/70-palpate-haptics.rules"
 
 
 @dataclass(frozen=True)

@@ -9,41 +9,13 @@ import warnings
 
 import numpy as np
 import pytest
+from held_device import Held
 
 import palpate
 from palpate.devices import SelfCheck
 from palpate.devices.polling import Polling
 
 RISE = 0.4
-
-
-class Held(palpate.Device):
-    """A tip in a hand without mass: it yields to a force by `F / STIFFNESS`, after a lag of `LAG`."""
-
-    STIFFNESS, LAG = 100.0, 0.01
-    limits = palpate.DeviceLimits(max_force=0.4)
-
-    def __init__(self, sign=1.0):
-        self.sign, self.position, self.force, self.when = sign, np.zeros(3), np.zeros(3), time.monotonic()
-        self.calls, self.threads, self.written = [], set(), []
-
-    def open(self):
-        self.calls.append("open")
-
-    def close(self):
-        self.calls.append("close")
-
-    def read(self):
-        self.threads.add(threading.current_thread())
-        now = time.monotonic()
-        share = 1.0 - math.exp((self.when - now) / self.LAG)
-        self.position, self.when = self.position + share * (self.force / self.STIFFNESS - self.position), now
-        return palpate.Reading(self.position, buttons=4)
-
-    def write(self, force, torque):
-        assert force.shape == torque.shape == (3,)
-        self.force = self.sign * force
-        self.written.append((time.monotonic(), force))
 
 
 def check(device, force=0.4):
@@ -175,7 +147,7 @@ def test_a_device_that_does_not_open_says_why():
     with pytest.raises(palpate.DeviceError, match=r"Shut\.open raised PermissionError: .*Permission denied.*ttyACM0"):
         SelfCheck(device)
     assert device.calls == [], "what was not opened is not closed"
-    with pytest.raises(palpate.DeviceError, match="Failing.read raised RuntimeError"):
+    with pytest.raises(palpate.DeviceError, match=r"Failing\.read raised RuntimeError"):
         failing = Failing(raises)
         failing.count = 200
         SelfCheck(failing)
