@@ -69,11 +69,13 @@ def terminal_keys():
 
 def scripted_keys(script, every=0.02):
     """Return a function that types the characters of a script one by one, so many seconds apart."""
-    begun, left = time.monotonic(), list(script)
+    begun, typed = None, 0
 
     def keys():
-        due = int((time.monotonic() - begun) / every) - (len(script) - len(left))
-        return [left.pop(0) for _ in range(min(due, len(left)))]
+        nonlocal begun, typed
+        begun = begun or time.monotonic()
+        before, typed = typed, int((time.monotonic() - begun) / every)
+        return script[before:typed]
 
     return keys
 
