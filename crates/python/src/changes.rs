@@ -5,40 +5,16 @@ use std::sync::{Arc, PoisonError};
 use palpate_core::simulation::{BodyModel, Kept, Model, ToolModel};
 use palpate_core::{Error, Result};
 use palpate_devices::simulated::{Handle, Target, simulated};
-use palpate_devices::{Device, DeviceLimits, Mounted, Scheduler, Workspace};
+use palpate_devices::{Device, DeviceLimits, Mounted, Workspace};
 use palpate_servo::{SceneChange, Settings, StrainPreparer};
 use pyo3::prelude::*;
 
-use crate::connection::{Connected, LimitsArguments, OpenedDevice, WorkspaceArguments, limits_of, limits_tuple};
+use crate::connection::{
+    Connected, LimitsArguments, LoopDevice, OpenedDevice, WorkspaceArguments, limits_of, limits_tuple,
+};
 use crate::errors::to_python;
 use crate::scene::{BodyArguments, ToolArguments, body_parts, placement, tool};
 use crate::simulation::SimulationCore;
-
-/// A device for the loop, and what moves it if it is a simulated one.
-pub struct LoopDevice {
-    pub device: Box<dyn Device>,
-    pub handle: Option<Handle>,
-    pub scheduler: Option<Arc<dyn Scheduler>>,
-}
-
-/// The driver that calls the tick, if some device has one.
-///
-/// # Errors
-/// Two of them, or one at another rate than the scene's.
-pub fn common_scheduler(devices: &[LoopDevice], rate: f64) -> Result<Option<Arc<dyn Scheduler>>> {
-    let mut schedulers = devices.iter().filter_map(|device| device.scheduler.clone());
-    let Some(first) = schedulers.next() else { return Ok(None) };
-    if schedulers.any(|other| !Arc::ptr_eq(&first, &other)) {
-        return Err(Error::Invalid("two devices have drivers that each call the loop: use one of them".into()));
-    }
-    let its_own = first.rate();
-    if its_own != rate {
-        return Err(Error::Invalid(format!(
-            "the device's driver calls the loop {its_own} times a second, the scene asks for {rate}: set device.rate = {its_own}"
-        )));
-    }
-    Ok(Some(first))
-}
 
 /// Bodies and tools of a changed scene, in order: those that stay by their rank before, with `None` for each that is new.
 type Ranks = Vec<Option<usize>>;

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use palpate_core::{Error, Result};
+use palpate_devices::simulated::Handle;
 use palpate_devices::{Connection, Device, DeviceLimits, Mounted, OpenError, Opened, Scheduler, Workspace};
 use pyo3::prelude::*;
 
@@ -131,4 +133,30 @@ impl Connected {
         let mounted = Mounted::new(device, workspace, &limits_of(limits));
         Ok(Self { limits: mounted.limits(), device: Mutex::new(Box::new(mounted)), scheduler })
     }
+}
+
+/// A device for the loop, and what moves it if it is a simulated one.
+pub struct LoopDevice {
+    pub device: Box<dyn Device>,
+    pub handle: Option<Handle>,
+    pub scheduler: Option<Arc<dyn Scheduler>>,
+}
+
+/// The driver that calls the tick, if some device has one.
+///
+/// # Errors
+/// Two of them, or one at another rate than the scene's.
+pub fn common_scheduler(devices: &[LoopDevice], rate: f64) -> Result<Option<Arc<dyn Scheduler>>> {
+    let mut schedulers = devices.iter().filter_map(|device| device.scheduler.clone());
+    let Some(first) = schedulers.next() else { return Ok(None) };
+    if schedulers.any(|other| !Arc::ptr_eq(&first, &other)) {
+        return Err(Error::Invalid("two devices have drivers that each call the loop: use one of them".into()));
+    }
+    let its_own = first.rate();
+    if its_own != rate {
+        return Err(Error::Invalid(format!(
+            "the device's driver calls the loop {its_own} times a second, the scene asks for {rate}: set device.rate = {its_own}"
+        )));
+    }
+    Ok(Some(first))
 }

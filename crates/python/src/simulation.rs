@@ -13,8 +13,7 @@ use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, StrainPre
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::changes::common_scheduler;
-use crate::connection::Connected;
+use crate::connection::{Connected, common_scheduler};
 use crate::errors::to_python;
 use crate::frame::{frame, push_row};
 use crate::recording::{Recorded, Recording, RecordingStatus, header};

@@ -24,7 +24,6 @@ mod strain;
 mod subnormals;
 mod timing;
 
-pub use change::SceneChange;
 pub use clock::now_ns;
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
@@ -40,6 +39,6 @@ pub use replay::{Difference, Owner, Replay};
 pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
 pub use scheduling::Scheduling;
 pub use self_check::{LARGEST_FORCE, Seen, SelfCheck, Task};
-pub use servo::Servo;
+pub use servo::{SceneChange, Servo};
 pub use settings::Settings;
 pub use statistics::{Histogram, Summary};

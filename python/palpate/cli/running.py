@@ -39,7 +39,7 @@ Devices = Annotated[
     list[str] | None,
     typer.Option(
         "--device",
-        help="What moves the first tool: haply, touch, forcedimension, or a [[device]] table's name; again for the next.",
+        help="What moves a tool: haply, touch, forcedimension, or the name of a [[device]]; again for the next tool.",
         autocompletion=devices,
     ),
 ]

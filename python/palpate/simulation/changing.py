@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from palpate import _native, units
 from palpate.body import Body
 from palpate.devices import Device
-from palpate.errors import SceneError
+from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
 from palpate.scene.devices import KINDS, tables_of_tools
@@ -164,6 +164,37 @@ class Changing:
         self._devices = {rank - (rank > tool): name for rank, name in self._devices.items() if rank != tool}
         if gone is not None and connected:
             gone.close_for_loop()
+
+    def connect(self, tool: int, device: Device | str) -> str:
+        """Let a tool of the running loop be moved by another device: of the program, or of a kind; returns its name.
+
+        Forces ramp in. The device that moved the tool is left at zero force.
+
+        Raises
+        ------
+        Error
+            A device that cannot be opened or calls the loop itself, a loop that does not run or is being recorded.
+
+        """
+        self._tool(tool)
+        if not self._running:
+            raise SimulationError("the simulation does not run: give it its devices, or their kinds in the scene")
+        given = None if isinstance(device, str) else device
+        kind = device if isinstance(device, str) else "simulated"
+        if given is None and kind not in KINDS[1:]:
+            raise SceneError(f"there is no kind of device '{kind}' to connect; there are {', '.join(KINDS[1:])}")
+        tables = [table.model_copy(update={"name": None}) for table in tables_of_tools(self.scene)]
+        tables[tool] = tables[tool].model_copy(update={"kind": kind, "id": None, "address": None, "library": None})
+        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
+        update = {"tools": tools, "device": tables[0], "further_devices": tables[1:]}
+        scene = self.scene.model_copy(update=update)
+        self._devices[tool] = connect_tool(self._core, scene, tool, given)
+        self.scene, before = scene, self._given.pop(tool, None)
+        if given is not None:
+            self._given[tool] = given
+        if before is not None:
+            before.close_for_loop()
+        return self._devices[tool]
 
     def _exchange(
         self, scene: SceneTables, bodies: tuple[BuiltBody, ...], body_ranks: list[Rank], tool_ranks: list[Rank]
