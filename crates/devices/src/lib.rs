@@ -2,8 +2,10 @@
 //! of it ([`Frame`]), which a scene maps to its own.
 
 mod device;
+pub mod emulated;
 mod frame;
 mod kinds;
+pub mod haply;
 pub mod known;
 mod mounted;
 mod opening;

@@ -6,6 +6,7 @@ mod changes;
 mod connection;
 mod devices;
 mod dynamics;
+mod emulated;
 mod errors;
 mod frame;
 mod green;
@@ -50,6 +51,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(changes::tool_stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(changes::assume_devices, module)?)?;
     module.add_function(wrap_pyfunction!(changes::change, module)?)?;
+    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;

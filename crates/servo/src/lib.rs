@@ -6,6 +6,7 @@
 
 mod change;
 mod clock;
+mod emulated;
 mod force_loop;
 mod handoff;
 mod log;
@@ -25,6 +26,7 @@ mod subnormals;
 mod timing;
 
 pub use clock::now_ns;
+pub use emulated::{EmulatedTick, Emulation};
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};

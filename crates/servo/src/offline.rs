@@ -74,7 +74,7 @@ pub fn run(
     let devices = (0..tools).map(|tool| Box::new(Scripted::new(script, tool, tools)) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
     force_loop.limit_strain_of(strain.known());
-    let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
+    let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
     let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
@@ -127,7 +127,7 @@ pub fn rerun(
     let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
     force_loop.limit_strain_of(strain.known());
-    let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
+    let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
     let mut settings = settings;
     for (tick, input) in inputs.into_iter().enumerate() {
@@ -149,20 +149,24 @@ pub fn rerun(
 }
 
 /// Strain responses between the ticks, handed over after a fixed number of them.
-struct Preparation<'a> {
+pub(crate) struct Preparation<'a> {
     end: PreparerEnd,
     strain: &'a StrainPreparer,
     due: VecDeque<(usize, StrainAnswer)>,
 }
 
-impl Preparation<'_> {
-    fn hand_over(&mut self, tick: usize) {
+impl<'a> Preparation<'a> {
+    pub(crate) fn new(end: PreparerEnd, strain: &'a StrainPreparer) -> Self {
+        Self { end, strain, due: VecDeque::new() }
+    }
+
+    pub(crate) fn hand_over(&mut self, tick: usize) {
         while self.due.front().is_some_and(|(when, _)| *when <= tick) {
             self.due.pop_front().into_iter().for_each(|(_, response)| self.end.hand_over(response));
         }
     }
 
-    fn prepare(&mut self, tick: usize) {
+    pub(crate) fn prepare(&mut self, tick: usize) {
         while let Some(prepared) = self.end.prepare_one(self.strain) {
             self.due.extend(prepared.map(|response| (tick + PREPARATION_TICKS, response)));
         }

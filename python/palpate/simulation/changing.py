@@ -180,6 +180,7 @@ class Changing:
         if not self._running:
             raise SimulationError("the simulation does not run: give it its devices, or their kinds in the scene")
         given = None if isinstance(device, str) else device
+        require_devices({} if given is None else {tool: given})
         kind = device if isinstance(device, str) else "simulated"
         if given is None and kind not in KINDS[1:]:
             raise SceneError(f"there is no kind of device '{kind}' to connect; there are {', '.join(KINDS[1:])}")
