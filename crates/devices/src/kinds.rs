@@ -1,6 +1,6 @@
 //! The kinds of devices, by name.
 
-use crate::{Connection, Listing, OpenError, Opened};
+use crate::{Connection, Listing, OpenError, Opened, forcedimension, haply, openhaptics};
 
 /// What the module of a driver does.
 struct Driver {
@@ -10,7 +10,11 @@ struct Driver {
 }
 
 /// All drivers, by the kind that a scene names.
-const DRIVERS: &[Driver] = &[];
+static DRIVERS: [Driver; 3] = [
+    Driver { kind: "haply", list: haply::list, open: haply::open },
+    Driver { kind: "touch", list: openhaptics::list, open: openhaptics::open },
+    Driver { kind: "forcedimension", list: forcedimension::list, open: forcedimension::open },
+];
 
 fn driver(kind: &str) -> Result<&'static Driver, OpenError> {
     DRIVERS.iter().find(|driver| driver.kind == kind).ok_or_else(|| {

@@ -3,13 +3,16 @@
 
 mod device;
 pub mod emulated;
+pub mod forcedimension;
 mod frame;
 mod kinds;
 pub mod haply;
 pub mod known;
+mod library;
 mod mounted;
 mod opening;
 pub mod programmed;
+pub mod openhaptics;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
