@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from palpate import models, palpation
 from palpate.body import Body, Loads, Material
+from palpate.devices import Device, DeviceLimits, Reading
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
@@ -45,7 +46,9 @@ __all__ = [
     "BodyError",
     "Comparison",
     "Contact",
+    "Device",
     "DeviceError",
+    "DeviceLimits",
     "DeviceWarning",
     "Difference",
     "Energy",
@@ -64,6 +67,7 @@ __all__ = [
     "PrecisionError",
     "PrecisionWarning",
     "QuantityDifference",
+    "Reading",
     "Recording",
     "RecordingStatus",
     "RecordingWarning",

@@ -10,13 +10,14 @@ mod kinds;
 pub mod known;
 mod library;
 mod mounted;
-mod opening;
 pub mod openhaptics;
+mod opening;
+pub mod programmed;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
-pub use kinds::open;
+pub use kinds::{kinds, list, open};
 pub use mounted::{Mounted, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 

@@ -3,6 +3,7 @@
 from palpate.cli import (  # noqa: F401  they register their commands
     benchmarks,
     caching,
+    devices,
     doctor,
     envelope,
     examining,
