@@ -115,6 +115,25 @@ impl DeviceLimits {
         let passive = self.own_damping.map_or(f64::INFINITY, |damping| damping / (0.5 * period + self.delay));
         self.max_stiffness.min(passive)
     }
+
+    /// What both allow.
+    pub fn lower_of(&self, other: &Self) -> Self {
+        let lower = |one: Option<f64>, other: Option<f64>| match (one, other) {
+            (Some(one), Some(other)) => Some(one.min(other)),
+            (one, other) => one.or(other),
+        };
+        Self {
+            max_force: self.max_force.min(other.max_force),
+            max_torque: self.max_torque.min(other.max_torque),
+            max_stiffness: self.max_stiffness.min(other.max_stiffness),
+            max_damping: self.max_damping.min(other.max_damping),
+            max_angular_damping: self.max_angular_damping.min(other.max_angular_damping),
+            own_damping: lower(self.own_damping, other.own_damping),
+            delay: self.delay.max(other.delay),
+            max_speed: lower(self.max_speed, other.max_speed),
+            rate: lower(self.rate, other.rate),
+        }
+    }
 }
 
 /// One haptic device. `read` and `write` belong to the tick: they never allocate, lock or block, and never panic. A driver

@@ -4,11 +4,13 @@
 mod device;
 mod frame;
 pub mod known;
+mod mounted;
 mod opening;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
+pub use mounted::{Mounted, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 
 // All that a driver knows of the core; `scripts/check_architecture.py` checks it.

@@ -7,6 +7,7 @@ use palpate_core::Result;
 use palpate_core::simulation::{Input, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
 use palpate_devices::{Device, Wrench};
 
+use crate::change::{ChangeEnd, change_ends};
 use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
@@ -22,23 +23,25 @@ use crate::timing::{Clock, Timing};
 /// Whoever owns it ticks it: one thread at a time, and any thread. It may move from one to another between ticks.
 pub struct ForceLoop {
     model: Arc<Model>,
-    state: State,
+    pub(crate) state: State,
     scratch: Scratch,
-    devices: Vec<Box<dyn Device>>,
+    pub(crate) devices: Vec<Box<dyn Device>>,
     limits: SafetyLimits,
-    stages: Vec<SafetyStage>,
+    pub(crate) stages: Vec<SafetyStage>,
     /// A fault of the whole loop.
-    fault: Option<FaultReason>,
-    ends: LoopEnds,
+    pub(crate) fault: Option<FaultReason>,
+    pub(crate) ends: LoopEnds,
+    /// Where another scene comes in.
+    pub(crate) changes: ChangeEnd,
     settings: Settings,
-    timing: Timing,
-    status: Status,
+    pub(crate) timing: Timing,
+    pub(crate) status: Status,
     /// Of which bodies the strain can be limited.
     limited: [bool; MAX_BODIES],
     /// Time of the first tick, ns.
-    start_ns: Option<u64>,
+    pub(crate) start_ns: Option<u64>,
     /// Row of the last tick: how long it took is known when it is over.
-    row: Option<LogRow>,
+    pub(crate) row: Option<LogRow>,
     /// Bodies whose requests for strain find no room in a tick that is made again.
     withheld: u32,
 }
@@ -74,7 +77,8 @@ impl ForceLoop {
         for (tool, device) in devices.iter().enumerate() {
             stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?, moves));
         }
-        let (ends, handle) = handoffs(&model, &settings, &stages);
+        let (changes, change_handle) = change_ends();
+        let (ends, handle) = handoffs(&model, &settings, &stages, change_handle);
         let (state, scratch) = (State::new(&model), Scratch::new(&model));
         let force_loop = Self {
             model,
@@ -85,6 +89,7 @@ impl ForceLoop {
             stages,
             fault: None,
             ends,
+            changes,
             settings,
             timing: Timing::new(clock),
             status: Status::default(),
@@ -177,6 +182,7 @@ impl ForceLoop {
     #[inline(never)]
     fn guarded_tick(&mut self, now_ns: u64, period: f64) {
         self.timing.begin(now_ns);
+        self.take_change();
         self.begin_record(now_ns, period);
         let mut input = self.receive(period);
         self.read_devices(&mut input, now_ns, period);

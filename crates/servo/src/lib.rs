@@ -4,6 +4,7 @@
 //! callback may call it instead, and an offline run calls it without a clock ([`run`]): the same input gives the same bits
 //! in all of them.
 
+mod change;
 mod clock;
 mod force_loop;
 mod handoff;
@@ -22,6 +23,7 @@ mod strain;
 mod subnormals;
 mod timing;
 
+pub use change::SceneChange;
 pub use clock::now_ns;
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};

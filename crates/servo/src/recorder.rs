@@ -99,6 +99,11 @@ impl RecorderHandle {
         }
     }
 
+    /// Whether a recording has begun, and not been ended.
+    pub fn is_begun(&self) -> bool {
+        self.begun
+    }
+
     /// Has the loop stop recording.
     pub fn end(&mut self) {
         if std::mem::replace(&mut self.begun, false) {

@@ -7,9 +7,10 @@ use std::time::Duration;
 
 use palpate_core::simulation::Model;
 use palpate_core::{Error, Result};
-use palpate_devices::Device;
+use palpate_devices::{Device, DeviceLimits, Scheduler};
 use rtrb::Consumer;
 
+use crate::change::{Awaited, SceneChange};
 use crate::clock::{next_deadline, now_ns, sleep_until_ns};
 use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
@@ -26,21 +27,33 @@ const MOST_WAITS: u32 = 1000;
 
 /// A running loop.
 pub struct Servo {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    caller: Caller,
     handle: LoopHandle,
     realtime: RealtimeStatus,
+    limits: SafetyLimits,
+    /// Time between two ticks, s.
+    period: f64,
+    /// What each tool's device can render.
+    devices: Vec<DeviceLimits>,
     /// Prepares strain responses while the loop runs.
-    _worker: StrainWorker,
+    worker: StrainWorker,
+}
+
+/// Who calls the tick.
+enum Caller {
+    /// A thread of ours, until it is told to stop.
+    Thread { stop: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
+    /// A driver, from its own.
+    Driver(Arc<dyn Scheduler>),
 }
 
 impl Servo {
-    /// Starts the loop with one device a tool on a thread scheduled as told, and beside it a thread that prepares the strain
-    /// of contacts.
+    /// Starts the loop with one device a tool, and beside it a thread that prepares the strain of contacts. Where some device
+    /// has a `scheduler`, its driver calls the tick at its own rate; else a thread does, scheduled as told.
     ///
     /// # Errors
     /// See [`ForceLoop::new`] and [`Scheduling::check`]; a rate beyond what a device takes; no thread from the operating
-    /// system. A priority that the system refuses is none: see [`Servo::realtime`].
+    /// system; a driver that does not start. A priority that the system refuses is none: see [`Servo::realtime`].
     pub fn start(
         model: Arc<Model>,
         devices: Vec<Box<dyn Device>>,
@@ -48,31 +61,45 @@ impl Servo {
         settings: Settings,
         scheduling: Scheduling,
         strain: StrainPreparer,
+        scheduler: Option<Arc<dyn Scheduler>>,
     ) -> Result<Self> {
         scheduling.check()?;
+        let device_limits = devices.iter().map(|device| device.limits()).collect();
         let (mut force_loop, mut handle) = ForceLoop::new(model, devices, limits, settings)?;
         let worker = force_loop.limit_strain(&mut handle, strain)?;
-        let period = 1.0 / scheduling.rate;
+        let period = 1.0 / scheduler.as_ref().map_or(scheduling.rate, |scheduler| scheduler.rate());
         force_loop.check_period(period)?;
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = stop.clone();
-        // Locking the memory of a large process takes a tenth of a second: wait, so that the first target set after the
-        // start is seen by a running loop.
-        let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
-        let ticks = move || {
-            let granted = scheduling.apply();
-            let realtime = granted.as_ref().copied().unwrap_or_default();
-            force_loop.set_realtime(realtime);
-            let refused = granted.is_err();
-            let _ = ready_in.send(granted);
-            if !refused {
-                run(&mut force_loop, period, &stopped);
-            }
+        let (caller, realtime) = match scheduler {
+            Some(scheduler) => (driven(force_loop, period, scheduler)?, RealtimeStatus::default()),
+            None => on_a_thread(force_loop, period, scheduling)?,
         };
-        let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(ticks);
-        let thread = thread.map_err(|source| Error::Io { path: "palpate-servo".into(), source })?;
-        let realtime = ready_out.recv().unwrap_or_else(|_| Ok(RealtimeStatus::default()))?;
-        Ok(Self { stop, thread: Some(thread), handle, realtime, _worker: worker })
+        Ok(Self { caller, handle, realtime, limits, period, devices: device_limits, worker })
+    }
+
+    /// Exchanges bodies, tools and devices while the loop runs; contacts between those that stay go on.
+    ///
+    /// # Errors
+    /// See [`ForceLoop::new`]; a rate beyond what a new device takes; a tool without a device; a loop that is being recorded, or
+    /// does not tick. The loop then goes on as it was.
+    pub fn change(&mut self, change: SceneChange) -> Result<()> {
+        let SceneChange { model, kept, devices, settings, strain } = change;
+        let keeps_device = devices.iter().map(Option::is_none).collect();
+        let mut placed: Vec<Box<dyn Device>> = Vec::new();
+        for (tool, device) in devices.into_iter().enumerate() {
+            let awaited = || kept.tools.get(tool).copied().flatten().and_then(|old| self.devices.get(old));
+            let missing = || Error::Invalid(format!("tool {tool} is new, and has no device"));
+            placed.push(match device {
+                Some(device) => device,
+                None => Box::new(Awaited(*awaited().ok_or_else(missing)?)),
+            });
+        }
+        let limits = placed.iter().map(|device| device.limits()).collect();
+        let (mut next, mut next_handle) = ForceLoop::new(model, placed, self.limits, settings)?;
+        next.check_period(self.period)?;
+        let worker = next.limit_strain(&mut next_handle, strain)?;
+        self.handle.change(next, next_handle, kept, keeps_device)?;
+        (self.devices, self.worker) = (limits, worker);
+        Ok(())
     }
 
     /// What the operating system granted the loop's thread.
@@ -119,9 +146,14 @@ impl Servo {
 
     /// Stops the loop; the devices are left without a wrench.
     pub fn stop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
+        match &mut self.caller {
+            Caller::Thread { stop, thread } => {
+                stop.store(true, Ordering::Relaxed);
+                if let Some(thread) = thread.take() {
+                    let _ = thread.join();
+                }
+            }
+            Caller::Driver(scheduler) => scheduler.stop(),
         }
     }
 }
@@ -130,6 +162,36 @@ impl Drop for Servo {
     fn drop(&mut self) {
         self.stop();
     }
+}
+
+/// Has a thread of its own call the tick.
+fn on_a_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -> Result<(Caller, RealtimeStatus)> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = stop.clone();
+    // Locking the memory of a large process takes a tenth of a second: wait, so that the first target set after the
+    // start is seen by a running loop.
+    let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
+    let ticks = move || {
+        let granted = scheduling.apply();
+        let realtime = granted.as_ref().copied().unwrap_or_default();
+        force_loop.set_realtime(realtime);
+        let refused = granted.is_err();
+        let _ = ready_in.send(granted);
+        if !refused {
+            run(&mut force_loop, period, &stopped);
+        }
+    };
+    let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(ticks);
+    let thread = thread.map_err(|source| Error::Io { path: "palpate-servo".into(), source })?;
+    let realtime = ready_out.recv().unwrap_or_else(|_| Ok(RealtimeStatus::default()))?;
+    Ok((Caller::Thread { stop, thread: Some(thread) }, realtime))
+}
+
+/// Has a driver call the tick.
+fn driven(mut force_loop: ForceLoop, period: f64, scheduler: Arc<dyn Scheduler>) -> Result<Caller> {
+    let tick = Box::new(move || force_loop.tick(now_ns(), period));
+    scheduler.start(tick).map_err(|error| Error::Invalid(error.to_string()))?;
+    Ok(Caller::Driver(scheduler))
 }
 
 /// Ticks on a grid of deadlines until stopped.

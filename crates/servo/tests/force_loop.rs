@@ -166,7 +166,8 @@ fn what_does_not_fit_the_scene_is_an_error() {
     let start = |limits, rate| {
         let scene = single(false);
         let strain = StrainPreparer::new(&scene);
-        let servo = Servo::start(scene, vec![with_limits(limits)], patient(), settings(), Scheduling::at(rate), strain);
+        let servo =
+            Servo::start(scene, vec![with_limits(limits)], patient(), settings(), Scheduling::at(rate), strain, None);
         servo.err().map(|error| error.to_string())
     };
     refused(start(weak, 500.0), "holds at most 2000 N/m: lower max_stiffness to 2000");
@@ -369,7 +370,7 @@ fn a_servo_keeps_its_rate_and_leaves_its_devices_without_a_wrench() {
     };
     let scene = single(false);
     let strain = StrainPreparer::new(&scene);
-    let servo = Servo::start(scene, vec![Box::new(device)], patient(), settings(), Scheduling::at(500.0), strain);
+    let servo = Servo::start(scene, vec![Box::new(device)], patient(), settings(), Scheduling::at(500.0), strain, None);
     let mut servo = servo.expect("a running loop");
     let (start, mut status) = (Instant::now(), servo.latest().status);
     while status.ticks < 250 && start.elapsed() < Duration::from_secs(20) {

@@ -47,10 +47,16 @@ pub struct LocalSurface {
     pub moduli: Moduli,
 }
 
-/// A body of a scene. Everything in it is in the body's own frame but its placement.
+/// A body of a scene. Copies share what was prepared.
+#[derive(Clone)]
 pub struct BodyModel {
     /// Where it stands.
     pub placement: Placement,
+    prepared: Arc<PreparedBody>,
+}
+
+/// What is prepared of a body, in its own frame.
+pub struct PreparedBody {
     pub(crate) green: Arc<GreensFunction>,
     /// Displacements of the surface under the reference loads, m (3s): the shape that tools meet.
     pub(super) free: Vec<f64>,
@@ -80,7 +86,8 @@ impl BodyModel {
         let query = SurfaceQuery::new(&loaded)?;
         let geometry = PatchGeometry::new(&green.surface);
         let mean_edge = mean_edge(&green.surface);
-        Ok(Self { placement, green, free, query, loaded, geometry, dynamics: None, mean_edge, local: None })
+        let prepared = PreparedBody { green, free, query, loaded, geometry, dynamics: None, mean_edge, local: None };
+        Ok(Self { placement, prepared: Arc::new(prepared) })
     }
 
     /// The same body, ready for the local law.
@@ -97,7 +104,7 @@ impl BodyModel {
             return Err(Error::Invalid("elastic constants at the surface are out of range".into()));
         }
         let smooth = SmoothSurface::new(&self.loaded, |node| self.green.touchable(node as usize).is_some());
-        Ok(Self { local: Some(LocalSurface { smooth, moduli }), ..self })
+        self.preparing(|prepared| prepared.local = Some(LocalSurface { smooth, moduli }))
     }
 
     /// The same body in motion.
@@ -109,9 +116,31 @@ impl BodyModel {
         if rows != dofs {
             return Err(Error::Invalid(format!("the modes have {rows} rows, the surface has {dofs} dofs")));
         }
-        Ok(Self { dynamics: Some(dynamics), ..self })
+        self.preparing(|prepared| prepared.dynamics = Some(dynamics))
     }
 
+    /// Completes what is prepared, before it is shared.
+    fn preparing(mut self, complete: impl FnOnce(&mut PreparedBody)) -> Result<Self> {
+        let shared = || Error::Invalid("the body is part of a scene already: it cannot be changed".into());
+        complete(Arc::get_mut(&mut self.prepared).ok_or_else(shared)?);
+        Ok(self)
+    }
+
+    /// Whether the other is the same body, wherever they stand.
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.prepared, &other.prepared)
+    }
+}
+
+impl std::ops::Deref for BodyModel {
+    type Target = PreparedBody;
+
+    fn deref(&self) -> &PreparedBody {
+        &self.prepared
+    }
+}
+
+impl PreparedBody {
     /// The Green's function behind the body.
     pub fn green(&self) -> &GreensFunction {
         &self.green

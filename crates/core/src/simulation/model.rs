@@ -26,6 +26,18 @@ impl Model {
     /// # Errors
     /// Too many of either, or none; a radius or stiffness that is not positive and finite.
     pub fn new(bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
+        Self::assembled(None, bodies, tools)
+    }
+
+    /// Other bodies and tools; what is known here of those that stay is taken over.
+    ///
+    /// # Errors
+    /// As of [`Model::new`].
+    pub fn changed(&self, bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
+        Self::assembled(Some(self), bodies, tools)
+    }
+
+    fn assembled(known: Option<&Self>, bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
         for (what, count, most) in [("bodies", bodies.len(), MAX_BODIES), ("tools", tools.len(), MAX_TOOLS)] {
             if !(1..=most).contains(&count) {
                 return Err(Error::Invalid(format!("a simulation takes 1 to {most} {what}, got {count}")));
@@ -40,13 +52,15 @@ impl Model {
         }
         let mut regular: Vec<Vec<Option<Arc<RegularCompliance>>>> = Vec::new();
         for (rank, tool) in tools.iter().enumerate() {
-            let twin = |other: &ToolModel| {
-                other.law == tool.law && other.radius == tool.radius && other.max_stiffness == tool.max_stiffness
-            };
-            let known = tools[..rank].iter().position(twin);
-            let of_tool = match known {
-                Some(known) => regular[known].clone(),
-                None => bodies.iter().map(|body| regular_compliance(body, tool)).collect::<Result<_>>()?,
+            let of_tool = match tools[..rank].iter().position(|other| meets_the_same(other, tool)) {
+                Some(twin) => regular[twin].clone(),
+                None => {
+                    let of_body = |body: &BodyModel| match known.and_then(|known| known.regular_of(body, tool)) {
+                        Some(known) => Ok(Some(known)),
+                        None => regular_compliance(body, tool),
+                    };
+                    bodies.iter().map(of_body).collect::<Result<_>>()?
+                }
             };
             regular.push(of_tool);
         }
@@ -58,13 +72,25 @@ impl Model {
         Ok(Self { bodies, tools, regular, hollows })
     }
 
+    /// What such a tool meets of a body, if some tool here does.
+    fn regular_of(&self, body: &BodyModel, tool: &ToolModel) -> Option<Arc<RegularCompliance>> {
+        let body = self.bodies.iter().position(|known| known.is_same(body))?;
+        let tool = self.tools.iter().position(|known| meets_the_same(known, tool))?;
+        self.regular[tool][body].clone()
+    }
+
     /// Refuses a contact radius that some body cannot take.
     ///
     /// # Errors
-    /// See [`BodyModel::check_contact_radius`].
+    /// See [`PreparedBody::check_contact_radius`](super::PreparedBody::check_contact_radius).
     pub fn check_contact_radius(&self, radius: f64) -> Result<()> {
         self.bodies.iter().try_for_each(|body| body.check_contact_radius(radius))
     }
+}
+
+/// Whether two tools meet the same regular compliance.
+fn meets_the_same(one: &ToolModel, other: &ToolModel) -> bool {
+    other.law == one.law && other.radius == one.radius && other.max_stiffness == one.max_stiffness
 }
 
 fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {
