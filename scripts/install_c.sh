@@ -17,24 +17,25 @@ mkdir -p "$prefix/lib/pkgconfig" "$prefix/lib/cmake/Palpate" "$prefix/include"
 prefix="$(cd "$prefix" && pwd)"
 lib="$prefix/lib"
 
-# Beside, then renamed: a program that runs keeps the library that it has.
+# Beside, then renamed: a program that runs keeps the library that it has. Tables of source lines stay where it was built.
 place() { install -m "$1" "$2" "$3.new" && mv -f "$3.new" "$3"; }
+place_library() { install -m "$1" "$2" "$3.new" && strip -S "$3.new" && mv -f "$3.new" "$3"; }
 place 644 "$root/crates/capi/include/palpate.h" "$prefix/include/palpate.h"
 case "$(uname -s)" in
     Darwin)
         shared="libpalpate.$major.dylib"
-        place 755 "$built/libpalpate.dylib" "$lib/libpalpate.$major.$minor.dylib"
+        place_library 755 "$built/libpalpate.dylib" "$lib/libpalpate.$major.$minor.dylib"
         ln -sfn "libpalpate.$major.$minor.dylib" "$lib/$shared"
         ln -sfn "$shared" "$lib/libpalpate.dylib"
         ;;
     *)
         shared="libpalpate.so.$major"
-        place 755 "$built/libpalpate.so" "$lib/libpalpate.so.$major.$minor"
+        place_library 755 "$built/libpalpate.so" "$lib/libpalpate.so.$major.$minor"
         ln -sfn "libpalpate.so.$major.$minor" "$lib/$shared"
         ln -sfn "$shared" "$lib/libpalpate.so"
         ;;
 esac
-place 644 "$built/libpalpate.a" "$lib/libpalpate.a"
+place_library 644 "$built/libpalpate.a" "$lib/libpalpate.a"
 
 cat >"$lib/pkgconfig/palpate.pc" <<END
 prefix=$prefix

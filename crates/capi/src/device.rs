@@ -50,7 +50,7 @@ impl Device for BroughtDevice {
     }
 
     fn write(&mut self, wrench: Wrench) -> Result<(), DeviceFault> {
-        let tick = self.readings.peek_output_buffer().0;
+        let tick = self.readings.output_buffer().0;
         self.wrenches.write((tick, wrench));
         Ok(())
     }

@@ -12,7 +12,7 @@ use palpate_core::simulation::Pose;
 use palpate_devices::Device;
 use palpate_devices::simulated::{self, simulated};
 use palpate_scene::{BodyId, Prepared, ToolId, unit_quaternion};
-use palpate_servo::{ForceLoop, LoopHandle, Published, Servo, Settings, StrainWorker};
+use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker};
 
 use crate::arguments::{hand_out, shared, take_back};
 use crate::device::{DeviceEnd, brought};
@@ -21,11 +21,10 @@ use crate::status::{Outcome, Refusal, Status, guarded};
 
 /// A force loop. One thread at a time may tick it; any other threads may read frames and change settings meanwhile.
 pub struct Loop {
-    pub(crate) prepared: Prepared,
-    bodies: Vec<BodyId>,
-    tools: Vec<ToolId>,
-    pub(crate) tick: Mutex<TickSide>,
+    tick: Mutex<TickSide>,
     frame: Mutex<FrameSide>,
+    /// Held while another scene is prepared.
+    changing: Mutex<()>,
 }
 
 /// What a tick needs.
@@ -39,6 +38,7 @@ pub(crate) struct TickSide {
 
 /// What frames and settings need.
 pub(crate) struct FrameSide {
+    pub prepared: Prepared,
     runner: Runner,
     pub settings: Settings,
     /// The tick that was read last.
@@ -60,6 +60,16 @@ impl FrameSide {
         };
         self.latest.clone_from(latest);
         &self.latest
+    }
+
+    /// Rank of a body in the loop.
+    pub fn body(&self, handle: u32) -> Outcome<usize> {
+        self.prepared.rank_of_body(BodyId(handle)).ok_or_else(|| unknown("body", handle))
+    }
+
+    /// Rank of a tool in the loop.
+    pub fn tool(&self, handle: u32) -> Outcome<usize> {
+        self.prepared.rank_of_tool(ToolId(handle)).ok_or_else(|| unknown("tool", handle))
     }
 
     /// Changes the settings; one that is refused changes nothing.
@@ -97,14 +107,8 @@ impl Loop {
             Runner::Program { handle, .. } => handle.latest().clone(),
             Runner::Thread { servo, .. } => servo.latest().clone(),
         };
-        let frame = FrameSide { runner, settings: prepared.settings, latest };
-        Ok(Self {
-            bodies: graph.scene.bodies().map(|(id, _)| id).collect(),
-            tools: graph.scene.tools().map(|(id, _)| id).collect(),
-            tick: Mutex::new(tick),
-            frame: Mutex::new(frame),
-            prepared,
-        })
+        let frame = FrameSide { runner, settings: prepared.settings, latest, prepared };
+        Ok(Self { tick: Mutex::new(tick), frame: Mutex::new(frame), changing: Mutex::new(()) })
     }
 
     /// The side of frames and settings; waits for others who are there, never for a tick.
@@ -124,38 +128,16 @@ impl Loop {
         }
     }
 
-    /// Rank of a body in the loop.
-    pub(crate) fn body(&self, handle: u32) -> Outcome<usize> {
-        rank(&self.bodies, BodyId(handle)).ok_or_else(|| unknown("body", handle))
-    }
-
-    /// Rank of a tool in the loop.
-    pub(crate) fn tool(&self, handle: u32) -> Outcome<usize> {
-        rank(&self.tools, ToolId(handle)).ok_or_else(|| unknown("tool", handle))
-    }
-
-    /// Handles of a body and a tool by their ranks.
-    pub(crate) fn handles(&self, body: usize, tool: usize) -> (u32, u32) {
-        (self.bodies[body].0, self.tools[tool].0)
-    }
-
     fn start(&self) -> Outcome<()> {
         let mut frame = self.frame();
         if let Runner::Thread { .. } = frame.runner {
             return Err(Refusal::state("the loop's own thread runs already"));
         }
         let mut tick = self.try_tick()?;
-        let (targets, devices): (Vec<_>, Vec<_>) = self
-            .tools
-            .iter()
-            .map(|_| {
-                let (handle, device) = simulated();
-                (handle, Box::new(device) as Box<dyn Device>)
-            })
-            .unzip();
-        let Prepared { model, limits, scheduling, strain, .. } = &self.prepared;
+        let (targets, devices) = frame.prepared.tools.iter().map(|_| simulated_device()).unzip();
+        let Prepared { model, limits, scheduling, strain, .. } = &frame.prepared;
         let (model, scheduling, strain) = (model.clone(), scheduling.clone(), strain.clone());
-        let servo = Servo::start(model, devices, *limits, frame.settings, scheduling, strain)?;
+        let servo = Servo::start(model, devices, *limits, frame.settings, scheduling, strain, None)?;
         tick.force_loop = None;
         frame.runner = Runner::Thread { servo, targets };
         Ok(())
@@ -166,16 +148,52 @@ impl Loop {
         if let Runner::Program { .. } = frame.runner {
             return Ok(());
         }
-        let (side, runner) = to_be_ticked(&self.prepared, frame.settings)?;
+        let (side, runner) = to_be_ticked(&frame.prepared, frame.settings)?;
         // Dropping the servo ends its thread and leaves the devices without a wrench.
         frame.runner = runner;
         *self.tick.lock().unwrap_or_else(PoisonError::into_inner) = side;
         Ok(())
     }
+
+    fn change(&self, graph: &SceneGraph) -> Outcome<()> {
+        let _one_at_a_time = self.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        // Beside the loop, frames and settings.
+        let before = self.frame().prepared.clone();
+        let (mut next, kept) = graph.scene.prepare_change(&before)?;
+        let mut frame = self.frame();
+        let FrameSide { prepared, runner, settings, latest } = &mut *frame;
+        let Runner::Thread { servo, targets } = runner else {
+            return Err(Refusal::state(
+                "the scene changes under the loop's own thread only: call palpate_loop_start first, or make a new loop",
+            ));
+        };
+        next.settings = next.settings_after(settings, &kept);
+        let (mut moved, mut devices) = (Vec::new(), Vec::new());
+        for old in &kept.tools[..next.tools.len()] {
+            let (handle, device) = match old {
+                Some(_) => (None, None),
+                None => Some(simulated_device()).unzip(),
+            };
+            moved.push(handle);
+            devices.push(device);
+        }
+        let (model, strain) = (next.model.clone(), next.strain.clone());
+        servo.change(SceneChange { model, kept, devices, settings: next.settings, strain })?;
+        let mut before: Vec<_> = targets.drain(..).map(Some).collect();
+        for (rank, handle) in moved.into_iter().enumerate() {
+            let known = || kept.tools[rank].and_then(|old| before.get_mut(old)).and_then(Option::take);
+            targets.extend(handle.or_else(known));
+        }
+        (*settings, *prepared) = (next.settings, next);
+        *latest = servo.latest().clone();
+        Ok(())
+    }
 }
 
-fn rank<T: PartialEq>(handles: &[T], handle: T) -> Option<usize> {
-    handles.iter().position(|other| *other == handle)
+/// A simulated device and the handle that moves it.
+fn simulated_device() -> (simulated::Handle, Box<dyn Device>) {
+    let (handle, device) = simulated();
+    (handle, Box::new(device))
 }
 
 fn unknown(what: &str, handle: u32) -> Refusal {
@@ -226,6 +244,19 @@ pub unsafe extern "C" fn palpate_loop_stop(force_loop: *mut Loop) -> Status {
     })
 }
 
+/// Exchanges the bodies and tools of a loop for those of its scene as it is now, while the loop's own thread runs: contacts
+/// between those that stay go on, and new tools are out of the scene until they get a target. `scene` must be the one that the
+/// loop was made of. Takes as long as it takes to prepare what is new; the loop ticks meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_change(force_loop: *mut Loop, scene: *const SceneGraph) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (own, scene) = unsafe { (shared(force_loop, "loop")?, shared(scene, "scene")?) };
+        own.change(scene)?;
+        Ok(Status::PalpateOk)
+    })
+}
+
 /// Where a simulated tool should go; it follows as a light damped hand. Never grows.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -248,13 +279,13 @@ pub unsafe extern "C" fn palpate_loop_set_target(force_loop: *mut Loop, tool: u3
     guarded(|| {
         // SAFETY: the caller's pointers.
         let (own, target) = unsafe { (shared(force_loop, "loop")?, shared(target, "target")?) };
-        let tool = own.tool(tool)?;
         let pose = pose(target.position, target.orientation);
         let velocity = DVec3::from(target.velocity);
         if !(pose.is_finite() && velocity.is_finite()) {
             return Err(Refusal::argument("target is not finite"));
         }
         let mut frame = own.frame();
+        let tool = frame.tool(tool)?;
         let Runner::Thread { targets, .. } = &mut frame.runner else {
             return Err(Refusal::state("targets are for the loop's own thread: call palpate_loop_start first"));
         };

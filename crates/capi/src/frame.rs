@@ -5,8 +5,8 @@
 use std::ffi::c_char;
 
 use glam::DVec3;
-use palpate_core::contact::TouchPatch;
 use palpate_core::simulation::{Contact, MAX_CONTACTS, MAX_TOOLS, Mode};
+use palpate_scene::Prepared;
 use palpate_servo::{Published, Summary};
 
 use crate::arguments::{array_mut, exclusive, require_count, shared};
@@ -57,26 +57,33 @@ pub struct Frame {
     pub faulty: u32,
     /// What happened, and what to do; empty without a fault.
     pub fault: [c_char; PALPATE_FAULT_BYTES],
-    /// Ticks since the start, and time since the first one, s.
+    /// Ticks since the start.
     pub ticks: u64,
+    /// Time since the first tick, s.
     pub time: f64,
-    /// Force on each device, N, and torque about each tip, N m.
+    /// Force on each device, N.
     pub forces: [[f64; 3]; PALPATE_MAX_TOOLS],
+    /// Torque about each tip, N m.
     pub torques: [[f64; 3]; PALPATE_MAX_TOOLS],
-    /// Tip of each tool, m, and its orientation, w x y z.
+    /// Tip of each tool, m.
     pub positions: [[f64; 3]; PALPATE_MAX_TOOLS],
+    /// Orientation of each tool, w x y z.
     pub orientations: [[f64; 4]; PALPATE_MAX_TOOLS],
-    /// Whether each tool is in the scene, and whether the limit of strain keeps it from following its device: 0 or 1.
+    /// Whether each tool is in the scene: 0 or 1.
     pub active: [u32; PALPATE_MAX_TOOLS],
+    /// Whether the limit of strain keeps each tool from following its device: 0 or 1.
     pub limited: [u32; PALPATE_MAX_TOOLS],
-    /// How long ticks take, us, and how late they begin, us.
+    /// How long ticks take, us.
     pub compute_us: Times,
+    /// How late ticks begin, us.
     pub wakeup_us: Times,
-    /// Deadlines that passed within ticks that took too long, and before ticks that began too late.
+    /// Deadlines that passed within ticks that took too long.
     pub missed_computing: u64,
+    /// Deadlines that passed before ticks that began too late.
     pub missed_waking: u64,
-    /// What the system granted the loop's own thread: real-time scheduling, locked memory; 0 or 1.
+    /// Whether the system granted the loop's own thread real-time scheduling: 0 or 1.
     pub realtime: u32,
+    /// Whether the system granted that thread locked memory: 0 or 1.
     pub locked_memory: u32,
 }
 
@@ -153,24 +160,31 @@ impl Frame {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct ContactRecord {
-    /// Handles of the tool and of the body.
+    /// Handle of the tool.
     pub tool: u32,
+    /// Handle of the body.
     pub body: u32,
-    /// Whether the tool holds on, slips, and is held back by the limit of strain: 0 or 1.
+    /// Whether the tool holds on: 0 or 1.
     pub grabs: u32,
+    /// Whether it slips: 0 or 1.
     pub slips: u32,
+    /// Whether the limit of strain holds it back: 0 or 1.
     pub limited: u32,
     /// 0.
     pub reserved: u32,
-    /// Contact point on the untouched surface, m, and outward unit normal there.
+    /// Contact point on the untouched surface, m.
     pub point: [f64; 3],
+    /// Outward unit normal there.
     pub normal: [f64; 3],
-    /// On the body, N, and about the contact point, N m.
+    /// On the body, N.
     pub force: [f64; 3],
+    /// On the body about the contact point, N m.
     pub torque: [f64; 3],
-    /// Under the local law: radius of the contact, m, depth, m, and stiffness, N/m; else 0.
+    /// Radius of the contact, m, under the local law; 0 otherwise, as what follows.
     pub radius: f64,
+    /// Depth, m, under the local law.
     pub depth: f64,
+    /// Stiffness, N/m, under the local law.
     pub stiffness: f64,
 }
 
@@ -181,7 +195,9 @@ pub unsafe extern "C" fn palpate_loop_get_frame(force_loop: *mut Loop, frame: *m
     guarded(|| {
         // SAFETY: the caller's pointer.
         let own = unsafe { shared(force_loop, "loop") }?;
-        let filled = Frame::of(own.frame().refresh(), own.prepared.model.tools.len());
+        let mut side = own.frame();
+        let tools = side.prepared.tools.len();
+        let filled = Frame::of(side.refresh(), tools);
         // SAFETY: the caller's pointer.
         unsafe { sized::write(&filled, frame) }?;
         Ok(Status::PalpateOk)
@@ -201,18 +217,18 @@ pub unsafe extern "C" fn palpate_loop_get_contacts(
         let (own, places, count) = unsafe {
             (shared(force_loop, "loop")?, array_mut(contacts, capacity, "contacts")?, exclusive(count, "count")?)
         };
-        let frame = own.frame();
-        let found = frame.latest.state.contacts.iter();
-        *count = found.clone().count();
-        places.iter_mut().zip(found).for_each(|(to, contact)| *to = record(own, contact));
+        let side = own.frame();
+        let found = || side.latest.state.contacts.iter();
+        *count = found().count();
+        places.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = record(&side.prepared, contact));
         Ok(Status::PalpateOk)
     })
 }
 
-fn record(own: &Loop, (contact, _): (&Contact, &TouchPatch)) -> ContactRecord {
-    let placement = &own.prepared.model.bodies[contact.body].placement;
+fn record(prepared: &Prepared, contact: &Contact) -> ContactRecord {
+    let placement = &prepared.model.bodies[contact.body].placement;
     let vector = |v: DVec3| placement.vector_to_world(v).to_array();
-    let (body, tool) = own.handles(contact.body, contact.tool);
+    let (body, tool) = (prepared.bodies[contact.body].0, prepared.tools[contact.tool].0);
     ContactRecord {
         tool,
         body,
@@ -241,7 +257,8 @@ pub unsafe extern "C" fn palpate_loop_get_surface_size(
     guarded(|| {
         // SAFETY: the caller's pointers.
         let (own, nodes, triangles) = unsafe { (shared(force_loop, "loop")?, nodes.as_mut(), triangles.as_mut()) };
-        let surface = &own.prepared.model.bodies[own.body(body)?].green().surface;
+        let side = own.frame();
+        let surface = &side.prepared.model.bodies[side.body(body)?].green().surface;
         nodes.into_iter().for_each(|count| *count = surface.positions.len());
         triangles.into_iter().for_each(|count| *count = surface.triangles.len());
         Ok(Status::PalpateOk)
@@ -259,7 +276,8 @@ pub unsafe extern "C" fn palpate_loop_get_triangles(
     guarded(|| {
         // SAFETY: the caller's pointer.
         let own = unsafe { shared(force_loop, "loop") }?;
-        let surface = &own.prepared.model.bodies[own.body(body)?].green().surface;
+        let side = own.frame();
+        let surface = &side.prepared.model.bodies[side.body(body)?].green().surface;
         require_count("triangles", triangles, surface.triangles.len())?;
         // SAFETY: the caller's pointer, to `triangles` of three numbers.
         unsafe { array_mut(nodes, 3 * triangles, "nodes") }?.copy_from_slice(surface.triangles.as_flattened());
@@ -278,7 +296,8 @@ pub unsafe extern "C" fn palpate_loop_get_rest_positions(
     guarded(|| {
         // SAFETY: the caller's pointer.
         let own = unsafe { shared(force_loop, "loop") }?;
-        let model = &own.prepared.model.bodies[own.body(body)?];
+        let side = own.frame();
+        let model = &side.prepared.model.bodies[side.body(body)?];
         let rest = &model.green().surface.positions;
         require_count("nodes", nodes, rest.len())?;
         // SAFETY: the caller's pointer, to `nodes` of three numbers.
@@ -301,14 +320,15 @@ pub unsafe extern "C" fn palpate_loop_get_positions(
     guarded(|| {
         // SAFETY: the caller's pointer.
         let own = unsafe { shared(force_loop, "loop") }?;
-        let rank = own.body(body)?;
-        let body = &own.prepared.model.bodies[rank];
+        let side = own.frame();
+        let (rank, model) = (side.body(body)?, &side.prepared.model);
+        let body = &model.bodies[rank];
         let rest = &body.green().surface.positions;
         require_count("nodes", nodes, rest.len())?;
         // SAFETY: the caller's pointer, to `nodes` of three numbers.
         let out = unsafe { array_mut(positions.cast::<[f64; 3]>(), nodes, "positions") }?;
         body.green().require_intact()?;
-        let moved = own.frame().latest.state.displacements(&own.prepared.model, rank);
+        let moved = side.latest.state.displacements(model, rank);
         for ((to, p), u) in out.iter_mut().zip(rest).zip(moved.chunks_exact(3)) {
             *to = body.placement.point_to_world(*p + DVec3::from_slice(u)).to_array();
         }

@@ -47,9 +47,9 @@ pub struct BodyOptions {
     pub position: [f64; 3],
     /// World from body, a unit quaternion w x y z.
     pub orientation: [f64; 4],
-    /// Elastic constants at the surface, Pa and 1, of a body of one material whose store does not say them; 0 for those of
-    /// the store.
+    /// Young's modulus at the surface, Pa, of a body of one material whose store does not say it; 0 for what the store says.
     pub youngs_modulus: f64,
+    /// Poisson's ratio at the surface.
     pub poissons_ratio: f64,
 }
 
@@ -90,9 +90,11 @@ pub struct ToolOptions {
     pub semi_axes: [f64; 3],
     /// Of a surface: x y z of each vertex, m; read when the tool is added.
     pub vertices: *const f64,
+    /// Vertices of a surface.
     pub vertex_count: usize,
     /// Of a surface: three vertices of each triangle, outward.
     pub triangles: *const u32,
+    /// Triangles of a surface.
     pub triangle_count: usize,
     /// PALPATE_LAW_...
     pub law: u32,
@@ -206,13 +208,15 @@ pub struct DeviceOptions {
     pub struct_size: u32,
     /// 0.
     pub reserved: u32,
-    /// Largest force, N, and torque, N m.
+    /// Largest force, N.
     pub max_force: f64,
+    /// Largest torque, N m.
     pub max_torque: f64,
     /// Stiffest contact that it holds without oscillating, N/m.
     pub max_stiffness: f64,
-    /// Strongest damping that it holds, N s/m, and of rotation, N m s/rad.
+    /// Strongest damping that it holds, N s/m.
     pub max_damping: f64,
+    /// Strongest damping of rotation that it holds, N m s/rad.
     pub max_angular_damping: f64,
     /// Damping of its own mechanics at the tip, N s/m; 0 where it is not known.
     pub own_damping: f64,
@@ -277,11 +281,13 @@ pub struct SceneOptions {
     pub struct_size: u32,
     /// Priority of the loop's own thread under SCHED_FIFO, 1 to 99, where the system grants it; 0 asks for none.
     pub priority: u32,
-    /// Largest force, N, and its fastest change other than a release, N/s.
+    /// Largest force, N.
     pub max_force: f64,
+    /// Fastest change of the force other than a release, N/s.
     pub max_slew: f64,
-    /// Largest torque, N m, and its fastest change other than a release, N m/s.
+    /// Largest torque, N m.
     pub max_torque: f64,
+    /// Fastest change of the torque other than a release, N m/s.
     pub max_torque_slew: f64,
     /// Time over which forces are let in after the start and after a reset, s.
     pub ramp: f64,

@@ -99,9 +99,10 @@ pub unsafe extern "C" fn palpate_scene_place_body(
             )
         };
         require_place(*position, *orientation)?;
-        let found = scene.scene.body_mut(BodyId(body)).ok_or_else(|| unknown("body", body))?;
-        found.placement = placement(*position, *orientation);
-        Ok(Status::PalpateOk)
+        match scene.scene.place_body(BodyId(body), placement(*position, *orientation)) {
+            true => Ok(Status::PalpateOk),
+            false => Err(unknown("body", body)),
+        }
     })
 }
 
@@ -157,9 +158,10 @@ pub unsafe extern "C" fn palpate_scene_set_device(
     guarded(|| {
         // SAFETY: the caller's pointers.
         let (scene, limits) = unsafe { (exclusive(scene, "scene")?, sized::read(limits)?) };
-        let found = scene.scene.tool_mut(ToolId(tool)).ok_or_else(|| unknown("tool", tool))?;
-        found.device = limits.limits();
-        Ok(Status::PalpateOk)
+        match scene.scene.set_device(ToolId(tool), limits.limits()) {
+            true => Ok(Status::PalpateOk),
+            false => Err(unknown("tool", tool)),
+        }
     })
 }
 

@@ -6,18 +6,18 @@ use palpate_core::simulation::Strike;
 use palpate_servo::Settings;
 
 use crate::arguments::shared;
-use crate::force_loop::Loop;
+use crate::force_loop::{FrameSide, Loop};
 use crate::status::{Outcome, Refusal, Status, guarded};
 
 /// # Safety
 /// The pointer is null or points to a loop.
-unsafe fn change(force_loop: *const Loop, change: impl FnOnce(&Loop, &mut Settings) -> Outcome<()>) -> Status {
+unsafe fn change(force_loop: *const Loop, change: impl FnOnce(&FrameSide, &mut Settings) -> Outcome<()>) -> Status {
     guarded(|| {
         // SAFETY: the caller's.
         let own = unsafe { shared(force_loop, "loop") }?;
         let mut frame = own.frame();
         let mut settings = frame.settings;
-        change(own, &mut settings)?;
+        change(&frame, &mut settings)?;
         frame.set(settings)?;
         Ok(Status::PalpateOk)
     })
@@ -28,8 +28,8 @@ unsafe fn change(force_loop: *const Loop, change: impl FnOnce(&Loop, &mut Settin
 pub unsafe extern "C" fn palpate_loop_set_friction(force_loop: *mut Loop, tool: u32, friction: f64) -> Status {
     // SAFETY: the caller's pointer.
     unsafe {
-        change(force_loop, |own, settings| {
-            settings.friction[own.tool(tool)?] = friction;
+        change(force_loop, |side, settings| {
+            settings.friction[side.tool(tool)?] = friction;
             Ok(())
         })
     }
@@ -40,9 +40,9 @@ pub unsafe extern "C" fn palpate_loop_set_friction(force_loop: *mut Loop, tool: 
 pub unsafe extern "C" fn palpate_loop_set_contact_radius(force_loop: *mut Loop, tool: u32, radius: f64) -> Status {
     // SAFETY: the caller's pointer.
     unsafe {
-        change(force_loop, |own, settings| {
-            own.prepared.model.check_contact_radius(radius)?;
-            settings.contact_radius[own.tool(tool)?] = radius;
+        change(force_loop, |side, settings| {
+            side.prepared.model.check_contact_radius(radius)?;
+            settings.contact_radius[side.tool(tool)?] = radius;
             Ok(())
         })
     }
@@ -53,9 +53,9 @@ pub unsafe extern "C" fn palpate_loop_set_contact_radius(force_loop: *mut Loop, 
 pub unsafe extern "C" fn palpate_loop_set_stiffness_scale(force_loop: *mut Loop, body: u32, scale: f64) -> Status {
     // SAFETY: the caller's pointer.
     unsafe {
-        change(force_loop, |own, settings| {
-            let rank = own.body(body)?;
-            let model = &own.prepared.model.bodies[rank];
+        change(force_loop, |side, settings| {
+            let rank = side.body(body)?;
+            let model = &side.prepared.model.bodies[rank];
             if model.green().youngs_modulus.is_none() || model.moves() {
                 let why = "the body has several materials, or loads, or moves: its stiffness cannot be changed";
                 return Err(Refusal::argument(why));
@@ -109,15 +109,15 @@ pub unsafe extern "C" fn palpate_loop_strike(
 ) -> Status {
     // SAFETY: the caller's pointers, to three numbers each.
     unsafe {
-        change(force_loop, |own, settings| {
+        change(force_loop, |side, settings| {
             let (point, impulse) = (shared(point.cast(), "point")?, shared(impulse.cast(), "impulse")?);
             let (point, impulse): (&[f64; 3], &[f64; 3]) = (point, impulse);
-            let rank = own.body(body)?;
+            let rank = side.body(body)?;
             let numbers = point.iter().chain(impulse).chain([&radius, &duration]);
             if !numbers.copied().all(f64::is_finite) || radius < 0.0 || duration < 0.0 {
                 return Err(Refusal::argument("a strike's numbers must be finite, its radius and duration not negative"));
             }
-            if !own.prepared.model.bodies[rank].moves() {
+            if !side.prepared.model.bodies[rank].moves() {
                 return Err(Refusal::argument("the body does not move: a strike does nothing to it"));
             }
             settings.strike = Strike { body: rank, point: (*point).into(), impulse: (*impulse).into(), radius, duration };

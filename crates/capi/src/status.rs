@@ -13,7 +13,7 @@ use palpate_core::Error;
 pub enum Status {
     /// Done.
     PalpateOk = 0,
-    /// A fault has latched: wrenches are zero until palpate_loop_reset.
+    /// A fault has latched: the tools that it concerns have no wrench until palpate_loop_reset.
     PalpateFault = 1,
     /// A null pointer, a wrong length, an unknown handle, a number out of range.
     PalpateErrorArgument = -1,

@@ -29,8 +29,9 @@ pub struct StoreInfo {
     pub triangles: u32,
     /// Nodes that may be touched.
     pub touchable_nodes: u32,
-    /// Corners of the box around the body at rest, m.
+    /// Lower corner of the box around the body at rest, m.
     pub lowest: [f64; 3],
+    /// Upper corner of that box, m.
     pub highest: [f64; 3],
     /// Young's modulus, Pa, if the whole body has one and no loads; else 0.
     pub youngs_modulus: f64,

@@ -19,8 +19,9 @@ pub struct DeviceReading {
     pub position: [f64; 3],
     /// World from tool, a unit quaternion w x y z; four zeros for a device that does not turn.
     pub orientation: [f64; 4],
-    /// Of the tip, m/s, and its angular velocity, rad/s, in the world.
+    /// Of the tip, m/s, in the world.
     pub velocity: [f64; 3],
+    /// Angular velocity, rad/s, in the world.
     pub angular_velocity: [f64; 3],
     /// When the device measured this, ns, by any clock that only goes forward; 0 for the time of the tick. A tool whose
     /// time stands still for 50 ms while it is in the scene is a fault.
@@ -57,8 +58,8 @@ pub unsafe extern "C" fn palpate_loop_check_period(force_loop: *const Loop, peri
 /// their devices, made safe. `now_ns` is the time for which it is due, by palpate_now_ns; `period` the time between two
 /// ticks, s. For a device's callback: it never allocates, locks, waits or does files; only a refused call keeps a message.
 ///
-/// Returns PALPATE_OK, or PALPATE_FAULT where a fault has latched: palpate_loop_get_frame tells which. Wrenches are zero then,
-/// and after a refused call.
+/// Returns PALPATE_OK, or PALPATE_FAULT where a fault has latched: palpate_loop_get_frame tells which. The tools that it
+/// concerns have no wrench then; after a refused call no tool has one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_tick(
     force_loop: *mut Loop,

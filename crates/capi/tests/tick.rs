@@ -134,13 +134,13 @@ fn frames_tell_of_the_latest_tick_and_surfaces_follow_the_tool() {
         let balance = contacts[0].force[2] + wrench.force[2];
         assert!(balance.abs() < 1e-9 && contacts[0].force[2] < -0.1, "on the body and on the device: {balance} N");
         done(palpate_loop_get_surface_size(own, 0, &mut nodes, &mut triangles));
-        let (mut rest, mut moved) = (vec![[0.0; 3]; nodes], vec![[0.0; 3]; nodes]);
+        let (mut rest, mut moved) = (vec![[0.0_f64; 3]; nodes], vec![[0.0; 3]; nodes]);
         let mut corners = vec![[0_u32; 3]; triangles];
         done(palpate_loop_get_triangles(own, 0, corners.as_mut_ptr().cast(), triangles));
         assert!(corners.as_flattened().iter().all(|&node| (node as usize) < nodes));
         done(palpate_loop_get_rest_positions(own, 0, rest.as_mut_ptr().cast(), nodes));
         done(palpate_loop_get_positions(own, 0, moved.as_mut_ptr().cast(), nodes));
-        let middle = rest.iter().position(|p| p.map(|x| (1e3 * x).round()) == [50.0, 50.0, 100.0]).expect("a node");
+        let middle = rest.iter().position(|p| p.map(|x: f64| (1e3 * x).round()) == [50.0, 50.0, 100.0]).expect("a node");
         let dent = rest[middle][2] - moved[middle][2];
         assert!((0.002..0.005).contains(&dent), "{dent} m under a tool 3 mm deep");
         let held = rest.iter().zip(&moved).filter(|(rest, _)| rest[2] < 1e-9);

@@ -95,7 +95,7 @@ impl SimulationCore {
         self.handles = handles;
         let (model, limits, settings, scheduling, strain) =
             (self.model.clone(), self.limits, self.settings, self.scheduling.clone(), self.strain.clone());
-        let started = py.detach(|| Servo::start(model, devices, limits, settings, scheduling, strain));
+        let started = py.detach(|| Servo::start(model, devices, limits, settings, scheduling, strain, None));
         let servo = started.map_err(|e| to_python(py, e))?;
         let realtime = servo.realtime();
         *self.servo() = Some(servo);

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use palpate_core::green::GreensFunction;
-use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS};
+use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS, Placement};
 use palpate_core::{Error, Result};
+use palpate_devices::DeviceLimits;
 use palpate_servo::{SafetyLimits, Scheduling};
 
 use crate::body::Body;
@@ -127,14 +128,17 @@ impl Scene {
         self.tools.iter().map(|(id, tool)| (*id, tool))
     }
 
-    /// A body to be changed.
-    pub fn body_mut(&mut self, id: BodyId) -> Option<&mut Body> {
-        self.bodies.iter_mut().find(|(other, _)| *other == id).map(|(_, body)| body)
+    /// Moves a body; false if there is none of that handle. Nothing else of a body changes as long as it has its handle.
+    pub fn place_body(&mut self, id: BodyId, placement: Placement) -> bool {
+        let found = self.bodies.iter_mut().find(|(other, _)| *other == id);
+        found.map(|(_, body)| body.placement = placement).is_some()
     }
 
-    /// A tool to be changed.
-    pub fn tool_mut(&mut self, id: ToolId) -> Option<&mut Tool> {
-        self.tools.iter_mut().find(|(other, _)| *other == id).map(|(_, tool)| tool)
+    /// States what the device of a tool can render; false if there is none of that handle. Nothing else of a tool changes as
+    /// long as it has its handle.
+    pub fn set_device(&mut self, id: ToolId, limits: DeviceLimits) -> bool {
+        let found = self.tools.iter_mut().find(|(other, _)| *other == id);
+        found.map(|(_, tool)| tool.device = limits).is_some()
     }
 }
 

@@ -6,14 +6,16 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneDescription {
-    pub format: String,
-    pub version: u32,
-    /// Version of the package that wrote it, for people.
-    #[allow(dead_code)]
-    pub palpate: String,
-    /// What the scene is called, for people.
-    #[allow(dead_code)]
-    pub name: String,
+    /// Both are checked before the rest is looked at.
+    #[serde(rename = "format")]
+    _format: String,
+    #[serde(rename = "version")]
+    _version: u32,
+    /// Version of the package that wrote it, and what the scene is called: for people.
+    #[serde(rename = "palpate")]
+    _palpate: String,
+    #[serde(rename = "name")]
+    _name: String,
     pub bodies: Vec<BodyDescription>,
     pub tools: Vec<ToolDescription>,
     pub device: DeviceDescription,

@@ -38,7 +38,8 @@ pub fn read(folder: &Path) -> Result<Scene> {
     let path = folder.join(SCENE_FILE);
     let text = fs::read_to_string(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
     let described = describe(&path, &text)?;
-    let mut scene = Scene { strain_limit: described.strain_limit, ..Scene::default() };
+    let mut scene = Scene::default();
+    scene.strain_limit = described.strain_limit;
     let device = described.device;
     scene.limits = SafetyLimits {
         max_force: device.max_force,
