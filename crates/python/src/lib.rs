@@ -59,6 +59,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<surface::SurfaceSearch>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;
+    module.add_function(wrap_pyfunction!(scene::checksum, module)?)?;
     module.add_function(wrap_pyfunction!(strain::contact_patch, module)?)?;
     module.add_function(wrap_pyfunction!(strain::provisional_displacement, module)?)?;
     Ok(())

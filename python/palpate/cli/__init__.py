@@ -7,6 +7,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     doctor,
     envelope,
     examining,
+    packing,
     palpating,
     recordings,
     running,
