@@ -39,7 +39,17 @@ def run(*command: object, **environment: str) -> str:
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory) -> Path:
     """Where the library is installed; built together with the extension, so that both share what is compiled."""
-    run("cargo", "build", "--release", "--quiet", "--manifest-path", ROOT / "Cargo.toml", *("-p", "palpate-capi"), "-p", "palpate-python")
+    run(
+        "cargo",
+        "build",
+        "--release",
+        "--quiet",
+        "--manifest-path",
+        ROOT / "Cargo.toml",
+        *("-p", "palpate-capi"),
+        "-p",
+        "palpate-python",
+    )
     where = tmp_path_factory.mktemp("prefix")
     run(ROOT / "scripts/install_c.sh", where, Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release")
     return where
@@ -64,13 +74,27 @@ def packed(scene, tmp_path_factory) -> Path:
 
 
 def flags(prefix: Path, *static: str) -> list[str]:
-    return run("pkg-config", "--cflags", "--libs", *static, "palpate", PKG_CONFIG_PATH=f"{prefix}/lib/pkgconfig").split()
+    return run(
+        "pkg-config", "--cflags", "--libs", *static, "palpate", PKG_CONFIG_PATH=f"{prefix}/lib/pkgconfig"
+    ).split()
 
 
 def compiled(prefix: Path, source: Path, *options: str) -> Path:
     made = prefix / f"{source.stem}{len(options)}"
     standard = ["gcc", "-std=c99"] if source.suffix == ".c" else ["g++", "-std=c++17"]
-    run(*standard, *WARNINGS, "-g", *options, source, "-o", made, *flags(prefix), f"-Wl,-rpath,{prefix}/lib", "-lm", "-pthread")
+    run(
+        *standard,
+        *WARNINGS,
+        "-g",
+        *options,
+        source,
+        "-o",
+        made,
+        *flags(prefix),
+        f"-Wl,-rpath,{prefix}/lib",
+        "-lm",
+        "-pthread",
+    )
     return made
 
 
@@ -177,7 +201,11 @@ def test_examples_leak_nothing_and_make_no_mistakes(tool, prefix, packed, tmp_pa
 
 
 def test_cmake_finds_it_and_its_static_form_links(prefix, tmp_path):
-    options = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_FLAGS={' '.join(WARNINGS)}", f"-DCMAKE_CXX_FLAGS={' '.join(WARNINGS)}"]
+    options = [
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_C_FLAGS={' '.join(WARNINGS)}",
+        f"-DCMAKE_CXX_FLAGS={' '.join(WARNINGS)}",
+    ]
     run("cmake", "-S", ROOT / "examples/c", "-B", tmp_path / "build", *options)
     run("cmake", "--build", tmp_path / "build")
     assert (tmp_path / "build/touch").exists() and (tmp_path / "build/render_loop").exists()
