@@ -117,7 +117,7 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
 
 
 def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
-    """Scene whose first tools are moved by devices: of a table by its name, or of a kind, where the tool's own stood."""
+    """Scene whose first tools are moved by devices: of a table by name, or of a kind, where its own stood."""
     from palpate.scene.devices import KINDS, device_ranks, moved_by
 
     if len(devices) > len(scene.tools):
