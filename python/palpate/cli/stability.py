@@ -12,6 +12,8 @@ import typer
 from palpate.cli.benchmarks import bench_app
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from palpate.validation.bench.touches import Touch
     from palpate.validation.bench.zwidth import DeviceRow, Row
 
@@ -48,7 +50,6 @@ def zwidth(
 
 
 def _print_map(rows: list[Row]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from palpate.validation.bench.zwidth import DAMPING, PERIOD
@@ -61,11 +62,10 @@ def _print_map(rows: list[Row]) -> None:
     for row in rows:
         figures = (row.any_hand, row.eigenvalue, row.bare, row.controlled, row.whole)
         table.add_row(f"{1e3 * row.mass:g}", f"{1e3 * row.delay:g}", *(f"{figure:.1f}" for figure in figures))
-    Console().print(table)
+    _wide_console().print(table)
 
 
 def _print_devices(rows: list[DeviceRow]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title="Known devices with assumed mechanics, N/m", title_justify="left")
@@ -75,7 +75,7 @@ def _print_devices(rows: list[DeviceRow]) -> None:
     for row in rows:
         figures = (row.recommended, row.any_hand, row.loose, row.loose_measured, row.firm, row.firm_measured)
         table.add_row(row.name, *(f"{figure:.0f}" for figure in figures))
-    Console().print(table)
+    _wide_console().print(table)
     print("alone, hands: by theory, friction and encoder apart; measured: with them, tapped at 0.1 m/s")
 
 
@@ -125,7 +125,6 @@ def touches(
 
 
 def _print_touches(found: list[tuple[Touch, bool | None]]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title="Touches by simulated hands on emulated devices", title_justify="left")
@@ -137,9 +136,16 @@ def _print_touches(found: list[tuple[Touch, bool | None]]) -> None:
         figures = (f"{touch.max_stiffness:g}", f"{touch.force:.2f}", f"{1e3 * touch.speed:.0f}")
         rest = (f"{1e6 * touch.unrest:.1f}", f"{1e6 * touch.allowed:.0f}", _verdict(touch, expected))
         table.add_row(touch.scene, touch.device, touch.hand, *figures, *rest)
+    _wide_console().print(table)
+
+
+def _wide_console() -> Console:
+    """Return a console that does not cut columns where nobody looks."""
+    from rich.console import Console
+
     console = Console()
     console.width = max(console.width, 120) if not console.is_terminal else console.width
-    console.print(table)
+    return console
 
 
 def _verdict(touch: Touch, expected: bool | None) -> str:
