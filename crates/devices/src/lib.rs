@@ -8,8 +8,8 @@ mod frame;
 pub mod known;
 mod library;
 mod mounted;
-mod opening;
 pub mod openhaptics;
+mod opening;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};

@@ -87,6 +87,8 @@ pub struct HdScheduler {
     /// Set while the library's scheduler is stopped for a device that is unplugged.
     dormant: AtomicBool,
     stopping: AtomicBool,
+    /// The tick has panicked.
+    panicked: AtomicBool,
 }
 
 /// Called by the library at each of its ticks.
@@ -117,6 +119,7 @@ impl HdScheduler {
             ticking: AtomicBool::new(false),
             dormant: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
+            panicked: AtomicBool::new(false),
         }));
         all.push(scheduler);
         scheduler
@@ -141,19 +144,14 @@ impl HdScheduler {
         let (Ok(slots), Ok(mut tick)) = (self.slots.try_read(), self.tick.try_lock()) else { return };
         slots.iter().for_each(|slot| slot.framed.store(false, Ordering::Relaxed));
         self.ticking.store(true, Ordering::Release);
-        let panicked = match tick.as_mut() {
-            // A panic must not reach the library. The loop catches its own, so that this one comes from elsewhere.
-            Some(tick) => catch_unwind(AssertUnwindSafe(tick)).is_err(),
-            None => false,
-        };
+        let callable = tick.as_mut().filter(|_| !self.panicked.load(Ordering::Acquire));
+        // A panic must not reach the library. A loop catches its own; a tick that panics all the same is not called again.
+        let panicked = callable.is_some_and(|tick| catch_unwind(AssertUnwindSafe(tick)).is_err());
         if !self.is_dormant() {
             slots.iter().for_each(|slot| self.release(slot));
         }
         self.ticking.store(false, Ordering::Release);
-        if panicked {
-            // Neither called again nor dropped on this thread: what it owns may panic once more.
-            std::mem::forget(tick.take());
-        }
+        self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
     /// A frame without a force for a device that has had none in this tick: it would keep its last one.
@@ -195,7 +193,10 @@ impl HdScheduler {
         self.paused(&control, || {
             self.sweep();
             if self.slots().iter().any(|slot| slot.name == name) {
-                return Err(OpenError::new("the device is in use by this program", "use another one, or close it first"));
+                return Err(OpenError::new(
+                    "the device is in use by this program",
+                    "use another one, or close it first",
+                ));
             }
             let (handle, traits) = prepared(self.hd, name.as_ref())?;
             let slot = Arc::new(Slot {
@@ -348,6 +349,7 @@ impl Scheduler for Handout {
         }
         *locked(&scheduler.tick) = Some(tick);
         scheduler.stopping.store(false, Ordering::Release);
+        scheduler.panicked.store(false, Ordering::Release);
         let hd = scheduler.hd;
         hd.first_error();
         let data = std::ptr::from_ref(scheduler).cast_mut().cast::<c_void>();

@@ -199,7 +199,8 @@ impl Device {
         (self.force, self.torque, self.told) = (put_force, put_torque, Instant::now());
         self.tip.write(put_force);
         // What rounding does to a force at the limit is no saturation.
-        let saturated = force.length() > largest * (1.0 + 1e-9) || torque.length() > self.model.max_torque * (1.0 + 1e-9);
+        let saturated =
+            force.length() > largest * (1.0 + 1e-9) || torque.length() > self.model.max_torque * (1.0 + 1e-9);
         Ok(saturated)
     }
 

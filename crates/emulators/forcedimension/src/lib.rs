@@ -7,7 +7,8 @@
 //!
 //! `PALPATE_EMULATED_FORCEDIMENSION` names the models that are plugged in (`omega.3`, `omega.6`, `omega.7`, `delta.3`, `sigma.7`,
 //! `lambda.7`, `falcon`, by commas), `PALPATE_EMULATED_HAND` leads the hand that holds each.
-#![allow(unsafe_code)] // Functions of C with pointers of their callers.
+#![allow(unsafe_code)]
+// Functions of C with pointers of their callers.
 // Each function is the vendor's of that name; to be called with pointers to what the vendor's documentation says, or null.
 #![allow(clippy::missing_safety_doc, missing_docs)]
 
@@ -40,10 +41,28 @@ mod error {
 }
 
 const TEXTS: [&CStr; 23] = [
-    c"no error", c"undocumented error", c"communication error", c"controller busy", c"no driver found",
-    c"no device found", c"not available", c"timeout", c"geometry error", c"expert mode disabled", c"not implemented",
-    c"out of memory", c"device not ready", c"file not found", c"configuration error", c"invalid index", c"deprecated",
-    c"null argument", c"redundant encoders disagree", c"not enabled", c"device in use", c"invalid argument",
+    c"no error",
+    c"undocumented error",
+    c"communication error",
+    c"controller busy",
+    c"no driver found",
+    c"no device found",
+    c"not available",
+    c"timeout",
+    c"geometry error",
+    c"expert mode disabled",
+    c"not implemented",
+    c"out of memory",
+    c"device not ready",
+    c"file not found",
+    c"configuration error",
+    c"invalid index",
+    c"deprecated",
+    c"null argument",
+    c"redundant encoders disagree",
+    c"not enabled",
+    c"device in use",
+    c"invalid argument",
     c"no regulation",
 ];
 

@@ -8,7 +8,8 @@
 //!
 //! `PALPATE_EMULATED_OPENHAPTICS` names what is plugged in (`Touch, Left=PHANTOM Omni`), `PALPATE_EMULATED_HAND` leads the hand
 //! that holds each.
-#![allow(unsafe_code)] // Functions of C with pointers of their callers.
+#![allow(unsafe_code)]
+// Functions of C with pointers of their callers.
 // Each function is the vendor's of that name; to be called with pointers to what the vendor's documentation says, or null.
 #![allow(clippy::missing_safety_doc, missing_docs)]
 

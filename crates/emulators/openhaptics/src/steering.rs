@@ -37,7 +37,6 @@ pub extern "C" fn palpate_emulator_press(rank: u32, buttons: u32) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_emulator_motors(rank: u32, numbers: *mut [f64; MOTORS_LENGTH]) {
     with_device(rank, |device| {
-        
         let (force, torque) = device.motors();
         let ago = device.told.elapsed().as_secs_f64();
         // SAFETY: by the caller as many numbers.

@@ -173,7 +173,9 @@ fn set(asked: u32, numbers: [f64; 3], limit: f64) {
             Ok(())
         }
         parameter::CURRENT_FORCE | parameter::CURRENT_TORQUE | parameter::CURRENT_JOINT_TORQUE => Err(error::FRAME),
-        parameter::SOFTWARE_VELOCITY_LIMIT | parameter::SOFTWARE_FORCE_IMPULSE_LIMIT | parameter::FORCE_RAMPING_RATE
+        parameter::SOFTWARE_VELOCITY_LIMIT
+        | parameter::SOFTWARE_FORCE_IMPULSE_LIMIT
+        | parameter::FORCE_RAMPING_RATE
             if !(limit > 0.0) =>
         {
             Err(error::INVALID_VALUE)
