@@ -34,6 +34,8 @@ pub struct Script<'a> {
     pub strikes: &'a [(usize, Strike)],
     /// Bodies and the ranks of their surface nodes whose displacements are recorded.
     pub watch: &'a [(usize, u32)],
+    /// What the device of each tool can render; empty for anything.
+    pub devices: &'a [DeviceLimits],
 }
 
 /// What a script did.
@@ -107,20 +109,21 @@ pub fn run(
 }
 
 /// Ticks through recorded inputs without looking at what came out of them: what the devices said, strikes, resets and the
-/// pace of bodies are as recorded, all other settings as given. Hands out a record of each tick.
+/// pace of bodies are as recorded, all other settings as given, and devices can render so much. Hands out a record of each
+/// tick.
 ///
 /// # Errors
 /// See [`ForceLoop::new`]; an input that cannot be had, or a strike on a body that the model does not have.
 pub fn rerun(
     model: &Arc<Model>,
+    devices: &[DeviceLimits],
     limits: SafetyLimits,
     settings: Settings,
     strain: &StrainPreparer,
     inputs: impl IntoIterator<Item = Result<RecordedInput>>,
     mut each: impl FnMut(&TickRecord),
 ) -> Result<()> {
-    let (mut readings, devices): (Vec<_>, Vec<_>) =
-        model.tools.iter().map(|_| Replayed::new(DeviceLimits::UNLIMITED)).unzip();
+    let (mut readings, devices): (Vec<_>, Vec<_>) = devices.iter().map(|&limits| Replayed::new(limits)).unzip();
     let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
     force_loop.limit_strain_of(strain.known());
@@ -192,6 +195,7 @@ struct Scripted {
     poses: std::vec::IntoIter<Pose>,
     grabs: std::vec::IntoIter<bool>,
     latest: Reading,
+    limits: DeviceLimits,
 }
 
 impl Scripted {
@@ -203,6 +207,10 @@ impl Scripted {
             poses: of_tool(script.poses, tool, tools),
             grabs: of_tool(script.grabs, tool, tools),
             latest: Reading::default(),
+            limits: DeviceLimits {
+                max_speed: None,
+                ..script.devices.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED)
+            },
         }
     }
 }
@@ -230,7 +238,7 @@ impl Device for Scripted {
     }
 
     fn limits(&self) -> DeviceLimits {
-        DeviceLimits::UNLIMITED
+        self.limits
     }
 }
 

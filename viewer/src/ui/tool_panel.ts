@@ -5,7 +5,7 @@ import { TILT_MAX, firstPosture } from "../control";
 import type { Control } from "../control";
 import { drivenTool } from "../store";
 import type { State, Store } from "../store";
-import { byId } from "./dom";
+import { byId, setText } from "./dom";
 import { degrees, millimetres } from "./numbers";
 import { Slider } from "./slider";
 
@@ -51,6 +51,7 @@ export class ToolPanel {
     store.subscribe(["scene", "settings", "pinned", "pressing"], (state) => this.showContact(state));
     store.subscribe(["scene", "settings", "pinned", "pressing", "status"], (state) => this.showShape(state));
     store.subscribe(["scene", "postures", "pinned", "pressing"], (state) => this.showPosture(state));
+    store.subscribe(["scene"], ({ scene }) => showDevices(scene?.tools.map(({ device }) => device) ?? []));
     store.subscribe(["role"], ({ role }) => {
       const { shape, tilt, turn, friction, radius } = this;
       for (const input of [shape, tilt, turn, friction, radius]) input.disabled = role !== "control";
@@ -91,4 +92,13 @@ export class ToolPanel {
     this.radius.input.step = String(header.max_contact_radius / 200);
     this.radius.show(settings.contact_radius[tool] ?? 0);
   }
+}
+
+/** Which devices move which tools. */
+function showDevices(devices: (string | null)[]): void {
+  const moved = devices.flatMap((device, tool) => (device === null ? [] : [{ device, tool }]));
+  byId("device-line").hidden = moved.length === 0;
+  const several = devices.length > 1;
+  const told = moved.map(({ device, tool }) => (several ? `Tool ${tool + 1}: ${device}` : `Moved by ${device}`));
+  setText(byId("device-line"), told.join(". "));
 }
