@@ -1,7 +1,7 @@
 //! The driver of the Touch and the PHANTOM devices against an emulated library.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use glam::DVec3;
@@ -137,6 +137,8 @@ fn two_devices_share_a_tick_and_are_told_apart() {
         openhaptics::open(&emulated.connection(None)).expect("the default device"),
         openhaptics::open(&emulated.connection(Some("Left"))).expect("the other one"),
     ];
+    let schedulers = [&opened[0], &opened[1]].map(|one| one.scheduler.clone().expect("the library has its own loop"));
+    assert!(Arc::ptr_eq(&schedulers[0], &schedulers[1]), "a loop must see that they share it");
     let again = openhaptics::open(&emulated.connection(Some("Left"))).err().expect("in use").to_string();
     assert!(again.contains("in use"), "{again}");
     let unknown = openhaptics::open(&emulated.connection(Some("Right"))).err().expect("nobody").to_string();

@@ -9,7 +9,7 @@
 use std::ffi::{CString, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -89,6 +89,8 @@ pub struct HdScheduler {
     stopping: AtomicBool,
     /// The tick has panicked.
     panicked: AtomicBool,
+    /// The same for all devices, so that a loop sees that they share it.
+    handout: OnceLock<Arc<dyn Scheduler>>,
 }
 
 /// Called by the library at each of its ticks.
@@ -120,9 +122,15 @@ impl HdScheduler {
             dormant: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
+            handout: OnceLock::new(),
         }));
         all.push(scheduler);
         scheduler
+    }
+
+    /// What a loop has of it.
+    pub fn handout(&'static self) -> Arc<dyn Scheduler> {
+        self.handout.get_or_init(|| Arc::new(Handout(self))).clone()
     }
 
     fn slots(&self) -> RwLockReadGuard<'_, Vec<Arc<Slot>>> {
@@ -334,7 +342,7 @@ impl HdScheduler {
 }
 
 /// What a loop has of the scheduler.
-pub struct Handout(pub &'static HdScheduler);
+struct Handout(&'static HdScheduler);
 
 impl Scheduler for Handout {
     fn rate(&self) -> f64 {
