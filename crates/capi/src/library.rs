@@ -15,11 +15,11 @@ pub extern "C" fn palpate_abi_version() -> u32 {
 /// Version of the library, such as "0.1.0".
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_version() -> *const c_char {
-    const VERSION: Option<&CStr> =
-        match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
-            Ok(version) => Some(version),
-            Err(_) => None,
-        };
+    const VERSION: Option<&CStr> = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes())
+    {
+        Ok(version) => Some(version),
+        Err(_) => None,
+    };
     VERSION.unwrap_or(c"").as_ptr()
 }
 

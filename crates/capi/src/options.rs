@@ -168,7 +168,9 @@ impl ToolOptions {
             _ => Err(Refusal::argument(format!("{name} is {value}, it must be positive, or 0 for the default"))),
         };
         if !matches!(shape, None | Some(ToolShape::Sphere { .. })) && !matches!(law, None | Some(LawKind::Local)) {
-            return Err(Refusal::argument("patches and nodes are for spheres: a tool of another shape takes the local law"));
+            return Err(Refusal::argument(
+                "patches and nodes are for spheres: a tool of another shape takes the local law",
+            ));
         }
         Ok(Tool {
             shape,

@@ -115,12 +115,15 @@ pub unsafe extern "C" fn palpate_loop_strike(
             let rank = side.body(body)?;
             let numbers = point.iter().chain(impulse).chain([&radius, &duration]);
             if !numbers.copied().all(f64::is_finite) || radius < 0.0 || duration < 0.0 {
-                return Err(Refusal::argument("a strike's numbers must be finite, its radius and duration not negative"));
+                return Err(Refusal::argument(
+                    "a strike's numbers must be finite, its radius and duration not negative",
+                ));
             }
             if !side.prepared.model.bodies[rank].moves() {
                 return Err(Refusal::argument("the body does not move: a strike does nothing to it"));
             }
-            settings.strike = Strike { body: rank, point: (*point).into(), impulse: (*impulse).into(), radius, duration };
+            settings.strike =
+                Strike { body: rank, point: (*point).into(), impulse: (*impulse).into(), radius, duration };
             settings.strikes = settings.strikes.wrapping_add(1);
             Ok(())
         })

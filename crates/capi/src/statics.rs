@@ -91,9 +91,8 @@ pub unsafe extern "C" fn palpate_store_solve(
         // SAFETY: the caller's pointers.
         let (store, conditions) = unsafe { (shared(store, "store")?, array(conditions, count, "conditions")?) };
         // SAFETY: the caller's pointers.
-        let (u, f, told) = unsafe {
-            (answers(store, displacements, nodes)?, answers(store, forces, nodes)?, error.as_mut())
-        };
+        let (u, f, told) =
+            unsafe { (answers(store, displacements, nodes)?, answers(store, forces, nodes)?, error.as_mut()) };
         let (known, switched) = sorted(&store.green, conditions)?;
         let answer = capacitance::solve(&store.green, &known, &switched)?;
         require_right(answer.error)?;

@@ -13,8 +13,20 @@ fn generated() -> String {
     let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(crate_folder.join("cbindgen.toml")).expect("a valid cbindgen.toml");
     // In the order in which a program meets them.
-    let files =
-        ["abi", "status", "library", "store", "statics", "options", "scene", "offline", "force_loop", "tick", "frame", "settings"];
+    let files = [
+        "abi",
+        "status",
+        "library",
+        "store",
+        "statics",
+        "options",
+        "scene",
+        "offline",
+        "force_loop",
+        "tick",
+        "frame",
+        "settings",
+    ];
     let sources = files.map(|name| crate_folder.join(format!("src/{name}.rs")));
     let builder = sources.iter().fold(cbindgen::Builder::new().with_config(config), |b, source| b.with_src(source));
     let mut text = Vec::new();

@@ -47,11 +47,17 @@ fn null_pointers_lengths_and_handles_are_refused_by_name() {
         let other = ToolOptions { shape: 9, ..ToolOptions::default() };
         refused(palpate_scene_add_tool(scene, &other, null_mut()), ARGUMENT, "there is no shape 9");
         // Wrenches are zero after a refused tick: none of an earlier one is put out again.
-        let call = |own, now, period, readings, wrenches, tools| palpate_loop_tick(own, now, period, readings, wrenches, tools);
+        let call = |own, now, period, readings, wrenches, tools| {
+            palpate_loop_tick(own, now, period, readings, wrenches, tools)
+        };
         refused(call(own, 1, PERIOD, null(), &mut wrench, 1), ARGUMENT, "readings is a null pointer");
         assert_eq!((wrench.force, wrench.torque), (NO_WRENCH.force, NO_WRENCH.torque));
         refused(call(own, 1, f64::NAN, &at(0.0), &mut wrench, 1), ARGUMENT, "period");
-        refused(call(own, 1, PERIOD, [at(0.0); 2].as_ptr(), [wrench; 2].as_mut_ptr(), 2), ARGUMENT, "tools is 2, it must be 1");
+        refused(
+            call(own, 1, PERIOD, [at(0.0); 2].as_ptr(), [wrench; 2].as_mut_ptr(), 2),
+            ARGUMENT,
+            "tools is 2, it must be 1",
+        );
         refused(call(null_mut(), 1, PERIOD, &at(0.0), &mut wrench, 1), ARGUMENT, "loop is a null pointer");
         palpate_loop_free(own);
         palpate_scene_free(scene);
@@ -107,7 +113,8 @@ fn statics_refuse_what_cannot_be_prescribed() {
     let condition = |node, kind, value| Condition { node, kind, value };
     // SAFETY: living objects and places.
     unsafe {
-        let solve = |c: &[Condition]| palpate_store_solve(store, c.as_ptr(), c.len(), null_mut(), null_mut(), 0, null_mut());
+        let solve =
+            |c: &[Condition]| palpate_store_solve(store, c.as_ptr(), c.len(), null_mut(), null_mut(), 0, null_mut());
         refused(solve(&[condition(9999, 0, [0.0; 3])]), ARGUMENT, "surface node 9999 is not touchable");
         refused(solve(&[condition(60, 7, [0.0; 3])]), ARGUMENT, "there is no kind 7");
         let both = [condition(60, 0, [nan, nan, 1e-3]), condition(60, 1, [0.0, 0.0, 1.0])];
@@ -131,14 +138,19 @@ fn who_ticks_is_one_at_a_time() {
     let store = load(&path);
     let (scene, own) = scene_and_loop(store);
     let mut wrench = NO_WRENCH;
-    let target = Target { position: [0.05, 0.05, 0.104], orientation: [0.0; 4], velocity: [0.0; 3], active: 1, grab: 0 };
+    let target =
+        Target { position: [0.05, 0.05, 0.104], orientation: [0.0; 4], velocity: [0.0; 3], active: 1, grab: 0 };
     // SAFETY: living objects and places.
     unsafe {
         refused(palpate_loop_set_target(own, 0, &target), Status::PalpateErrorState, "palpate_loop_start first");
         done(palpate_loop_start(own));
         refused(palpate_loop_start(own), Status::PalpateErrorState, "runs already");
         done(palpate_loop_set_target(own, 0, &target));
-        refused(palpate_loop_tick(own, 1, PERIOD, &at(0.0), &mut wrench, 1), Status::PalpateErrorState, "palpate_loop_stop");
+        refused(
+            palpate_loop_tick(own, 1, PERIOD, &at(0.0), &mut wrench, 1),
+            Status::PalpateErrorState,
+            "palpate_loop_stop",
+        );
         done(palpate_loop_stop(own));
         done(palpate_loop_stop(own));
         done(palpate_loop_tick(own, 1, PERIOD, &at(0.1), &mut wrench, 1));
@@ -153,7 +165,14 @@ fn who_ticks_is_one_at_a_time() {
                 for tick in 0..400_000 {
                     // SAFETY: a living loop.
                     let status = unsafe {
-                        palpate_loop_tick(address as *mut Loop, first + 1_000_000 * tick, PERIOD, &at(0.1), &mut wrench, 1)
+                        palpate_loop_tick(
+                            address as *mut Loop,
+                            first + 1_000_000 * tick,
+                            PERIOD,
+                            &at(0.1),
+                            &mut wrench,
+                            1,
+                        )
                     };
                     busy.fetch_or(status == Status::PalpateErrorBusy, Ordering::Relaxed);
                     if busy.load(Ordering::Relaxed) {

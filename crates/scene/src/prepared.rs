@@ -113,7 +113,8 @@ impl Prepared {
                 old.map_or_else(|| of(&self.settings, rank), |old| of(settings, old));
         }
         for (rank, old) in kept.bodies.iter().enumerate() {
-            now.stiffness_scale[rank] = old.map_or(self.settings.stiffness_scale[rank], |old| settings.stiffness_scale[old]);
+            now.stiffness_scale[rank] =
+                old.map_or(self.settings.stiffness_scale[rank], |old| settings.stiffness_scale[old]);
         }
         now
     }

@@ -59,9 +59,9 @@ impl Tool {
         };
         let known = bodies.clone().all(|body| body.moduli.is_some());
         let law = self.law.unwrap_or(if known { LawKind::Local } else { LawKind::Patch });
-        let contact_radius = self.contact_radius.unwrap_or_else(|| {
-            smallest(|body| largest_contact_radius(&body.green, suiting_radius(&body.green)))
-        });
+        let contact_radius = self
+            .contact_radius
+            .unwrap_or_else(|| smallest(|body| largest_contact_radius(&body.green, suiting_radius(&body.green))));
         let radius = contact_size(&shape);
         let (pad_youngs_modulus, max_stiffness) = (self.pad_youngs_modulus, self.max_stiffness);
         Ok((ToolModel { shape, radius, law, pad_youngs_modulus, max_stiffness }, contact_radius))

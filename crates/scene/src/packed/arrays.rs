@@ -20,7 +20,11 @@ pub fn checksum(bytes: &[u8]) -> String {
 /// A name that leads out of the folder.
 pub fn file_of(folder: &Path, name: &str) -> Result<PathBuf> {
     let plain = Path::new(name).file_name().is_some_and(|last| last == name);
-    if plain { Ok(folder.join(name)) } else { Err(refused(folder, format!("names the file '{name}' outside of itself"))) }
+    if plain {
+        Ok(folder.join(name))
+    } else {
+        Err(refused(folder, format!("names the file '{name}' outside of itself")))
+    }
 }
 
 pub fn refused(path: &Path, reason: impl Into<String>) -> Error {

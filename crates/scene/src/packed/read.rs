@@ -66,7 +66,10 @@ fn describe(path: &Path, text: &str) -> Result<SceneDescription> {
     }
     if value["version"] != VERSION {
         let version = &value["version"];
-        return Err(refused(path, format!("has version {version}, this program reads {VERSION}; pack the scene again")));
+        return Err(refused(
+            path,
+            format!("has version {version}, this program reads {VERSION}; pack the scene again"),
+        ));
     }
     serde_json::from_value(value).map_err(foreign)
 }
