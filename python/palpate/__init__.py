@@ -7,9 +7,12 @@ from importlib.metadata import version
 
 from palpate import models, palpation
 from palpate.body import Body, Loads, Material
+from palpate.devices import Device, DeviceLimits, Reading
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
+    DeviceError,
+    DeviceWarning,
     Error,
     LockingWarning,
     MeshError,
@@ -53,6 +56,10 @@ __all__ = [
     "BodyError",
     "Comparison",
     "Contact",
+    "Device",
+    "DeviceError",
+    "DeviceLimits",
+    "DeviceWarning",
     "Difference",
     "Energy",
     "Error",
@@ -70,6 +77,7 @@ __all__ = [
     "PrecisionError",
     "PrecisionWarning",
     "QuantityDifference",
+    "Reading",
     "Recording",
     "RecordingStatus",
     "RecordingWarning",

@@ -56,6 +56,10 @@ class ViewerError(Error):
     """The browser viewer cannot be served, or was asked for something it cannot do."""
 
 
+class DeviceError(Error):
+    """A haptic device that cannot be found or opened, or a device of a program that does not do what it says."""
+
+
 class PalpateWarning(UserWarning):
     """Base of everything Palpate warns of: the answer stands, but not as well as asked."""
 
@@ -78,6 +82,10 @@ class PrecisionWarning(PalpateWarning):
 
 class SchedulingWarning(PalpateWarning):
     """The system did not give the force loop the scheduling that was asked for: ticks may begin late."""
+
+
+class DeviceWarning(PalpateWarning):
+    """A haptic device that renders less than the scene asks for, or has a fault."""
 
 
 class TouchWarning(PalpateWarning):

@@ -1,9 +1,9 @@
 import { describe, expect, it } from "vitest";
 
-import { Store, drivenTool } from "./store";
+import { Store, drivenTool, shownTool } from "./store";
 import type { SceneMessage } from "./net/protocol";
 
-const tool = { radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01, friction: 0.3, shape: "sphere" };
+const tool = { device: null, radius: 0.005, contact_radius: 0.005, max_contact_radius: 0.01, friction: 0.3, shape: "sphere" };
 
 describe("the store", () => {
   it("tells a listener at once, and of every change of its keys", () => {
@@ -50,5 +50,16 @@ describe("the store", () => {
     expect(drivenTool(store.get())).toBeNull();
     store.update({ pinned: [0, 1], pressing: { tool: 1, grab: false, depth: 0 } });
     expect(drivenTool(store.get())).toBe(1);
+  });
+
+  it("leaves a tool to its device, and shows that one's numbers", () => {
+    const store = new Store();
+    const moved = { ...tool, device: "Haply Inverse3 0A01" };
+    store.update({ scene: { tools: [tool, moved] } as unknown as SceneMessage });
+    expect([drivenTool(store.get()), shownTool(store.get())]).toEqual([0, 1]);
+    store.update({ pressing: { tool: 0, grab: false, depth: 0 } });
+    expect([drivenTool(store.get()), shownTool(store.get())]).toEqual([0, 0]);
+    store.update({ pressing: null, scene: { tools: [moved] } as unknown as SceneMessage });
+    expect([drivenTool(store.get()), shownTool(store.get())]).toEqual([null, 0]);
   });
 });

@@ -165,9 +165,16 @@ export function inControl({ role, connection }: Readonly<State>): boolean {
   return role === "control" && connection === "open";
 }
 
-/** The tool that is driven, or that the next press drives; null where all are pinned. */
+/** The tool that is driven, or that the next press drives; null where all are pinned, or moved by devices. */
 export function drivenTool({ scene, pressing, pinned }: Readonly<State>): number | null {
   if (pressing) return pressing.tool;
-  const free = (scene?.tools ?? []).findIndex((_, tool) => !pinned.includes(tool));
+  const free = (scene?.tools ?? []).findIndex(({ device }, tool) => device === null && !pinned.includes(tool));
   return free < 0 ? null : free;
+}
+
+/** The tool whose numbers are shown: the one that the pointer drives, else the first that a device moves. */
+export function shownTool(state: Readonly<State>): number | null {
+  if (state.pressing) return state.pressing.tool;
+  const moved = (state.scene?.tools ?? []).findIndex(({ device }) => device !== null);
+  return moved < 0 ? drivenTool(state) : moved;
 }

@@ -2,10 +2,15 @@
 //! people. The interpreter lock is released in everything long.
 
 mod body;
+mod changes;
+mod connection;
+mod devices;
 mod dynamics;
+mod emulated;
 mod errors;
 mod frame;
 mod green;
+mod programmed;
 mod recording;
 mod replay;
 mod rerun;
@@ -35,6 +40,19 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
+    module.add_class::<connection::OpenedDevice>()?;
+    module.add_class::<programmed::ProgrammedDevice>()?;
+    module.add_class::<devices::DeviceCheck>()?;
+    module.add_function(wrap_pyfunction!(devices::device_kinds, module)?)?;
+    module.add_function(wrap_pyfunction!(devices::list_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::connect, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::disconnect, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::device_limits, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::tool_stiffness, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::assume_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::change, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;

@@ -8,7 +8,6 @@ use std::sync::Mutex;
 use numpy::{IntoPyArray, PyArray1};
 use palpate_core::simulation::{MAX_BODIES, Mode};
 use palpate_core::{Error, Result};
-use palpate_devices::DeviceLimits;
 use palpate_recording::{Ticks, same_settings};
 use palpate_servo::{Owner, Settings, TickRecord};
 use pyo3::prelude::*;
@@ -240,9 +239,9 @@ impl Replay {
     fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> PyResult<Self> {
         let ticks = open(source).map_err(|e| to_python(py, e))?;
         let tools = core.model.tools.len();
-        let devices = vec![DeviceLimits::UNLIMITED; tools];
+        let devices = &core.device_limits;
         let (limits, settings, strain) = (core.limits, core.settings, core.strain.clone());
-        let replay = palpate_servo::Replay::new(&core.model, &devices, limits, settings, strain);
+        let replay = palpate_servo::Replay::new(&core.model, devices, limits, settings, strain);
         let replay = replay.map_err(|e| to_python(py, e))?;
         Ok(Self { parts: Mutex::new((ticks, replay)), model: core.model.clone(), tools })
     }

@@ -41,7 +41,8 @@ pub fn rerun<'py>(
     });
     let inputs: Inputs<'_> = Box::new(inputs);
     let each = |record: &TickRecord| file.push(record);
-    let made = py.detach(|| palpate_servo::rerun(&model, limits, settings, &strain, inputs, each));
+    let devices = &core.device_limits;
+    let made = py.detach(|| palpate_servo::rerun(&model, devices, limits, settings, &strain, inputs, each));
     if let Some(error) = stopped {
         return Err(error);
     }

@@ -6,13 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use palpate_core::simulation::{MAX_BODIES, Model, Pose, Strike};
-use palpate_devices::Device;
-use palpate_devices::simulated::{Handle, Target, simulated};
+use palpate_core::simulation::{MAX_BODIES, Model, Pose, Strike, ToolModel};
+use palpate_devices::DeviceLimits;
+use palpate_devices::simulated::{Handle, Target};
 use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, StrainPreparer, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
+use crate::connection::{Connected, common_scheduler};
 use crate::errors::to_python;
 use crate::frame::{frame, push_row};
 use crate::recording::{Recorded, Recording, RecordingStatus, header};
@@ -32,8 +33,15 @@ pub struct SimulationCore {
     pub(crate) settings: Settings,
     pub(crate) scheduling: Scheduling,
     pub(crate) strain: StrainPreparer,
-    handles: Vec<Handle>,
-    targets: Vec<Target>,
+    /// What the device of each tool can render, in the scene.
+    pub(crate) device_limits: Vec<DeviceLimits>,
+    /// As the scene asks for them, whatever devices hold.
+    pub(crate) asked: Vec<ToolModel>,
+    /// Devices for the next start; a tool without one is moved by its target.
+    pub(crate) connected: Vec<Option<Connected>>,
+    /// Of tools that a target moves.
+    pub(crate) handles: Vec<Option<Handle>>,
+    pub(crate) targets: Vec<Target>,
     /// Locked by callers from Python among themselves; the loop knows nothing of it.
     servo: Mutex<Option<Servo>>,
     recording: Option<Recording>,
@@ -69,6 +77,9 @@ impl SimulationCore {
             settings,
             scheduling: Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 },
             strain: StrainPreparer::new(&model),
+            device_limits: vec![DeviceLimits::UNLIMITED; model.tools.len()],
+            asked: model.tools.clone(),
+            connected: model.tools.iter().map(|_| None).collect(),
             handles: Vec::new(),
             targets: vec![Target::default(); model.tools.len()],
             servo: Mutex::new(None),
@@ -84,19 +95,18 @@ impl SimulationCore {
 
     /// Starts the loop; whether the system granted its priority, and locked memory.
     fn start(&mut self, py: Python<'_>) -> PyResult<(bool, bool)> {
-        let (handles, devices): (Vec<_>, Vec<_>) = self
-            .targets
-            .iter()
-            .map(|_| {
-                let (handle, device) = simulated();
-                (handle, Box::new(device) as Box<dyn Device>)
-            })
-            .unzip();
+        let connected = std::mem::replace(&mut self.connected, self.asked.iter().map(|_| None).collect());
+        let mut parts = Vec::new();
+        for (tool, device) in connected.into_iter().enumerate() {
+            parts.push(self.device_of(tool, device));
+        }
+        let scheduler = common_scheduler(&parts, self.scheduling.rate).map_err(|e| to_python(py, e))?;
+        let (handles, devices): (Vec<_>, Vec<_>) = parts.into_iter().map(|part| (part.handle, part.device)).unzip();
         self.handles = handles;
         let (model, limits, settings, scheduling, strain) =
             (self.model.clone(), self.limits, self.settings, self.scheduling.clone(), self.strain.clone());
-        let started = py.detach(|| Servo::start(model, devices, limits, settings, scheduling, strain, None));
-        let servo = started.map_err(|e| to_python(py, e))?;
+        let start = || Servo::start(model, devices, limits, settings, scheduling, strain, scheduler);
+        let servo = py.detach(start).map_err(|e| to_python(py, e))?;
         let realtime = servo.realtime();
         *self.servo() = Some(servo);
         Ok((realtime.priority, realtime.locked_memory))
@@ -127,7 +137,7 @@ impl SimulationCore {
         let target = Target { pose, velocity: velocity.into(), active, grab };
         let Some(place) = self.targets.get_mut(tool) else { return };
         *place = target;
-        if let Some(handle) = self.handles.get_mut(tool) {
+        if let Some(Some(handle)) = self.handles.get_mut(tool) {
             handle.set(target);
         }
     }
@@ -294,6 +304,7 @@ impl SimulationCore {
             grabs: &grabs,
             strikes: &strikes,
             watch: &watch,
+            devices: &self.device_limits,
         };
         let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
         let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
@@ -323,7 +334,7 @@ impl SimulationCore {
 }
 
 impl SimulationCore {
-    fn servo(&mut self) -> &mut Option<Servo> {
+    pub(crate) fn servo(&mut self) -> &mut Option<Servo> {
         self.servo.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -4,10 +4,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use palpate_core::Result;
-use palpate_core::simulation::{Input, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
+use palpate_core::simulation::{Input, Kept, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
 use palpate_devices::{Device, Wrench};
 
-use crate::change::{ChangeEnd, change_ends};
+use crate::change::{ChangeEnd, ChangeHandle, change_ends};
 use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
@@ -23,25 +23,26 @@ use crate::timing::{Clock, Timing};
 /// Whoever owns it ticks it: one thread at a time, and any thread. It may move from one to another between ticks.
 pub struct ForceLoop {
     model: Arc<Model>,
-    pub(crate) state: State,
+    state: State,
     scratch: Scratch,
-    pub(crate) devices: Vec<Box<dyn Device>>,
+    devices: Vec<Box<dyn Device>>,
     limits: SafetyLimits,
-    pub(crate) stages: Vec<SafetyStage>,
+    stages: Vec<SafetyStage>,
     /// A fault of the whole loop.
-    pub(crate) fault: Option<FaultReason>,
-    pub(crate) ends: LoopEnds,
-    /// Where another scene comes in.
-    pub(crate) changes: ChangeEnd,
+    fault: Option<FaultReason>,
+    ends: LoopEnds,
+    /// Where another scene comes in, and the other end until somebody takes it.
+    changes: ChangeEnd<Successor>,
+    change_handle: Option<ChangeHandle<Successor>>,
     settings: Settings,
-    pub(crate) timing: Timing,
-    pub(crate) status: Status,
+    timing: Timing,
+    status: Status,
     /// Of which bodies the strain can be limited.
     limited: [bool; MAX_BODIES],
     /// Time of the first tick, ns.
-    pub(crate) start_ns: Option<u64>,
+    start_ns: Option<u64>,
     /// Row of the last tick: how long it took is known when it is over.
-    pub(crate) row: Option<LogRow>,
+    row: Option<LogRow>,
     /// Bodies whose requests for strain find no room in a tick that is made again.
     withheld: u32,
 }
@@ -78,7 +79,7 @@ impl ForceLoop {
             stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?, moves));
         }
         let (changes, change_handle) = change_ends();
-        let (ends, handle) = handoffs(&model, &settings, &stages, change_handle);
+        let (ends, handle) = handoffs(&model, &settings, &stages);
         let (state, scratch) = (State::new(&model), Scratch::new(&model));
         let force_loop = Self {
             model,
@@ -90,6 +91,7 @@ impl ForceLoop {
             fault: None,
             ends,
             changes,
+            change_handle: Some(change_handle),
             settings,
             timing: Timing::new(clock),
             status: Status::default(),
@@ -174,6 +176,11 @@ impl ForceLoop {
         self.withheld = input.strain.unasked;
     }
 
+    /// The end through which another scene comes in.
+    pub(crate) fn take_change_handle(&mut self) -> Option<ChangeHandle<Successor>> {
+        self.change_handle.take()
+    }
+
     pub(crate) fn set_realtime(&mut self, realtime: RealtimeStatus) {
         self.status.realtime = realtime;
     }
@@ -197,6 +204,36 @@ impl ForceLoop {
         }
         self.ends.recorder.end_tick(&self.model, &self.state, self.timing.delay_ns(), took_ns);
         overrun.into_iter().for_each(|reason| self.latch(reason));
+    }
+
+    /// Goes on as the loop that has come in, if one has. Never allocates or frees.
+    fn take_change(&mut self) {
+        let Some(mut taken) = self.changes.take() else { return };
+        let Successor { force_loop, kept, keeps_device } = taken.item();
+        force_loop.go_on_from(self, kept, keeps_device);
+        std::mem::swap(self, force_loop);
+        // Whoever waits does so at the ends of the loop that was there first.
+        std::mem::swap(&mut self.changes, &mut force_loop.changes);
+        self.changes.give_back(taken);
+    }
+
+    /// Takes over what goes on from the loop before.
+    fn go_on_from(&mut self, before: &mut ForceLoop, kept: &Kept, keeps_device: &[bool]) {
+        self.state.take_over(&mut before.state, kept);
+        for (tool, (old, _)) in kept.tools.iter().zip(keeps_device).enumerate().filter(|(_, (_, keeps))| **keeps) {
+            let Some(old) = old.filter(|&old| old < before.devices.len()) else { continue };
+            std::mem::swap(&mut self.devices[tool], &mut before.devices[old]);
+            std::mem::swap(&mut self.stages[tool], &mut before.stages[old]);
+        }
+        self.status = Status {
+            readings: by_new_rank(&before.status.readings, kept),
+            wrenches: by_new_rank(&before.status.wrenches, kept),
+            ports: by_new_rank(&before.status.ports, kept),
+            ..before.status
+        };
+        std::mem::swap(&mut self.timing, &mut before.timing);
+        std::mem::swap(&mut self.ends.rows, &mut before.ends.rows);
+        (self.fault, self.start_ns, self.row) = (before.fault, before.start_ns, before.row.take());
     }
 
     /// Begins a recording that has been asked for, in a new state.
@@ -324,6 +361,24 @@ impl ForceLoop {
         self.status.fault = fault(self.fault, &self.stages);
         self.publish();
     }
+}
+
+/// A loop that is to take the place of the running one: with another scene, at rest.
+///
+/// Everything that depends on the scene is made anew beside the loop. It takes over what goes on: contacts between bodies and
+/// tools that stay go on without a step in their force; a new tool's forces ramp in; a device that leaves is left without a
+/// wrench.
+pub(crate) struct Successor {
+    pub force_loop: ForceLoop,
+    /// Which bodies and tools stay.
+    pub kept: Kept,
+    /// Which tools keep their device.
+    pub keeps_device: Vec<bool>,
+}
+
+/// Each new rank's value: of a tool that stays the one it had.
+fn by_new_rank<T: Copy + Default>(values: &[T; MAX_TOOLS], kept: &Kept) -> [T; MAX_TOOLS] {
+    kept.tools.map(|old| old.and_then(|old| values.get(old)).copied().unwrap_or_default())
 }
 
 /// The devices are left without a wrench.

@@ -11,7 +11,6 @@ use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
 
-use crate::change::ChangeHandle;
 use crate::log::{LogRow, Status};
 use crate::record::TickRecord;
 use crate::recorder::{RecorderEnd, RecorderHandle, recorder_ends};
@@ -49,16 +48,10 @@ pub struct LoopHandle {
     /// For whoever prepares strain responses.
     strain: Option<PreparerEnd>,
     recorder: RecorderHandle,
-    pub(crate) changes: ChangeHandle,
 }
 
 /// Both ends, with settings that have been checked and the safety stages of the start.
-pub(crate) fn handoffs(
-    model: &Arc<Model>,
-    settings: &Settings,
-    stages: &[SafetyStage],
-    changes: ChangeHandle,
-) -> (LoopEnds, LoopHandle) {
+pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings, stages: &[SafetyStage]) -> (LoopEnds, LoopHandle) {
     let (settings_in, settings_out) = triple_buffer(settings);
     let first = Published { status: Status::default(), state: Snapshot::new(model) };
     let (published_in, published_out) = triple_buffer(&first);
@@ -74,7 +67,6 @@ pub(crate) fn handoffs(
         rows: consumer,
         strain: Some(preparer),
         recorder,
-        changes,
     };
     (ends, handle)
 }
@@ -110,8 +102,7 @@ impl LoopHandle {
         self.recorder.is_begun()
     }
 
-    /// Belongs to the loop that has taken the place of this one's. The log goes on in the same ring, and other changes come in
-    /// where this one did.
+    /// Belongs to the loop that has taken the place of this one's. The log goes on in the same ring.
     pub(crate) fn go_on_as(&mut self, next: LoopHandle) {
         let Self { model, settings, published, strain, recorder, .. } = next;
         (self.model, self.settings, self.published) = (model, settings, published);

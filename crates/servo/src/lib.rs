@@ -6,6 +6,7 @@
 
 mod change;
 mod clock;
+mod emulated;
 mod force_loop;
 mod handoff;
 mod log;
@@ -16,6 +17,7 @@ mod recorder;
 mod replay;
 mod safety;
 mod scheduling;
+mod self_check;
 mod servo;
 mod settings;
 mod statistics;
@@ -23,8 +25,8 @@ mod strain;
 mod subnormals;
 mod timing;
 
-pub use change::SceneChange;
 pub use clock::now_ns;
+pub use emulated::{EmulatedTick, Emulation};
 pub use force_loop::ForceLoop;
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
@@ -38,6 +40,7 @@ pub use recorder::RecordingProgress;
 pub use replay::{Difference, Owner, Replay};
 pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
 pub use scheduling::Scheduling;
-pub use servo::Servo;
+pub use self_check::{LARGEST_FORCE, Seen, SelfCheck, Task};
+pub use servo::{SceneChange, Servo};
 pub use settings::Settings;
 pub use statistics::{Histogram, Summary};

@@ -34,6 +34,8 @@ pub struct Script<'a> {
     pub strikes: &'a [(usize, Strike)],
     /// Bodies and the ranks of their surface nodes whose displacements are recorded.
     pub watch: &'a [(usize, u32)],
+    /// What the device of each tool can render; empty for anything.
+    pub devices: &'a [DeviceLimits],
 }
 
 /// What a script did.
@@ -72,7 +74,7 @@ pub fn run(
     let devices = (0..tools).map(|tool| Box::new(Scripted::new(script, tool, tools)) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
     force_loop.limit_strain_of(strain.known());
-    let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
+    let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
     let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
@@ -107,24 +109,25 @@ pub fn run(
 }
 
 /// Ticks through recorded inputs without looking at what came out of them: what the devices said, strikes, resets and the
-/// pace of bodies are as recorded, all other settings as given. Hands out a record of each tick.
+/// pace of bodies are as recorded, all other settings as given, and devices can render so much. Hands out a record of each
+/// tick.
 ///
 /// # Errors
 /// See [`ForceLoop::new`]; an input that cannot be had, or a strike on a body that the model does not have.
 pub fn rerun(
     model: &Arc<Model>,
+    devices: &[DeviceLimits],
     limits: SafetyLimits,
     settings: Settings,
     strain: &StrainPreparer,
     inputs: impl IntoIterator<Item = Result<RecordedInput>>,
     mut each: impl FnMut(&TickRecord),
 ) -> Result<()> {
-    let (mut readings, devices): (Vec<_>, Vec<_>) =
-        model.tools.iter().map(|_| Replayed::new(DeviceLimits::UNLIMITED)).unzip();
+    let (mut readings, devices): (Vec<_>, Vec<_>) = devices.iter().map(|&limits| Replayed::new(limits)).unzip();
     let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
     force_loop.limit_strain_of(strain.known());
-    let mut preparation = Preparation { end: handle.take_strain()?, strain, due: VecDeque::new() };
+    let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
     let mut settings = settings;
     for (tick, input) in inputs.into_iter().enumerate() {
@@ -146,20 +149,24 @@ pub fn rerun(
 }
 
 /// Strain responses between the ticks, handed over after a fixed number of them.
-struct Preparation<'a> {
+pub(crate) struct Preparation<'a> {
     end: PreparerEnd,
     strain: &'a StrainPreparer,
     due: VecDeque<(usize, StrainAnswer)>,
 }
 
-impl Preparation<'_> {
-    fn hand_over(&mut self, tick: usize) {
+impl<'a> Preparation<'a> {
+    pub(crate) fn new(end: PreparerEnd, strain: &'a StrainPreparer) -> Self {
+        Self { end, strain, due: VecDeque::new() }
+    }
+
+    pub(crate) fn hand_over(&mut self, tick: usize) {
         while self.due.front().is_some_and(|(when, _)| *when <= tick) {
             self.due.pop_front().into_iter().for_each(|(_, response)| self.end.hand_over(response));
         }
     }
 
-    fn prepare(&mut self, tick: usize) {
+    pub(crate) fn prepare(&mut self, tick: usize) {
         while let Some(prepared) = self.end.prepare_one(self.strain) {
             self.due.extend(prepared.map(|response| (tick + PREPARATION_TICKS, response)));
         }
@@ -188,6 +195,7 @@ struct Scripted {
     poses: std::vec::IntoIter<Pose>,
     grabs: std::vec::IntoIter<bool>,
     latest: Reading,
+    limits: DeviceLimits,
 }
 
 impl Scripted {
@@ -199,6 +207,10 @@ impl Scripted {
             poses: of_tool(script.poses, tool, tools),
             grabs: of_tool(script.grabs, tool, tools),
             latest: Reading::default(),
+            limits: DeviceLimits {
+                max_speed: None,
+                ..script.devices.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED)
+            },
         }
     }
 }
@@ -226,7 +238,7 @@ impl Device for Scripted {
     }
 
     fn limits(&self) -> DeviceLimits {
-        DeviceLimits::UNLIMITED
+        self.limits
     }
 }
 

@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 #[cfg(feature = "offline")]
 use palpate_core::simulation::StrainWatch;
-use palpate_core::simulation::{MAX_BODIES, Model};
+use palpate_core::simulation::{Kept, MAX_BODIES, Model};
 #[cfg(feature = "offline")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
@@ -37,6 +37,12 @@ impl StrainPreparer {
         }
     }
 
+    /// For another model, with the measures of the bodies that stay.
+    pub fn changed(&self, model: &Arc<Model>, kept: &Kept) -> Self {
+        let measures = kept.bodies.map(|old| self.measures.get(old?).cloned().flatten());
+        Self { model: model.clone(), measures }
+    }
+
     /// Whether the strain of each body can be limited.
     pub(crate) fn known(&self) -> [bool; MAX_BODIES] {
         self.measures.each_ref().map(Option::is_some)
@@ -55,6 +61,11 @@ impl StrainPreparer {
 impl StrainPreparer {
     /// Knows none.
     pub fn new(_model: &Arc<Model>) -> Self {
+        Self {}
+    }
+
+    /// The same.
+    pub fn changed(&self, _model: &Arc<Model>, _kept: &Kept) -> Self {
         Self {}
     }
 

@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use palpate_core::simulation::Model;
+use palpate_core::simulation::{Kept, Model};
 use palpate_core::{Error, Result};
-use palpate_devices::{Device, DeviceLimits, Scheduler};
+use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 use rtrb::Consumer;
 
-use crate::change::{Awaited, SceneChange};
+use crate::change::ChangeHandle;
 use crate::clock::{next_deadline, now_ns, sleep_until_ns};
-use crate::force_loop::ForceLoop;
+use crate::force_loop::{ForceLoop, Successor};
 use crate::handoff::{LoopHandle, Published};
 use crate::log::{LogRow, RealtimeStatus};
 use crate::preparer::{StrainPreparer, StrainWorker};
@@ -29,6 +29,7 @@ const MOST_WAITS: u32 = 1000;
 pub struct Servo {
     caller: Caller,
     handle: LoopHandle,
+    changes: Option<ChangeHandle<Successor>>,
     realtime: RealtimeStatus,
     limits: SafetyLimits,
     /// Time between two ticks, s.
@@ -69,11 +70,12 @@ impl Servo {
         let worker = force_loop.limit_strain(&mut handle, strain)?;
         let period = 1.0 / scheduler.as_ref().map_or(scheduling.rate, |scheduler| scheduler.rate());
         force_loop.check_period(period)?;
+        let changes = force_loop.take_change_handle();
         let (caller, realtime) = match scheduler {
             Some(scheduler) => (driven(force_loop, period, scheduler)?, RealtimeStatus::default()),
             None => on_a_thread(force_loop, period, scheduling)?,
         };
-        Ok(Self { caller, handle, realtime, limits, period, devices: device_limits, worker })
+        Ok(Self { caller, handle, changes, realtime, limits, period, devices: device_limits, worker })
     }
 
     /// Exchanges bodies, tools and devices while the loop runs; contacts between those that stay go on.
@@ -83,6 +85,11 @@ impl Servo {
     /// does not tick. The loop then goes on as it was.
     pub fn change(&mut self, change: SceneChange) -> Result<()> {
         let SceneChange { model, kept, devices, settings, strain } = change;
+        if self.handle.is_recorded() {
+            return Err(Error::Invalid(
+                "the scene cannot be changed while it is recorded: stop the recording first".into(),
+            ));
+        }
         let keeps_device = devices.iter().map(Option::is_none).collect();
         let mut placed: Vec<Box<dyn Device>> = Vec::new();
         for (tool, device) in devices.into_iter().enumerate() {
@@ -97,7 +104,12 @@ impl Servo {
         let (mut next, mut next_handle) = ForceLoop::new(model, placed, self.limits, settings)?;
         next.check_period(self.period)?;
         let worker = next.limit_strain(&mut next_handle, strain)?;
-        self.handle.change(next, next_handle, kept, keeps_device)?;
+        let silent = || Error::Invalid("the loop does not tick: the scene stays as it was".into());
+        let changes = self.changes.as_mut().ok_or_else(silent)?;
+        if !changes.offer(Successor { force_loop: next, kept, keeps_device }) {
+            return Err(silent());
+        }
+        self.handle.go_on_as(next_handle);
         (self.devices, self.worker) = (limits, worker);
         Ok(())
     }
@@ -161,6 +173,41 @@ impl Servo {
 impl Drop for Servo {
     fn drop(&mut self) {
         self.stop();
+    }
+}
+
+/// Another scene for a running loop.
+pub struct SceneChange {
+    /// Its bodies and tools.
+    pub model: Arc<Model>,
+    /// Which of them were there before.
+    pub kept: Kept,
+    /// One a tool: a new device, or none for a tool that keeps the one it has.
+    pub devices: Vec<Option<Box<dyn Device>>>,
+    /// From now on.
+    pub settings: Settings,
+    /// What measures the strain of the bodies.
+    pub strain: StrainPreparer,
+}
+
+/// Holds the place of a device that is to come from the loop before.
+struct Awaited(DeviceLimits);
+
+impl Device for Awaited {
+    fn name(&self) -> &str {
+        "no device yet"
+    }
+
+    fn read(&mut self, _now_ns: u64, _period: f64) -> std::result::Result<Reading, DeviceFault> {
+        Err(DeviceFault::Disconnected)
+    }
+
+    fn write(&mut self, _wrench: Wrench) -> std::result::Result<(), DeviceFault> {
+        Ok(())
+    }
+
+    fn limits(&self) -> DeviceLimits {
+        self.0
     }
 }
 

@@ -39,7 +39,7 @@ fn record() {
     for scene in &SCENES {
         let model = model(scene);
         let poses: Vec<_> = (0..800 * scene.tools).map(|k| pose(k % scene.tools, k / scene.tools)).collect();
-        let script = Script { period: 1e-3, poses: &poses, grabs: &[], strikes: &[], watch: &[] };
+        let script = Script { period: 1e-3, poses: &poses, grabs: &[], strikes: &[], watch: &[], devices: &[] };
         let header = Header { about: Default::default(), tools: scene.tools, bodies: 1, rate: 1e3, begun_ns: 0 };
         let mut writer = TickWriter::new(std::io::Cursor::new(Vec::new()), header).expect("room in memory");
         let mut touching = 0;

@@ -60,7 +60,8 @@ fn a_drivers_callback_gives_the_bits_of_an_offline_run() {
     let blow = DVec3::new(0.0, 0.0, -1e-3);
     let point = DVec3::new(0.02, 0.02, 0.1);
     let strike = Strike { body: 0, point, impulse: blow, radius: 0.02, duration: 3e-3 };
-    let script = Script { period: PERIOD, poses: &poses, grabs: &grabs, strikes: &[(700, strike)], watch: &[] };
+    let script =
+        Script { period: PERIOD, poses: &poses, grabs: &grabs, strikes: &[(700, strike)], watch: &[], devices: &[] };
     let mut pairs = std::collections::BTreeSet::new();
     let each = |record: &TickRecord| pairs.extend(record.output.contacts.iter().map(|c| (c.tool, c.body)));
     let strain = StrainPreparer::new(&model);
@@ -114,7 +115,8 @@ fn subnormal_numbers_are_flushed_live_and_offline() {
 
     let poses = vec![Pose::at(DVec3::NAN); 100];
     let watch: Vec<_> = nodes.iter().map(|&node| (0, node)).collect();
-    let script = Script { period: PERIOD, poses: &poses, grabs: &[], strikes: &[(0, strike)], watch: &watch };
+    let script =
+        Script { period: PERIOD, poses: &poses, grabs: &[], strikes: &[(0, strike)], watch: &watch, devices: &[] };
     let strain = StrainPreparer::new(&model);
     let recording = run(&model, patient(), settings(), &strain, &script, |_| ()).expect("a valid script");
     let offline = bits(recording.displacements[99 * nodes.len()..].to_vec());

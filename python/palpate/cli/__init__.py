@@ -3,6 +3,7 @@
 from palpate.cli import (  # noqa: F401  they register their commands
     benchmarks,
     caching,
+    devices,
     doctor,
     envelope,
     examining,
@@ -12,6 +13,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     running,
     session_bench,
     sessions,
+    stability,
     verification,
 )
 from palpate.cli.app import main

@@ -38,5 +38,12 @@ def checks(incomplete: str) -> list[tuple[str, str]]:
     return [(name, known.title) for name, known in BENCHMARKS.items() if name.startswith(incomplete)]
 
 
+def devices(incomplete: str) -> list[str]:
+    """Kinds of devices."""
+    from palpate.scene.devices import KINDS
+
+    return _beginning(KINDS, incomplete)
+
+
 def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
     return [word for word in words if word.startswith(incomplete)]

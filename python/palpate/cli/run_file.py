@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,7 @@ class RunOptions:
     repair: bool = False
     cpus: str | None = None
     priority: int | None = None
+    device: tuple[str, ...] | None = None
 
     def refuse(self, file: Path, allowed: set[str], reason: str) -> None:
         """Refuse options that the kind of file does not take.
@@ -45,12 +46,12 @@ class RunOptions:
 
         """
         for field in fields(self):
-            if getattr(self, field.name) not in (None, False) and field.name not in allowed | SCHEDULING:
+            if getattr(self, field.name) not in (None, False) and field.name not in allowed | OF_LOOP:
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
-# Of the loop's thread, whatever the file.
-SCHEDULING = {"cpus", "priority"}
+# Of the loop, whatever the file.
+OF_LOOP = {"cpus", "priority", "device"}
 FLAGS = {
     "radius": "--radius",
     "fix": "--fix",
@@ -111,7 +112,31 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
         update["tools"] = [tool.model_copy(update=_radii(tool, options.radius)) for tool in scene.tools]
     if options.cpus is not None or options.priority is not None:
         update["device"] = _scheduled(scene.device, options)
-    return scene.model_copy(update={**update, "bodies": bodies})
+    changed = scene.model_copy(update={**update, "bodies": bodies})
+    return changed if options.device is None else _with_devices(changed, options.device)
+
+
+def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
+    """Scene whose first tools are moved by devices: of a table by name, or of a kind, where its own stood."""
+    from palpate.scene.devices import KINDS, device_ranks, moved_by
+
+    if len(devices) > len(scene.tools):
+        raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(scene.tools)} of [[tool]]")
+    tables = [scene.device, *scene.further_devices]
+    named = [table.name for table in tables]
+    for tool, device in enumerate(devices):
+        if device in named or any(table.kind == device for table in tables) or device not in KINDS:
+            tools = list(scene.tools)
+            tools[tool] = tools[tool].model_copy(update={"device": device})
+            scene = scene.model_copy(update={"tools": tools})
+    try:
+        device_ranks(scene.tools, tables)
+    except ValueError as error:
+        raise SceneError(f"--device: {error}") from None
+    for tool, device in enumerate(devices):
+        if scene.device_of(tool).kind != device and device not in named:
+            scene = scene.model_copy(update=moved_by(scene, tool, device))
+    return scene
 
 
 def _scheduled(device: Any, options: RunOptions) -> Any:
@@ -187,7 +212,8 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     green = palpate.precompute(body)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
-    of_run = RunOptions(radius=options.radius, cpus=options.cpus, priority=options.priority)
+    of_loop = {name: getattr(options, name) for name in OF_LOOP}
+    of_run = RunOptions(radius=options.radius, **of_loop)
     built = BuiltScene.of(scene_with(scene, of_run), body, green)
     if options.radius is None:
         told.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")

@@ -12,7 +12,7 @@ import typer
 
 from palpate.cli.app import app
 from palpate.cli.bodies import ElementChoice, MaxSize, Repair
-from palpate.cli.completion import models, units
+from palpate.cli.completion import devices, models, units
 
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
@@ -34,6 +34,14 @@ Record = Annotated[
 ]
 Priority = Annotated[
     int | None, typer.Option(help="Real-time priority of the loop's thread, 1 to 99; 0 asks for none; default: 80.")
+]
+Devices = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--device",
+        help="What moves a tool: haply, touch, forcedimension, or the name of a [[device]]; again for the next tool.",
+        autocompletion=devices,
+    ),
 ]
 Recordings = Annotated[Path, typer.Option(help="Folder of what the page records; default: this one.")]
 PORT = 8642
@@ -103,6 +111,7 @@ def run(
     surface_map: Annotated[
         Path | None, typer.Option("--map", help="Map of 'palpate palpate' to show: stiffness.vtu or detection.vtu.")
     ] = None,
+    device: Devices = None,
     cpus: Cpus = None,
     priority: Priority = None,
     record: Record = None,
@@ -125,6 +134,8 @@ def run(
 
     Example: palpate run scene.toml --headless 3 --out results
 
+    Example: palpate run scene.toml --device haply
+
     Example: palpate run scene.toml --record press.mcap
 
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
@@ -133,8 +144,8 @@ def run(
 
     lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
-    scheduling = {"cpus": cpus, "priority": priority}
-    built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths, **scheduling))
+    of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
+    built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop))
     if headless is not None:
         _scripted(built, file.stem, headless, out, record)
         return
@@ -226,3 +237,6 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
     if record.interrupted:
         print("palpate: interrupted", file=sys.stderr)
         raise typer.Exit(130)
+    if statistics["fault"] is not None:
+        print(f"palpate: {statistics['fault']}", file=sys.stderr)
+        raise typer.Exit(1)

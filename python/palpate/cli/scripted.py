@@ -56,7 +56,10 @@ class PressRecord:
 
 
 def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = None) -> PressRecord:
-    """Press for so many seconds, within the scene's limit of strain, or until Ctrl-C; recorded in a new file."""
+    """Press for so many seconds, within the scene's limit of strain, or until Ctrl-C; recorded in a new file.
+
+    A tool that a device moves goes where the hand on it does.
+    """
     rest, depth = _target(built)
     logs, depths, sampled = [], [], []
     limited: list[Frame] = []
@@ -65,13 +68,15 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
     if recording is not None:
         simulation.record(recording)
     with simulation:
+        by_script = 0 not in simulation.devices
         hardest = simulation.frame()
         start = time.monotonic()
         try:
             while (elapsed := time.monotonic() - start) < seconds:
                 phase = elapsed / seconds
                 push = depth * np.clip(4.0 * min(phase - 0.1, 0.85 - phase), -0.1, 1.0)
-                simulation.move(rest - [0, 0, push])
+                if by_script:
+                    simulation.move(rest - [0, 0, push])
                 time.sleep(1.0 / POINTER_RATE)
                 logs.append(simulation.drain_log())
                 # The press is along a line: the largest force has the largest strain.

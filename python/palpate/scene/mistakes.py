@@ -33,7 +33,16 @@ Place = Sequence[str | int]
 def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel]) -> str:
     """First mistake of the file, with its line and the nearest known key of ``model``'s tables."""
     first = error.errors()[0]
-    place = [k for k in first["loc"] if isinstance(k, int) or k not in UNION_MEMBERS]
+    found = getattr(first.get("ctx", {}).get("error"), "place", first["loc"])
+    place = [k for k in found if isinstance(k, int) or k not in UNION_MEMBERS]
+    if place[:1] == ["[[device]]"]:
+        place = ["device", *([place[1] + 1, *place[2:]] if len(place) > 1 else [])]
+    elif (
+        place[:1] == ["device"]
+        and not any(isinstance(key, int) for key in place)
+        and re.search(r"^\s*\[\[\s*device", text, re.MULTILINE)
+    ):
+        place[1:1] = [0]
     keys = [k for k in place if isinstance(k, str)]
     where = ".".join(keys)
     at = located(path, text, place)
@@ -142,7 +151,8 @@ def _known_keys(model: type[BaseModel], parents: Sequence[str]) -> list[str]:
         model = next(
             kind for kind in _kinds(field.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)
         )
-    return [field.alias or name for name, field in model.model_fields.items()]
+    known = [field.alias or name for name, field in model.model_fields.items()]
+    return [key for key in known if key.isidentifier()]
 
 
 def _kinds(annotation: object) -> list[object]:

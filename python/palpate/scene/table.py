@@ -53,6 +53,14 @@ def one_of(what: str, allowed: Callable[[Any], bool]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+class Mistake(ValueError):
+    """A mistake that shows only beside other tables, and the place in the file at which it stands."""
+
+    def __init__(self, message: str, place: tuple[str | int, ...]):
+        super().__init__(message)
+        self.place = place
+
+
 def is_whole(value: Any, least: int = 0) -> bool:
     """Whether a value is a whole number of at least ``least``."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= least

@@ -10,10 +10,11 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from palpate import models
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
+from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
-from palpate.scene.table import Force, Length, Number, Point, Pressure, Radius, Stiffness, Table, Time, is_whole, one_of
+from palpate.scene.table import Length, Number, Point, Pressure, Radius, Table, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
 
 # As many as the force loop takes.
@@ -111,12 +112,14 @@ class ToolTable(ShapeTable):
     ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
     goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
     names a ``contact_radius`` and no law is a patch, for only patches have one; one that is not given follows the body.
+    ``device`` is the name of a ``[[device]]`` table, or a kind of device.
     """
 
     contact: Literal["local", "patch", "node"] = "local"
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
     pad_youngs_modulus: Pressure | None = None
     contact_radius: Radius | None = None
+    device: str | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -130,29 +133,6 @@ class ToolTable(ShapeTable):
         if self.shape != "sphere" and self.contact != "local":
             raise ValueError(f"contact = '{self.contact}' is for spheres: a tool of shape '{self.shape}' takes 'local'")
         return self
-
-
-_CPUS = one_of(
-    "a list of processors, such as [1]",
-    lambda v: isinstance(v, (list, tuple)) and all(map(is_whole, v)) and len(set(v)) == len(v),
-)
-
-
-class DeviceTable(Table):
-    """Limits of the device, kept by the safety stage, ticks a second, and how the loop's thread is scheduled.
-
-    ``cpus`` are the processors that the thread keeps to, by their numbers; none for any. ``priority`` is that under
-    ``SCHED_FIFO``, 1 to 99, where the system grants it, or 0 for ordinary scheduling; one that is given and not granted
-    is warned of, the default is only told in the statistics.
-    """
-
-    max_force: Force = 8.0
-    max_slew: Annotated[float, Field(gt=0)] = 500.0
-    ramp: Time = 0.25
-    max_stiffness: Stiffness = 5000.0
-    rate: Annotated[float, Field(ge=100, le=10_000)] = 1000.0
-    cpus: Annotated[tuple[int, ...], _CPUS] = ()
-    priority: Annotated[int, Field(ge=0, le=99)] = 80
 
 
 class ViewTable(Table):
@@ -177,6 +157,8 @@ class SceneTables(Table):
     loads: list[LoadTable] = Field(default_factory=list)
     tools: list[ToolTable] = Field(default=[ToolTable()], alias="tool", min_length=1, max_length=MOST_TOOLS)
     device: DeviceTable = DeviceTable()
+    # As no file can name it: there they stand in further tables [[device]].
+    further_devices: list[DeviceTable] = Field(default_factory=list, alias="[[device]]", max_length=MOST_TOOLS - 1)
     dynamics: DynamicsTable | None = None
     view: ViewTable = ViewTable()
 
@@ -187,6 +169,29 @@ class SceneTables(Table):
     def _single(cls, tables: Any) -> Any:
         """Take a single table as the only entry."""
         return tables if isinstance(tables, list) else [tables]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _several_devices(cls, given: Any) -> Any:
+        """Take the first of several device tables for that of the scene, for the loop and its limits stand there."""
+        if not isinstance(given, dict) or not isinstance(given.get("device"), list):
+            return given
+        if not given["device"]:
+            return {key: value for key, value in given.items() if key != "device"}
+        first, *others = given["device"]
+        return {**given, "device": first, "[[device]]": others}
+
+    @model_validator(mode="after")
+    def _devices_of_tools(self) -> SceneTables:
+        check_tables(self.device, self.further_devices)
+        device_ranks(self.tools, [self.device, *self.further_devices])
+        return self
+
+    def device_of(self, tool: int) -> DeviceTable:
+        """Table of the device that moves a tool."""
+        tables = [self.device, *self.further_devices]
+        rank = device_ranks(self.tools, tables)[tool]
+        return self.device.of_kind(self.tools[tool].device) if rank is None else tables[rank]
 
     def __repr__(self) -> str:
         bodies = ", ".join(

@@ -16,8 +16,10 @@ from palpate.scene.tables import SceneTables
 FORMAT = 1
 
 
-def about(scene: SceneTables, bodies: Sequence[BuiltBody], shown: tuple[int, bool], clock: bool) -> dict[str, str]:
-    """Tables of the scene, where its paths start, and keys of what was computed for its bodies.
+def about(
+    scene: SceneTables, bodies: Sequence[BuiltBody], devices: Sequence[tuple], shown: tuple[int, bool], clock: bool
+) -> dict[str, str]:
+    """Tables of the scene, where its paths start, keys of what was computed for its bodies, and limits of its devices.
 
     ``shown`` is the number of tools of which a recording speaks, and whether it speaks of one without an axis of tools.
     """
@@ -32,6 +34,7 @@ def about(scene: SceneTables, bodies: Sequence[BuiltBody], shown: tuple[int, boo
         "keys": json.dumps(keys),
         "rate": repr(scene.device.rate),
         "tools": str(len(scene.tools)),
+        "devices": json.dumps(devices),
         "shown": json.dumps(shown),
         "clock": str(int(clock)),
     }

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from palpate.body import moduli_of_store, surface_moduli
-from palpate.errors import Error, SceneError
+from palpate.errors import BodyError, Error, SceneError
 from palpate.scene import BuiltBody
 from palpate.scene.mistakes import located
 from palpate.scene.tables import SceneTables
+from palpate.simulation.connecting import largest_stiffness
 
 
 def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
@@ -22,29 +23,45 @@ def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
         A surface file that is missing, cannot be read or holds no closed surface, with its line.
 
     """
-    tool, device = scene.tools[rank], scene.device
+    tool, most = scene.tools[rank], largest_stiffness(scene.device_of(rank))
     try:
         shape = tool.shape_arguments(scene.folder)
     except Error as error:
         path, text = scene.source
         raise SceneError(f"{located(path, text, ['tool', rank, 'shape'])}: tool.shape: {error}") from None
-    return shape, tool.contact_radius, tool.contact, device.max_stiffness, tool.friction, tool.pad_youngs_modulus
+    return shape, tool.contact_radius, tool.contact, most, tool.friction, tool.pad_youngs_modulus
 
 
 def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
-    """Arrays of one body in the order of the native module."""
+    """Arrays of one body in the order of the native module.
+
+    Elastic constants at the surface are given wherever they are known, for a tool under the local law may come later.
+
+    Raises
+    ------
+    BodyError
+        A store that does not know them, under a ``local`` law.
+
+    """
     motion = body.motion
     moving = None
     if motion is not None:
         shapes = motion.basis.shapes[body.green.surface_nodes].reshape(-1, len(motion.basis))
         moving = (motion.basis.eigenvalues, np.ascontiguousarray(shapes), motion.scheme, motion.exact, motion.coupling)
-    moduli = None
-    if local:
-        green = body.green
-        known = body.body is not None
+    return body.green._core, body.position, body.orientation, moving, _moduli(body, local)
+
+
+def _moduli(body: BuiltBody, needed: bool) -> tuple[np.ndarray, np.ndarray, bool] | None:
+    green = body.green
+    try:
         young, poisson = (
-            surface_moduli(body.body) if known else moduli_of_store(green.description, len(green.surface_nodes))
+            surface_moduli(body.body)
+            if body.body is not None
+            else moduli_of_store(green.description, len(green.surface_nodes))
         )
-        materials = green.description.get("materials", {}).values()
-        moduli = young, poisson, len({tuple(values[:2]) for values in materials}) == 1
-    return body.green._core, body.position, body.orientation, moving, moduli
+    except BodyError:
+        if needed:
+            raise
+        return None
+    materials = green.description.get("materials", {}).values()
+    return young, poisson, len({tuple(values[:2]) for values in materials}) == 1

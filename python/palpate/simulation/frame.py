@@ -123,6 +123,8 @@ class Frame(ComparedByValue, Exported):
         (tools, 3) N on the devices, and (tools, 3) N m about the tips.
     positions, orientations
         (tools, 3) m of the devices, and (tools, 4) unit quaternions w x y z.
+    active
+        (tools,) whether each tool is in the scene.
     limited
         (tools,) whether each tool is kept from following its device by the limit of strain.
     contacts
@@ -143,6 +145,7 @@ class Frame(ComparedByValue, Exported):
     torques: np.ndarray
     positions: np.ndarray
     orientations: np.ndarray
+    active: np.ndarray
     limited: np.ndarray
     contacts: list[Contact]
     bodies: tuple[BodyFrame, ...]
@@ -197,7 +200,7 @@ def frame_of(raw: dict[str, Any], bodies: Sequence[BuiltBody], stiffness_scales:
         BodyFrame(surface.reshape(-1, 3), None if energy is None else Energy(*energy), body.green, body, scale)
         for body, (surface, energy), scale in zip(bodies, raw["bodies"], stiffness_scales, strict=True)
     )
-    tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "limited")]
+    tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "active", "limited")]
     contacts = [contact_of(record, bodies) for record in raw["contacts"]]
     return Frame(raw["time"], *tools, contacts, moved, statistics)
 

@@ -13,6 +13,7 @@ from palpate import _native
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
 from palpate.simulation.about import require_same, scene_of
+from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.recording import Recording
 from palpate.simulation.simulation import Simulation
 
@@ -105,6 +106,7 @@ def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None)
     """
     simulation = Simulation(built_scene_of(recording, scene))
     simulation._arm_strain_limit()
+    assume_recorded(simulation._core, recording.about)
     return simulation
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene, Scene
+from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.frame import PERCENTILES, Frame, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording
 from palpate.simulation.replay import Difference, built_scene_of, unbroken
@@ -59,6 +60,7 @@ class ReplayedSimulation(Simulation):
         self.scene_as_built = built_scene_of(recorded, scene)
         super().__init__(self.scene_as_built)
         self._arm_strain_limit()
+        assume_recorded(self._core, recorded.about)
         self.recorded, self.ticks = recorded, unbroken(recorded)
         if self.ticks == 0:
             raise SceneError("the recording has no tick that can be made again")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 
 from palpate import _native, units
 from palpate.body import Body
+from palpate.devices import Device
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
@@ -21,16 +22,16 @@ from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
+from palpate.simulation.changing import UPRIGHT, Changing
+from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
 from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
-UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
-
-class Simulation(Adjustable):
+class Simulation(Adjustable, Changing):
     """Force loop of a scene.
 
     As a context manager it runs at 1 kHz on a thread of its own; :meth:`run` needs no clock.
@@ -41,6 +42,8 @@ class Simulation(Adjustable):
         What to touch, and with what.
     cpus, priority
         Processors and priority of the loop's thread, in place of those of ``scene.device``.
+    devices
+        Devices of the program by tool, in place of those of the scene.
 
     Attributes
     ----------
@@ -56,7 +59,14 @@ class Simulation(Adjustable):
 
     """
 
-    def __init__(self, scene: Scene | BuiltScene, *, cpus: Sequence[int] | None = None, priority: int | None = None):
+    def __init__(
+        self,
+        scene: Scene | BuiltScene,
+        *,
+        cpus: Sequence[int] | None = None,
+        priority: int | None = None,
+        devices: Mapping[int, Device] | None = None,
+    ):
         built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
         device, tools = self.scene.device, self.scene.tools
@@ -68,10 +78,16 @@ class Simulation(Adjustable):
         self._core = _native.SimulationCore(
             [body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
             [tool_arguments(self.scene, rank) for rank in range(len(tools))],
-            (device.max_force, device.max_slew, device.ramp),
+            (largest_force(self.scene), device.max_slew, device.ramp),
             self.scene.view.strain_limit,
             (device.rate, device.cpus, device.priority),
         )
+        assume_tables(self._core, self.scene)
+        self._given = dict(devices or {})
+        require_devices(self._given)
+        for tool in self._given:
+            self._tool(tool)
+        self._devices: dict[int, str] = {}
         self._strain_limit, self._armed = self.scene.view.strain_limit, False
         self._running = False
         self._to_record: Path | None = None
@@ -106,28 +122,43 @@ class Simulation(Adjustable):
         return self.bodies[0].motion
 
     def start(self) -> None:
-        """Start the loop; tools are out of the scene until moved.
+        """Open the devices, and start the loop; simulated tools are out of the scene until moved.
 
-        A priority that was asked for and is not granted gives a :class:`SchedulingWarning`.
+        A priority that was asked for and is not granted gives a :class:`SchedulingWarning`, a device that renders less
+        than the scene asks for a :class:`DeviceWarning`.
 
         Raises
         ------
+        DeviceError
+            A device that cannot be opened, and what to do.
         SceneError
             Processors of ``scene.device`` that this process may not run on.
 
         """
         if not self._running:
             self._arm_strain_limit()
-            start_loop(self._core, self.scene.device)
+            self._devices = connect(self._core, self.scene, self._given)
+            try:
+                start_loop(self._core, self.scene.device)
+            except BaseException:
+                self.stop()
+                raise
             self._running = True
             if self._to_record is not None:
                 path, self._to_record = self._to_record, None
                 self._begin_recording(path)
 
     def stop(self) -> None:
-        """Stop the loop; devices are left at zero force."""
+        """Stop the loop; devices are left at zero force, and closed."""
         self._core.stop()
         self._running = False
+        disconnect(self._core, self._given, self._devices)
+        self._devices = {}
+
+    @property
+    def devices(self) -> dict[int, str]:
+        """Names of the devices that move tools of the running loop, by tool; the others are simulated."""
+        return dict(self._devices)
 
     def record(self, path: str | os.PathLike[str]) -> None:
         """Record every tick from now on, or from the start of the loop, in a new file (MCAP).
@@ -167,7 +198,7 @@ class Simulation(Adjustable):
         self._core.begin_recording(path, self._about((tools, tools == 1), clock=True))
 
     def _about(self, shown: tuple[int, bool], clock: bool) -> dict[str, str]:
-        return about(self.scene, self.bodies, shown, clock)
+        return about(self.scene, self.bodies, _native.device_limits(self._core), shown, clock)
 
     def move(
         self,
@@ -184,9 +215,11 @@ class Simulation(Adjustable):
         Raises
         ------
         SceneError
-            No such tool, or numbers that are not finite.
+            No such tool, one that a device moves, or numbers that are not finite.
 
         """
+        if tool in self._devices:
+            raise SceneError(f"tool {tool} is moved by {self._devices[tool]}")
         place = three_numbers(position, "a tool's position", SceneError, units.length)
         moving = (0.0, 0.0, 0.0) if velocity is None else three_numbers(velocity, "a tool's velocity", SceneError)
         turned = self._targets[self._tool(tool)][1]
@@ -241,6 +274,9 @@ class Simulation(Adjustable):
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
+        failed = self._given.get(raw["failed_program"])
+        if failed is not None and failed.failure is not None:
+            raw["fault"] = f"tool {raw['failed_program']}: {failed.failure}; forces are off until a reset"
         return frame_of(raw, self.bodies, self._scales)
 
     def contacts(self) -> list[Contact]:

@@ -19,7 +19,7 @@ from palpate.errors import ViewerError
 from palpate.units import to_float
 from palpate.vectors import three_numbers
 
-VERSION = 8
+VERSION = 9
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}

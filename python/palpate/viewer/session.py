@@ -239,6 +239,7 @@ class Session:
     def _tool_entry(self, tool: int) -> dict[str, Any]:
         """Entry of the scene message, but for what its shape looks like."""
         return {
+            "device": self.simulation.devices.get(tool),
             "shapes": shape_choices(self.own_tools[tool]),
             "contact": self.built.scene.tools[tool].contact,
             "friction": self.simulation.friction_of(tool),
@@ -314,7 +315,7 @@ class Session:
         return {
             "position": position.tolist(),
             "orientation": frame.orientations[tool].tolist(),
-            "active": self._active[tool],
+            "active": bool(frame.active[tool]) if tool in self.simulation.devices else self._active[tool],
             "limited": limited,
             # Where the device is, while the tool does not follow it.
             "wanted": device.tolist() if limited else None,
@@ -324,6 +325,8 @@ class Session:
 
     def _press(self, message: Mapping[str, Any]) -> bool:
         tool, position = index(message, "tool", len(self._active)), np.array(vector(message, "position"))
+        if tool in self.simulation.devices:
+            raise ViewerError(f"press: tool {tool} is moved by {self.simulation.devices[tool]}")
         grab = message.get("grab", False)
         if not isinstance(grab, bool):
             raise ViewerError("press: grab must be true or false")

@@ -102,7 +102,9 @@ def frame_of(bodies, displacements, scales=None) -> Frame:
         for body, u, scale in zip(bodies, displacements, scales or [1.0] * len(bodies), strict=True)
     )
     zeros = np.zeros((1, 3))
-    return Frame(0.0, zeros, zeros, zeros, np.array([[1.0, 0, 0, 0]]), np.array([False]), [], made, {})
+    return Frame(
+        0.0, zeros, zeros, zeros, np.array([[1.0, 0, 0, 0]]), np.array([True]), np.array([False]), [], made, {}
+    )
 
 
 def test_a_frame_stands_where_its_bodies_stand(block, block_green, tmp_path):

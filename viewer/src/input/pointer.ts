@@ -27,6 +27,7 @@ const HOVER_TRIANGLES_MAX = 30_000;
 /** By which the tool turns for each pixel that the pointer goes with Alt. */
 const DEGREES_PER_PIXEL = 0.5;
 const ALL_PINNED = "All tools are pinned: Escape lets them go.";
+const ALL_MOVED = "Every tool is moved by a device: press with it.";
 
 /** What one pointer does from when it goes down on a body. */
 interface Drag {
@@ -118,7 +119,7 @@ export class Pointer {
     const pick = this.pick(event);
     if (!pick) return;
     const tool = drivenTool(state);
-    if (tool === null) return this.control.notice(ALL_PINNED);
+    if (tool === null) return this.control.notice(state.pinned.length > 0 ? ALL_PINNED : ALL_MOVED);
     this.begin(event, pick, tool, state);
   }
 

@@ -6,7 +6,7 @@
 
 import type { RecordedMessage, RecordingStatus, ReplayFrame, ReplayScene, SessionCommand } from "./session_messages";
 
-export const PROTOCOL_VERSION = 8;
+export const PROTOCOL_VERSION = 9;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -80,6 +80,8 @@ export interface ToolMessage {
   lengths: Vec3;
   /** Half of its smallest extent. */
   radius: number;
+  /** The device that moves it; null for one that the pointer does. */
+  device: string | null;
   /** The shapes that it may take. */
   shapes: Choice[];
   /** The law of its contacts: "local" slides and rubs, the others hold on to what they touch. */

@@ -1,6 +1,6 @@
 // Force, felt stiffness, depth, contact and strain over the picture.
 
-import { drivenTool } from "../store";
+import { shownTool } from "../store";
 import type { State, Store } from "../store";
 import { contactsOf, deepest, feltStiffness } from "../tool_contacts";
 import { byId, setText } from "./dom";
@@ -34,7 +34,7 @@ export class Readout {
   /** The force on the device of the driven tool, and in a second line those of pinned ones. */
   private showForces(state: Readonly<State>): void {
     const { frame, pinned } = state;
-    const tool = drivenTool(state);
+    const tool = shownTool(state);
     const driven = tool === null ? undefined : frame?.tools[tool];
     const force = driven?.force ?? [0, 0, 0];
     const magnitude = threeDigits(Math.hypot(...force));
@@ -54,7 +54,7 @@ export class Readout {
    */
   private showContact(state: Readonly<State>): void {
     const { pressing, frame, scene } = state;
-    const contacts = contactsOf(frame?.contacts ?? [], drivenTool(state));
+    const contacts = contactsOf(frame?.contacts ?? [], shownTool(state));
     const contact = deepest(contacts);
     const stiffness = feltStiffness(contacts, scene?.bodies ?? []);
     setText(this.stiffness, stiffness === null ? "–" : newtonsPerMillimetre(stiffness));

@@ -126,6 +126,11 @@ impl BodyModel {
         Ok(self)
     }
 
+    /// The same body elsewhere.
+    pub fn placed(&self, placement: Placement) -> Self {
+        Self { placement, ..self.clone() }
+    }
+
     /// Whether the other is the same body, wherever they stand.
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.prepared, &other.prepared)

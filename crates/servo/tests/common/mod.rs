@@ -51,6 +51,12 @@ pub fn single(moving: bool) -> Arc<Model> {
     Arc::new(Model::new(vec![body], vec![TOOL]).expect("a valid scene"))
 }
 
+/// A cube at rest at the origin under one tool.
+pub fn single_with(tool: ToolModel) -> Arc<Model> {
+    let body = BodyModel::new(green(&cube(4)), Placement::default()).expect("a valid body");
+    Arc::new(Model::new(vec![body], vec![tool]).expect("a valid scene"))
+}
+
 /// A cube at the origin under tools of the local law, one a shape.
 pub fn sliding(moving: bool, shapes: [ToolShape; 2]) -> Arc<Model> {
     let body = BodyModel::new(green(&cube(6)), Placement::default()).expect("a valid body");

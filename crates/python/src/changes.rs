@@ -1,0 +1,244 @@
+//! Devices of a simulation, and what comes into it or goes out of it, also while its loop runs.
+
+use std::sync::{Arc, PoisonError};
+
+use palpate_core::simulation::{BodyModel, Kept, Model, ToolModel};
+use palpate_core::{Error, Result};
+use palpate_devices::simulated::{Handle, Target, simulated};
+use palpate_devices::{Device, DeviceLimits, Mounted, Workspace};
+use palpate_scene::placement;
+use palpate_servo::{SceneChange, Settings, StrainPreparer};
+use pyo3::prelude::*;
+
+use crate::connection::{
+    Connected, LimitsArguments, LoopDevice, OpenedDevice, WorkspaceArguments, limits_of, limits_tuple,
+};
+use crate::errors::to_python;
+use crate::scene::{BodyArguments, ToolArguments, scene_body, tool};
+use crate::simulation::SimulationCore;
+
+/// Bodies and tools of a changed scene, in order: those that stay by their rank before, with `None` for each that is new.
+type Ranks = Vec<Option<usize>>;
+/// Positions (m) and orientations (w x y z).
+type Places = Vec<([f64; 3], [f64; 4])>;
+
+/// Gives a tool a device for the next start, or at once where the loop runs.
+#[pyfunction]
+pub fn connect(
+    py: Python<'_>,
+    core: &mut SimulationCore,
+    tool: usize,
+    device: &mut OpenedDevice,
+    workspace: WorkspaceArguments,
+    limits: LimitsArguments,
+) -> PyResult<()> {
+    let connected = Connected::new(py, device, workspace, limits)?;
+    let held = core.held_by(tool, &connected.limits);
+    if core.servo().is_none() {
+        core.device_limits[tool] = connected.limits;
+        core.connected[tool] = Some(connected);
+        core.model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
+        return Ok(());
+    }
+    if connected.scheduler.is_some() {
+        let message = "the device's driver calls the loop itself: stop the loop, and start it with the device";
+        return Err(to_python(py, Error::Invalid(message.into())));
+    }
+    let model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
+    let (bodies, tools) = (ranks(model.bodies.len()), ranks(model.tools.len()));
+    let mut devices: Vec<_> = model.tools.iter().map(|_| None).collect();
+    let limits = connected.limits;
+    devices[tool] = Some(core.device_of(tool, Some(connected)));
+    core.exchange(py, model, (&bodies, &tools), devices, core.settings)?;
+    core.device_limits[tool] = limits;
+    Ok(())
+}
+
+/// Lets go of devices that no loop has taken.
+#[pyfunction]
+pub fn disconnect(core: &mut SimulationCore) {
+    core.connected.iter_mut().for_each(|device| *device = None);
+}
+
+/// What the device of each tool can render, in the scene.
+#[pyfunction]
+pub fn device_limits(core: &SimulationCore) -> Vec<LimitsArguments> {
+    core.device_limits.iter().map(limits_tuple).collect()
+}
+
+/// Largest stiffness (N/m) that the scene asks for with each tool, and the one that its device leaves of it.
+#[pyfunction]
+pub fn tool_stiffness(core: &SimulationCore) -> Vec<(f64, f64)> {
+    let asked = core.asked.iter().map(|tool| tool.max_stiffness);
+    asked.zip(core.model.tools.iter().map(|tool| tool.max_stiffness)).collect()
+}
+
+/// Takes the devices of all tools to be such, before the loop starts: those of a recording, or of a scene.
+#[pyfunction]
+pub fn assume_devices(py: Python<'_>, core: &mut SimulationCore, limits: Vec<LimitsArguments>) -> PyResult<()> {
+    for (tool, limits) in limits.into_iter().enumerate().take(core.asked.len()) {
+        core.device_limits[tool] = limits_of(limits);
+    }
+    let held = core.asked.iter().zip(&core.device_limits).map(|(tool, device)| core.held(tool, device)).collect();
+    core.model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
+    Ok(())
+}
+
+/// Takes other bodies and tools: those that stay by their ranks, others in order; all bodies with their places. Devices of
+/// new tools are simulated. The loop goes on if it runs.
+#[pyfunction]
+pub fn change(
+    py: Python<'_>,
+    core: &mut SimulationCore,
+    bodies: (Ranks, Vec<BodyArguments<'_>>, Places),
+    tools: (Ranks, Vec<ToolArguments>),
+) -> PyResult<()> {
+    let ((body_ranks, new_bodies, places), (tool_ranks, new_tools)) = (bodies, tools);
+    let parts = new_bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
+    let before = core.model.clone();
+    let make = || -> Result<_> {
+        let mut built = parts.into_iter().map(|part| part.model());
+        let mut made = new_tools.into_iter().map(tool);
+        let bodies = body_ranks.iter().zip(places).map(|(rank, place)| {
+            let body: BodyModel = match rank {
+                Some(rank) => before.bodies.get(*rank).cloned().ok_or_else(missing)?,
+                None => built.next().ok_or_else(missing)??,
+            };
+            Ok(body.placed(placement(place.0, place.1)))
+        });
+        let bodies = bodies.collect::<Result<Vec<_>>>()?;
+        let mut tools: Vec<(ToolModel, Option<(f64, f64)>)> = Vec::new();
+        for rank in &tool_ranks {
+            tools.push(match rank {
+                Some(rank) => (before.tools.get(*rank).cloned().ok_or_else(missing)?, None),
+                None => {
+                    made.next().ok_or_else(missing)?.map(|(tool, radius, friction)| (tool, Some((radius, friction))))?
+                }
+            });
+        }
+        let model = before.changed(bodies, tools.iter().map(|(tool, _)| tool.clone()).collect())?;
+        Ok((Arc::new(model), tools))
+    };
+    let (model, tools) = py.detach(make).map_err(|e| to_python(py, e))?;
+    let settings = changed_settings(&core.settings, &body_ranks, &tool_ranks, &tools);
+    let radii = settings.contact_radius[..model.tools.len()].to_vec();
+    let checked = py.detach(|| radii.iter().try_for_each(|&radius| model.check_contact_radius(radius)));
+    checked.map_err(|e| to_python(py, e))?;
+    let devices = tool_ranks.iter().map(|rank| match rank {
+        Some(_) => None,
+        None => Some(core.device_of(usize::MAX, None)),
+    });
+    let devices: Vec<_> = devices.collect();
+    core.exchange(py, model.clone(), (&body_ranks, &tool_ranks), devices, settings)?;
+    let moved = |rank: &Option<usize>| rank.map_or(DeviceLimits::UNLIMITED, |rank| core.device_limits[rank]);
+    core.device_limits = tool_ranks.iter().map(moved).collect();
+    let asked = tool_ranks.iter().zip(&model.tools);
+    core.asked = asked.map(|(rank, new)| rank.map_or_else(|| new.clone(), |rank| core.asked[rank].clone())).collect();
+    Ok(())
+}
+
+fn missing() -> Error {
+    Error::Invalid("the change names a body or tool that there is not".into())
+}
+
+/// All of so many, as they are.
+fn ranks(count: usize) -> Ranks {
+    (0..count).map(Some).collect()
+}
+
+/// Settings by new ranks; those of new tools are their own.
+fn changed_settings(
+    before: &Settings,
+    bodies: &[Option<usize>],
+    tools: &[Option<usize>],
+    models: &[(ToolModel, Option<(f64, f64)>)],
+) -> Settings {
+    let mut settings = *before;
+    settings.contact_radius = Settings::default().contact_radius;
+    settings.friction = Settings::default().friction;
+    settings.stiffness_scale = Settings::default().stiffness_scale;
+    for (tool, (rank, (_, own))) in tools.iter().zip(models).enumerate() {
+        let kept = rank.map(|rank| (before.contact_radius[rank], before.friction[rank]));
+        (settings.contact_radius[tool], settings.friction[tool]) = kept.or(*own).unwrap_or_default();
+    }
+    for (body, rank) in bodies.iter().enumerate() {
+        rank.iter().for_each(|&rank| settings.stiffness_scale[body] = before.stiffness_scale[rank]);
+    }
+    let new_rank = |old: usize| bodies.iter().position(|&rank| rank == Some(old));
+    settings.watch = before.watch.and_then(|(body, node)| Some((new_rank(body)?, node)));
+    settings.strike.body = new_rank(before.strike.body).unwrap_or(0);
+    settings
+}
+
+impl SimulationCore {
+    /// The device of a tool: the one that is connected, or a simulated one at its target, with the limits that the scene gives it.
+    pub(crate) fn device_of(&self, tool: usize, connected: Option<Connected>) -> LoopDevice {
+        if let Some(Connected { device, scheduler, .. }) = connected {
+            let device = device.into_inner().unwrap_or_else(PoisonError::into_inner);
+            return LoopDevice { device, handle: None, scheduler };
+        }
+        let (handle, device) = simulated();
+        let limits = self.device_limits.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED);
+        let device: Box<dyn Device> = match limits == DeviceLimits::UNLIMITED {
+            true => Box::new(device),
+            false => Box::new(Mounted::new(Box::new(device), Workspace::default(), &limits)),
+        };
+        LoopDevice { device, handle: Some(handle), scheduler: None }
+    }
+
+    /// Largest stiffness that a tool may ask of a device.
+    fn held(&self, tool: &ToolModel, device: &DeviceLimits) -> f64 {
+        tool.max_stiffness.min(device.largest_stiffness(1.0 / self.scheduling.rate))
+    }
+
+    /// The same of all tools, one of which gets another device.
+    fn held_by(&self, changed: usize, device: &DeviceLimits) -> Vec<f64> {
+        let of_tool = |(rank, tool)| self.held(tool, if rank == changed { device } else { &self.device_limits[rank] });
+        self.asked.iter().enumerate().map(of_tool).collect()
+    }
+
+    /// The model with tools that ask for no more than so much.
+    fn model_with(&self, held: Vec<f64>) -> Result<Arc<Model>> {
+        let same = self.model.tools.iter().zip(&held).all(|(tool, &held)| tool.max_stiffness == held);
+        if same {
+            return Ok(self.model.clone());
+        }
+        let tools =
+            self.asked.iter().zip(held).map(|(tool, max_stiffness)| ToolModel { max_stiffness, ..tool.clone() });
+        Ok(Arc::new(self.model.changed(self.model.bodies.clone(), tools.collect())?))
+    }
+
+    /// Takes a model whose bodies and tools were at these ranks, in the loop too if it runs, with devices where they are new.
+    fn exchange(
+        &mut self,
+        py: Python<'_>,
+        model: Arc<Model>,
+        (bodies, tools): (&[Option<usize>], &[Option<usize>]),
+        devices: Vec<Option<LoopDevice>>,
+        settings: Settings,
+    ) -> PyResult<()> {
+        let mut kept = Kept::default();
+        kept.bodies.iter_mut().zip(bodies).for_each(|(to, &rank)| *to = rank);
+        kept.tools.iter_mut().zip(tools).for_each(|(to, &rank)| *to = rank);
+        let strain = self.strain.changed(&model, &kept);
+        let (handles, devices): (Vec<_>, Vec<_>) =
+            devices.into_iter().map(|new| new.map_or((None, None), |new| (Some(new.handle), Some(new.device)))).unzip();
+        let change =
+            SceneChange { model: model.clone(), kept, devices, settings, strain: StrainPreparer::clone(&strain) };
+        if let Some(servo) = self.servo() {
+            py.detach(|| servo.change(change)).map_err(|e| to_python(py, e))?;
+            let mut before: Vec<_> = std::mem::take(&mut self.handles).into_iter().map(Some).collect();
+            let of_tool = |(new, rank): (Option<Option<Handle>>, &Option<usize>)| {
+                new.unwrap_or_else(|| rank.and_then(|rank| before.get_mut(rank)?.take()).flatten())
+            };
+            self.handles = handles.into_iter().zip(tools).map(of_tool).collect();
+        }
+        let target = |rank: &Option<usize>| rank.map_or_else(Target::default, |rank| self.targets[rank]);
+        self.targets = tools.iter().map(target).collect();
+        let mut connected: Vec<_> = std::mem::take(&mut self.connected);
+        let stays = |rank: &Option<usize>| rank.and_then(|rank| connected.get_mut(rank)?.take());
+        self.connected = tools.iter().map(stays).collect();
+        (self.model, self.settings, self.strain) = (model, settings, strain);
+        Ok(())
+    }
+}

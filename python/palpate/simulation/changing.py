@@ -1,0 +1,260 @@
+"""Bodies, tools and devices that come into a simulation or go out of it, also while its loop runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from pydantic import ValidationError
+
+from palpate import _native, units
+from palpate.body import Body
+from palpate.devices import Device
+from palpate.errors import SceneError, SimulationError
+from palpate.green import GreensFunction, precompute
+from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
+from palpate.scene.devices import KINDS, moved_by, tables_of_tools
+from palpate.scene.tables import BodyTable, SceneTables
+from palpate.simulation.arguments import body_arguments, tool_arguments
+from palpate.simulation.connecting import connect_tool, require_devices
+from palpate.vectors import three_numbers
+
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+Rank = int | None
+
+
+class Changing:
+    """The nodes of a scene, while they are simulated.
+
+    Ranks of bodies and tools behind one that is removed go down by one. Contacts between what stays go on, and forces
+    of what comes ramp in; a device that goes is left at zero force. A loop that is being recorded cannot be changed.
+    """
+
+    scene: SceneTables
+    bodies: tuple[BuiltBody, ...]
+    _core: _native.SimulationCore
+    _scales: list[float]
+    _radii: list[float]
+    _friction: list[float]
+    _targets: list[tuple[Any, Any]]
+    _grab: list[bool]
+    _armed: bool
+    _running: bool
+    _given: dict[int, Device]
+    _devices: dict[int, str]
+
+    def add_body(
+        self,
+        body: Body | GreensFunction | Scene | Mapping[str, Any],
+        position: Sequence[float] | None = None,
+        orientation: Sequence[float] | None = None,
+    ) -> int:
+        """Add a body at a position, m, with an orientation, a unit quaternion w x y z; returns its rank.
+
+        It is computed first, if need be. A scene gives its first body, a mapping is taken as a ``[body]`` table; both
+        say where they stand, unless it is said here. Of a Green's function the file must be there.
+
+        Raises
+        ------
+        Error
+            A body that cannot be built, more bodies than a scene takes, or a loop that is being recorded.
+
+        """
+        built, table = _built(body)
+        place = _placed(table.position if position is None else position, table.orientation, orientation)
+        built, table = replace(built, position=place[0], orientation=place[1]), _moved(table, place)
+        bodies = [*range(len(self.bodies)), None]
+        scene = self.scene.model_copy(update={"bodies": [*self.scene.bodies, table]})
+        self._exchange(scene, (*self.bodies, built), bodies, list(range(len(self.scene.tools))))
+        return len(self.bodies) - 1
+
+    def remove_body(self, body: int) -> None:
+        """Remove a body, and the contacts on it.
+
+        Raises
+        ------
+        Error
+            No such body, the last one, or a loop that is being recorded.
+
+        """
+        kept: list[Rank] = [rank for rank in range(len(self.bodies)) if rank != self._body(body)]
+        if not kept:
+            raise SceneError("a simulation needs a body: add another one before the last is removed")
+        tables = [table for rank, table in enumerate(self.scene.bodies) if rank != body]
+        bodies = tuple(one for rank, one in enumerate(self.bodies) if rank != body)
+        scene = self.scene.model_copy(update={"bodies": tables})
+        self._exchange(scene, bodies, kept, list(range(len(self.scene.tools))))
+
+    def place_body(self, body: int, position: Sequence[float], orientation: Sequence[float] | None = None) -> None:
+        """Put a body at a position, m, with an orientation, a unit quaternion w x y z; None keeps the one it has.
+
+        Contacts go on as if their tools had moved.
+
+        Raises
+        ------
+        Error
+            No such body, numbers that are not finite, or a loop that is being recorded.
+
+        """
+        moved = self.bodies[self._body(body)]
+        place = _placed(position, moved.orientation, orientation)
+        bodies, tables = list(self.bodies), list(self.scene.bodies)
+        bodies[body] = replace(moved, position=place[0], orientation=place[1])
+        tables[body] = _moved(tables[body], place)
+        scene = self.scene.model_copy(update={"bodies": tables})
+        self._exchange(scene, tuple(bodies), list(range(len(bodies))), list(range(len(self.scene.tools))))
+
+    def add_tool(self, device: str | Device = "simulated", **table: Any) -> int:
+        """Add a tool, given as in a ``[tool]`` table, moved by a device of a kind or of the program; returns its rank.
+
+        Raises
+        ------
+        Error
+            A mistake in the table, more tools than a scene takes, a device that cannot be opened, or a loop that is
+            being recorded.
+
+        """
+        try:
+            tool = ToolTable(**{"radius": self.scene.tools[0].radius, **table})
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            raise SceneError(f"tool.{place}: {first['msg'].removeprefix('Value error, ')}") from None
+        given = None if isinstance(device, str) else device
+        rank = len(self.scene.tools)
+        require_devices({} if given is None else {rank: given})
+        kind = device if isinstance(device, str) else "simulated"
+        if kind not in KINDS:
+            raise SceneError(f"there is no kind of device '{kind}'; there are {', '.join(KINDS)}")
+        first, *further = [*tables_of_tools(self.scene), self.scene.device.of_kind(kind)]
+        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
+        scene = self.scene.model_copy(update={"tools": [*tools, tool], "device": first, "further_devices": further})
+        scene = BuiltScene(scene, self.bodies).scene
+        self._exchange(scene, self.bodies, list(range(len(self.bodies))), [*range(rank), None])
+        if given is not None:
+            self._given[rank] = given
+        if self._running and (given is not None or kind != "simulated"):
+            try:
+                self._devices[rank] = connect_tool(self._core, self.scene, rank, given)
+            except BaseException:
+                self.remove_tool(rank)
+                raise
+        return rank
+
+    def remove_tool(self, tool: int) -> None:
+        """Remove a tool, and its contacts; its device is left at zero force.
+
+        Raises
+        ------
+        Error
+            No such tool, the last one, or a loop that is being recorded.
+
+        """
+        kept: list[Rank] = [rank for rank in range(len(self.scene.tools)) if rank != self._tool(tool)]
+        if not kept:
+            raise SceneError("a simulation needs a tool: add another one before the last is removed")
+        devices = tables_of_tools(self.scene, without=tool)
+        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
+        update = {"tools": tools[:tool] + tools[tool + 1 :], "device": devices[0], "further_devices": devices[1:]}
+        self._exchange(self.scene.model_copy(update=update), self.bodies, list(range(len(self.bodies))), kept)
+        gone, connected = self._given.pop(tool, None), tool in self._devices
+        self._given = {rank - (rank > tool): given for rank, given in self._given.items()}
+        self._devices = {rank - (rank > tool): name for rank, name in self._devices.items() if rank != tool}
+        if gone is not None and connected:
+            gone.close_for_loop()
+
+    def connect(self, tool: int, device: Device | str) -> str:
+        """Let a tool of the running loop be moved by another device: of the program, or of a kind; returns its name.
+
+        Forces ramp in. The device that moved the tool is left at zero force.
+
+        Raises
+        ------
+        Error
+            A device that cannot be opened or calls the loop itself, a loop that does not run or is being recorded.
+
+        """
+        self._tool(tool)
+        if not self._running:
+            raise SimulationError("the simulation does not run: give it its devices, or their kinds in the scene")
+        given = None if isinstance(device, str) else device
+        require_devices({} if given is None else {tool: given})
+        kind = device if isinstance(device, str) else "simulated"
+        if given is None and kind not in KINDS[1:]:
+            raise SceneError(f"there is no kind of device '{kind}' to connect; there are {', '.join(KINDS[1:])}")
+        scene = self.scene.model_copy(update=moved_by(self.scene, tool, kind))
+        self._devices[tool] = connect_tool(self._core, scene, tool, given)
+        self.scene, before = scene, self._given.pop(tool, None)
+        if given is not None:
+            self._given[tool] = given
+        if before is not None:
+            before.close_for_loop()
+        return self._devices[tool]
+
+    def _exchange(
+        self, scene: SceneTables, bodies: tuple[BuiltBody, ...], body_ranks: list[Rank], tool_ranks: list[Rank]
+    ) -> None:
+        """Give the core bodies and tools, of which some were at these ranks before."""
+        local = any(tool.contact == "local" for tool in scene.tools)
+        new_bodies = [
+            body_arguments(body, local) for body, rank in zip(bodies, body_ranks, strict=True) if rank is None
+        ]
+        new_tools = [tool_arguments(scene, tool) for tool, rank in enumerate(tool_ranks) if rank is None]
+        places = [(tuple(body.position), tuple(body.orientation)) for body in bodies]
+        _native.change(self._core, (body_ranks, new_bodies, places), (tool_ranks, new_tools))
+        self.scene, self.bodies = scene, bodies
+        tools = scene.tools
+        self._scales = [1.0 if rank is None else self._scales[rank] for rank in body_ranks]
+        radii, friction, targets, grab = self._radii, self._friction, self._targets, self._grab
+        new = [rank is None for rank in tool_ranks]
+        kept = [0 if rank is None else rank for rank in tool_ranks]
+        self._radii = [tools[t].contact_radius if new[t] else radii[k] for t, k in enumerate(kept)]
+        self._friction = [tools[t].friction if new[t] else friction[k] for t, k in enumerate(kept)]
+        self._targets = [((0.0, 0.0, 0.0), UPRIGHT) if new[t] else targets[k] for t, k in enumerate(kept)]
+        self._grab = [not new[t] and grab[k] for t, k in enumerate(kept)]
+        if self._armed and None in body_ranks:
+            for rank, was in enumerate(body_ranks):
+                if was is None:
+                    self._core.set_strain_measure(rank, bodies[rank].green.native_strain_measure)
+            # The running loop takes the measures with a scene that is otherwise the same.
+            everything = (list(range(len(bodies))), [], places), (list(range(len(tools))), [])
+            _native.change(self._core, *everything)
+
+    def _tool(self, tool: int) -> int:
+        raise NotImplementedError
+
+    def _body(self, body: int) -> int:
+        raise NotImplementedError
+
+
+def _built(body: Body | GreensFunction | Scene | Mapping[str, Any]) -> tuple[BuiltBody, BodyTable]:
+    """Build a body, and give the table that describes it."""
+    if isinstance(body, (Body, GreensFunction)):
+        green = precompute(body) if isinstance(body, Body) else body
+        if green.path is None:
+            raise SceneError("a body that is added needs the file of its Green's function: save it first")
+        table = BodyTable(store=str(green.path))
+        return BuiltBody(body if isinstance(body, Body) else None, green, None, table.title), table
+    scene = body if isinstance(body, Scene) else Scene(body=dict(body))
+    built = scene.build()
+    return built.bodies[0], built.scene.bodies[0]
+
+
+def _placed(
+    position: Sequence[float], before: Sequence[float], orientation: Sequence[float] | None
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position and orientation, checked by the table of a body."""
+    place = tuple(three_numbers(position, "a body's position", SceneError, units.length))
+    turned = tuple(map(float, before if orientation is None else orientation))
+    try:
+        BodyTable(model="beam", position=place, orientation=turned)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise SceneError(first["msg"].removeprefix("Value error, ")) from None
+    return place, turned
+
+
+def _moved(table: BodyTable, place: tuple[tuple[float, ...], tuple[float, ...]]) -> BodyTable:
+    return table.model_copy(update={"position": place[0], "orientation": place[1]})
