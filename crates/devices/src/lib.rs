@@ -5,14 +5,14 @@ mod device;
 pub mod emulated;
 pub mod forcedimension;
 mod frame;
-mod kinds;
 pub mod haply;
+mod kinds;
 pub mod known;
 mod library;
 mod mounted;
+pub mod openhaptics;
 mod opening;
 pub mod programmed;
-pub mod openhaptics;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};

@@ -58,7 +58,8 @@ impl Search {
         }
         let tried: Vec<String> = candidates.iter().map(|path| path.display().to_string()).collect();
         let tried = tried.join(", ");
-        let what = broken.unwrap_or_else(|| format!("the library of {} is not found, looked for as {tried}", self.product));
+        let what =
+            broken.unwrap_or_else(|| format!("the library of {} is not found, looked for as {tried}", self.product));
         Err(OpenError::new(one_line(&what), format!("{}, or set {} to its file", self.advice, self.variable)))
     }
 }

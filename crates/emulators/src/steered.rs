@@ -77,7 +77,9 @@ impl SteeredTip {
 pub fn hand_from_environment() -> Hand {
     let asked = env::var(HAND_VARIABLE).unwrap_or_else(|_| PRESS_AND_SLIDE.to_owned());
     let waypoints = parse(&asked).unwrap_or_else(|wrong| {
-        eprintln!("{HAND_VARIABLE}: {wrong:?} is not \"time x y z\" in s and mm with times that grow: the usual hand is used");
+        eprintln!(
+            "{HAND_VARIABLE}: {wrong:?} is not \"time x y z\" in s and mm with times that grow: the usual hand is used"
+        );
         parse(PRESS_AND_SLIDE).unwrap_or_default()
     });
     Hand::firm(Wanted::Along(repeated(&waypoints)))

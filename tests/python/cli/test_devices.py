@@ -117,7 +117,15 @@ def test_without_a_terminal_nothing_is_pushed(pads, monkeypatch):
     assert pads.calls == []
 
 
-def test_the_command_line(tmp_path):
-    refused(run("devices", "joystick", cwd=tmp_path), "joystick", "haply")
+def test_the_command_line(tmp_path, monkeypatch):
+    refused(run("devices", "joystick", cwd=tmp_path), "joystick", "haply, touch, forcedimension")
+    # Nobody listens there, and there is no such file.
+    monkeypatch.setenv("PALPATE_HAPLY_ADDRESS", "ws://127.0.0.1:9")
+    for name in ("OPENHAPTICS", "FORCEDIMENSION"):
+        monkeypatch.setenv(f"PALPATE_{name}_LIBRARY", str(tmp_path / f"lib{name}.so"))
     result = run("devices", "--json", cwd=tmp_path)
-    assert result.returncode == (0 if any(kind["found"] for kind in json.loads(result.stdout)["kinds"]) else 1)
+    assert result.returncode == 1
+    haply, touch, forcedimension = json.loads(result.stdout)["kinds"]
+    assert haply["found"] == [] and "ws://127.0.0.1:9" in haply["missing"]["what"]
+    assert str(tmp_path / "libOPENHAPTICS.so") in touch["missing"]["what"]
+    assert str(tmp_path / "libFORCEDIMENSION.so") in forcedimension["missing"]["what"]

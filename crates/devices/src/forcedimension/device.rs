@@ -55,10 +55,7 @@ impl ForceDimensionDevice {
         };
         self.fresh_ns = Some(fresh_ns);
         Ok(Reading {
-            pose: Pose {
-                position: FRAME.to_palpate(position),
-                orientation: FRAME.orientation_to_palpate(orientation),
-            },
+            pose: Pose { position: FRAME.to_palpate(position), orientation: FRAME.orientation_to_palpate(orientation) },
             twist: Twist { linear: FRAME.to_palpate(linear), angular: FRAME.to_palpate(angular) },
             buttons: Buttons(dhd.buttons(id)),
             active: true,

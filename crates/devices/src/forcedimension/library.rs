@@ -167,9 +167,8 @@ impl Dhd {
     /// N and N m, in the vendor's frame.
     pub fn set_force_and_torque(self, force: DVec3, torque: DVec3, id: Id) -> Result<Freshness, c_int> {
         // SAFETY: numbers.
-        let returned = unsafe {
-            (self.0.set_force_and_torque)(force.x, force.y, force.z, torque.x, torque.y, torque.z, id)
-        };
+        let returned =
+            unsafe { (self.0.set_force_and_torque)(force.x, force.y, force.z, torque.x, torque.y, torque.z, id) };
         self.check(returned)
     }
 

@@ -36,7 +36,8 @@ pub fn list(connection: &Connection) -> Listing {
         Err(error) => return Listing { found: Vec::new(), missing: Some(error), facts: Vec::new() },
     };
     let ranks = open_ranks();
-    let found: Vec<FoundDevice> = (0..dhd.count() as i8).map(|rank| describe(dhd, rank, ranks.contains(&rank))).collect();
+    let found: Vec<FoundDevice> =
+        (0..dhd.count() as i8).map(|rank| describe(dhd, rank, ranks.contains(&rank))).collect();
     let missing = found.is_empty().then(nothing_found);
     Listing { found, missing, facts }
 }
@@ -160,7 +161,10 @@ fn nothing_found() -> OpenError {
 }
 
 fn in_use(rank: i8) -> OpenError {
-    OpenError::new(format!("Force Dimension device {rank} is in use by this program"), "use another one, or close it first")
+    OpenError::new(
+        format!("Force Dimension device {rank} is in use by this program"),
+        "use another one, or close it first",
+    )
 }
 
 fn does_not_open(dhd: Dhd, rank: i8, code: i32) -> OpenError {

@@ -67,7 +67,7 @@ impl Address {
             None if uri.authority().is_some_and(|named| named.as_str().ends_with(host)) => DEFAULT_PORT,
             None => return Err(refused("has a port that is none")),
         };
-        let mut address = Self { host, port, rate: DEFAULT_RATE, events_port: None, uri: Uri::default() };
+        let mut address = Self { host: host.to_string(), port, rate: DEFAULT_RATE, events_port: None, uri: Uri::default() };
         address.events_port = (port == DEFAULT_PORT).then_some(DEFAULT_EVENTS_PORT);
         for pair in uri.query().unwrap_or("").split('&').filter(|pair| !pair.is_empty()) {
             match pair.split_once('=') {

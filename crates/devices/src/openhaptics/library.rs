@@ -106,7 +106,6 @@ impl Hd {
         unsafe { (self.0.enable)(capability) };
     }
 
-
     pub fn begin_frame(self, handle: Handle) {
         // SAFETY: as above.
         unsafe { (self.0.begin_frame)(handle) };

@@ -122,8 +122,7 @@ fn prepared(hd: Hd, name: Option<&CString>) -> Result<(Handle, Traits), OpenErro
 
 /// A version whose number cannot be read is not refused: how the vendor writes it is not documented.
 fn check_version(version: &str) -> Result<(), OpenError> {
-    let digits: String =
-        version.chars().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
+    let digits: String = version.chars().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
     match digits.parse::<u32>() {
         Ok(major) if major < FIRST_VERSION => {
             let what = format!("the library of OpenHaptics is of version {version}");

@@ -195,7 +195,10 @@ impl HdScheduler {
         self.paused(&control, || {
             self.sweep();
             if self.slots().iter().any(|slot| slot.name == name) {
-                return Err(OpenError::new("the device is in use by this program", "use another one, or close it first"));
+                return Err(OpenError::new(
+                    "the device is in use by this program",
+                    "use another one, or close it first",
+                ));
             }
             let (handle, traits) = prepared(self.hd, name.as_ref())?;
             let slot = Arc::new(Slot {
