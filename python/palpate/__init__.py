@@ -36,7 +36,17 @@ from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
 from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
 from palpate.sessions import Comparison, QuantityDifference, compare, export, rerun
-from palpate.simulation import Contact, Difference, Frame, Recording, RecordingStatus, Replayed, Simulation, replay
+from palpate.simulation import (
+    Contact,
+    Difference,
+    Frame,
+    Recording,
+    RecordingStatus,
+    Replayed,
+    Simulation,
+    pack,
+    replay,
+)
 
 __version__ = version("palpate")
 
@@ -91,6 +101,7 @@ __all__ = [
     "export",
     "models",
     "modes",
+    "pack",
     "palpation",
     "plan",
     "precompute",

@@ -1,6 +1,7 @@
 //! Emulated haptic devices, for tests and for people without hardware, and the suite that every driver passes against its own.
 
 pub mod conformance;
+pub mod inverse_service;
 mod steered;
 pub mod vendor;
 

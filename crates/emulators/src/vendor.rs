@@ -23,7 +23,10 @@ pub const MOTORS_LENGTH: usize = 7;
 /// Everything that the library says is random.
 pub const NONSENSE: u32 = 6;
 
-/// Number of a disturbance; 0 is none, [`NONSENSE`] one more.
+/// The device has not been calibrated since it was switched on.
+pub const UNCALIBRATED: u32 = 7;
+
+/// Number of a disturbance; 0 is none, [`NONSENSE`] and [`UNCALIBRATED`] are more.
 pub fn disturbance_number(disturbance: Option<Disturbance>) -> u32 {
     match disturbance {
         None => 0,
@@ -129,7 +132,7 @@ impl Steering {
         Motors { wrench: Wrench { force: DVec3::new(fx, fy, fz), torque: DVec3::new(tx, ty, tz) }, at }
     }
 
-    /// Makes something go wrong with a device, by the number of [`disturbance_number`] or [`NONSENSE`].
+    /// Makes something go wrong with a device, by the number of [`disturbance_number`] [`NONSENSE`] or [`UNCALIBRATED`].
     pub fn disturb(&self, device: u32, number: u32) {
         // SAFETY: numbers.
         unsafe { (self.disturb)(device, number) };

@@ -40,6 +40,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_class::<simulation::SimulationCore>()?;
+    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
+    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
     module.add_class::<connection::OpenedDevice>()?;
     module.add_class::<programmed::ProgrammedDevice>()?;
     module.add_class::<devices::DeviceCheck>()?;
@@ -51,14 +53,13 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(changes::tool_stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(changes::assume_devices, module)?)?;
     module.add_function(wrap_pyfunction!(changes::change, module)?)?;
-    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
-    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;
     module.add_class::<surface::SurfaceSearch>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;
+    module.add_function(wrap_pyfunction!(scene::checksum, module)?)?;
     module.add_function(wrap_pyfunction!(strain::contact_patch, module)?)?;
     module.add_function(wrap_pyfunction!(strain::provisional_displacement, module)?)?;
     Ok(())

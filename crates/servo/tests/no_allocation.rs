@@ -11,7 +11,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use palpate_core::simulation::{Contact, Mode, Pose, Snapshot, Strike};
 use palpate_core::strain::StrainMeasure;
-use palpate_devices::{Buttons, Reading};
+use palpate_devices::emulated::{Command, Hand, Tip, Wanted, Waypoint, emulated, known};
+use palpate_devices::{Buttons, Device, DeviceLimits, Reading, Wrench};
 use palpate_servo::{ForceLoop, LoopHandle, Published, SafetyLimits, Settings, StrainPreparer};
 
 use common::{PERIOD, PERIOD_NS, device, scene, settings};
@@ -140,6 +141,25 @@ fn allocations_are_counted() {
     let start = allocations();
     drop(std::hint::black_box(vec![0_u8]));
     assert_eq!(allocations() - start, 2);
+}
+
+#[test]
+fn an_emulated_device_does_not_allocate() {
+    let at = |time: f64, z: f64| Waypoint { time, position: DVec3::new(0.0, 0.0, z) };
+    let wanted = Wanted::Along(vec![at(0.1, 0.0), at(0.4, -0.01), at(0.8, -0.01), at(1.2, 0.0)]);
+    for (_, mechanics) in known::ALL {
+        let tip = Tip::new(mechanics, DVec3::ZERO, Some(Hand::loose(wanted.clone())));
+        let (mut handle, mut device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
+        let start = allocations();
+        for tick in 0..3000 {
+            let said = device.read(tick * PERIOD_NS, PERIOD).expect("an emulated device has no faults");
+            let force = -300.0 * said.pose.position.min(DVec3::ZERO);
+            device.write(Wrench { force, ..Wrench::default() }).expect("an emulated device has no faults");
+            handle.set(Command { wanted: (tick > 2000).then_some(DVec3::Y), ..Command::default() });
+            handle.truth();
+        }
+        assert_eq!(allocations() - start, 0);
+    }
 }
 
 #[test]

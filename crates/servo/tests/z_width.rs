@@ -59,9 +59,9 @@ impl Held {
         Self { model, stiffness, largest: direction.dot(stiffness * direction), direction }
     }
 
-    /// Ticks of a tip that holds on, on a body of a stiffness, N/m.
-    fn run(&self, tip: Tip, period: f64, stiffness: f64, mut each: impl FnMut(&EmulatedTick) -> ControlFlow<()>) {
-        let settings = Settings { stiffness_scale: [stiffness / self.largest; MAX_BODIES], ..settings() };
+    /// Ticks of a tip that holds on, with the body's stiffness at a scale.
+    fn run(&self, tip: Tip, period: f64, scale: f64, mut each: impl FnMut(&EmulatedTick) -> ControlFlow<()>) {
+        let settings = Settings { stiffness_scale: [scale; MAX_BODIES], ..settings() };
         let strain = StrainPreparer::new(&self.model);
         let emulation = Emulation { model: &self.model, limits: BARE, settings, strain: &strain, period };
         let (mut handle, device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
@@ -78,9 +78,10 @@ impl Held {
         // At the edge of stability energy grows or fades with (b - K tau) / m.
         let ticks = (40.0 * mechanics.mass / mechanics.damping / period).max(400.0) as usize;
         let tip = Tip::new(mechanics, PLACE, None).moving(1e-2 * self.direction);
-        let scaled = self.stiffness * (stiffness / self.largest);
+        let scale = stiffness / self.largest;
+        let scaled = self.stiffness * scale;
         let (mut middle, mut end) = (0.0, 0.0);
-        self.run(tip, period, stiffness, |tick| {
+        self.run(tip, period, scale, |tick| {
             let truth = tick.truths[0];
             let x = truth.position - PLACE;
             let energy = mechanics.mass * truth.velocity.length_squared() + x.dot(scaled * x);
@@ -156,7 +157,7 @@ fn mechanics(mass: f64, damping: f64, delay: f64) -> Mechanics {
 /// negative damping `K (T/2 + d)`: it needs all of the device's own, as the worst of hands does.
 #[test]
 fn the_largest_stable_stiffness_of_a_heavy_tip_is_the_bound_for_any_hand() {
-    let held = Held::new(5000.0);
+    let held = Held::new(1e9);
     for (mass, damping, period, delay) in [
         (0.2, 0.8, 1e-3, 0.0),
         (0.1, 2.0, 0.5e-3, 0.0),
@@ -178,7 +179,7 @@ fn the_largest_stable_stiffness_of_a_heavy_tip_is_the_bound_for_any_hand() {
 /// `theta / sin theta` times the bound.
 #[test]
 fn a_light_tip_holds_more() {
-    let held = Held::new(5000.0);
+    let held = Held::new(1e9);
     let (damping, period) = (0.8, 1e-3);
     for (delay, share) in [(0.0, 0.5), (0.0, 2.0), (1.6e-3, 0.5), (1.6e-3, 2.0)] {
         let late: f64 = 0.5 * period + delay;
@@ -197,13 +198,15 @@ fn a_light_tip_holds_more() {
     }
 }
 
-/// Speed of a tip in the last of two seconds under a steady push, m/s, on a sampled spring that is read in steps.
-fn speed_at_the_end(held: &Held, mechanics: Mechanics, stiffness: f64, push: f64) -> f64 {
+/// Speed of a tip in the last of two seconds under a steady push, m/s, on a spring that is the same in all directions.
+fn speed_at_the_end(mechanics: Mechanics, stiffness: f64, push: f64) -> f64 {
     // Muscles so soft that the force is steady.
     let hand = Hand { mass: 0.0, damping: 0.0, stiffness: 1.0, wanted: Wanted::At(PLACE - push * DVec3::Z) };
     let tip = Tip::new(mechanics, PLACE, Some(hand));
+    // A body far stiffer than the tool may ask for: all the compliance is that in series.
+    let held = Held::new(stiffness);
     let mut speed = 0.0_f64;
-    held.run(tip, 1e-3, stiffness, |tick| {
+    held.run(tip, 1e-3, 1e4, |tick| {
         speed = if tick.number < 1000 { 0.0 } else { speed.max(tick.truths[0].velocity.z.abs()) };
         if tick.number == 2000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -215,19 +218,46 @@ fn speed_at_the_end(held: &Held, mechanics: Mechanics, stiffness: f64, push: f64
 /// virtual-wall passivity, IEEE Trans. Robotics 21, 2005), however well the stiffness suits the damping.
 #[test]
 fn dry_friction_must_hold_half_a_step_of_the_encoder() {
-    // Nearly the same in all directions: the compliance in series makes up most of it.
-    let held = Held::new(20.0);
     let step = 5e-5;
     let tip = |friction: f64| Mechanics { encoder_step: step, dry_friction: friction, ..mechanics(0.1, 0.8, 0.0) };
     let stiffness = 0.5 * bound(&tip(0.0), 1e-3);
-    let along = DVec3::Z.dot(held.stiffness * DVec3::Z) * stiffness / held.largest;
-    let enough = 0.5 * along * step;
+    let enough = 0.5 * stiffness * step;
     for steps in [3.0, 11.0] {
-        let push = along * (steps + 0.5) * step;
+        let push = stiffness * (steps + 0.5) * step;
         for (friction, rests) in [(0.0, false), (0.9 * enough, false), (1.1 * enough, true), (3.0 * enough, true)] {
-            let speed = speed_at_the_end(&held, tip(friction), stiffness, push);
+            let speed = speed_at_the_end(tip(friction), stiffness, push);
             println!("{steps} steps, friction {:.2} of K step / 2: {speed:.2e} m/s", friction / enough);
             assert_eq!(speed == 0.0, rests, "{friction} of {enough}: {speed}");
         }
     }
+}
+
+/// Beyond the bound a cycle of amplitude `A` gains `pi (K T/2 - b) omega A^2` and dry friction takes `4 f A`: a tip that is
+/// struck comes to rest while it swings less than `4 f / (pi (K T/2 - b) omega)`, and runs away beyond.
+#[test]
+fn dry_friction_holds_more_until_the_tip_is_struck_harder() {
+    let (period, friction) = (1e-3, 0.05);
+    let tip = Mechanics { dry_friction: friction, ..mechanics(0.1, 0.8, 0.0) };
+    let stiffness = 1.5 * bound(&tip, period);
+    let held = Held::new(stiffness);
+    let comes_to_rest = |speed: f64| {
+        let mut moves = true;
+        held.run(Tip::new(tip, PLACE, None).moving(speed * DVec3::Z), period, 1e4, |tick| {
+            let truth = tick.truths[0];
+            moves = truth.velocity != DVec3::ZERO || tick.number == 0;
+            let ends = !moves || truth.position.distance(PLACE) > 0.1 || tick.number == 20_000;
+            if ends { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        !moves
+    };
+    let (mut rests, mut runs_away) = (0.01, 1.0);
+    assert!(comes_to_rest(rests) && !comes_to_rest(runs_away));
+    while runs_away > 1.005 * rests {
+        let middle = f64::sqrt(rests * runs_away);
+        if comes_to_rest(middle) { rests = middle } else { runs_away = middle }
+    }
+    // The speed of that amplitude.
+    let expected = 4.0 * friction / (std::f64::consts::PI * (0.5 * stiffness * period - tip.damping));
+    println!("struck at {rests:.4} m/s, by the balance of energy {expected:.4} m/s");
+    assert!((rests / expected - 1.0).abs() < 0.05, "{rests} {expected}");
 }

@@ -7,11 +7,13 @@ from palpate.cli import (  # noqa: F401  they register their commands
     doctor,
     envelope,
     examining,
+    packing,
     palpating,
     recordings,
     running,
     session_bench,
     sessions,
+    stability,
     verification,
 )
 from palpate.cli.app import main

@@ -114,7 +114,11 @@ impl Device for ForceDimensionDevice {
             false => self.dhd.set_force(force, id),
         };
         self.guard.note_write();
-        written.map_err(|code| self.failed(code))?;
+        if let Err(code) = written {
+            // A force that cannot be replaced is switched off; the guard switches on again what is well.
+            let _ = self.dhd.enable_force(false, id);
+            return Err(self.failed(code));
+        }
         if finite { Ok(()) } else { Err(DeviceFault::NotFinite) }
     }
 

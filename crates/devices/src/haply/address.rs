@@ -1,6 +1,7 @@
 //! Where the service listens, and how fast it is asked.
 
 use std::net::{SocketAddr, ToSocketAddrs};
+use std::time::Duration;
 
 use tungstenite::http::Uri;
 
@@ -16,12 +17,18 @@ const DEFAULT_PORT: u16 = 10001;
 const DEFAULT_EVENTS_PORT: u16 = 10020;
 
 /// Exchanges with the service a second unless the address says `?rate=`. Each waits for half a period on average before and
-/// after the tick: the delay falls with the rate, the processor time of driver and service rises (docs/devices.md).
+/// after the tick: the delay falls with the rate, the processor time of driver and service rises.
 pub const DEFAULT_RATE: f64 = 2000.0;
 /// Rates that make sense: below, a tick of 1 kHz would meet the same reading ten times over; above, no service answers.
 const RATES: std::ops::RangeInclusive<f64> = 100.0..=10_000.0;
 
-/// A parsed address: `ws://host:port?rate=HZ&events=PORT`.
+/// Time for which a force stays on the motors when the loop says nothing new, and for which a reply may be late before the force
+/// is taken off, ms, unless the address says `?hold=`. Machines and services that pause for longer need more.
+pub const DEFAULT_HOLD_MS: u32 = 5;
+/// Beyond the longer ones the device is stale anyway.
+const HOLDS_MS: std::ops::RangeInclusive<u32> = 1..=50;
+
+/// A parsed address: `ws://host:port?rate=HZ&hold=MS&events=PORT`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Address {
     /// For messages and the handshake.
@@ -30,6 +37,8 @@ pub struct Address {
     port: u16,
     /// Exchanges a second.
     pub rate: f64,
+    /// See [`DEFAULT_HOLD_MS`].
+    pub hold: Duration,
     /// Port of the channel of events on the same host; none is known for a service on another port than the default one.
     pub events_port: Option<u16>,
 }
@@ -67,7 +76,9 @@ impl Address {
             None if uri.authority().is_some_and(|named| named.as_str().ends_with(host)) => DEFAULT_PORT,
             None => return Err(refused("has a port that is none")),
         };
-        let mut address = Self { host: host.to_string(), port, rate: DEFAULT_RATE, events_port: None, uri: Uri::default() };
+        let host = host.trim_start_matches('[').trim_end_matches(']').to_string();
+        let hold = Duration::from_millis(u64::from(DEFAULT_HOLD_MS));
+        let mut address = Self { host, port, rate: DEFAULT_RATE, hold, events_port: None, uri: Uri::default() };
         address.events_port = (port == DEFAULT_PORT).then_some(DEFAULT_EVENTS_PORT);
         for pair in uri.query().unwrap_or("").split('&').filter(|pair| !pair.is_empty()) {
             match pair.split_once('=') {
@@ -75,11 +86,16 @@ impl Address {
                     let rate = value.parse().ok().filter(|rate| RATES.contains(rate));
                     address.rate = rate.ok_or_else(|| refused("asks for a rate outside of 100 to 10000 Hz"))?;
                 }
+                Some(("hold", value)) => {
+                    let hold = value.parse().ok().filter(|hold| HOLDS_MS.contains(hold));
+                    let hold: u32 = hold.ok_or_else(|| refused("asks for a hold outside of 1 to 50 ms"))?;
+                    address.hold = Duration::from_millis(u64::from(hold));
+                }
                 Some(("events", value)) => {
                     address.events_port =
                         Some(value.parse().map_err(|_| refused("has a port of events that is none"))?);
                 }
-                _ => return Err(refused("has a setting other than rate and events")),
+                _ => return Err(refused("has a setting other than rate, hold and events")),
             }
         }
         // The service is asked for its root: the settings are the driver's.
@@ -158,6 +174,8 @@ mod tests {
             "ws://h?speed=3",
             "ws://h?events=x",
             "ws://h?rate",
+            "ws://h?hold=0",
+            "ws://h?hold=2.5",
         ] {
             let message = Address::parse(text).expect_err(text).to_string();
             assert!(message.contains("ws://localhost:10001"), "{message}");

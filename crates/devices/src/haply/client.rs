@@ -1,7 +1,7 @@
 //! The driver's thread: sends the latest force, takes one state, publishes it, and so on.
 //!
 //! What stands on the motors is the latest force of a loop that goes on, or zero: zero when the loop or the measurements stop
-//! for [`HOLD_NS`], when anything is wrong with a reply, and last of all when the device is dropped.
+//! for a few milliseconds, when anything is wrong with a reply, and last of all when the device is dropped.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,18 +16,21 @@ use super::commands::{self, ForceMessage, KEEPALIVE};
 use super::fault::ReplyFault;
 use super::grips::Turning;
 use super::handoff::{Asked, Clock, Published};
-use super::output::{HOLD_NS, Output};
+use super::output::Output;
+use super::priority;
+use super::reading::understand;
 use super::safety_events::SafetyEvents;
 use super::service::Service;
 use super::snapshot::{Arm, Snapshot};
 use super::socket::{Socket, SocketError};
-use super::{entries, grips};
-use crate::{DeviceFault, Pose, Reading, Twist};
+use crate::{DeviceFault, Reading};
 
 /// After this time without a measurement the reading is a fault, ns: as long as the safety stage waits for one.
 pub const STALE_NS: u64 = 50_000_000;
 /// After this time without a reply the connection is given up.
 const DEAD: Duration = Duration::from_millis(500);
+/// Messages without force to an arm that a reply does not have: it may still have one.
+const ABSENT_FORCES: u32 = 16;
 /// Time between two questions for an arm that is not there.
 const ABSENT_PERIOD: Duration = Duration::from_millis(20);
 /// First and longest time between two attempts to connect.
@@ -46,8 +49,8 @@ enum Phase {
     Forces,
     /// It has just come: how it is to be set.
     Hello,
-    /// It is not there.
-    Absent,
+    /// It is not there, for so many messages.
+    Absent(u32),
 }
 
 /// The thread's side of a device.
@@ -117,6 +120,7 @@ impl Client {
 
     /// Until it is stopped.
     pub fn run(mut self) {
+        priority::raise();
         while !self.is_stopped() {
             match self.exchange() {
                 Ok(()) => self.pace(),
@@ -147,9 +151,9 @@ impl Client {
         }
         let sent = Instant::now();
         socket.send(match self.phase {
-            Phase::Forces => self.message.of(force),
             Phase::Hello => &self.hello,
-            Phase::Absent => KEEPALIVE,
+            Phase::Absent(ABSENT_FORCES..) => KEEPALIVE,
+            Phase::Forces | Phase::Absent(_) => self.message.of(force),
         })?;
         let reply = self.reply(sent)?;
         self.round_trip = sent.elapsed();
@@ -160,14 +164,15 @@ impl Client {
     /// Waits until the next message is due.
     pub fn pace(&mut self) {
         let now = Instant::now();
-        self.due = (self.due + if self.phase == Phase::Absent { ABSENT_PERIOD } else { self.period }).max(now);
+        let period = if matches!(self.phase, Phase::Absent(ABSENT_FORCES..)) { ABSENT_PERIOD } else { self.period };
+        self.due = (self.due + period).max(now);
         thread::sleep(self.due - now);
     }
 
     /// The force for the next message.
     fn next_force(&mut self) -> DVec3 {
         let now_ns = self.clock.now_ns();
-        let longest_ns = HOLD_NS.max(2 * self.period.as_nanos() as u64);
+        let longest_ns = self.service.address.hold.max(2 * self.period).as_nanos() as u64;
         let age_ns = now_ns.saturating_sub(self.published.reading.timestamp_ns);
         let measured = self.published.fault.is_none() && age_ns <= longest_ns && self.phase == Phase::Forces;
         self.output.choose(self.from_loop.read(), self.published.faults, measured, now_ns)
@@ -177,7 +182,7 @@ impl Client {
     /// one that counts.
     fn reply(&mut self, sent: Instant) -> Result<Utf8Bytes, SocketError> {
         let socket = self.socket.as_mut().ok_or(SocketError::Closed)?;
-        match socket.receive(sent + Duration::from_nanos(HOLD_NS)) {
+        match socket.receive(sent + self.service.address.hold) {
             Err(SocketError::TimedOut) => {}
             reply => return reply,
         }
@@ -199,11 +204,14 @@ impl Client {
     /// Publishes what a reply says.
     fn take(&mut self, reply: &str) {
         let now_ns = self.clock.now_ns();
-        let understood = self.understand(reply, now_ns);
+        let understood = understand(reply, (&self.arm.id, self.arm.rank), &mut self.turning, now_ns);
         match (self.phase, &understood) {
-            (_, Err(ReplyFault::Absent)) => self.phase = Phase::Absent,
+            (Phase::Absent(messages), Err(ReplyFault::Absent)) => {
+                self.phase = Phase::Absent(messages.saturating_add(1))
+            }
+            (_, Err(ReplyFault::Absent)) => self.phase = Phase::Absent(0),
             // Its state is that of before it was set up.
-            (Phase::Absent, Ok(_)) => return self.phase = Phase::Hello,
+            (Phase::Absent(_), Ok(_)) => return self.phase = Phase::Hello,
             (Phase::Hello, Ok(_)) => self.phase = Phase::Forces,
             _ => {}
         }
@@ -215,22 +223,6 @@ impl Client {
             }
             Err(fault) => self.fail(fault.into()),
         }
-    }
-
-    fn understand(&mut self, reply: &str, now_ns: u64) -> Result<Reading, ReplyFault> {
-        let message = entries::parse(reply)?;
-        let entry = entries::of_device(&message, &self.arm.id)?;
-        entries::check_motors(entry)?;
-        let (position, linear) = entries::tip(entry)?;
-        let grip = grips::of_arm(&message, self.arm.rank)?;
-        let (orientation, angular) = self.turning.follow(grip.map(|grip| grip.orientation), now_ns);
-        Ok(Reading {
-            pose: Pose { position, orientation },
-            twist: Twist { linear, angular },
-            buttons: grip.map(|grip| grip.buttons).unwrap_or_default(),
-            active: true,
-            timestamp_ns: now_ns,
-        })
     }
 
     fn look_at_events(&mut self) {
@@ -264,7 +256,7 @@ impl Client {
 
     fn begin_session(&mut self, socket: Socket, snapshot: &Snapshot) {
         self.socket = Some(socket);
-        self.phase = Phase::Absent;
+        self.phase = Phase::Absent(0);
         if let Some(arm) = snapshot.arms.iter().find(|arm| arm.id == self.arm.id) {
             self.arm = arm.clone();
             self.hello = commands::hello(arm, snapshot);

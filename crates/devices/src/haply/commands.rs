@@ -11,13 +11,11 @@ use super::snapshot::{Arm, Snapshot};
 
 /// A tick of the service that commands nothing.
 pub const KEEPALIVE: &str = "{}";
-/// Asks for a full state.
-pub const FULL_STATE: &str = r#"{"session":{"force_render_full_state":{}}}"#;
 /// Name of the session in the vendor's hub.
 const PROFILE: &str = "org.palpate.servo";
 
 /// The message with which a session begins: its name, the basis x right, y away, z up, the origin in the middle of the
-/// workspace where that can be chosen, and no force. The answer is a full state.
+/// workspace where that can be chosen, and no force.
 pub fn hello(arm: &Arm, snapshot: &Snapshot) -> String {
     let mut configure = json!({"profile": {"name": PROFILE}});
     if snapshot.other_basis.is_some() {
@@ -28,8 +26,7 @@ pub fn hello(arm: &Arm, snapshot: &Snapshot) -> String {
     if let Some(preset) = arm.origin.centred() {
         device["configure"] = json!({"preset": {"preset": preset}});
     }
-    let session = json!({"configure": configure, "force_render_full_state": Value::Object(Default::default())});
-    json!({"session": session, "inverse3": [device]}).to_string()
+    json!({"session": {"configure": configure}, "inverse3": [device]}).to_string()
 }
 
 /// Writes the messages of forces for one arm into the same memory.

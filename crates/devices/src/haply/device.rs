@@ -9,7 +9,7 @@ use triple_buffer::{Input, Output as Latest};
 
 use super::client::STALE_NS;
 use super::handoff::{Asked, Clock, Published};
-use super::output::{HOLD_NS, hold_ns};
+use super::output::hold_ns;
 use crate::{Device, DeviceFault, DeviceLimits, Reading, Wrench};
 
 /// Longest time to wait for the thread's last message. A thread that is about to connect has no force to take off.
@@ -25,6 +25,8 @@ pub struct Haply {
     /// Number of the latest fault that the loop knows of.
     knew: Option<u64>,
     fault: Option<DeviceFault>,
+    /// Shortest time for which a force stays on the motors, ns.
+    least_hold_ns: u64,
     hold_ns: u64,
     stop: Arc<AtomicBool>,
     thread: JoinHandle<()>,
@@ -34,11 +36,13 @@ impl Haply {
     /// With the thread that serves it.
     pub fn new(
         (name, limits): (String, DeviceLimits),
-        clock: Clock,
+        (clock, hold): (Clock, Duration),
         (from_thread, to_thread): (Latest<Published>, Input<Asked>),
         (stop, thread): (Arc<AtomicBool>, JoinHandle<()>),
     ) -> Self {
-        Self { name, limits, clock, from_thread, to_thread, knew: None, fault: None, hold_ns: HOLD_NS, stop, thread }
+        let hold_ns = hold.as_nanos() as u64;
+        let (knew, fault, least_hold_ns) = (None, None, hold_ns);
+        Self { name, limits, clock, from_thread, to_thread, knew, fault, least_hold_ns, hold_ns, stop, thread }
     }
 
     fn latest(&mut self) -> Result<Reading, DeviceFault> {
@@ -63,7 +67,7 @@ impl Device for Haply {
     }
 
     fn read(&mut self, _now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
-        self.hold_ns = hold_ns(period);
+        self.hold_ns = hold_ns(self.least_hold_ns, period);
         let said = self.latest();
         self.fault = said.err();
         said

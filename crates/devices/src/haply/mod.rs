@@ -20,10 +20,12 @@ mod handoff;
 mod numbers;
 mod open;
 mod output;
+mod priority;
+mod reading;
 mod safety_events;
 mod service;
 mod snapshot;
 mod socket;
 
-pub use address::{ADDRESS_VARIABLE, DEFAULT_ADDRESS, DEFAULT_RATE};
+pub use address::{ADDRESS_VARIABLE, DEFAULT_ADDRESS, DEFAULT_HOLD_MS, DEFAULT_RATE};
 pub use open::{list, open};

@@ -11,11 +11,14 @@ use super::handoff::{Asked, Clock, Published};
 use super::output::MAX_FORCE;
 use super::service::Service;
 use super::snapshot::{Arm, Snapshot};
+use super::socket::Socket;
 use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Opened, Reading, known};
 
 /// Exchanges by which the delay is measured before the first tick.
 const TRIALS: usize = 64;
-/// Longest time for them.
+/// Longest time until the service knows that another session has ended.
+const RELEASE: Duration = Duration::from_millis(500);
+/// Longest time for the trials.
 const LONGEST_TRIAL: Duration = Duration::from_millis(1500);
 
 /// The arms that the service has.
@@ -49,8 +52,8 @@ fn found(arm: Arm, limits: DeviceLimits) -> FoundDevice {
 /// No service, no such arm, or one that cannot be used now.
 pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
     let service = Service::of(connection)?;
-    let (socket, snapshot) = service.connect()?;
-    let arm = choose(&service, &snapshot, connection.id.as_deref())?;
+    let (socket, snapshot, arm) = find(&service, connection.id.as_deref())?;
+    let hold = service.address.hold;
     let (name, rate) = (format!("{} {}", arm.model, arm.id), service.address.rate);
     let clock = Clock::start();
     let (to_loop, from_thread) = triple_buffer(&Published::new(Reading::default()));
@@ -61,7 +64,7 @@ pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
     let thread = thread::Builder::new().name("haply".into()).spawn(move || client.run()).map_err(|error| {
         OpenError::new(format!("the system gives no thread for the {name} ({error})"), "close other programs")
     })?;
-    let device = Haply::new((name, limits(rate, delay)), clock, (from_thread, to_thread), (stop, thread));
+    let device = Haply::new((name, limits(rate, delay)), (clock, hold), (from_thread, to_thread), (stop, thread));
     Ok(Opened { device: Box::new(device), scheduler: None })
 }
 
@@ -76,6 +79,20 @@ fn no_arm(service: &Service) -> OpenError {
         format!("the Haply Inverse Service at {} runs, but has no Inverse3 or Minverse", service.address),
         "connect one by USB and switch it on; on Linux its serial port must be readable (group dialout)",
     )
+}
+
+/// Connects and chooses; waits for an arm that somebody has just let go of, for the service may not know it yet.
+fn find(service: &Service, id: Option<&str>) -> Result<(Socket, Snapshot, Arm), OpenError> {
+    let began = Instant::now();
+    loop {
+        let (socket, snapshot) = service.connect()?;
+        let arm = choose(service, &snapshot, id)?;
+        match arm.obstacle.clone() {
+            None => return Ok((socket, snapshot, arm)),
+            Some(_) if arm.is_in_use && began.elapsed() < RELEASE => thread::sleep(RELEASE / 10),
+            Some(obstacle) => return Err(obstacle),
+        }
+    }
 }
 
 fn choose(service: &Service, snapshot: &Snapshot, id: Option<&str>) -> Result<Arm, OpenError> {
@@ -93,7 +110,7 @@ fn choose(service: &Service, snapshot: &Snapshot, id: Option<&str>) -> Result<Ar
         }
         _ => no_arm(service),
     })?;
-    arm.obstacle.clone().map_or_else(|| Ok(arm.clone()), Err)
+    Ok(arm.clone())
 }
 
 /// Exchanges without force: the median time from a message to its reply, s.

@@ -6,17 +6,14 @@ use super::handoff::Asked;
 
 /// Largest force, N. UNVERIFIED: the vendor publishes none, other programs take 10 N an axis. The scene's `max_force` lowers it.
 pub const MAX_FORCE: f64 = 10.0;
-/// Shortest time for which a force stays on the motors when the loop says nothing new, and for which a reply may be late
-/// before the force is taken off, ns.
-pub const HOLD_NS: u64 = 5_000_000;
-/// Longest such time, of a slow loop, ns.
+/// Longest time for which the force of a slow loop stays on the motors, ns.
 const LONGEST_HOLD_NS: u64 = 50_000_000;
 /// After a force was withheld it comes back at this rate, N/s: the default of the safety stage, which does not know of it.
 const RETURN: f64 = 500.0;
 
-/// How long the force of a loop with this period, s, stays on the motors, ns: a tick may come late by two.
-pub fn hold_ns(period: f64) -> u64 {
-    ((3e9 * period) as u64).clamp(HOLD_NS, LONGEST_HOLD_NS)
+/// How long the force of a loop with this period, s, stays on the motors, ns: `least_ns`, or where a tick is late by two.
+pub fn hold_ns(least_ns: u64, period: f64) -> u64 {
+    ((3e9 * period) as u64).clamp(least_ns, LONGEST_HOLD_NS)
 }
 
 /// Withholds forces that are too old, and lets them come back gently.
@@ -65,7 +62,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     fn asked(force: f64, written_ms: u64) -> Asked {
-        Asked { force: DVec3::Z * force, knew: Some(0), written_ns: written_ms * MS, hold_ns: hold_ns(1e-3) }
+        Asked { force: DVec3::Z * force, knew: Some(0), written_ns: written_ms * MS, hold_ns: hold_ns(5 * MS, 1e-3) }
     }
 
     #[test]
@@ -73,8 +70,9 @@ mod tests {
         let mut output = Output::default();
         assert_eq!(output.choose(&asked(3.0, 100), 0, true, 105 * MS).z, 3.0);
         assert_eq!(output.choose(&asked(3.0, 100), 0, true, 105 * MS + 1).z, 0.0);
-        assert_eq!((hold_ns(1e-3), hold_ns(1e-2), hold_ns(1.0)), (5 * MS, 30 * MS, 50 * MS));
-        assert_eq!(hold_ns(f64::NAN), HOLD_NS);
+        let hold_of = |period| hold_ns(5 * MS, period);
+        assert_eq!((hold_of(1e-3), hold_of(1e-2), hold_of(1.0)), (5 * MS, 30 * MS, 50 * MS));
+        assert_eq!(hold_of(f64::NAN), 5 * MS);
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub struct Arm {
     pub origin: Origin,
     /// Why it cannot be used now.
     pub obstacle: Option<OpenError>,
+    /// Whether another session uses it.
+    pub is_in_use: bool,
     /// What else there is to know, by name.
     pub facts: Vec<(&'static str, String)>,
 }
@@ -47,10 +49,11 @@ impl Origin {
     }
 }
 
+/// Where a session of ours has it.
 impl std::fmt::Display for Origin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = match self {
-            Origin::Preset(name) => name.as_str(),
+            Origin::Preset(name) => self.centred().unwrap_or(name),
             Origin::Fixed(name) => name.as_deref().unwrap_or("device_base"),
         };
         match name {
@@ -120,8 +123,8 @@ fn arm(rank: usize, entry: &Value) -> Option<Arm> {
     for (name, path) in [("port", "/port"), ("handedness", "/handedness"), ("connected by", "/streaming_mode")] {
         facts.extend(text(path).map(|value| (name, value.to_string())));
     }
-    let obstacle = obstacle(&model, &id, entry);
-    Some(Arm { id, rank, model, origin, obstacle, facts })
+    let (obstacle, is_in_use) = (obstacle(&model, &id, entry), entries::flag(entry, "in_use") == Some(true));
+    Some(Arm { id, rank, model, origin, obstacle, is_in_use, facts })
 }
 
 /// Why an arm cannot be used, and what to do; what has to be done first comes first.

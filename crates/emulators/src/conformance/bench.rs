@@ -75,7 +75,7 @@ pub struct Motors {
 pub enum Disturbance {
     /// The cable is out.
     Unplugged,
-    /// The vendor's software reports an error of the device at every call, by a number that [`Facts::driver_error`] tells.
+    /// The vendor's software reports an error of the device whenever it is asked where it is, by a number that [`Facts::driver_error`] tells.
     DriverError,
     /// The vendor's software says that it is of a version with which the driver cannot work.
     WrongVersion,

@@ -1,0 +1,139 @@
+"""Stability of the loop with devices and hands, from the command line."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.benchmarks import bench_app
+
+if TYPE_CHECKING:
+    from palpate.validation.bench.touches import Touch
+    from palpate.validation.bench.zwidth import DeviceRow, Row
+
+
+@bench_app.command()
+def zwidth(
+    out: Annotated[Path | None, typer.Option(help="Folder for zwidth.csv, devices.csv and zwidth.png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the tables.")] = False,
+) -> None:
+    """Largest stiffness that the loop holds on emulated devices, by bisection, beside theory.
+
+    A map over delay and mass, and the known devices in a loose and a firm hand. It takes some minutes.
+
+    Example: palpate bench zwidth --out plots
+    """
+    from dataclasses import asdict
+
+    from palpate.progress import progress_reporter
+    from palpate.validation.bench import zwidth as bench
+
+    with progress_reporter("measuring the largest stable stiffness", True) as report:
+        rows, devices = bench.run(report)
+    if as_json:
+        print(json.dumps({"map": [asdict(row) for row in rows], "devices": [asdict(row) for row in devices]}, indent=2))
+    else:
+        _print_map(rows)
+        _print_devices(devices)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        bench.write(rows, out / "zwidth.csv")
+        bench.write(devices, out / "devices.csv")
+        bench.plot(rows, out / "zwidth.png")
+        print(f"wrote {out / 'zwidth.csv'}, {out / 'devices.csv'} and {out / 'zwidth.png'}", file=sys.stderr)
+
+
+def _print_map(rows: list[Row]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from palpate.validation.bench.zwidth import DAMPING, PERIOD
+
+    title = f"Largest stable stiffness, N/m, of a tip with {DAMPING:g} N s/m at {1 / PERIOD:g} Hz"
+    table = Table(title=title, title_justify="left")
+    columns = ("mass g", "delay ms", "b/(T/2+d)", "eigenvalue", "measured", "controller", "whole stage")
+    for name in columns:
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        figures = (row.any_hand, row.eigenvalue, row.bare, row.controlled, row.whole)
+        table.add_row(f"{1e3 * row.mass:g}", f"{1e3 * row.delay:g}", *(f"{figure:.1f}" for figure in figures))
+    Console().print(table)
+
+
+def _print_devices(rows: list[DeviceRow]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Known devices with assumed mechanics, N/m", title_justify="left")
+    table.add_column("device", no_wrap=True)
+    for name in ("recommended", "alone", "loose hand", "measured", "firm hand", "measured"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        figures = (row.recommended, row.any_hand, row.loose, row.loose_measured, row.firm, row.firm_measured)
+        table.add_row(row.name, *(f"{figure:.0f}" for figure in figures))
+    Console().print(table)
+    print("alone, hands: by theory, friction and encoder apart; measured: with them")
+
+
+@bench_app.command()
+def touches(
+    scenes: Annotated[
+        list[Path] | None, typer.Argument(help="Scene files (.toml); the built-in models if none is named.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the tables.")] = False,
+) -> None:
+    """Press, slide, hold and lift with simulated hands on every known device; exit code 1 if a tip does not rest.
+
+    Each scene is touched with eight emulated devices, loosely and firmly held; tools ask for no more stiffness than
+    the device holds. A Touch on blocks of 800 and 20,000 N/m shows what that limit does.
+
+    Example: palpate bench touches examples/block.toml examples/nodule.toml
+    """
+    from dataclasses import asdict
+
+    from palpate import Scene
+    from palpate.models import NAMES
+    from palpate.progress import narrated
+    from palpate.scene import model_scene
+    from palpate.validation.bench.emulation import known_devices
+    from palpate.validation.bench.touches import controls, touches
+
+    devices = known_devices()
+    chosen = [Scene.read(path) for path in scenes] if scenes else [model_scene(name, True, False) for name in NAMES]
+    found: list[tuple[Touch, bool | None]] = []
+    for scene in chosen:
+        with narrated(f"touching {scene.name}"):
+            found += [(touch, True) for touch in touches(scene.build(progress=False), list(devices.values()))]
+    with narrated("touching hard blocks"):
+        found += controls(devices["Touch"])
+    if as_json:
+        print(json.dumps([{**asdict(touch), "stable": touch.stable} for touch, _ in found], indent=2))
+    else:
+        _print_touches(found)
+    if any(touch.stable != expected for touch, expected in found if expected is not None):
+        raise typer.Exit(1)
+
+
+def _print_touches(found: list[tuple[Touch, bool | None]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Touches by simulated hands on emulated devices", title_justify="left")
+    for name in ("scene", "device", "hand"):
+        table.add_column(name, no_wrap=True)
+    for name in ("at most N/m", "force N", "speed mm/s", "unrest um", "allowed", ""):
+        table.add_column(name, justify="right", no_wrap=True)
+    for touch, expected in found:
+        figures = (f"{touch.max_stiffness:.0f}", f"{touch.force:.2f}", f"{1e3 * touch.speed:.0f}")
+        rest = (f"{1e6 * touch.unrest:.1f}", f"{1e6 * touch.allowed:.0f}", _verdict(touch, expected))
+        table.add_row(touch.scene, touch.device, touch.hand, *figures, *rest)
+    Console().print(table)
+
+
+def _verdict(touch: Touch, expected: bool | None) -> str:
+    said = "stable" if touch.stable else "UNSTABLE"
+    return said if expected is None or touch.stable == expected else f"{said}: wrong"

@@ -1,0 +1,213 @@
+"""Largest stiffness that the loop holds on emulated devices, beside theory.
+
+A tool holds on to a block, which makes it a linear spring: its stiffness is set by Young's modulus, and the largest
+stable one found by bisection in the same loop that drives real devices.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, astuple, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from palpate.atomic import written_beside
+from palpate.simulation import Simulation
+from palpate.validation.bench.emulation import (
+    BARE,
+    CONTROLLED,
+    FIRM,
+    LOOSE,
+    Device,
+    Hand,
+    Held,
+    Mechanics,
+    emulate,
+    known_devices,
+    tireless,
+)
+from palpate.validation.bench.sampled_loop import bound_for_any_hand, largest_stable
+from palpate.validation.verify.contact.loop import loop_of
+from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
+from palpate.validation.verify.solution import green_of
+
+PERIOD = 1e-3
+# Of the map: damping of the device, N s/m, its masses, kg, and delays, s.
+DAMPING = 1.0
+MASSES = (0.002, 0.005, 0.02, 0.05, 0.2, 1.0)
+DELAYS = (0.0, 0.25e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3)
+# The tip is struck at this speed, m/s, and watched for so many times as its energy takes to fade by damping alone.
+KICK, TIMES = 1e-2, 40.0
+# Relative width at which bisection ends; a tip this far away, m, has run away.
+WIDTH, REACH = 1e-3, 0.5
+# Stages under which the map is measured.
+STAGES = {"bare": BARE, "controlled": CONTROLLED, "whole": None}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A device of the map, N/m.
+
+    Attributes
+    ----------
+    mass, delay
+        Of the tip, kg, and s.
+    any_hand
+        ``b / (T/2 + d)``.
+    eigenvalue
+        Of the sampled system of the mass alone.
+    bare, controlled, whole
+        Measured: the loop alone, with the passivity controller, and with the whole safety stage of a scene.
+
+    """
+
+    mass: float
+    delay: float
+    any_hand: float
+    eigenvalue: float
+    bare: float
+    controlled: float
+    whole: float
+
+
+@dataclass(frozen=True)
+class DeviceRow:
+    """A known device with assumed mechanics, N/m.
+
+    Attributes
+    ----------
+    name, recommended
+        The device, and the stiffness that its driver recommends.
+    any_hand
+        ``b / (T/2 + d)`` of its own.
+    loose, firm
+        From the eigenvalues of tip and hand, friction and encoder apart.
+    loose_measured, firm_measured
+        With friction and encoder.
+
+    """
+
+    name: str
+    recommended: float
+    any_hand: float
+    loose: float
+    loose_measured: float
+    firm: float
+    firm_measured: float
+
+
+class Spring:
+    """A tool that holds on in the middle of a block's top, as a spring of any stiffness."""
+
+    def __init__(self) -> None:
+        body = body_on_table(Block(), (8, 8, 4), quadratic=False)
+        green = green_of(body, touch=top_nodes(body, 0.03))
+        self.radius = 0.01
+        tool = {"shape": "sphere", "radius": self.radius, "contact": "patch", "contact_radius": 0.015}
+        self._loop = lambda device: loop_of(body, green, [tool], device)
+        self._loops = [self._loop(device) for device in (None, {"max_stiffness": 1e9})]
+        low, high = body.mesh.bounds
+        self.place = np.array([*(low + high)[:2] / 2, high[2]])
+        self.matrix = self._measured()
+        values, vectors = np.linalg.eigh(self.matrix)
+        self._modulus = self._loops[0].youngs_modulus
+        self.largest, self.direction = float(values[-1]), vectors[:, -1]
+
+    def _measured(self) -> np.ndarray:
+        """Stiffness (3, 3), N/m, as the loop has it."""
+        step = 1e-4
+        path = self.place + step * np.vstack([np.zeros(3), np.eye(3)])
+        forces = self._loops[0].play(path, grabs=np.ones(len(path), dtype=bool)).forces
+        matrix = -forces[1:].T / step
+        return (matrix + matrix.T) / 2
+
+    def pressed(self, stiffness: float, max_stiffness: float) -> Simulation:
+        """Loop whose block pushes back along its normal with a stiffness, under a tool that is limited, N/m."""
+        simulation = self._loop({"max_stiffness": max_stiffness})
+        simulation.set_youngs_modulus(self._modulus * stiffness / self.matrix[2, 2])
+        return simulation
+
+    def is_stable(self, device: Device, hand: Hand | None, stage: str, stiffness: float) -> bool:
+        """Whether a tip that is struck along the stiffest direction ends with less energy than it began with."""
+        simulation = self._loops[stage == "whole"]
+        scale = stiffness / self.largest
+        simulation.set_youngs_modulus(self._modulus * scale)
+        held = Held(tireless(device), self.place, KICK * self.direction, hand, grab=True)
+        mass, damping = device.mechanics.mass, device.mechanics.damping
+        matrix = scale * self.matrix
+        if hand is not None:
+            mass, damping = mass + hand.mass, damping + hand.damping
+            matrix = matrix + hand.stiffness * np.eye(3)
+        ticks = max(int(TIMES * mass / damping / PERIOD), 400)
+        motion = emulate(simulation, [held], PERIOD, ticks, STAGES[stage], REACH)
+        if len(motion) < ticks:
+            return False
+        away, speed = motion.positions[:, 0] - self.place, motion.velocities[:, 0]
+        energy = mass * (speed**2).sum(1) + np.einsum("ti,ij,tj->t", away, matrix, away)
+        fifth = ticks // 5
+        return bool(energy[-fifth:].mean() < energy[:fifth].mean())
+
+    def largest_stable(self, device: Device, hand: Hand | None = None, stage: str = "bare") -> float:
+        """By bisection, N/m."""
+        stable = unstable = 0.5 * bound_for_any_hand(device.mechanics.damping, PERIOD, device.mechanics.delay)
+        while self.is_stable(device, hand, stage, unstable):
+            stable, unstable = unstable, 2 * unstable
+        while unstable > (1 + WIDTH) * stable:
+            middle = float(np.sqrt(stable * unstable))
+            held = self.is_stable(device, hand, stage, middle)
+            stable, unstable = (middle, unstable) if held else (stable, middle)
+        return stable
+
+
+def run(report: Callable[[int, int], None] | None = None) -> tuple[list[Row], list[DeviceRow]]:
+    """Measure the map, and the known devices; ``report`` is told how many of all are done."""
+    spring, devices = Spring(), known_devices().values()
+    rows, of_devices = [], []
+    total = len(MASSES) * len(DELAYS) + len(devices)
+    for mass in MASSES:
+        for delay in DELAYS:
+            rows.append(measured(spring, Mechanics(mass, DAMPING, delay=delay)))
+            _tell(report, len(rows), total)
+    for device in devices:
+        of_devices.append(measured_device(spring, device))
+        _tell(report, len(rows) + len(of_devices), total)
+    return rows, of_devices
+
+
+def measured(spring: Spring, mechanics: Mechanics) -> Row:
+    """Measure one device of the map."""
+    device = Device("emulated", mechanics)
+    theory = (bound_for_any_hand(mechanics.damping, PERIOD, mechanics.delay), largest_stable(mechanics, PERIOD))
+    found = (spring.largest_stable(device, stage=stage) for stage in STAGES)
+    return Row(mechanics.mass, mechanics.delay, *theory, *found)
+
+
+def measured_device(spring: Spring, device: Device) -> DeviceRow:
+    """Measure one known device in both hands."""
+    mechanics = device.mechanics
+    pairs = ((largest_stable(mechanics, PERIOD, hand), spring.largest_stable(device, hand)) for hand in (LOOSE, FIRM))
+    bound = bound_for_any_hand(mechanics.damping, PERIOD, mechanics.delay)
+    (loose, loose_measured), (firm, firm_measured) = pairs
+    return DeviceRow(device.name, device.max_stiffness, bound, loose, loose_measured, firm, firm_measured)
+
+
+def _tell(report: Callable[[int, int], None] | None, count: int, total: int) -> None:
+    if report is not None:
+        report(count, total)
+
+
+def write(rows: Sequence[Row] | Sequence[DeviceRow], path: Path) -> None:
+    """Write rows as CSV with their names as header."""
+    with written_beside(path) as partial, partial.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([field.name for field in fields(rows[0])])
+        writer.writerows(astuple(row) for row in rows)
+
+
+def plot(rows: Sequence[Row], path: Path) -> None:
+    """Draw stiffness against delay, a line for each mass, beside theory."""
+    from palpate.validation.plots import plot_z_width
+
+    plot_z_width([asdict(row) for row in rows], DAMPING, PERIOD, path)
