@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test other-build sanitize lint viewer check-tools clean
+.PHONY: demo test install other-build sanitize lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -40,6 +40,11 @@ viewer/node_modules/.checks: viewer/node_modules/.package-lock.json | $(PAGE)
 	@touch -r $(PAGE) $< && touch $@
 
 viewer: $(PAGE)
+
+# libpalpate for programs in C and C++: library, header, pkg-config, CMake (docs/c-api.md).
+PREFIX ?= /usr/local
+install:
+	scripts/install_c.sh $(PREFIX)
 
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)

@@ -34,7 +34,8 @@ FORBIDDEN = {
 # Folders of the Python package, lowest first: each imports from those before it. The modules at its top come before
 # all of them, the package itself, which exports the public names, where its name stands.
 PYTHON_ORDER = (
-    *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "simulation", "palpation", "sessions"),
+    *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation", "palpation"),
+    "sessions",
     *("palpate", "viewer", "validation/plots", "exam", "validation/verify", "validation/bench", "validation/doctor"),
     "cli",
 )

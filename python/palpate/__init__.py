@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from palpate import models, palpation
 from palpate.body import Body, Loads, Material
+from palpate.devices import Device, DeviceLimits, Reading
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
@@ -35,7 +36,17 @@ from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
 from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
 from palpate.sessions import Comparison, QuantityDifference, compare, export, rerun
-from palpate.simulation import Contact, Difference, Frame, Recording, RecordingStatus, Replayed, Simulation, replay
+from palpate.simulation import (
+    Contact,
+    Difference,
+    Frame,
+    Recording,
+    RecordingStatus,
+    Replayed,
+    Simulation,
+    pack,
+    replay,
+)
 
 __version__ = version("palpate")
 
@@ -45,7 +56,9 @@ __all__ = [
     "BodyError",
     "Comparison",
     "Contact",
+    "Device",
     "DeviceError",
+    "DeviceLimits",
     "DeviceWarning",
     "Difference",
     "Energy",
@@ -64,6 +77,7 @@ __all__ = [
     "PrecisionError",
     "PrecisionWarning",
     "QuantityDifference",
+    "Reading",
     "Recording",
     "RecordingStatus",
     "RecordingWarning",
@@ -87,6 +101,7 @@ __all__ = [
     "export",
     "models",
     "modes",
+    "pack",
     "palpation",
     "plan",
     "precompute",

@@ -46,6 +46,8 @@ pub enum DeviceFault {
     MotorsOff,
     /// Its driver reports an error by number.
     Driver(i32),
+    /// The program that brings it has failed, and tells why itself.
+    Program,
 }
 
 impl fmt::Display for DeviceFault {
@@ -58,6 +60,7 @@ impl fmt::Display for DeviceFault {
                 write!(f, "the device has switched its motors off: let it cool, or release its stop")
             }
             DeviceFault::Driver(code) => write!(f, "the device's driver reports error {code}"),
+            DeviceFault::Program => write!(f, "the device's program has failed"),
         }
     }
 }

@@ -44,7 +44,14 @@ pub const LAMBDA: DeviceLimits = turning(desktop(12.0, 8000.0, 30.0));
 /// Haply Inverse3. Its force is the scene's to limit: the tutorials state none.
 pub const INVERSE3: DeviceLimits = desktop(f64::INFINITY, 800.0, 3.0);
 
-/// All of them by name.
+/// Force Dimension delta.3.
+pub const DELTA: DeviceLimits = desktop(20.0, 5000.0, 30.0);
+/// SensAble PHANTOM Premium 1.5 with six degrees of freedom.
+pub const PHANTOM_PREMIUM_1_5: DeviceLimits = DeviceLimits { max_torque: 0.188, ..desktop(8.5, 800.0, 5.0) };
+/// SensAble PHANTOM Premium 3.0 with six degrees of freedom.
+pub const PHANTOM_PREMIUM_3_0: DeviceLimits = DeviceLimits { max_torque: 0.188, ..desktop(22.0, 1000.0, 5.0) };
+
+/// Those on a desk, by name.
 pub const ALL: [(&str, DeviceLimits); 8] = [
     ("Touch", TOUCH),
     ("PHANTOM Omni", PHANTOM_OMNI),

@@ -3,16 +3,21 @@
 
 mod device;
 pub mod emulated;
+pub mod forcedimension;
 mod frame;
+pub mod haply;
 mod kinds;
 pub mod known;
+mod library;
 mod mounted;
+pub mod openhaptics;
 mod opening;
+pub mod programmed;
 pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
-pub use kinds::open;
+pub use kinds::{kinds, list, open};
 pub use mounted::{Mounted, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
 

@@ -6,6 +6,7 @@ use palpate_core::simulation::{BodyModel, Kept, Model, ToolModel};
 use palpate_core::{Error, Result};
 use palpate_devices::simulated::{Handle, Target, simulated};
 use palpate_devices::{Device, DeviceLimits, Mounted, Workspace};
+use palpate_scene::placement;
 use palpate_servo::{SceneChange, Settings, StrainPreparer};
 use pyo3::prelude::*;
 
@@ -13,7 +14,7 @@ use crate::connection::{
     Connected, LimitsArguments, LoopDevice, OpenedDevice, WorkspaceArguments, limits_of, limits_tuple,
 };
 use crate::errors::to_python;
-use crate::scene::{BodyArguments, ToolArguments, body_parts, placement, tool};
+use crate::scene::{BodyArguments, ToolArguments, scene_body, tool};
 use crate::simulation::SimulationCore;
 
 /// Bodies and tools of a changed scene, in order: those that stay by their rank before, with `None` for each that is new.
@@ -93,17 +94,17 @@ pub fn change(
     tools: (Ranks, Vec<ToolArguments>),
 ) -> PyResult<()> {
     let ((body_ranks, new_bodies, places), (tool_ranks, new_tools)) = (bodies, tools);
-    let parts = new_bodies.iter().map(body_parts).collect::<PyResult<Vec<_>>>()?;
+    let parts = new_bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
     let before = core.model.clone();
     let make = || -> Result<_> {
-        let mut built = parts.into_iter().map(|part| part.build());
+        let mut built = parts.into_iter().map(|part| part.model());
         let mut made = new_tools.into_iter().map(tool);
         let bodies = body_ranks.iter().zip(places).map(|(rank, place)| {
             let body: BodyModel = match rank {
                 Some(rank) => before.bodies.get(*rank).cloned().ok_or_else(missing)?,
                 None => built.next().ok_or_else(missing)??,
             };
-            Ok(body.placed(placement(place)))
+            Ok(body.placed(placement(place.0, place.1)))
         });
         let bodies = bodies.collect::<Result<Vec<_>>>()?;
         let mut tools: Vec<(ToolModel, Option<(f64, f64)>)> = Vec::new();

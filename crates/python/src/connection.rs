@@ -66,6 +66,18 @@ impl From<Opened> for OpenedDevice {
     }
 }
 
+impl OpenedDevice {
+    /// What a loop takes, once.
+    ///
+    /// # Errors
+    /// A device that a loop has taken already.
+    pub fn take(&mut self, py: Python<'_>) -> PyResult<Opened> {
+        let taken = || OpenError::new(self.name.clone(), "another loop has this device: open it once more");
+        let opened = self.opened.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        opened.ok_or_else(|| device_error(py, &taken()))
+    }
+}
+
 #[pymethods]
 impl OpenedDevice {
     /// Opens the device of a kind.
@@ -117,11 +129,7 @@ impl Connected {
         let (position, orientation, scale, force_scale, clutch) = workspace;
         let workspace =
             Workspace { position: position.into(), orientation: quaternion(orientation), scale, force_scale, clutch };
-        let taken = || OpenError::new(device.name.clone(), "another loop has this device: open it once more");
-        let Some(Opened { device, scheduler }) = device.opened.get_mut().unwrap_or_else(PoisonError::into_inner).take()
-        else {
-            return Err(device_error(py, &taken()));
-        };
+        let Opened { device, scheduler } = device.take(py)?;
         let mounted = Mounted::new(device, workspace, &limits_of(limits));
         Ok(Self { limits: mounted.limits(), device: Mutex::new(Box::new(mounted)), scheduler })
     }

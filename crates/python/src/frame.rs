@@ -2,7 +2,8 @@
 
 use numpy::IntoPyArray;
 use palpate_core::simulation::{Model, Snapshot};
-use palpate_servo::{LogRow, Published};
+use palpate_devices::DeviceFault;
+use palpate_servo::{Fault, FaultReason, LogRow, Published};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -43,6 +44,9 @@ pub fn frame<'py>(py: Python<'py>, model: &Model, tools: usize, published: Publi
     let port = |port: &palpate_servo::PortEnergy| [port.given, port.owed, port.unpaid];
     frame.set_item("port_energy", status.ports[..tools].iter().map(port).collect::<Vec<_>>())?;
     frame.set_item("fault", status.fault.map(|fault| fault.to_string()))?;
+    // A program tells why by itself.
+    let of_program = |fault: &Fault| fault.reason == FaultReason::Device(DeviceFault::Program);
+    frame.set_item("failed_program", status.fault.filter(of_program).and_then(|fault| fault.tool))?;
     frame.set_item("realtime", (status.realtime.priority, status.realtime.locked_memory))?;
     Ok(frame)
 }

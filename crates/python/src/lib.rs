@@ -4,11 +4,13 @@
 mod body;
 mod changes;
 mod connection;
+mod devices;
 mod dynamics;
 mod emulated;
 mod errors;
 mod frame;
 mod green;
+mod programmed;
 mod recording;
 mod replay;
 mod rerun;
@@ -41,6 +43,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
     module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
     module.add_class::<connection::OpenedDevice>()?;
+    module.add_class::<programmed::ProgrammedDevice>()?;
+    module.add_class::<devices::DeviceCheck>()?;
+    module.add_function(wrap_pyfunction!(devices::device_kinds, module)?)?;
+    module.add_function(wrap_pyfunction!(devices::list_devices, module)?)?;
     module.add_function(wrap_pyfunction!(changes::connect, module)?)?;
     module.add_function(wrap_pyfunction!(changes::disconnect, module)?)?;
     module.add_function(wrap_pyfunction!(changes::device_limits, module)?)?;
@@ -53,6 +59,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<surface::SurfaceSearch>()?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;
+    module.add_function(wrap_pyfunction!(scene::checksum, module)?)?;
     module.add_function(wrap_pyfunction!(strain::contact_patch, module)?)?;
     module.add_function(wrap_pyfunction!(strain::provisional_displacement, module)?)?;
     Ok(())

@@ -1,17 +1,18 @@
 //! Arguments of a simulation, as Python gives them, and what it reads back.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::{SurfaceShape, ToolShape};
-use palpate_core::dynamics::{Energy, Integration, ModalModel};
-use palpate_core::simulation::{
-    BodyDynamics, BodyModel, Contact, LawKind, Mode, Model, Placement, Pose, Snapshot, ToolModel, contact_size,
-};
+use palpate_core::dynamics::Energy;
+use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot, ToolModel, contact_size};
 use palpate_core::{Error, Result};
+pub use palpate_scene::unit_quaternion as quaternion;
+use palpate_scene::{Body, Motion, placement};
 use pyo3::prelude::*;
 
 use crate::dynamics::{SchemeArguments, scheme};
+use crate::errors::to_python;
 use crate::green::GreenCore;
 
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
@@ -31,27 +32,17 @@ pub type ToolArguments = (ShapeArguments, f64, String, f64, f64, Option<f64>);
 /// contact radius (m), depth (m) and stiffness (N/m) under the local law, nodes and weights of a contact.
 pub type ContactRecord = (usize, usize, &'static str, [[f64; 3]; 6], [bool; 2], [f64; 3], Vec<u32>, Vec<f64>);
 
-/// A body with everything that Python gave of it, free of the interpreter.
-pub struct BodyParts {
-    green: std::sync::Arc<palpate_core::green::GreensFunction>,
-    placement: Placement,
-    modes: Option<ModesParts>,
-    moduli: Option<Moduli>,
-}
-
-/// [`DynamicsArguments`] free of the interpreter.
-type ModesParts = (Vec<f64>, Vec<f64>, SchemeArguments, bool, f64);
-
 /// Takes arguments out of the interpreter's hands.
-pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
+pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
     let (green, position, orientation, dynamics, moduli) = arguments;
-    let modes = dynamics
+    let motion = dynamics
         .as_ref()
-        .map(|(eigenvalues, shapes, scheme, exact, coupling)| -> PyResult<_> {
-            Ok((eigenvalues.as_slice()?.to_vec(), shapes.as_slice()?.to_vec(), *scheme, *exact, *coupling))
+        .map(|(eigenvalues, shapes, arguments, exact, coupling)| -> PyResult<_> {
+            let (newmark, rayleigh) = scheme(*arguments).map_err(|e| to_python(green.py(), e))?;
+            let (eigenvalues, shapes) = (eigenvalues.as_slice()?.to_vec(), shapes.as_slice()?.to_vec());
+            Ok(Motion { eigenvalues, shapes, newmark, rayleigh, exact: *exact, coupling: *coupling })
         })
         .transpose()?;
-    let placement = placement((*position, *orientation));
     let moduli = moduli
         .as_ref()
         .map(|(youngs, poissons, homogeneous)| -> PyResult<_> {
@@ -59,23 +50,14 @@ pub fn body_parts(arguments: &BodyArguments<'_>) -> PyResult<BodyParts> {
             Ok(Moduli { youngs, poissons, homogeneous: *homogeneous })
         })
         .transpose()?;
-    Ok(BodyParts { green: green.green.clone(), placement, modes, moduli })
+    let placement = placement(*position, *orientation);
+    Ok(Body { name: String::new(), green: green.green.clone(), placement, moduli, motion, strain: None })
 }
 
-impl BodyParts {
-    /// The body as a tick sees it.
-    pub fn build(self) -> Result<BodyModel> {
-        let mut body = BodyModel::new(self.green, self.placement)?;
-        if let Some(moduli) = self.moduli {
-            body = body.with_moduli(moduli)?;
-        }
-        let Some((eigenvalues, shapes, arguments, exact, coupling)) = self.modes else { return Ok(body) };
-        let (newmark, rayleigh) = scheme(arguments)?;
-        let held = Integration::ExactHeld { dt: newmark.dt, weight: newmark.delta };
-        let integration = if exact { held } else { Integration::Newmark(newmark) };
-        let modes = ModalModel::new(&eigenvalues, &shapes, &rayleigh, integration)?;
-        body.with_dynamics(BodyDynamics::new(modes, coupling)?)
-    }
+/// Hex BLAKE3 hash, as a packed scene names it.
+#[pyfunction]
+pub fn checksum(data: &[u8]) -> String {
+    palpate_scene::checksum(data)
 }
 
 /// A tool, the contact radius (m) and the friction that it starts with.
@@ -98,16 +80,6 @@ fn tool_shape((kind, [a, b, c], vertices, triangles): ShapeArguments) -> Result<
             Ok(ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles)?)))
         }
     }
-}
-
-/// Where a body stands: position (m), and orientation w x y z.
-pub fn placement((position, orientation): ([f64; 3], [f64; 4])) -> Placement {
-    Placement { position: position.into(), rotation: DMat3::from_quat(quaternion(orientation)) }
-}
-
-/// From w x y z, made of length one to the last bit.
-pub fn quaternion([w, x, y, z]: [f64; 4]) -> DQuat {
-    DQuat::from_xyzw(x, y, z, w).normalize()
 }
 
 /// As w x y z.

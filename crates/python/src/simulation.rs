@@ -18,7 +18,7 @@ use crate::errors::to_python;
 use crate::frame::{frame, push_row};
 use crate::recording::{Recorded, Recording, RecordingStatus, header};
 use crate::scene::{
-    BodyArguments, ContactRecord, ToolArguments, body_parts, contact_records, energy_array, poses, quaternion, tool,
+    BodyArguments, ContactRecord, ToolArguments, contact_records, energy_array, poses, quaternion, scene_body, tool,
 };
 use crate::strain::StrainMeasure;
 
@@ -60,9 +60,9 @@ impl SimulationCore {
         strain_limit: f64,
         scheduling: (f64, Vec<usize>, u8),
     ) -> PyResult<Self> {
-        let parts = bodies.iter().map(body_parts).collect::<PyResult<Vec<_>>>()?;
+        let parts = bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
         let prepare = || {
-            let bodies = parts.into_iter().map(|part| part.build()).collect::<palpate_core::Result<Vec<_>>>()?;
+            let bodies = parts.iter().map(|part| part.model()).collect::<palpate_core::Result<Vec<_>>>()?;
             let tools = tools.into_iter().map(tool).collect::<palpate_core::Result<Vec<_>>>()?;
             let mut settings = Settings { strain_limit, ..Settings::default() };
             settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius, _))| *to = *radius);

@@ -67,6 +67,19 @@ impl StrainMeasure {
         Ok(StrainResponse { response: response.map_err(|e| to_python(py, e))? })
     }
 
+    /// Displacement gradients at all places: first entry of each place and the end (p + 1), node (k) and coefficients
+    /// (3k), 1/m, of each entry.
+    #[allow(clippy::type_complexity)] // three arrays read once
+    fn gradients<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>) {
+        let (start, nodes, coefficients) = self.measure.gradients().parts();
+        let start: Vec<u64> = start.iter().map(|&entry| entry as u64).collect();
+        let coefficients = coefficients.as_flattened().to_vec();
+        (start.into_pyarray(py), nodes.to_vec().into_pyarray(py), coefficients.into_pyarray(py))
+    }
+
     /// Largest strain of displacements (3s) of the surface, m.
     fn largest(&self, py: Python<'_>, displacements: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
         let displacements = displacements.as_slice()?;

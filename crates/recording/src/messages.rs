@@ -113,6 +113,7 @@ impl From<Option<FaultReason>> for Fault {
             Some(FaultReason::Device(DeviceFault::NotFinite)) => (12, 0),
             Some(FaultReason::Device(DeviceFault::MotorsOff)) => (13, 0),
             Some(FaultReason::Device(DeviceFault::Driver(code))) => (14, code),
+            Some(FaultReason::Device(DeviceFault::Program)) => (15, 0),
         };
         Self { kind, driver_code }
     }
@@ -133,6 +134,7 @@ impl From<Fault> for Option<FaultReason> {
             11 => FaultReason::Device(DeviceFault::Stale),
             12 => FaultReason::Device(DeviceFault::NotFinite),
             13 => FaultReason::Device(DeviceFault::MotorsOff),
+            15 => FaultReason::Device(DeviceFault::Program),
             code => FaultReason::Device(DeviceFault::Driver(if code == 14 { driver_code } else { i32::from(code) })),
         })
     }

@@ -128,6 +128,11 @@ impl ForceLoop {
         }
     }
 
+    /// The fault that keeps wrenches at zero: that of the whole loop, or the first tool's that has one.
+    pub fn fault(&self) -> Option<Fault> {
+        fault(self.fault, &self.stages)
+    }
+
     /// Limits the strain of the bodies that `preparer` can measure, by a thread beside the loop that prepares what each
     /// contact needs; to be kept as long as the loop ticks.
     ///

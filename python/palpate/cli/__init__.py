@@ -3,9 +3,11 @@
 from palpate.cli import (  # noqa: F401  they register their commands
     benchmarks,
     caching,
+    devices,
     doctor,
     envelope,
     examining,
+    packing,
     palpating,
     recordings,
     running,

@@ -2,6 +2,7 @@
 
 from palpate.simulation.about import scene_of, shown_of
 from palpate.simulation.frame import BodyFrame, Contact, Frame, frame_of
+from palpate.simulation.packed import pack
 from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
 from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, unbroken
 from palpate.simulation.replayed import ReplayedSimulation
@@ -19,6 +20,7 @@ __all__ = [
     "ReplayedSimulation",
     "Simulation",
     "frame_of",
+    "pack",
     "replay",
     "scene_of",
     "shown_of",

@@ -10,13 +10,14 @@ from pydantic import ValidationError
 
 from palpate import _native, units
 from palpate.body import Body
+from palpate.devices import Device
 from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
-from palpate.scene.devices import KINDS, tables_of_tools
+from palpate.scene.devices import KINDS, moved_by, tables_of_tools
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.connecting import Opens, connect_tool
+from palpate.simulation.connecting import connect_tool, require_devices
 from palpate.vectors import three_numbers
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -41,7 +42,7 @@ class Changing:
     _grab: list[bool]
     _armed: bool
     _running: bool
-    _given: dict[int, Opens]
+    _given: dict[int, Device]
     _devices: dict[int, str]
 
     def add_body(
@@ -105,7 +106,7 @@ class Changing:
         scene = self.scene.model_copy(update={"bodies": tables})
         self._exchange(scene, tuple(bodies), list(range(len(bodies))), list(range(len(self.scene.tools))))
 
-    def add_tool(self, device: str | Opens = "simulated", **table: Any) -> int:
+    def add_tool(self, device: str | Device = "simulated", **table: Any) -> int:
         """Add a tool, given as in a ``[tool]`` table, moved by a device of a kind or of the program; returns its rank.
 
         Raises
@@ -121,16 +122,17 @@ class Changing:
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"]))
             raise SceneError(f"tool.{place}: {first['msg'].removeprefix('Value error, ')}") from None
+        given = None if isinstance(device, str) else device
+        rank = len(self.scene.tools)
+        require_devices({} if given is None else {rank: given})
         kind = device if isinstance(device, str) else "simulated"
         if kind not in KINDS:
             raise SceneError(f"there is no kind of device '{kind}'; there are {', '.join(KINDS)}")
-        rank = len(self.scene.tools)
         first, *further = [*tables_of_tools(self.scene), self.scene.device.of_kind(kind)]
         tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
         scene = self.scene.model_copy(update={"tools": [*tools, tool], "device": first, "further_devices": further})
         scene = BuiltScene(scene, self.bodies).scene
         self._exchange(scene, self.bodies, list(range(len(self.bodies))), [*range(rank), None])
-        given = None if isinstance(device, str) else device
         if given is not None:
             self._given[rank] = given
         if self._running and (given is not None or kind != "simulated"):
@@ -157,13 +159,13 @@ class Changing:
         tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
         update = {"tools": tools[:tool] + tools[tool + 1 :], "device": devices[0], "further_devices": devices[1:]}
         self._exchange(self.scene.model_copy(update=update), self.bodies, list(range(len(self.bodies))), kept)
-        gone = self._given.pop(tool, None)
+        gone, connected = self._given.pop(tool, None), tool in self._devices
         self._given = {rank - (rank > tool): given for rank, given in self._given.items()}
         self._devices = {rank - (rank > tool): name for rank, name in self._devices.items() if rank != tool}
-        if gone is not None and self._running:
+        if gone is not None and connected:
             gone.close_for_loop()
 
-    def connect(self, tool: int, device: Opens | str) -> str:
+    def connect(self, tool: int, device: Device | str) -> str:
         """Let a tool of the running loop be moved by another device: of the program, or of a kind; returns its name.
 
         Forces ramp in. The device that moved the tool is left at zero force.
@@ -178,14 +180,11 @@ class Changing:
         if not self._running:
             raise SimulationError("the simulation does not run: give it its devices, or their kinds in the scene")
         given = None if isinstance(device, str) else device
+        require_devices({} if given is None else {tool: given})
         kind = device if isinstance(device, str) else "simulated"
         if given is None and kind not in KINDS[1:]:
             raise SceneError(f"there is no kind of device '{kind}' to connect; there are {', '.join(KINDS[1:])}")
-        tables = [table.model_copy(update={"name": None}) for table in tables_of_tools(self.scene)]
-        tables[tool] = tables[tool].model_copy(update={"kind": kind, "id": None, "address": None, "library": None})
-        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
-        update = {"tools": tools, "device": tables[0], "further_devices": tables[1:]}
-        scene = self.scene.model_copy(update=update)
+        scene = self.scene.model_copy(update=moved_by(self.scene, tool, kind))
         self._devices[tool] = connect_tool(self._core, scene, tool, given)
         self.scene, before = scene, self._given.pop(tool, None)
         if given is not None:

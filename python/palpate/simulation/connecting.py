@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from palpate import _native
-from palpate.errors import DeviceWarning
+from palpate.devices import Device
+from palpate.errors import DeviceError, DeviceWarning
 from palpate.scene import DeviceTable
 from palpate.scene.tables import SceneTables
 
@@ -17,14 +18,19 @@ INFINITE = float("inf")
 UNLIMITED = (INFINITE, INFINITE, INFINITE, INFINITE, INFINITE, None, 0.0, None, None)
 
 
-class Opens(Protocol):
-    """A device of a program: opened for a loop, and closed behind it."""
+def require_devices(devices: Mapping[int, Device]) -> None:
+    """Refuse what is no device.
 
-    def open_for_loop(self, rate: float) -> _native.OpenedDevice:
-        """Give what the loop takes, whose ``rate`` (Hz) is that of its ticks."""
+    Raises
+    ------
+    DeviceError
+        The tool, and what it was given.
 
-    def close_for_loop(self) -> None:
-        """Take note that the loop has stopped."""
+    """
+    for tool, device in devices.items():
+        if not isinstance(device, Device):
+            given = f"the class {device.__name__}" if isinstance(device, type) else type(device).__name__
+            raise DeviceError(f"the device of tool {tool} must be an object of a palpate.Device, got {given}")
 
 
 def largest_force(scene: SceneTables) -> float:
@@ -50,7 +56,7 @@ def assume_recorded(core: _native.SimulationCore, about: Mapping[str, str]) -> N
         _native.assume_devices(core, [tuple(limits) for limits in json.loads(about["devices"])])
 
 
-def connect(core: _native.SimulationCore, scene: SceneTables, given: Mapping[int, Opens]) -> dict[int, str]:
+def connect(core: _native.SimulationCore, scene: SceneTables, given: Mapping[int, Device]) -> dict[int, str]:
     """Open the device of every tool that is not simulated; what they are called, by tool.
 
     A device that holds less than the scene asks for is warned of: contacts are then rendered as soft as it needs.
@@ -67,12 +73,20 @@ def connect(core: _native.SimulationCore, scene: SceneTables, given: Mapping[int
             if tool in given or scene.device_of(tool).kind != "simulated":
                 names[tool] = connect_tool(core, scene, tool, given.get(tool))
     except BaseException:
-        _native.disconnect(core)
+        disconnect(core, given, names)
         raise
     return names
 
 
-def connect_tool(core: _native.SimulationCore, scene: SceneTables, tool: int, given: Opens | None) -> str:
+def disconnect(core: _native.SimulationCore, given: Mapping[int, Device], names: Mapping[int, str]) -> None:
+    """Let go of devices that were opened, by tool."""
+    _native.disconnect(core)
+    for tool in names:
+        if tool in given:
+            given[tool].close_for_loop()
+
+
+def connect_tool(core: _native.SimulationCore, scene: SceneTables, tool: int, given: Device | None) -> str:
     """Open the device of one tool, and give it to the loop; what it is called."""
     table = scene.device_of(tool)
     if given is None:
@@ -80,7 +94,12 @@ def connect_tool(core: _native.SimulationCore, scene: SceneTables, tool: int, gi
     else:
         opened = given.open_for_loop(scene.device.rate)
     limits = (table.max_force, INFINITE, table.max_stiffness, *UNLIMITED[3:])
-    _native.connect(core, tool, opened, workspace_of(table), limits)
+    try:
+        _native.connect(core, tool, opened, workspace_of(table), limits)
+    except BaseException:
+        if given is not None:
+            given.close_for_loop()
+        raise
     asked, held = _native.tool_stiffness(core)[tool]
     if held < asked:
         warnings.warn(

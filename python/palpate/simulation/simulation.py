@@ -12,6 +12,7 @@ import numpy as np
 
 from palpate import _native, units
 from palpate.body import Body
+from palpate.devices import Device
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
 from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
@@ -22,7 +23,7 @@ from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.changing import UPRIGHT, Changing
-from palpate.simulation.connecting import Opens, assume_tables, connect, largest_force
+from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
 from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
@@ -64,7 +65,7 @@ class Simulation(Adjustable, Changing):
         *,
         cpus: Sequence[int] | None = None,
         priority: int | None = None,
-        devices: Mapping[int, Opens] | None = None,
+        devices: Mapping[int, Device] | None = None,
     ):
         built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
@@ -83,6 +84,7 @@ class Simulation(Adjustable, Changing):
         )
         assume_tables(self._core, self.scene)
         self._given = dict(devices or {})
+        require_devices(self._given)
         for tool in self._given:
             self._tool(tool)
         self._devices: dict[int, str] = {}
@@ -136,7 +138,11 @@ class Simulation(Adjustable, Changing):
         if not self._running:
             self._arm_strain_limit()
             self._devices = connect(self._core, self.scene, self._given)
-            start_loop(self._core, self.scene.device)
+            try:
+                start_loop(self._core, self.scene.device)
+            except BaseException:
+                self.stop()
+                raise
             self._running = True
             if self._to_record is not None:
                 path, self._to_record = self._to_record, None
@@ -146,9 +152,8 @@ class Simulation(Adjustable, Changing):
         """Stop the loop; devices are left at zero force, and closed."""
         self._core.stop()
         self._running = False
+        disconnect(self._core, self._given, self._devices)
         self._devices = {}
-        for device in self._given.values():
-            device.close_for_loop()
 
     @property
     def devices(self) -> dict[int, str]:
@@ -269,6 +274,9 @@ class Simulation(Adjustable, Changing):
         raw = self._core.frame()
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
+        failed = self._given.get(raw["failed_program"])
+        if failed is not None and failed.failure is not None:
+            raw["fault"] = f"tool {raw['failed_program']}: {failed.failure}; forces are off until a reset"
         return frame_of(raw, self.bodies, self._scales)
 
     def contacts(self) -> list[Contact]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import gzip
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from command_line import refused, run
 
+from palpate import DeviceLimits
+from palpate.devices import FoundDevice, Listing, Obstacle
 from palpate.validation import doctor
 from palpate.validation.bench.loop_ticks import LoopTimes, Times
 from palpate.validation.bench.viewer import servo_threads
@@ -212,11 +215,20 @@ def test_json_has_the_same_keys_on_every_machine(tmp_path):
     known = doctor.as_json(report(machine(tmp_path, DESKTOP)))
     unknown = doctor.as_json(report(doctor.Machine("Darwin", "23.0")))
     assert known.keys() == unknown.keys()
-    assert list(known) == ["schema", "verdict", "machine", "loop", "ticks", "page", "advice"]
+    assert list(known) == ["schema", "verdict", "machine", "loop", "ticks", "page", "devices", "advice"]
     for part in ("machine", "loop", "page"):
         assert known[part].keys() == unknown[part].keys()
     assert known["loop"]["wakeup"] == {"count": 1000, "median": 30.0, "p999": 30.0, "worst": 30.0}
     assert json.loads(json.dumps(known)) == json.loads(json.dumps(known, allow_nan=False))
+
+
+def test_haptic_devices_are_counted_in_a_line():
+    ready = FoundDevice("0", "omega.3", DeviceLimits(), None, {})
+    busy = replace(ready, id="1", obstacle=Obstacle("in use", "close it"))
+    listings = (Listing("forcedimension", (ready, busy), None, {}), Listing("touch", (), Obstacle("no", "do"), {}))
+    found = replace(report(doctor.Machine("Linux", "6.1")), devices=listings)
+    assert "haptic devices ready: forcedimension 1, touch none ('palpate devices' tells why)" in doctor.as_text(found)
+    assert doctor.as_json(found)["devices"]["forcedimension"] == {"found": 2, "ready": 1}
 
 
 def test_this_machine_is_examined(monkeypatch, tmp_path):

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::StrainKind;
+use crate::{Error, Result};
 
 /// `H_p = sum_n u_n (x) g_pn` at each place `p` of a body: the gradient of the function that elements, or a fit through
 /// several of them, make of the displacements `u_n` of the nodes.
@@ -27,6 +28,29 @@ impl GradientOperator {
             operator.start.push(operator.nodes.len());
         }
         operator
+    }
+
+    /// From [`GradientOperator::parts`] for a body of `node_count` nodes.
+    ///
+    /// # Errors
+    /// Parts that do not fit together, or name nodes that the body does not have.
+    pub fn from_parts(
+        start: Vec<usize>,
+        nodes: Vec<u32>,
+        coefficients: Vec<[f64; 3]>,
+        node_count: usize,
+    ) -> Result<Self> {
+        let ascending = start.first() == Some(&0) && start.windows(2).all(|s| s[0] <= s[1]);
+        let fits = ascending && start.last() == Some(&nodes.len()) && nodes.len() == coefficients.len();
+        if !fits || nodes.iter().any(|&node| node as usize >= node_count) {
+            return Err(Error::Invalid("the gradients of the body's strain do not fit together".into()));
+        }
+        Ok(Self { start, nodes, coefficients })
+    }
+
+    /// First entry of each place and the end; node and coefficients (1/m) of each entry.
+    pub fn parts(&self) -> (&[usize], &[u32], &[[f64; 3]]) {
+        (&self.start, &self.nodes, &self.coefficients)
     }
 
     /// Number of places.

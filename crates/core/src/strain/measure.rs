@@ -45,10 +45,19 @@ impl StrainMeasure {
     /// # Errors
     /// An operator that is not the symmetric part of a gradient, or names nodes that the body does not have.
     pub fn of_elements(operator: StrainOperator<'_>, interior: Arc<Interior>) -> Result<Self> {
-        let gradients = gradients_of(operator, interior.dof_count() / 3)?;
+        Ok(Self::of_gradients(gradients_of(operator, interior.dof_count() / 3)?, interior))
+    }
+
+    /// The infinitesimal strain of displacement gradients, as [`StrainMeasure::gradients`] has them.
+    pub fn of_gradients(gradients: GradientOperator, interior: Arc<Interior>) -> Self {
         let surface_count = interior.surface_count();
         let kind = StrainKind::Infinitesimal;
-        Ok(Self { kind, gradients, interior: Some(interior), positions: Vec::new(), surface_count })
+        Self { kind, gradients, interior: Some(interior), positions: Vec::new(), surface_count }
+    }
+
+    /// The gradients of displacements at all places: from nodes of the body, or of the surface alone.
+    pub fn gradients(&self) -> &GradientOperator {
+        &self.gradients
     }
 
     /// The Green strain in the plane of the elements' faces: once on a flat face, at each of its nodes on a 6-node one.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from palpate.devices import listings
 from palpate.validation.doctor.advice import Advice, advice
 from palpate.validation.doctor.machine import Machine, ProcessorTime, cpu_list, processor_time, read_machine
 from palpate.validation.doctor.measure import PageRate, histogram, loop_times, page_rate
@@ -35,4 +36,4 @@ def examine(seconds: float, report: Callable[[float], None] | None = None) -> Re
     after = processor_time()
     taken = None if before is None or after is None else after.shares_since(before)
     advised = advice(machine, loop.priority, loop.locked_memory, taken)
-    return Report(machine, seconds, loop, ticks, page_rate(), advised, taken)
+    return Report(machine, seconds, loop, ticks, page_rate(), advised, taken, tuple(listings()))

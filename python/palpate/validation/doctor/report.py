@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices import Listing
 from palpate.simulation.scheduling import cpu_ranges
 from palpate.validation.bench.loop_ticks import LoopTimes, Times
 from palpate.validation.doctor.advice import Advice
@@ -44,6 +45,8 @@ class Report:
     taken
         Shares of the processors' time that programs took while the loop ran, and that the host of a virtual machine
         took; None where the system does not tell.
+    devices
+        Haptic devices, by the drivers that look for them.
 
     """
 
@@ -54,6 +57,7 @@ class Report:
     page: PageRate
     advice: list[Advice]
     taken: tuple[float, float] | None = None
+    devices: tuple[Listing, ...] = ()
 
     @property
     def missed(self) -> float:
@@ -95,6 +99,9 @@ def as_json(report: Report) -> dict[str, Any]:
         },
         "ticks": {kind: asdict(times) for kind, times in report.ticks.items()},
         "page": asdict(report.page),
+        "devices": {
+            listing.kind: {"found": len(listing.found), "ready": len(listing.ready)} for listing in report.devices
+        },
         "advice": [asdict(one) for one in report.advice],
     }
 
@@ -180,6 +187,8 @@ def _last(report: Report) -> Iterator[str]:
         drawn = f"{page.drawn_per_second:.0f} frames a second, drawn in software by a Chromium without a screen"
     served = page.served_per_second
     yield f"page: {drawn}; served over the websocket: {'not measured' if served is None else f'{served:.0f} a second'}"
+    counts = ", ".join(f"{listing.kind} {len(listing.ready) or 'none'}" for listing in report.devices)
+    yield f"haptic devices ready: {counts or NOT_AVAILABLE} ('palpate devices' tells why)"
     if report.advice:
         yield ""
         yield "what to change, the most important first:"

@@ -1,0 +1,304 @@
+//! The force loop of a scene: ticked by the program, or by a thread of its own.
+//!
+//! Two sides, each behind a lock of its own: that of the tick, which is only ever tried, never waited for; and that of
+//! frames and settings, whose callers wait for each other. Between both stand the wait-free hand-offs of the servo.
+#![allow(unsafe_code)] // called from C with raw pointers
+#![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
+
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+
+use glam::DVec3;
+use palpate_core::simulation::Pose;
+use palpate_devices::Device;
+use palpate_devices::simulated::{self, simulated};
+use palpate_scene::{BodyId, Prepared, ToolId, unit_quaternion};
+use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker};
+
+use crate::arguments::{hand_out, shared, take_back};
+use crate::device::{DeviceEnd, brought};
+use crate::scene::SceneGraph;
+use crate::status::{Outcome, Refusal, Status, guarded};
+
+/// A force loop. One thread at a time may tick it; any other threads may read frames and change settings meanwhile.
+pub struct Loop {
+    tick: Mutex<TickSide>,
+    frame: Mutex<FrameSide>,
+    /// Held while another scene is prepared.
+    changing: Mutex<()>,
+}
+
+/// What a tick needs.
+pub(crate) struct TickSide {
+    /// None while the loop's own thread runs.
+    pub force_loop: Option<ForceLoop>,
+    pub ends: Vec<DeviceEnd>,
+    /// Ticks so far.
+    pub count: u64,
+}
+
+/// What frames and settings need.
+pub(crate) struct FrameSide {
+    pub prepared: Prepared,
+    runner: Runner,
+    pub settings: Settings,
+    /// The tick that was read last.
+    pub latest: Published,
+}
+
+/// Who ticks.
+enum Runner {
+    Program { handle: LoopHandle, _worker: StrainWorker },
+    Thread { servo: Servo, targets: Vec<simulated::Handle> },
+}
+
+impl FrameSide {
+    /// The latest tick.
+    pub fn refresh(&mut self) -> &Published {
+        let latest = match &mut self.runner {
+            Runner::Program { handle, .. } => handle.latest(),
+            Runner::Thread { servo, .. } => servo.latest(),
+        };
+        self.latest.clone_from(latest);
+        &self.latest
+    }
+
+    /// Rank of a body in the loop.
+    pub fn body(&self, handle: u32) -> Outcome<usize> {
+        self.prepared.rank_of_body(BodyId(handle)).ok_or_else(|| unknown("body", handle))
+    }
+
+    /// Rank of a tool in the loop.
+    pub fn tool(&self, handle: u32) -> Outcome<usize> {
+        self.prepared.rank_of_tool(ToolId(handle)).ok_or_else(|| unknown("tool", handle))
+    }
+
+    /// Changes the settings; one that is refused changes nothing.
+    pub fn set(&mut self, settings: Settings) -> Outcome<()> {
+        match &mut self.runner {
+            Runner::Program { handle, .. } => handle.set(settings)?,
+            Runner::Thread { servo, .. } => servo.set(settings)?,
+        }
+        self.settings = settings;
+        Ok(())
+    }
+}
+
+/// A loop for the program to tick, at rest.
+fn to_be_ticked(prepared: &Prepared, settings: Settings) -> Outcome<(TickSide, Runner)> {
+    let (ends, devices): (Vec<_>, Vec<_>) = prepared
+        .devices
+        .iter()
+        .map(|limits| {
+            let (end, device) = brought(*limits);
+            (end, Box::new(device) as Box<dyn Device>)
+        })
+        .unzip();
+    let (mut force_loop, mut handle) = ForceLoop::new(prepared.model.clone(), devices, prepared.limits, settings)?;
+    let worker = force_loop.limit_strain(&mut handle, prepared.strain.clone())?;
+    let side = TickSide { force_loop: Some(force_loop), ends, count: 0 };
+    Ok((side, Runner::Program { handle, _worker: worker }))
+}
+
+impl Loop {
+    fn new(graph: &SceneGraph) -> Outcome<Self> {
+        let prepared = graph.scene.prepare()?;
+        let (tick, mut runner) = to_be_ticked(&prepared, prepared.settings)?;
+        let latest = match &mut runner {
+            Runner::Program { handle, .. } => handle.latest().clone(),
+            Runner::Thread { servo, .. } => servo.latest().clone(),
+        };
+        let frame = FrameSide { runner, settings: prepared.settings, latest, prepared };
+        Ok(Self { tick: Mutex::new(tick), frame: Mutex::new(frame), changing: Mutex::new(()) })
+    }
+
+    /// The side of frames and settings; waits for others who are there, never for a tick.
+    pub(crate) fn frame(&self) -> MutexGuard<'_, FrameSide> {
+        self.frame.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The side of the tick; never waits.
+    pub(crate) fn try_tick(&self) -> Outcome<MutexGuard<'_, TickSide>> {
+        match self.tick.try_lock() {
+            Ok(side) => Ok(side),
+            Err(TryLockError::Poisoned(side)) => Ok(side.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(Refusal {
+                status: Status::PalpateErrorBusy,
+                message: "another thread is within a tick of this loop: tick it from one thread at a time".into(),
+            }),
+        }
+    }
+
+    fn start(&self) -> Outcome<()> {
+        let mut frame = self.frame();
+        if let Runner::Thread { .. } = frame.runner {
+            return Err(Refusal::state("the loop's own thread runs already"));
+        }
+        let mut tick = self.try_tick()?;
+        let (targets, devices) = frame.prepared.tools.iter().map(|_| simulated_device()).unzip();
+        let Prepared { model, limits, scheduling, strain, .. } = &frame.prepared;
+        let (model, scheduling, strain) = (model.clone(), scheduling.clone(), strain.clone());
+        let servo = Servo::start(model, devices, *limits, frame.settings, scheduling, strain, None)?;
+        tick.force_loop = None;
+        frame.runner = Runner::Thread { servo, targets };
+        Ok(())
+    }
+
+    fn stop(&self) -> Outcome<()> {
+        let mut frame = self.frame();
+        if let Runner::Program { .. } = frame.runner {
+            return Ok(());
+        }
+        let (side, runner) = to_be_ticked(&frame.prepared, frame.settings)?;
+        // Dropping the servo ends its thread and leaves the devices without a wrench.
+        frame.runner = runner;
+        *self.tick.lock().unwrap_or_else(PoisonError::into_inner) = side;
+        Ok(())
+    }
+
+    fn change(&self, graph: &SceneGraph) -> Outcome<()> {
+        let _one_at_a_time = self.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        // Beside the loop, frames and settings.
+        let before = self.frame().prepared.clone();
+        let (mut next, kept) = graph.scene.prepare_change(&before)?;
+        let mut frame = self.frame();
+        let FrameSide { prepared, runner, settings, latest } = &mut *frame;
+        let Runner::Thread { servo, targets } = runner else {
+            return Err(Refusal::state(
+                "the scene changes under the loop's own thread only: call palpate_loop_start first, or make a new loop",
+            ));
+        };
+        next.settings = next.settings_after(settings, &kept);
+        let (mut moved, mut devices) = (Vec::new(), Vec::new());
+        for old in &kept.tools[..next.tools.len()] {
+            let (handle, device) = match old {
+                Some(_) => (None, None),
+                None => Some(simulated_device()).unzip(),
+            };
+            moved.push(handle);
+            devices.push(device);
+        }
+        let (model, strain) = (next.model.clone(), next.strain.clone());
+        servo.change(SceneChange { model, kept, devices, settings: next.settings, strain })?;
+        let mut before: Vec<_> = targets.drain(..).map(Some).collect();
+        for (rank, handle) in moved.into_iter().enumerate() {
+            let known = || kept.tools[rank].and_then(|old| before.get_mut(old)).and_then(Option::take);
+            targets.extend(handle.or_else(known));
+        }
+        (*settings, *prepared) = (next.settings, next);
+        *latest = servo.latest().clone();
+        Ok(())
+    }
+}
+
+/// A simulated device and the handle that moves it.
+fn simulated_device() -> (simulated::Handle, Box<dyn Device>) {
+    let (handle, device) = simulated();
+    (handle, Box::new(device))
+}
+
+fn unknown(what: &str, handle: u32) -> Refusal {
+    Refusal::argument(format!("the loop has no {what} of the handle {handle}"))
+}
+
+/// Makes the loop of a scene as it is now, at rest, to be ticked by the program: seconds for large bodies. What changes in the
+/// scene later does not change it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_new(scene: *const SceneGraph, force_loop: *mut *mut Loop) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let made = Loop::new(unsafe { shared(scene, "scene") }?)?;
+        // SAFETY: the caller's pointer.
+        unsafe { hand_out(made, force_loop, "loop") }?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Ends a loop and frees it; no thread may be in a call with it. Null is nothing.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_free(force_loop: *mut Loop) {
+    // SAFETY: the caller's pointer.
+    guarded(|| unsafe {
+        take_back(force_loop);
+        Ok(Status::PalpateOk)
+    });
+}
+
+/// Starts a thread of the loop's own at the rate of the scene, with simulated devices that palpate_loop_set_target moves.
+/// Tools are out of the scene until then. The program cannot tick until palpate_loop_stop.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_start(force_loop: *mut Loop) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        unsafe { shared(force_loop, "loop") }?.start()?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Stops that thread. The loop is at rest then, and for the program to tick; settings stay. Once more, it does nothing.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_stop(force_loop: *mut Loop) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        unsafe { shared(force_loop, "loop") }?.stop()?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Exchanges the bodies and tools of a loop for those of its scene as it is now, while the loop's own thread runs: contacts
+/// between those that stay go on, and new tools are out of the scene until they get a target. `scene` must be the one that the
+/// loop was made of. Takes as long as it takes to prepare what is new; the loop ticks meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_change(force_loop: *mut Loop, scene: *const SceneGraph) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (own, scene) = unsafe { (shared(force_loop, "loop")?, shared(scene, "scene")?) };
+        own.change(scene)?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Where a simulated tool should go; it follows as a light damped hand. Never grows.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Target {
+    /// Of the tip, m, in the world.
+    pub position: [f64; 3],
+    /// World from tool, a unit quaternion w x y z; four zeros do not turn it.
+    pub orientation: [f64; 4],
+    /// At which the target goes on from there for a tenth of a second at most, m/s.
+    pub velocity: [f64; 3],
+    /// Whether the tool is in the scene: 0 or 1.
+    pub active: u32,
+    /// Whether it holds on to what it touches: 0 or 1.
+    pub grab: u32,
+}
+
+/// Sends a simulated tool to a target, while the loop's own thread runs.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_set_target(force_loop: *mut Loop, tool: u32, target: *const Target) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (own, target) = unsafe { (shared(force_loop, "loop")?, shared(target, "target")?) };
+        let pose = pose(target.position, target.orientation);
+        let velocity = DVec3::from(target.velocity);
+        if !(pose.is_finite() && velocity.is_finite()) {
+            return Err(Refusal::argument("target is not finite"));
+        }
+        let mut frame = own.frame();
+        let tool = frame.tool(tool)?;
+        let Runner::Thread { targets, .. } = &mut frame.runner else {
+            return Err(Refusal::state("targets are for the loop's own thread: call palpate_loop_start first"));
+        };
+        let (active, grab) = (target.active != 0, target.grab != 0);
+        targets[tool].set(simulated::Target { pose, velocity, active, grab });
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// A pose; without an orientation, four zeros, it is not turned.
+pub(crate) fn pose(position: [f64; 3], orientation: [f64; 4]) -> Pose {
+    match orientation {
+        [0.0, 0.0, 0.0, 0.0] => Pose::at(position.into()),
+        _ => Pose { position: position.into(), orientation: unit_quaternion(orientation) },
+    }
+}

@@ -1,0 +1,337 @@
+//! What is drawn of a tick: forces, contacts, deformed surfaces, statistics.
+#![allow(unsafe_code)] // called from C with raw pointers
+#![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
+
+use std::ffi::c_char;
+
+use glam::DVec3;
+use palpate_core::simulation::{Contact, MAX_CONTACTS, MAX_TOOLS, Mode};
+use palpate_scene::Prepared;
+use palpate_servo::{Published, Summary};
+
+use crate::arguments::{array_mut, exclusive, require_count, shared};
+use crate::force_loop::Loop;
+use crate::sized::{self, Sized};
+use crate::status::{Status, guarded};
+
+/// Most tools of a scene.
+pub const PALPATE_MAX_TOOLS: usize = 4;
+/// Most contacts at once.
+pub const PALPATE_MAX_CONTACTS: usize = 24;
+/// Bytes of palpate_frame.fault.
+pub const PALPATE_FAULT_BYTES: usize = 192;
+
+const _: () = assert!(PALPATE_MAX_TOOLS == MAX_TOOLS && PALPATE_MAX_CONTACTS == MAX_CONTACTS);
+
+/// Times, us. Never grows.
+#[repr(C)]
+#[derive(Clone, Copy, Default)]
+pub struct Times {
+    /// Half are below.
+    pub p50: f64,
+    /// 99 % are below.
+    pub p99: f64,
+    /// 99.9 % are below.
+    pub p999: f64,
+    /// The largest.
+    pub max: f64,
+}
+
+impl From<Summary> for Times {
+    fn from(Summary { p50, p99, p999, max }: Summary) -> Self {
+        Self { p50, p99, p999, max }
+    }
+}
+
+/// Numbers of a tick; tools stand in the order in which they were added to the scene. Set struct_size before it is filled.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Frame {
+    /// sizeof(palpate_frame).
+    pub struct_size: u32,
+    /// Tools of the loop.
+    pub tools: u32,
+    /// Contacts that palpate_loop_get_contacts tells of.
+    pub contacts: u32,
+    /// Whether a fault has latched: 0 or 1.
+    pub faulty: u32,
+    /// What happened, and what to do; empty without a fault.
+    pub fault: [c_char; PALPATE_FAULT_BYTES],
+    /// Ticks since the start.
+    pub ticks: u64,
+    /// Time since the first tick, s.
+    pub time: f64,
+    /// Force on each device, N.
+    pub forces: [[f64; 3]; PALPATE_MAX_TOOLS],
+    /// Torque about each tip, N m.
+    pub torques: [[f64; 3]; PALPATE_MAX_TOOLS],
+    /// Tip of each tool, m.
+    pub positions: [[f64; 3]; PALPATE_MAX_TOOLS],
+    /// Orientation of each tool, w x y z.
+    pub orientations: [[f64; 4]; PALPATE_MAX_TOOLS],
+    /// Whether each tool is in the scene: 0 or 1.
+    pub active: [u32; PALPATE_MAX_TOOLS],
+    /// Whether the limit of strain keeps each tool from following its device: 0 or 1.
+    pub limited: [u32; PALPATE_MAX_TOOLS],
+    /// How long ticks take, us.
+    pub compute_us: Times,
+    /// How late ticks begin, us.
+    pub wakeup_us: Times,
+    /// Deadlines that passed within ticks that took too long.
+    pub missed_computing: u64,
+    /// Deadlines that passed before ticks that began too late.
+    pub missed_waking: u64,
+    /// Whether the system granted the loop's own thread real-time scheduling: 0 or 1.
+    pub realtime: u32,
+    /// Whether the system granted that thread locked memory: 0 or 1.
+    pub locked_memory: u32,
+}
+
+impl Default for Frame {
+    fn default() -> Self {
+        Self {
+            struct_size: size_of::<Self>() as u32,
+            tools: 0,
+            contacts: 0,
+            faulty: 0,
+            fault: [0; PALPATE_FAULT_BYTES],
+            ticks: 0,
+            time: 0.0,
+            forces: [[0.0; 3]; PALPATE_MAX_TOOLS],
+            torques: [[0.0; 3]; PALPATE_MAX_TOOLS],
+            positions: [[0.0; 3]; PALPATE_MAX_TOOLS],
+            orientations: [[0.0; 4]; PALPATE_MAX_TOOLS],
+            active: [0; PALPATE_MAX_TOOLS],
+            limited: [0; PALPATE_MAX_TOOLS],
+            compute_us: Times::default(),
+            wakeup_us: Times::default(),
+            missed_computing: 0,
+            missed_waking: 0,
+            realtime: 0,
+            locked_memory: 0,
+        }
+    }
+}
+
+// SAFETY: numbers only; the size comes first.
+unsafe impl Sized for Frame {
+    const NAME: &str = "palpate_frame";
+    const FIRST_SIZE: usize = size_of::<Self>();
+}
+
+impl Frame {
+    fn of(published: &Published, tools: usize) -> Self {
+        let Published { status, state } = published;
+        let mut frame = Self {
+            tools: tools as u32,
+            contacts: state.contacts.iter().count() as u32,
+            ticks: status.ticks,
+            time: status.time,
+            compute_us: status.compute.into(),
+            wakeup_us: status.wakeup.into(),
+            missed_computing: status.missed_computing,
+            missed_waking: status.missed_waking,
+            realtime: u32::from(status.realtime.priority),
+            locked_memory: u32::from(status.realtime.locked_memory),
+            ..Self::default()
+        };
+        if let Some(fault) = status.fault {
+            frame.faulty = 1;
+            // The last byte stays the zero that ends it.
+            let text = fault.to_string();
+            let bytes = text.bytes().take(PALPATE_FAULT_BYTES - 1);
+            frame.fault.iter_mut().zip(bytes).for_each(|(to, byte)| *to = byte as c_char);
+        }
+        for tool in 0..tools {
+            let (wrench, reading) = (&status.wrenches[tool], &status.readings[tool]);
+            let turned = reading.pose.orientation;
+            frame.forces[tool] = wrench.force.to_array();
+            frame.torques[tool] = wrench.torque.to_array();
+            frame.positions[tool] = reading.pose.position.to_array();
+            frame.orientations[tool] = [turned.w, turned.x, turned.y, turned.z];
+            frame.active[tool] = u32::from(reading.active);
+            frame.limited[tool] = u32::from(status.limited[tool]);
+        }
+        frame
+    }
+}
+
+/// A contact; vectors are in the world. Never grows.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct ContactRecord {
+    /// Handle of the tool.
+    pub tool: u32,
+    /// Handle of the body.
+    pub body: u32,
+    /// Whether the tool holds on: 0 or 1.
+    pub grabs: u32,
+    /// Whether it slips: 0 or 1.
+    pub slips: u32,
+    /// Whether the limit of strain holds it back: 0 or 1.
+    pub limited: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Contact point on the untouched surface, m.
+    pub point: [f64; 3],
+    /// Outward unit normal there.
+    pub normal: [f64; 3],
+    /// On the body, N.
+    pub force: [f64; 3],
+    /// On the body about the contact point, N m.
+    pub torque: [f64; 3],
+    /// Radius of the contact, m, under the local law; 0 otherwise, as what follows.
+    pub radius: f64,
+    /// Depth, m, under the local law.
+    pub depth: f64,
+    /// Stiffness, N/m, under the local law.
+    pub stiffness: f64,
+}
+
+/// Takes the latest tick and tells its numbers. Contacts and surfaces that are read next are of the same tick. Never waits for
+/// the tick; callers of frames and settings wait for each other.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_frame(force_loop: *mut Loop, frame: *mut Frame) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let own = unsafe { shared(force_loop, "loop") }?;
+        let mut side = own.frame();
+        let tools = side.prepared.tools.len();
+        let filled = Frame::of(side.refresh(), tools);
+        // SAFETY: the caller's pointer.
+        unsafe { sized::write(&filled, frame) }?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Contacts of the tick of the last palpate_loop_get_frame: `count` gets how many there are, of which `capacity` are written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_contacts(
+    force_loop: *mut Loop,
+    contacts: *mut ContactRecord,
+    capacity: usize,
+    count: *mut usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (own, places, count) = unsafe {
+            (shared(force_loop, "loop")?, array_mut(contacts, capacity, "contacts")?, exclusive(count, "count")?)
+        };
+        let side = own.frame();
+        let found = || side.latest.state.contacts.iter();
+        *count = found().count();
+        places.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = record(&side.prepared, contact));
+        Ok(Status::PalpateOk)
+    })
+}
+
+fn record(prepared: &Prepared, contact: &Contact) -> ContactRecord {
+    let placement = &prepared.model.bodies[contact.body].placement;
+    let vector = |v: DVec3| placement.vector_to_world(v).to_array();
+    let (body, tool) = (prepared.bodies[contact.body].0, prepared.tools[contact.tool].0);
+    ContactRecord {
+        tool,
+        body,
+        grabs: u32::from(contact.mode == Mode::Grab),
+        slips: u32::from(contact.local.slipping),
+        limited: u32::from(contact.limited),
+        reserved: 0,
+        point: placement.point_to_world(contact.point).to_array(),
+        normal: vector(contact.normal),
+        force: vector(contact.force),
+        torque: vector(-contact.local.torque),
+        radius: contact.local.radius,
+        depth: contact.local.depth,
+        stiffness: contact.local.stiffness,
+    }
+}
+
+/// How many surface nodes and triangles a body has; either place may be null. They never change.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_surface_size(
+    force_loop: *const Loop,
+    body: u32,
+    nodes: *mut usize,
+    triangles: *mut usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (own, nodes, triangles) = unsafe { (shared(force_loop, "loop")?, nodes.as_mut(), triangles.as_mut()) };
+        let side = own.frame();
+        let surface = &side.prepared.model.bodies[side.body(body)?].green().surface;
+        nodes.into_iter().for_each(|count| *count = surface.positions.len());
+        triangles.into_iter().for_each(|count| *count = surface.triangles.len());
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Triangles of a body, outward, three numbers of surface nodes each.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_triangles(
+    force_loop: *const Loop,
+    body: u32,
+    nodes: *mut u32,
+    triangles: usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let own = unsafe { shared(force_loop, "loop") }?;
+        let side = own.frame();
+        let surface = &side.prepared.model.bodies[side.body(body)?].green().surface;
+        require_count("triangles", triangles, surface.triangles.len())?;
+        // SAFETY: the caller's pointer, to `triangles` of three numbers.
+        unsafe { array_mut(nodes, 3 * triangles, "nodes") }?.copy_from_slice(surface.triangles.as_flattened());
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Positions of the surface nodes of a body at rest, without its loads, x y z of each, m, in the world.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_rest_positions(
+    force_loop: *const Loop,
+    body: u32,
+    positions: *mut f64,
+    nodes: usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let own = unsafe { shared(force_loop, "loop") }?;
+        let side = own.frame();
+        let model = &side.prepared.model.bodies[side.body(body)?];
+        let rest = &model.green().surface.positions;
+        require_count("nodes", nodes, rest.len())?;
+        // SAFETY: the caller's pointer, to `nodes` of three numbers.
+        let out = unsafe { array_mut(positions.cast::<[f64; 3]>(), nodes, "positions") }?;
+        let placed = |p: &DVec3| model.placement.point_to_world(*p).to_array();
+        out.iter_mut().zip(rest).for_each(|(to, p)| *to = placed(p));
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Positions of the surface nodes of a body in the tick of the last palpate_loop_get_frame, x y z of each, m, in the world.
+/// Worked out by the caller, in some hundred microseconds: not for the thread that ticks.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_positions(
+    force_loop: *mut Loop,
+    body: u32,
+    positions: *mut f64,
+    nodes: usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let own = unsafe { shared(force_loop, "loop") }?;
+        let side = own.frame();
+        let (rank, model) = (side.body(body)?, &side.prepared.model);
+        let body = &model.bodies[rank];
+        let rest = &body.green().surface.positions;
+        require_count("nodes", nodes, rest.len())?;
+        // SAFETY: the caller's pointer, to `nodes` of three numbers.
+        let out = unsafe { array_mut(positions.cast::<[f64; 3]>(), nodes, "positions") }?;
+        body.green().require_intact()?;
+        let moved = side.latest.state.displacements(model, rank);
+        for ((to, p), u) in out.iter_mut().zip(rest).zip(moved.chunks_exact(3)) {
+            *to = body.placement.point_to_world(*p + DVec3::from_slice(u)).to_array();
+        }
+        Ok(Status::PalpateOk)
+    })
+}

@@ -1,0 +1,218 @@
+//! A scene: bodies and tools, put together or read.
+#![allow(unsafe_code)] // called from C with raw pointers
+#![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
+
+use std::ffi::c_char;
+
+use palpate_core::contact::Moduli;
+use palpate_scene::{Body, BodyId, Scene, ToolId, placement};
+
+use crate::arguments::{exclusive, hand_out, path, shared, take_back};
+use crate::options::{BodyOptions, DeviceOptions, SceneOptions, ToolOptions};
+use crate::sized;
+use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::store::Store;
+
+/// How far from one the length of an orientation may be.
+const UNIT_LENGTH: f64 = 1e-6;
+
+/// What to touch, and with what. One thread at a time may use it.
+pub struct SceneGraph {
+    pub(crate) scene: Scene,
+}
+
+/// Makes a scene without bodies and tools.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_new(scene: *mut *mut SceneGraph) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        unsafe { hand_out(SceneGraph { scene: Scene::default() }, scene, "scene") }?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Reads a scene that `palpate pack` has written (the folder), or a bare store (.palpate) with a tool that suits it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_load(file: *const c_char, scene: *mut *mut SceneGraph) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let file = unsafe { path(file, "file") }?;
+        let loaded = Scene::load(file)?;
+        // SAFETY: the caller's pointer.
+        unsafe { hand_out(SceneGraph { scene: loaded }, scene, "scene") }?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Frees a scene; loops made of it go on. Null is nothing.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_free(scene: *mut SceneGraph) {
+    // SAFETY: the caller's pointer.
+    guarded(|| unsafe {
+        take_back(scene);
+        Ok(Status::PalpateOk)
+    });
+}
+
+/// Adds a body made of a store, four at most. `options` may be null: at the origin. `body` gets its handle, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_add_body(
+    scene: *mut SceneGraph,
+    store: *const Store,
+    options: *const BodyOptions,
+    body: *mut u32,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (scene, store, handle) = unsafe { (exclusive(scene, "scene")?, shared(store, "store")?, body.as_mut()) };
+        // SAFETY: the caller's pointer.
+        let options = if options.is_null() { BodyOptions::default() } else { unsafe { sized::read(options) }? };
+        let mut body = Body::of_store(store.green.clone())?;
+        require_place(options.position, options.orientation)?;
+        body.placement = placement(options.position, options.orientation);
+        if options.youngs_modulus != 0.0 {
+            let all = |value| vec![value; store.green.surface_count()];
+            let (youngs, poissons) = (all(options.youngs_modulus), all(options.poissons_ratio));
+            body.moduli = Some(Moduli { youngs, poissons, homogeneous: true });
+        }
+        let id = scene.scene.add_body(body)?;
+        handle.into_iter().for_each(|handle| *handle = id.0);
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Moves a body of the scene: position, m, and orientation, a unit quaternion w x y z.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_place_body(
+    scene: *mut SceneGraph,
+    body: u32,
+    position: *const f64,
+    orientation: *const f64,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers, to three and four numbers.
+        let (scene, position, orientation) = unsafe {
+            (
+                exclusive(scene, "scene")?,
+                shared(position.cast::<[f64; 3]>(), "position")?,
+                shared(orientation.cast::<[f64; 4]>(), "orientation")?,
+            )
+        };
+        require_place(*position, *orientation)?;
+        match scene.scene.place_body(BodyId(body), placement(*position, *orientation)) {
+            true => Ok(Status::PalpateOk),
+            false => Err(unknown("body", body)),
+        }
+    })
+}
+
+/// Takes a body out of the scene; loops that were made before keep it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_remove_body(scene: *mut SceneGraph, body: u32) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let scene = unsafe { exclusive(scene, "scene") }?;
+        scene.scene.remove_body(BodyId(body)).ok_or_else(|| unknown("body", body))?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Adds a tool, four at most. `options` may be null: a ball that suits the bodies. `tool` gets its handle, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_add_tool(
+    scene: *mut SceneGraph,
+    options: *const ToolOptions,
+    tool: *mut u32,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (scene, handle) = unsafe { (exclusive(scene, "scene")?, tool.as_mut()) };
+        // SAFETY: the caller's pointer.
+        let options = if options.is_null() { ToolOptions::default() } else { unsafe { sized::read(options) }? };
+        // SAFETY: the caller's vertices and triangles.
+        let id = scene.scene.add_tool(unsafe { options.tool() }?)?;
+        handle.into_iter().for_each(|handle| *handle = id.0);
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Takes a tool out of the scene; loops that were made before keep it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_remove_tool(scene: *mut SceneGraph, tool: u32) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        let scene = unsafe { exclusive(scene, "scene") }?;
+        scene.scene.remove_tool(ToolId(tool)).ok_or_else(|| unknown("tool", tool))?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// States what the device of a tool can render: the safety stage keeps it, and a tool that is stiffer is refused by
+/// palpate_loop_new.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_set_device(
+    scene: *mut SceneGraph,
+    tool: u32,
+    limits: *const DeviceOptions,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (scene, limits) = unsafe { (exclusive(scene, "scene")?, sized::read(limits)?) };
+        match scene.scene.set_device(ToolId(tool), limits.limits()) {
+            true => Ok(Status::PalpateOk),
+            false => Err(unknown("tool", tool)),
+        }
+    })
+}
+
+/// Reads limits and scheduling of a scene. Set struct_size before.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_get_options(scene: *const SceneGraph, options: *mut SceneOptions) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        unsafe { sized::write(&SceneOptions::of(&shared(scene, "scene")?.scene), options) }?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// Changes limits and scheduling of a scene, for loops that are made from now on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_set_options(scene: *mut SceneGraph, options: *const SceneOptions) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (scene, options) = unsafe { (exclusive(scene, "scene")?, sized::read(options)?) };
+        options.give_to(&mut scene.scene)?;
+        Ok(Status::PalpateOk)
+    })
+}
+
+/// How many bodies and tools a scene has; either place may be null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_scene_get_counts(
+    scene: *const SceneGraph,
+    bodies: *mut usize,
+    tools: *mut usize,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the caller's pointers.
+        let (scene, bodies, tools) = unsafe { (&shared(scene, "scene")?.scene, bodies.as_mut(), tools.as_mut()) };
+        bodies.into_iter().for_each(|count| *count = scene.bodies().count());
+        tools.into_iter().for_each(|count| *count = scene.tools().count());
+        Ok(Status::PalpateOk)
+    })
+}
+
+fn unknown(what: &str, handle: u32) -> Refusal {
+    Refusal::argument(format!("the scene has no {what} of the handle {handle}"))
+}
+
+fn require_place(position: [f64; 3], orientation: [f64; 4]) -> Outcome<()> {
+    if !position.iter().all(|x| x.is_finite()) {
+        return Err(Refusal::argument(format!("position is {position:?}, it must be finite")));
+    }
+    let length = orientation.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if (length - 1.0).abs() <= UNIT_LENGTH {
+        return Ok(());
+    }
+    Err(Refusal::argument(format!("orientation must be a unit quaternion w x y z, got {orientation:?}")))
+}

@@ -1,0 +1,79 @@
+//! Structs that may grow: their first member is the size that the caller was compiled with.
+//!
+//! A longer library reads what an older program does not know of as its default, and writes no further than that program's
+//! struct reaches. A longer struct of a newer program is refused: this library could not obey what stands in it.
+#![allow(unsafe_code)] // bytes are copied into and out of structs of callers
+
+use std::ptr::copy_nonoverlapping;
+
+use crate::status::{Outcome, Refusal};
+
+/// A struct that may grow.
+///
+/// # Safety
+/// It is plain data of which every bit pattern is valid, its first member is `struct_size: u32`, and its default has the own
+/// size there.
+pub unsafe trait Sized: Copy + Default {
+    /// Its name in C.
+    const NAME: &str;
+    /// Its size when it came into the interface: no program has a shorter one.
+    const FIRST_SIZE: usize;
+}
+
+fn check<T: Sized>(size: usize) -> Outcome<usize> {
+    let own = size_of::<T>();
+    match size {
+        _ if (T::FIRST_SIZE..=own).contains(&size) => Ok(size),
+        _ if size > own => Err(Refusal::argument(format!(
+            "{} has {size} bytes, this library knows {own}: the program was compiled with a newer palpate.h",
+            T::NAME
+        ))),
+        _ => Err(Refusal::argument(format!("struct_size of {} is {size}: set it to sizeof({})", T::NAME, T::NAME))),
+    }
+}
+
+/// What a caller has given; defaults where its struct ends.
+///
+/// # Safety
+/// The pointer is null or points to a struct of the size that it states.
+pub unsafe fn read<T: Sized>(from: *const T) -> Outcome<T> {
+    if from.is_null() {
+        return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
+    }
+    // SAFETY: the first member of the caller's struct.
+    let size = check::<T>(unsafe { from.cast::<u32>().read() } as usize)?;
+    let mut own = T::default();
+    // SAFETY: `size` bytes are within both; every bit pattern is a valid `T`.
+    unsafe { copy_nonoverlapping(from.cast::<u8>(), (&raw mut own).cast::<u8>(), size) };
+    Ok(own)
+}
+
+/// As much of an answer as the caller's struct takes.
+///
+/// # Safety
+/// The pointer is null or points to a struct of the size that it states.
+pub unsafe fn write<T: Sized>(value: &T, to: *mut T) -> Outcome<()> {
+    if to.is_null() {
+        return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
+    }
+    // SAFETY: the first member of the caller's struct.
+    let stated = unsafe { to.cast::<u32>().read() };
+    // SAFETY: it has the size that it states.
+    unsafe { write_as(value, to, stated as usize) }
+}
+
+/// The same into a struct of which the size is told beside it.
+///
+/// # Safety
+/// The pointer is null or points to `size` bytes.
+pub unsafe fn write_as<T: Sized>(value: &T, to: *mut T, size: usize) -> Outcome<()> {
+    if to.is_null() {
+        return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
+    }
+    let size = check::<T>(size)?;
+    // SAFETY: `size` bytes are within both.
+    unsafe { copy_nonoverlapping((&raw const *value).cast::<u8>(), to.cast::<u8>(), size) };
+    // SAFETY: the first member of the caller's struct; `size` fits, for it is at most that of `T`.
+    unsafe { to.cast::<u32>().write(size as u32) };
+    Ok(())
+}

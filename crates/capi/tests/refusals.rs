@@ -1,0 +1,195 @@
+//! Every call that cannot be obeyed is refused by name, and changes nothing.
+#![allow(unsafe_code)] // calls what C calls
+
+mod common;
+
+use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use common::{NO_WRENCH, PERIOD, at, done, load, refused, scene_and_loop, store_file};
+use palpate::force_loop::{
+    Loop, Target, palpate_loop_free, palpate_loop_new, palpate_loop_set_target, palpate_loop_start, palpate_loop_stop,
+};
+use palpate::frame::{Frame, palpate_loop_get_frame, palpate_loop_get_positions};
+use palpate::options::{DeviceOptions, ToolOptions, palpate_device_limits_known};
+use palpate::scene::{
+    palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_free, palpate_scene_load, palpate_scene_new,
+    palpate_scene_set_device,
+};
+use palpate::settings::{palpate_loop_reset, palpate_loop_set_friction};
+use palpate::statics::{Condition, palpate_store_solve, palpate_store_touch};
+use palpate::status::Status;
+use palpate::store::{palpate_store_free, palpate_store_get_positions, palpate_store_load};
+use palpate::tick::{DeviceWrench, palpate_loop_tick};
+
+const ARGUMENT: Status = Status::PalpateErrorArgument;
+
+#[test]
+fn null_pointers_lengths_and_handles_are_refused_by_name() {
+    let path = store_file("refusals");
+    let store = load(&path);
+    let (scene, own) = scene_and_loop(store);
+    let mut wrench = DeviceWrench { force: [1.0; 3], torque: [1.0; 3] };
+    // SAFETY: what is not null lives.
+    unsafe {
+        refused(palpate_store_load(null(), null_mut()), ARGUMENT, "file is a null pointer");
+        refused(palpate_store_load(c"x".as_ptr(), null_mut()), Status::PalpateErrorSystem, "x");
+        refused(palpate_scene_new(null_mut()), ARGUMENT, "scene is a null pointer");
+        refused(palpate_scene_add_body(scene, null(), null(), null_mut()), ARGUMENT, "store is a null pointer");
+        refused(palpate_store_get_positions(store, null_mut(), 7), ARGUMENT, "nodes is 7, it must be");
+        refused(palpate_loop_get_positions(own, 5, null_mut(), 0), ARGUMENT, "no body of the handle 5");
+        refused(palpate_loop_set_friction(own, 1, 0.1), ARGUMENT, "no tool of the handle 1");
+        refused(palpate_loop_set_friction(own, 0, -0.1), ARGUMENT, "friction of tool 0 must not be negative");
+        let mut frame = Frame { struct_size: 3, ..Frame::default() };
+        refused(palpate_loop_get_frame(own, &mut frame), ARGUMENT, "sizeof(palpate_frame)");
+        frame.struct_size = 1 << 20;
+        refused(palpate_loop_get_frame(own, &mut frame), ARGUMENT, "newer palpate.h");
+        let other = ToolOptions { shape: 9, ..ToolOptions::default() };
+        refused(palpate_scene_add_tool(scene, &other, null_mut()), ARGUMENT, "there is no shape 9");
+        // Wrenches are zero after a refused tick: none of an earlier one is put out again.
+        let call = |own, now, period, readings, wrenches, tools| {
+            palpate_loop_tick(own, now, period, readings, wrenches, tools)
+        };
+        refused(call(own, 1, PERIOD, null(), &mut wrench, 1), ARGUMENT, "readings is a null pointer");
+        assert_eq!((wrench.force, wrench.torque), (NO_WRENCH.force, NO_WRENCH.torque));
+        refused(call(own, 1, f64::NAN, &at(0.0), &mut wrench, 1), ARGUMENT, "period");
+        refused(
+            call(own, 1, PERIOD, [at(0.0); 2].as_ptr(), [wrench; 2].as_mut_ptr(), 2),
+            ARGUMENT,
+            "tools is 2, it must be 1",
+        );
+        refused(call(null_mut(), 1, PERIOD, &at(0.0), &mut wrench, 1), ARGUMENT, "loop is a null pointer");
+        palpate_loop_free(own);
+        palpate_scene_free(scene);
+        palpate_store_free(store);
+        palpate_loop_free(null_mut::<Loop>());
+    }
+    std::fs::remove_file(path).expect("the store");
+}
+
+#[test]
+fn damaged_and_foreign_files_are_refused() {
+    let path = store_file("damaged");
+    let mut bytes = std::fs::read(&path).expect("the store");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&path, bytes).expect("the store");
+    let file = std::ffi::CString::new(path.to_str().expect("UTF-8")).expect("no zero");
+    let (mut store, mut scene) = (null_mut(), null_mut());
+    // SAFETY: texts and places.
+    unsafe {
+        refused(palpate_store_load(file.as_ptr(), &mut store), Status::PalpateErrorStore, "damaged");
+        refused(palpate_scene_load(file.as_ptr(), &mut scene), Status::PalpateErrorStore, "damaged");
+        assert!(store.is_null() && scene.is_null());
+    }
+    std::fs::remove_file(path).expect("the store");
+}
+
+#[test]
+fn a_tool_stiffer_than_its_device_holds_is_refused() {
+    let path = store_file("device");
+    let store = load(&path);
+    let (scene, own) = scene_and_loop(store);
+    let (mut limits, mut second) = (DeviceOptions::default(), null_mut());
+    // SAFETY: living objects and places.
+    unsafe {
+        refused(palpate_device_limits_known(c"Tuch".as_ptr(), &mut limits, size_of_val(&limits)), ARGUMENT, "Touch");
+        done(palpate_device_limits_known(c"Touch".as_ptr(), &mut limits, size_of_val(&limits)));
+        assert_eq!(limits.max_stiffness, 400.0);
+        done(palpate_scene_set_device(scene, 0, &limits));
+        refused(palpate_loop_new(scene, &mut second), ARGUMENT, "at most 400 N/m");
+        palpate_loop_free(own);
+        palpate_scene_free(scene);
+        palpate_store_free(store);
+    }
+    std::fs::remove_file(path).expect("the store");
+}
+
+#[test]
+fn statics_refuse_what_cannot_be_prescribed() {
+    let path = store_file("statics");
+    let store = load(&path);
+    let (mut force, nan) = ([0.0; 3], f64::NAN);
+    let condition = |node, kind, value| Condition { node, kind, value };
+    // SAFETY: living objects and places.
+    unsafe {
+        let solve =
+            |c: &[Condition]| palpate_store_solve(store, c.as_ptr(), c.len(), null_mut(), null_mut(), 0, null_mut());
+        refused(solve(&[condition(9999, 0, [0.0; 3])]), ARGUMENT, "surface node 9999 is not touchable");
+        refused(solve(&[condition(60, 7, [0.0; 3])]), ARGUMENT, "there is no kind 7");
+        let both = [condition(60, 0, [nan, nan, 1e-3]), condition(60, 1, [0.0, 0.0, 1.0])];
+        refused(solve(&both), ARGUMENT, "both a force and a displacement along z");
+        let touch = |radius, force| {
+            let (point, press) = ([0.05, 0.05, 0.1], [nan, nan, -1e-3]);
+            palpate_store_touch(store, point.as_ptr(), press.as_ptr(), radius, force, null_mut(), 0, null_mut())
+        };
+        refused(touch(-1.0, force.as_mut_ptr()), ARGUMENT, "radius");
+        refused(touch(0.02, null_mut()), ARGUMENT, "force is a null pointer");
+        done(touch(0.02, force.as_mut_ptr()));
+        assert!(force[2] < 0.0);
+        palpate_store_free(store);
+    }
+    std::fs::remove_file(path).expect("the store");
+}
+
+#[test]
+fn who_ticks_is_one_at_a_time() {
+    let path = store_file("threads");
+    let store = load(&path);
+    let (scene, own) = scene_and_loop(store);
+    let mut wrench = NO_WRENCH;
+    let target =
+        Target { position: [0.05, 0.05, 0.104], orientation: [0.0; 4], velocity: [0.0; 3], active: 1, grab: 0 };
+    // SAFETY: living objects and places.
+    unsafe {
+        refused(palpate_loop_set_target(own, 0, &target), Status::PalpateErrorState, "palpate_loop_start first");
+        done(palpate_loop_start(own));
+        refused(palpate_loop_start(own), Status::PalpateErrorState, "runs already");
+        done(palpate_loop_set_target(own, 0, &target));
+        refused(
+            palpate_loop_tick(own, 1, PERIOD, &at(0.0), &mut wrench, 1),
+            Status::PalpateErrorState,
+            "palpate_loop_stop",
+        );
+        done(palpate_loop_stop(own));
+        done(palpate_loop_stop(own));
+        done(palpate_loop_tick(own, 1, PERIOD, &at(0.1), &mut wrench, 1));
+    }
+    // Two threads tick without pause: whoever comes second is turned away, and nobody waits.
+    let (address, busy) = (own as usize, AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        for first in [1_u64, 2] {
+            let busy = &busy;
+            scope.spawn(move || {
+                let mut wrench = NO_WRENCH;
+                for tick in 0..400_000 {
+                    // SAFETY: a living loop.
+                    let status = unsafe {
+                        palpate_loop_tick(
+                            address as *mut Loop,
+                            first + 1_000_000 * tick,
+                            PERIOD,
+                            &at(0.1),
+                            &mut wrench,
+                            1,
+                        )
+                    };
+                    busy.fetch_or(status == Status::PalpateErrorBusy, Ordering::Relaxed);
+                    if busy.load(Ordering::Relaxed) {
+                        return;
+                    }
+                    assert!(matches!(status, Status::PalpateOk | Status::PalpateFault));
+                }
+            });
+        }
+    });
+    assert!(busy.load(Ordering::Relaxed), "the two never met");
+    // SAFETY: living objects.
+    unsafe {
+        done(palpate_loop_reset(own));
+        palpate_loop_free(own);
+        palpate_scene_free(scene);
+        palpate_store_free(store);
+    }
+    std::fs::remove_file(path).expect("the store");
+}

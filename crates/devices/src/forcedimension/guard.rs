@@ -1,0 +1,197 @@
+//! What is watched beside the tick, by a thread that may wait.
+
+use std::ffi::c_char;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use super::ffi::{Id, force_off, status};
+use super::library::Dhd;
+use super::{Traits, open_ranks, prepared};
+use crate::OpenError;
+
+/// Time between two looks.
+const LOOK: Duration = Duration::from_millis(4);
+
+/// Longest time for which the motors keep a force that is not written again, ns: sixteen ticks, half of what the hardware's
+/// own watchdog waits, which is there for a process that does not run at all.
+const HOLD_NS: u64 = 16_000_000;
+
+/// Looks from one question for the device's status to the next.
+const LOOKS_A_STATUS: u32 = 5;
+
+/// Looks from one attempt to bring back a device, or motors that are off, to the next: 0.2 s.
+const LOOKS_AN_ATTEMPT: u32 = 50;
+
+/// What the tick finds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Open, by its number.
+    Ready(Id),
+    /// Open, with its motors switched off.
+    MotorsOff,
+    /// Unplugged.
+    Lost,
+}
+
+const LOST: i32 = -1;
+const MOTORS_OFF: i32 = -2;
+
+struct Shared {
+    dhd: Dhd,
+    rank: i8,
+    traits: Traits,
+    /// The device's number when it is ready; [`LOST`], [`MOTORS_OFF`].
+    state: AtomicI32,
+    began: Instant,
+    written_ns: AtomicU64,
+    closing: AtomicBool,
+}
+
+/// The guard of one open device. When it is dropped the motors are off and the device is closed.
+pub struct Guard {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<Option<Id>>>,
+}
+
+impl Guard {
+    pub fn start(dhd: Dhd, rank: i8, id: Id, traits: Traits) -> Result<Self, OpenError> {
+        let (began, written_ns, closing) = (Instant::now(), AtomicU64::new(0), AtomicBool::new(false));
+        let state = AtomicI32::new(id.into());
+        let shared = Arc::new(Shared { dhd, rank, traits, state, began, written_ns, closing });
+        let watched = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("palpate-forcedimension".to_owned())
+            .spawn(move || watch(&watched, id))
+            .map_err(|error| {
+                dhd.close(id);
+                OpenError::new(format!("the system gives no thread ({error})"), "close other programs")
+            })?;
+        Ok(Self { shared, thread: Some(thread) })
+    }
+
+    pub fn state(&self) -> State {
+        self.shared.state()
+    }
+
+    /// The tick has found it unplugged.
+    pub fn lose(&self) {
+        self.shared.state.store(LOST, Ordering::Release);
+    }
+
+    /// The tick has written a force.
+    pub fn note_write(&self) {
+        self.shared.written_ns.store(self.shared.now_ns(), Ordering::Relaxed);
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        self.shared.closing.store(true, Ordering::Release);
+        let open = self.thread.take().and_then(|thread| {
+            thread.thread().unpark();
+            thread.join().ok().flatten()
+        });
+        if let Some(id) = open {
+            let _ = self.shared.release(id);
+            let _ = self.shared.dhd.enable_force(false, id);
+            self.shared.dhd.close(id);
+        }
+        open_ranks().retain(|rank| *rank != self.shared.rank);
+    }
+}
+
+impl Shared {
+    fn now_ns(&self) -> u64 {
+        self.began.elapsed().as_nanos() as u64
+    }
+
+    fn state(&self) -> State {
+        match self.state.load(Ordering::Acquire) {
+            LOST => State::Lost,
+            MOTORS_OFF => State::MotorsOff,
+            id => State::Ready(id as c_char),
+        }
+    }
+
+    /// No force, and none of rotation.
+    fn release(&self, id: Id) -> Result<(), i32> {
+        match self.traits.has_active_wrist {
+            true => self.dhd.set_force_and_torque(DVec3::ZERO, DVec3::ZERO, id),
+            false => self.dhd.set_force(DVec3::ZERO, id),
+        }
+        .map(|_| ())
+    }
+
+    /// Changes the state, unless the tick has changed it meanwhile.
+    fn change(&self, from: State, to: i32) {
+        if let State::Ready(id) = from {
+            let _ = self.state.compare_exchange(id.into(), to, Ordering::AcqRel, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Until the device is closed; the number by which it is open then.
+fn watch(shared: &Shared, id: Id) -> Option<Id> {
+    let mut open = Some(id);
+    let mut look = 0_u32;
+    while !shared.closing.load(Ordering::Acquire) {
+        look = look.wrapping_add(1);
+        match (shared.state(), open) {
+            (State::Lost, _) => {
+                if let Some(lost) = open.take() {
+                    shared.dhd.close(lost);
+                }
+                if look.is_multiple_of(LOOKS_AN_ATTEMPT) {
+                    open = reopen(shared);
+                }
+            }
+            (_, Some(id)) => watch_open(shared, id, look),
+            (_, None) => shared.state.store(LOST, Ordering::Release),
+        }
+        std::thread::park_timeout(LOOK);
+    }
+    open
+}
+
+fn watch_open(shared: &Shared, id: Id, look: u32) {
+    let state = shared.state();
+    let age_ns = shared.now_ns().saturating_sub(shared.written_ns.load(Ordering::Relaxed));
+    if age_ns > HOLD_NS && matches!(state, State::Ready(_)) {
+        // The tick notices what is wrong, if it still ticks.
+        let _ = shared.release(id);
+    }
+    if !look.is_multiple_of(LOOKS_A_STATUS) {
+        return;
+    }
+    match shared.dhd.status(id) {
+        Ok(status) if status[status::CONNECTED] == 0 => shared.state.store(LOST, Ordering::Release),
+        Ok(status) if status[status::FORCE_OFF_CAUSE] != force_off::NONE => {
+            shared.change(state, MOTORS_OFF);
+            let cause = status[status::FORCE_OFF_CAUSE];
+            // Those that a person holds down end by themselves.
+            let by_hand = matches!(cause, force_off::BUTTON | force_off::DEAD_MAN);
+            if !by_hand && look.is_multiple_of(LOOKS_AN_ATTEMPT) && shared.dhd.enable_force(true, id).is_ok() {
+                let _ = shared.release(id);
+            }
+        }
+        // Well, or the tick will notice.
+        Ok(_) if state == State::MotorsOff => shared.state.store(id.into(), Ordering::Release),
+        _ => (),
+    }
+}
+
+/// The same device, if it is back.
+fn reopen(shared: &Shared) -> Option<Id> {
+    let (id, traits) = prepared(shared.dhd, shared.rank).ok()?;
+    if traits.system_type != shared.traits.system_type {
+        shared.dhd.close(id);
+        return None;
+    }
+    shared.written_ns.store(shared.now_ns(), Ordering::Relaxed);
+    shared.state.store(id.into(), Ordering::Release);
+    Some(id)
+}

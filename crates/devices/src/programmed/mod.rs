@@ -1,0 +1,103 @@
+//! A device that a program brings: its own thread measures and moves motors, however long that takes, and the servo reads and
+//! writes memory.
+//!
+//! Readings go one way and wrenches the other through triple buffers: the latest counts, and neither side ever waits. The
+//! program polls: it publishes a reading, fetches the wrench, puts it out. A reading that is older than
+//! [`LONGEST_SILENCE`] by the ticks of the servo is a fault; a wrench that is older than [`LONGEST_HOLD`] by the clock is zero for
+//! the program, and so is one whose loop has ended.
+//!
+//! **Delay.** Polls a time `P` apart see the hand at `0` and put out at `P` what a tick in between has answered, to hold it for `P`:
+//! the answer is `P + P/2` old on average, of which [`DeviceLimits::largest_stiffness`] knows the half period of the tick. It is
+//! given the whole as [`DeviceLimits::delay`], on the safe side by that half.
+
+mod end;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use triple_buffer::{Input, Output, triple_buffer};
+
+pub use self::end::ProgramEnd;
+use crate::{Device, DeviceFault, DeviceLimits, Pose, Reading, Twist, Wrench};
+
+/// Longest time without a new reading, s. Drivers give up a cable after about as long; the servo's own limit on the age of
+/// a reading is the same.
+pub const LONGEST_SILENCE: f64 = 0.05;
+
+/// Longest time for which a wrench is put out that no tick has renewed, s: two and a half periods of the slowest loop,
+/// 100 Hz.
+pub const LONGEST_HOLD: f64 = 0.025;
+
+/// Which of both sides have gone.
+#[derive(Default)]
+struct Gone {
+    program: AtomicBool,
+    servo: AtomicBool,
+}
+
+/// What the program says: a reading, or why there is none; nothing at first.
+type Said = Option<Result<Reading, DeviceFault>>;
+
+/// A wrench, and when the servo put it out.
+type Asked = Option<(Wrench, Instant)>;
+
+/// The device's end, owned by the servo.
+pub struct ProgrammedDevice {
+    name: String,
+    limits: DeviceLimits,
+    said: Output<Said>,
+    asked: Input<Asked>,
+    gone: Arc<Gone>,
+    /// Ticks since the latest reading.
+    silent: u32,
+}
+
+/// A device whose program polls at `rate`, Hz, with the delay that polling adds to its limits, and the program's end.
+pub fn programmed(name: impl Into<String>, limits: DeviceLimits, rate: f64) -> (ProgramEnd, ProgrammedDevice) {
+    let (said_in, said_out) = triple_buffer(&None);
+    let (asked_in, asked_out) = triple_buffer(&None);
+    let gone = Arc::new(Gone::default());
+    let limits = DeviceLimits { delay: limits.delay + 1.5 / rate, ..limits };
+    let device =
+        ProgrammedDevice { name: name.into(), limits, said: said_out, asked: asked_in, gone: gone.clone(), silent: 0 };
+    (ProgramEnd::new(said_in, asked_out, gone), device)
+}
+
+impl Device for ProgrammedDevice {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
+        self.silent = if self.said.update() { 0 } else { self.silent.saturating_add(1) };
+        // Asked after the update: what a program said before it went is not missed.
+        let gone = self.gone.program.load(Ordering::Acquire);
+        match *self.said.output_buffer_mut() {
+            Some(Err(fault)) => Err(fault),
+            _ if gone => Err(DeviceFault::Disconnected),
+            None => Ok(Reading { timestamp_ns: now_ns, ..Reading::default() }),
+            Some(Ok(_)) if f64::from(self.silent) * period > LONGEST_SILENCE => Err(DeviceFault::Stale),
+            Some(Ok(reading)) => Ok(reading),
+        }
+    }
+
+    fn write(&mut self, wrench: Wrench) -> Result<(), DeviceFault> {
+        self.asked.write(Some((wrench, Instant::now())));
+        Ok(())
+    }
+
+    fn limits(&self) -> DeviceLimits {
+        self.limits
+    }
+}
+
+/// The program learns that there is no loop any more.
+impl Drop for ProgrammedDevice {
+    fn drop(&mut self) {
+        self.gone.servo.store(true, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests;

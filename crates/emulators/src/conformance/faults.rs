@@ -1,0 +1,167 @@
+//! Bad days: cables, errors, versions, delays, numbers that are none. No force outlives a fault by more than a tick, and a
+//! device that is well again works again in the same program.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use palpate_devices::{DeviceFault, OpenError};
+
+use super::readings::close_to;
+use super::rig::{PERIOD, Rig};
+use super::spring::{PUSH, STIFFNESS, Spring};
+use super::{Bench, Check, Disturbance, Seat, Tip, Verdict};
+
+pub fn checks<B: Bench>() -> Vec<Check<B>> {
+    vec![
+        Check { name: "unplugged: no force, and plugged in it works again", run: |seat| seat.with_open(unplugged) },
+        Check { name: "a driver's error: no force, and then it works again", run: |seat| seat.with_open(driver_error) },
+        Check { name: "slow replies: stale, and then it works again", run: |seat| seat.with_open(slow_replies) },
+        Check { name: "positions that are no numbers: no force", run: |seat| seat.with_open(not_finite) },
+        Check { name: "a wrong version is refused", run: |seat| refused(seat, Disturbance::WrongVersion) },
+        Check { name: "a device that is not there is refused", run: |seat| refused(seat, Disturbance::Unplugged) },
+    ]
+}
+
+/// How long a fault is watched, where its ticks are slow.
+const WATCHED: Duration = Duration::from_millis(300);
+
+/// Time after which a fault must have been said.
+fn until_said<B: Bench>(rig: &Rig<B>) -> f64 {
+    (rig.facts.stale_after + PERIOD * (2 + rig.facts.late_ticks as u32)).as_secs_f64()
+}
+
+/// Presses against the spring until something goes wrong; the fault. From the tick after the one that says so (or as many
+/// later as the device is late) the motors have no force, for as long as it goes on.
+fn without_force<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance) -> Result<DeviceFault, String> {
+    let facts = rig.facts;
+    let pressed = rig.settle(Spring::to(facts.middle), |bench| bench.set_tip(Tip::at(PUSH * DVec3::X)))?;
+    close_to(
+        "the force",
+        pressed.motors.force,
+        -STIFFNESS * PUSH * DVec3::X,
+        STIFFNESS * facts.position_tolerance + facts.force_tolerance,
+    )?;
+    let (most, mut spring, mut began) = (until_said(rig), Spring::to(facts.middle), None);
+    let (mut after_fault, mut said_at) = (0, None);
+    let fault = rig.each_tick(60_000, move |bench, device, now_ns| {
+        let began = *began.get_or_insert_with(|| {
+            bench.disturb(Some(disturbance));
+            Instant::now()
+        });
+        let asked_after = began.elapsed().as_secs_f64();
+        let (said, _) = spring.tick(device, now_ns);
+        if said.is_ok_and(|reading| !reading.pose.is_finite()) {
+            return ControlFlow::Break(Err("a position that is no number was told as if it were one".to_owned()));
+        }
+        let Some(fault) = spring.fault else {
+            if asked_after > most {
+                return ControlFlow::Break(Err(format!("no fault {asked_after} s after {disturbance:?}")));
+            }
+            return ControlFlow::Continue(());
+        };
+        let force = bench.motors().wrench.force;
+        if after_fault > facts.late_ticks && force.length() > facts.force_tolerance {
+            return ControlFlow::Break(Err(format!("{force} N, {after_fault} ticks after the fault: {fault}")));
+        }
+        after_fault += 1;
+        // Slow replies may make slow ticks.
+        let long = said_at.get_or_insert_with(Instant::now).elapsed() > WATCHED;
+        let enough = if long { 2 } else { 50 } + facts.late_ticks;
+        if after_fault > enough { ControlFlow::Break(Ok(fault)) } else { ControlFlow::Continue(()) }
+    });
+    fault.unwrap_or_else(|| Err("no ticks".to_owned()))
+}
+
+/// Whether the device, well again, gives readings in time, and after a reset forces.
+fn works_again<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+    let (facts, mut spring, mut began) = (rig.facts, Spring::to(rig.facts.middle), None);
+    let mut good = 0;
+    spring.fault = Some(DeviceFault::Stale);
+    let again = rig.each_tick(120_000, move |bench, device, now_ns| {
+        let began = *began.get_or_insert_with(|| {
+            bench.disturb(None);
+            Instant::now()
+        });
+        let (said, _) = spring.tick(device, now_ns);
+        good = if said.is_ok() { good + 1 } else { 0 };
+        let force = bench.motors().wrench.force;
+        if good > 2 * facts.late_ticks && force.length() > facts.force_tolerance {
+            return ControlFlow::Break(Err(format!("{force} N before the reset")));
+        }
+        match said {
+            // A device that is back stays back.
+            Ok(_) if good > 20 => ControlFlow::Break(Ok(())),
+            Err(fault) if began.elapsed() > facts.recovers_within => {
+                ControlFlow::Break(Err(format!("well again for {:?} and still: {fault}", began.elapsed())))
+            }
+            _ => ControlFlow::Continue(()),
+        }
+    });
+    again.unwrap_or_else(|| Err("no ticks".to_owned()))?;
+    let pressed = rig.settle(Spring::to(facts.middle), |bench| bench.set_tip(Tip::at(-PUSH * DVec3::Y)))?;
+    let tolerance = STIFFNESS * facts.position_tolerance + facts.force_tolerance;
+    close_to("the force after the reset", pressed.motors.force, STIFFNESS * PUSH * DVec3::Y, tolerance)
+}
+
+fn unplugged<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+    for _ in 0..2 {
+        let fault = without_force(rig, Disturbance::Unplugged)?;
+        if !matches!(fault, DeviceFault::Disconnected | DeviceFault::Stale) {
+            return Err(format!("unplugged is called: {fault}"));
+        }
+        works_again(rig)?;
+    }
+    Ok(())
+}
+
+fn driver_error<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+    let (fault, expected) = (without_force(rig, Disturbance::DriverError)?, rig.facts.driver_error);
+    if fault != expected {
+        return Err(format!("a driver's error is told as {fault:?}, not as {expected:?}"));
+    }
+    works_again(rig)
+}
+
+fn slow_replies<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+    let fault = without_force(rig, Disturbance::SlowReplies)?;
+    if fault != DeviceFault::Stale {
+        return Err(format!("slow replies are called: {fault}"));
+    }
+    works_again(rig)
+}
+
+fn not_finite<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+    let fault = without_force(rig, Disturbance::NotFinite)?;
+    if fault != DeviceFault::NotFinite {
+        return Err(format!("positions that are no numbers are called: {fault}"));
+    }
+    works_again(rig)
+}
+
+/// Does not open, with one line that says what is wrong and what to do; and opens when all is well.
+fn refused<B: Bench>(seat: &mut Seat<B>, disturbance: Disturbance) -> Verdict {
+    seat.bench().disturb(Some(disturbance));
+    let error = match seat.bench().open() {
+        Err(error) => error,
+        Ok(_) => return Err(format!("opens at {disturbance:?}")),
+    };
+    useful(&error)?;
+    seat.bench().disturb(None);
+    let waited = Instant::now();
+    loop {
+        match seat.with_open(|_| Ok(())) {
+            Ok(()) => return Ok(()),
+            Err(still) if waited.elapsed() > seat.bench().facts().recovers_within => return Err(still),
+            Err(_) => std::thread::sleep(10 * PERIOD),
+        }
+    }
+}
+
+fn useful(error: &OpenError) -> Verdict {
+    let line = error.to_string();
+    if error.what.trim().is_empty() || error.advice.trim().is_empty() || line.contains('\n') || line.len() > 1000 {
+        return Err(format!("the error does not say what to do in one line: {line:?}"));
+    }
+    Ok(())
+}

@@ -1,0 +1,190 @@
+//! The suite in the place of the force loop: it ticks an opened device from whichever thread may.
+
+use std::ops::ControlFlow;
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use palpate_devices::{Device, DeviceLimits, OpenError, Opened, Reading, Scheduler, Wrench};
+
+use super::spring::Spring;
+use super::{Bench, Facts};
+
+/// Time between two ticks.
+pub const PERIOD: Duration = Duration::from_millis(1);
+
+/// How long the suite waits for a driver's scheduler that should be ticking.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What a job does at each tick: with the bench, the device and the time, ns.
+type Job<B> = Box<dyn FnMut(&mut B, &mut dyn Device, u64) -> ControlFlow<()> + Send>;
+
+/// What the ticks are made of. It is locked for the length of a tick: a suite may, a force loop must not.
+struct Parts<B> {
+    bench: B,
+    device: Box<dyn Device>,
+    job: Option<Job<B>>,
+    /// Ticks without pause between them.
+    hurried: bool,
+    began: Instant,
+}
+
+impl<B> Parts<B> {
+    /// One tick of the job; between jobs a loop with nothing to render.
+    fn tick(&mut self) {
+        let now_ns = self.began.elapsed().as_nanos() as u64;
+        let Some(job) = &mut self.job else {
+            let _ = self.device.read(now_ns, PERIOD.as_secs_f64());
+            let _ = self.device.write(Wrench::default());
+            return;
+        };
+        if job(&mut self.bench, &mut *self.device, now_ns).is_break() {
+            self.job = None;
+        }
+    }
+}
+
+fn locked<B>(parts: &Mutex<Parts<B>>) -> std::sync::MutexGuard<'_, Parts<B>> {
+    parts.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What was seen at the end of a tick.
+pub struct Seen {
+    pub reading: Reading,
+    pub written: Wrench,
+    pub motors: Wrench,
+}
+
+/// A bench with its driver open.
+pub struct Rig<B: Bench> {
+    pub facts: Facts,
+    pub limits: DeviceLimits,
+    parts: Arc<Mutex<Parts<B>>>,
+    scheduler: Option<Arc<dyn Scheduler>>,
+}
+
+impl<B: Bench> Rig<B> {
+    pub fn open(mut bench: B) -> Result<Self, (B, OpenError)> {
+        let facts = bench.facts();
+        let Opened { device, scheduler } = match bench.open() {
+            Ok(opened) => opened,
+            Err(error) => return Err((bench, error)),
+        };
+        let limits = device.limits();
+        let parts = Arc::new(Mutex::new(Parts { bench, device, job: None, hurried: false, began: Instant::now() }));
+        if let Some(scheduler) = &scheduler {
+            let ticked = Arc::clone(&parts);
+            if let Err(error) = scheduler.start(Box::new(move || locked(&ticked).tick())) {
+                return Err((taken(parts).bench, error));
+            }
+        }
+        Ok(Self { facts, limits, parts, scheduler })
+    }
+
+    /// Calls `job` at each tick until it breaks with a result, `most` ticks at most.
+    pub fn each_tick<R: Send + 'static>(
+        &mut self,
+        most: usize,
+        mut job: impl FnMut(&mut B, &mut dyn Device, u64) -> ControlFlow<R> + Send + 'static,
+    ) -> Option<R> {
+        let (sender, results) = channel();
+        let mut ticks = 0;
+        locked(&self.parts).job = Some(Box::new(move |bench, device, now_ns| {
+            ticks += 1;
+            match job(bench, device, now_ns) {
+                ControlFlow::Break(result) => {
+                    let _ = sender.send(Some(result));
+                    ControlFlow::Break(())
+                }
+                ControlFlow::Continue(()) if ticks >= most => {
+                    let _ = sender.send(None);
+                    ControlFlow::Break(())
+                }
+                ControlFlow::Continue(()) => ControlFlow::Continue(()),
+            }
+        }));
+        match self.scheduler {
+            Some(_) => self.wait(&results, most),
+            None => self.tick_here(&results),
+        }
+    }
+
+    /// The driver's thread ticks.
+    fn wait<R>(&self, results: &Receiver<Option<R>>, most: usize) -> Option<R> {
+        results.recv_timeout(PATIENCE + 2 * PERIOD * most as u32).ok().flatten()
+    }
+
+    /// This thread ticks. A deadline that is missed is not made up for: the ticks that follow would be too close.
+    fn tick_here<R>(&self, results: &Receiver<Option<R>>) -> Option<R> {
+        let mut deadline = Instant::now();
+        loop {
+            let hurried = {
+                let mut parts = locked(&self.parts);
+                parts.tick();
+                parts.hurried
+            };
+            if let Ok(result) = results.try_recv() {
+                return result;
+            }
+            let now = Instant::now();
+            deadline = (deadline + PERIOD).max(now);
+            if !hurried {
+                std::thread::sleep(deadline - now);
+            }
+        }
+    }
+
+    /// Does something to the device, and lets the spring answer until reading and motors must show it.
+    pub fn settle(&mut self, mut spring: Spring, act: impl FnOnce(&mut B) + Send + 'static) -> Result<Seen, String> {
+        let (mut act, mut left) = (Some(act), 2 * self.facts.late_ticks);
+        let seen = self.each_tick(left + 1, move |bench, device, now_ns| {
+            if let Some(act) = act.take() {
+                act(bench);
+            }
+            let (said, written) = spring.tick(device, now_ns);
+            if left > 0 {
+                left -= 1;
+                return ControlFlow::Continue(());
+            }
+            ControlFlow::Break(match (said, spring.fault) {
+                (Ok(reading), None) => Ok(Seen { reading, written, motors: bench.motors().wrench }),
+                (Err(fault), _) | (_, Some(fault)) => Err(format!("a fault of a device that is well: {fault}")),
+            })
+        });
+        seen.unwrap_or_else(|| Err("no ticks".to_owned()))
+    }
+
+    /// Ticks as fast as possible, where the device allows it.
+    pub fn hurry(&mut self, as_fast_as_possible: bool) {
+        let mut parts = locked(&self.parts);
+        parts.hurried = as_fast_as_possible && self.facts.hurries;
+        let hurried = parts.hurried;
+        parts.bench.hurry(hurried);
+    }
+
+    /// Name by which a person knows the device.
+    pub fn name(&self) -> String {
+        locked(&self.parts).device.name().to_owned()
+    }
+
+    /// Stops the ticks and closes the driver.
+    pub fn close(self) -> B {
+        if let Some(scheduler) = &self.scheduler {
+            scheduler.stop();
+        }
+        taken(self.parts).bench
+    }
+}
+
+/// What a stopped scheduler has given back. The job goes with it, for it may hold what a driver waits for.
+fn taken<B>(mut parts: Arc<Mutex<Parts<B>>>) -> Parts<B> {
+    let began = Instant::now();
+    loop {
+        match Arc::try_unwrap(parts) {
+            Ok(alone) => return alone.into_inner().unwrap_or_else(PoisonError::into_inner),
+            Err(shared) if began.elapsed() < PATIENCE => parts = shared,
+            Err(_) => panic!("the driver's scheduler has been stopped and still holds its tick"),
+        }
+        std::thread::sleep(PERIOD);
+    }
+}

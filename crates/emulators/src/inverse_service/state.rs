@@ -1,0 +1,158 @@
+//! States as the service writes them.
+
+use glam::{DQuat, DVec3};
+use serde_json::{Map, Value, json};
+
+use super::arm::{Arm, MIDDLE};
+use super::grip::{Grip, GripKind};
+use super::persona::Persona;
+use super::world::{Session, World};
+
+fn vector(v: DVec3) -> Value {
+    json!({"x": v.x, "y": v.y, "z": v.z})
+}
+
+fn quaternion(q: DQuat) -> Value {
+    json!({"w": q.w, "x": q.x, "y": q.y, "z": q.z})
+}
+
+/// A transform that does nothing.
+fn identity(persona: Persona) -> Value {
+    match persona {
+        Persona::V35 => json!({}),
+        _ => {
+            json!({"position": vector(DVec3::ZERO), "rotation": quaternion(DQuat::IDENTITY), "scale": vector(DVec3::ONE)})
+        }
+    }
+}
+
+/// A message for a session: with the configuration of everything if it is a `full` one.
+pub fn render(world: &World, number: u64, full: bool) -> Value {
+    let session = world.sessions.get(&number).cloned().unwrap_or_default();
+    let persona = world.persona;
+    let plugged = world.arms.iter().filter(|arm| arm.condition.plugged);
+    let arms = plugged.map(|arm| (arm.id.clone(), render_arm(world, arm, &session, number, full)));
+    let mut message = Map::new();
+    message.insert("inverse3".into(), collected(persona, arms));
+    for kind in [GripKind::Wired, GripKind::Wireless, GripKind::Custom] {
+        if kind == GripKind::Custom && persona < Persona::V34 {
+            continue;
+        }
+        let grips = world.grips.iter().filter(|grip| grip.kind == kind);
+        let grips = grips.map(|grip| (grip.id.clone(), render_grip(persona, grip, full)));
+        message.insert(kind.array().into(), collected(persona, grips));
+    }
+    message.insert("session_id".into(), json!(number));
+    if persona >= Persona::V35 {
+        let basis = json!({"permutation": session.basis.as_deref().unwrap_or("XYZ")});
+        let profile = json!({"name": session.profile.as_deref().unwrap_or("default")});
+        let config = json!({"profile": profile, "started_time": 0, "basis": basis});
+        message.insert("session".into(), json!({"session_id": number, "config": config}));
+    }
+    Value::Object(message)
+}
+
+/// Entries as an array, or before 3.1 as a map.
+fn collected(persona: Persona, entries: impl Iterator<Item = (String, Value)>) -> Value {
+    if persona == Persona::V30 { Value::Object(entries.collect()) } else { entries.map(|(_, entry)| entry).collect() }
+}
+
+fn render_arm(world: &World, arm: &Arm, session: &Session, number: u64, full: bool) -> Value {
+    let persona = world.persona;
+    let mut entry = json!({"device_id": arm.id, "state": arm_state(persona, arm, session), "status": {
+        "calibrated": arm.condition.calibrated,
+        "in_use": arm.commanded_by().is_some_and(|other| other != number),
+        "power_supply": arm.condition.power_supply,
+        "ready": arm.condition.ready,
+        "started": true,
+    }});
+    if full {
+        entry["config"] = arm_config(persona, arm, session);
+    }
+    entry
+}
+
+fn arm_state(persona: Persona, arm: &Arm, session: &Session) -> Value {
+    let is_centred = persona.has_presets() && session.preset(&arm.id).ends_with("_centered");
+    let position = arm.measured.position + if is_centred { DVec3::ZERO } else { MIDDLE };
+    let is_commanded = arm.commanded_by().is_some();
+    let angles = json!({"a0": 0, "a1": 0.0, "a2": 0});
+    let mut state = json!({
+        "cursor_position": vector(position),
+        "cursor_velocity": vector(arm.measured.velocity),
+        "angular_position": angles,
+        "angular_velocity": angles,
+        "body_orientation": quaternion(DQuat::IDENTITY),
+        "mode": "idle",
+        "control_domain": if is_commanded { "cartesian" } else { "undefined" },
+        "control_mode": if is_commanded { "force" } else { "idle" },
+        "transform": identity(persona),
+    });
+    if persona.repeats_commands() {
+        state["current_cursor_force"] = vector(arm.motors.force);
+        state["current_cursor_position"] = vector(DVec3::ZERO);
+        state["current_angular_torques"] = angles.clone();
+        state["current_angular_position"] = angles;
+    }
+    if persona >= Persona::V35 {
+        state["transform_velocity"] = identity(persona);
+    }
+    state
+}
+
+fn arm_config(persona: Persona, arm: &Arm, session: &Session) -> Value {
+    let number = if arm.kind == "minverse" { 6 } else { 4 };
+    // Both are seen: a number, and the name.
+    let device_type = if persona == Persona::V31 { json!(arm.kind) } else { json!(number) };
+    let mut config = json!({
+        "type": arm.kind,
+        "device_info": {
+            "major_version": 7, "minor_version": 3, "id": 1, "device_type": device_type,
+            "uuid": "00000000000000000000000000000001",
+        },
+        "port": "/dev/ttyACM0",
+        "extended_device_id": arm.id,
+        "extended_firmware_version": "7.3",
+        "gravity_compensation": {"enabled": true, "scaling_factor": 1},
+        "handedness": "right",
+        "streaming_mode": "USB",
+        "torque_scaling": {"enabled": true},
+        "home_return": {"enabled": false},
+    });
+    if persona.has_presets() {
+        config["preset"] = json!(session.preset(&arm.id));
+        config["basis"] = json!({"permutation": session.basis.as_deref().unwrap_or("XYZ")});
+        config["mount"] = identity(persona);
+        config["filters"] = json!({"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.0}});
+    } else {
+        config["cursor_offset"] = vector(DVec3::ZERO);
+        config["coordinate_origin"] = json!("device_base");
+    }
+    config
+}
+
+fn render_grip(persona: Persona, grip: &Grip, full: bool) -> Value {
+    let mut state = json!({
+        "hall": 0, "orientation": quaternion(grip.orientation), "transform": identity(persona),
+    });
+    let status = if grip.kind == GripKind::Wired {
+        state["button"] = json!(grip.holds(0));
+        json!({"error": 0, "ready": grip.awake})
+    } else {
+        state["buttons"] = json!({"a": grip.holds(0), "b": grip.holds(1), "c": grip.holds(2)});
+        state["battery_level"] = json!(0.8);
+        state["battery_voltage"] = json!(3.9);
+        json!({"connected": grip.awake, "awake": grip.awake, "ready": grip.awake})
+    };
+    if grip.kind == GripKind::Custom {
+        state["extension_data"] = json!([0_u8; 12].as_slice());
+    }
+    let mut entry = json!({"device_id": grip.id, "state": state, "status": status});
+    if full {
+        entry["config"] = json!({
+            "port": "/dev/ttyACM1", "type": grip.kind.array(), "major_version": 1, "minor_version": 2,
+            "hardware_version": 1, "streaming_mode": if grip.kind == GripKind::Wired { "USB" } else { "Radio" },
+        });
+    }
+    entry
+}

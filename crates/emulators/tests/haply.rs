@@ -1,0 +1,386 @@
+//! The driver of Haply's arms against the emulated Inverse Service.
+
+mod haply_bench;
+
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use palpate_devices::haply::{list, open};
+use palpate_devices::{Buttons, Connection, Device, DeviceFault, Wrench};
+use palpate_emulators::conformance::assert_conforms;
+use palpate_emulators::inverse_service::{Condition, GripKind, Held, InverseService, MIDDLE, Persona, Trouble};
+use serde_json::json;
+
+use haply_bench::{ARM, HaplyBench, alone, service};
+
+const PERIOD: f64 = 1e-3;
+
+fn connection(service: &InverseService) -> Connection {
+    Connection { address: Some(service.address()), ..Connection::default() }
+}
+
+fn opened(service: &InverseService) -> Box<dyn Device> {
+    open(&connection(service)).expect("the emulated arm opens").device
+}
+
+/// Ticks with a force until a condition holds; panics if it does not within two seconds.
+fn tick_until(
+    device: &mut dyn Device,
+    force: DVec3,
+    what: &str,
+    mut holds: impl FnMut(Result<palpate_devices::Reading, DeviceFault>) -> bool,
+) {
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(4) {
+        let said = device.read(0, PERIOD);
+        let wrench = if said.is_ok() { Wrench { force, ..Wrench::default() } } else { Wrench::default() };
+        let _ = device.write(wrench);
+        if holds(said) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("{what} within 4 s");
+}
+
+fn until_force(device: &mut dyn Device, service: &InverseService, force: DVec3) {
+    tick_until(device, force, "the force reaches the motors", |_| service.motors(ARM).force == force);
+}
+
+#[test]
+fn conforms_with_services_of_3_5() {
+    let _alone = alone();
+    assert_conforms(HaplyBench::new(Persona::V35));
+}
+
+#[test]
+fn conforms_with_services_of_3_4() {
+    let _alone = alone();
+    assert_conforms(HaplyBench::new(Persona::V34));
+}
+
+#[test]
+fn conforms_with_services_of_3_1() {
+    let _alone = alone();
+    assert_conforms(HaplyBench::new(Persona::V31));
+}
+
+#[test]
+fn the_origin_is_the_middle_of_the_workspace_where_it_can_be_chosen() {
+    let _alone = alone();
+    for (persona, origin) in [(Persona::V31, MIDDLE), (Persona::V34, MIDDLE), (Persona::V35, DVec3::ZERO)] {
+        let service = service(persona);
+        let mut device = opened(&service);
+        let held = DVec3::new(0.01, 0.02, -0.03);
+        service.hold(ARM, Held::at(held));
+        tick_until(&mut *device, DVec3::ZERO, "the place", |said| {
+            said.is_ok_and(|reading| (reading.pose.position - held - origin).length() < 1e-12)
+        });
+        assert_eq!(device.name(), "Haply Inverse3 0A01");
+        assert_eq!(service.profiles(), [Some("org.palpate.servo".to_string())]);
+        // Nothing that the service of this release does not know.
+        assert_eq!(service.take_complaints(), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn limits_tell_the_measured_delay() {
+    let _alone = alone();
+    let slow = Trouble::Late(Duration::from_millis(3));
+    let service = service(Persona::V35);
+    let quick = opened(&service).limits();
+    assert!(quick.delay > 0.5e-3, "half a period before and after the tick: {}", quick.delay);
+    assert_eq!((quick.max_force, quick.max_torque, quick.rate), (10.0, 0.0, Some(2000.0)));
+    // A greeting that is late does no harm either.
+    service.set_trouble(Some(slow));
+    let delay = opened(&service).limits().delay;
+    assert!(delay > 3.4e-3, "{delay} {}", quick.delay);
+}
+
+#[test]
+fn lists_what_there_is_and_says_what_to_do() {
+    let _alone = alone();
+    let service = service(Persona::V34);
+    service.add_held_arm("0B02", "minverse");
+    service.set_condition("0B02", Condition { calibrated: false, ..Condition::default() });
+    let listing = list(&connection(&service));
+    assert_eq!(listing.missing, None);
+    let found: Vec<_> = listing.found.iter().map(|found| (found.id.as_str(), found.name.as_str())).collect();
+    assert_eq!(found, [(ARM, "Haply Inverse3"), ("0B02", "Haply Minverse")]);
+    assert!(listing.found[0].obstacle.is_none());
+    let obstacle = listing.found[1].obstacle.as_ref().expect("not calibrated").to_string();
+    assert!(obstacle.contains("0B02 is not calibrated"), "{obstacle}");
+    assert!(listing.facts.contains(&("messages of version", "3.1 to 3.4".into())), "{:?}", listing.facts);
+    // By name, whatever its case; the first free one by default.
+    let by_id = |id: &str| open(&Connection { id: Some(id.into()), ..connection(&service) });
+    assert_eq!(by_id("0a01").expect("opens").device.name(), "Haply Inverse3 0A01");
+    let refused = |id: &str| by_id(id).err().expect("refused").to_string();
+    assert_eq!(refused("0B02"), obstacle);
+    assert!(refused("0C03").ends_with("has no device \"0C03\": it has 0A01, 0B02"), "{}", refused("0C03"));
+    service.plug(ARM, false);
+    service.plug("0B02", false);
+    let none = list(&connection(&service));
+    assert!(none.found.is_empty() && none.missing.is_some());
+}
+
+#[test]
+fn what_does_not_answer_as_the_service_does_is_refused_in_time() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let refused = |expected: &str| {
+        let began = Instant::now();
+        let error = open(&connection(&service)).err().expect(expected).to_string();
+        assert!(error.contains(expected), "{error}");
+        assert!(!error.contains('\n') && began.elapsed() < Duration::from_secs(3), "{error}");
+    };
+    service.set_persona(Persona::V30);
+    refused("update it to 3.1 or later");
+    service.set_persona(Persona::V35);
+    for (trouble, expected) in [
+        (Trouble::Silence, "does not answer in time"),
+        (Trouble::Truncated, "does not greet as"),
+        (Trouble::Text("[]".into()), "does not greet as"),
+        (Trouble::Binary, "does not greet as"),
+        (Trouble::Cut, "does not speak as"),
+        (Trouble::Huge(1 << 20), "does not speak as"),
+        (Trouble::Missing("/inverse3/0/state"), "error 2"),
+    ] {
+        service.set_trouble(Some(trouble));
+        refused(expected);
+    }
+    let nobody = Connection { address: Some("ws://127.0.0.1:9".into()), ..Connection::default() };
+    let error = open(&nobody).err().expect("nobody listens").to_string();
+    assert!(error.contains("no Haply Inverse Service listens at ws://127.0.0.1:9"), "{error}");
+    // Somebody who takes connections and says nothing.
+    let mute = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = Some(format!("ws://{}", mute.local_addr().unwrap()));
+    let error = open(&Connection { address, ..Connection::default() }).err().expect("mute").to_string();
+    assert!(error.contains("does not answer in time"), "{error}");
+}
+
+#[test]
+fn an_arm_in_use_is_refused_and_a_second_one_is_not() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut first = opened(&service);
+    until_force(&mut *first, &service, DVec3::X);
+    let error = open(&connection(&service)).err().expect("in use").to_string();
+    assert!(error.contains("is used by another program"), "{error}");
+    service.add_held_arm("0B02", "inverse3x");
+    let mut second = opened(&service);
+    assert_eq!(second.name(), "Haply Inverse3x 0B02");
+    for _ in 0..50 {
+        for (device, force) in [(&mut first, DVec3::X), (&mut second, DVec3::Y)] {
+            device.read(0, PERIOD).expect("both go on");
+            device.write(Wrench { force, ..Wrench::default() }).expect("both go on");
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!((service.motors(ARM).force, service.motors("0B02").force), (DVec3::X, DVec3::Y));
+    assert_eq!(service.take_complaints(), Vec::<String>::new());
+}
+
+/// Each of these replies is a fault, takes the force off, and is over with the next good one.
+#[test]
+fn bad_replies_are_faults_and_take_the_force_off() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    let state = "/inverse3/0/state";
+    let x = "/inverse3/0/state/cursor_position/x";
+    for (trouble, expected) in [
+        (Trouble::Truncated, DeviceFault::Driver(1)),
+        (Trouble::Binary, DeviceFault::Driver(1)),
+        (Trouble::Text("".into()), DeviceFault::Driver(1)),
+        (Trouble::Text("[".repeat(100_000)), DeviceFault::Driver(1)),
+        (
+            Trouble::Text(r#"{"inverse3":[{"device_id":"0A01","state":{"cursor_position":{"x":NaN}}}]}"#.into()),
+            DeviceFault::Driver(1),
+        ),
+        (Trouble::Text("null".into()), DeviceFault::Driver(2)),
+        (Trouble::Text("{}".into()), DeviceFault::Driver(2)),
+        (Trouble::Missing(state), DeviceFault::Driver(2)),
+        (Trouble::Missing("/inverse3/0/state/cursor_velocity"), DeviceFault::Driver(2)),
+        (Trouble::Missing("/inverse3/0/device_id"), DeviceFault::Disconnected),
+        (Trouble::Missing("/inverse3/0"), DeviceFault::Disconnected),
+        (Trouble::Replaced(state, json!([1, 2])), DeviceFault::Driver(2)),
+        (Trouble::Replaced(x, json!("0.1")), DeviceFault::Driver(2)),
+        (Trouble::Replaced(x, json!(null)), DeviceFault::NotFinite),
+        (Trouble::Replaced(x, json!(1e300)), DeviceFault::Driver(3)),
+        (Trouble::Replaced("/inverse3/0/state/cursor_velocity/z", json!(-1e9)), DeviceFault::Driver(3)),
+        (Trouble::Replaced("/wireless_verse_grip/0/state/orientation/w", json!(null)), DeviceFault::NotFinite),
+        (Trouble::Replaced("/inverse3", json!({"0A01": {}})), DeviceFault::Driver(4)),
+        (Trouble::Replaced("/inverse3/0/status/calibrated", json!(false)), DeviceFault::MotorsOff),
+        (Trouble::Replaced("/inverse3/0/status/power_supply", json!(false)), DeviceFault::MotorsOff),
+        (Trouble::Cut, DeviceFault::Disconnected),
+        (Trouble::Huge(1 << 20), DeviceFault::Disconnected),
+        (Trouble::Silence, DeviceFault::Stale),
+        (Trouble::Late(Duration::from_millis(150)), DeviceFault::Stale),
+    ] {
+        until_force(&mut *device, &service, DVec3::new(0.0, 0.0, 2.0));
+        service.set_trouble(Some(trouble.clone()));
+        let mut fault = None;
+        tick_until(&mut *device, DVec3::Z, "a fault", |said| {
+            fault = said.err();
+            fault.is_some()
+        });
+        assert_eq!(fault, Some(expected), "{trouble:?}");
+        // The tick that is told of it has written none, and what was written before counts no more.
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_millis(40) {
+            let _ = device.read(0, PERIOD);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(service.motors(ARM).force, DVec3::ZERO, "{trouble:?}");
+        service.set_trouble(None);
+        tick_until(&mut *device, DVec3::ZERO, "readings again", |said| said.is_ok());
+    }
+}
+
+/// Wrong types where nothing is needed, and grips that are none, are no faults.
+#[test]
+fn oddities_are_tolerated() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    for trouble in [
+        Trouble::Replaced("/inverse3/0/status", json!(7)),
+        Trouble::Replaced("/inverse3/0/status/ready", json!("yes")),
+        Trouble::Replaced("/session", json!([])),
+        Trouble::Replaced("/wireless_verse_grip", json!({"a": 1})),
+        Trouble::Replaced("/wireless_verse_grip/0/state", json!(null)),
+        Trouble::Replaced("/wireless_verse_grip/0/state/buttons", json!([true])),
+        Trouble::Replaced("/wireless_verse_grip/0/state/orientation", json!({"w": 0, "x": 0, "y": 0, "z": 0})),
+        Trouble::Missing("/wireless_verse_grip"),
+        Trouble::Replaced("/inverse3/0/state/cursor_position", json!({"y": 0, "z": 1, "x": 0, "w": {}})),
+    ] {
+        service.set_trouble(Some(trouble.clone()));
+        for _ in 0..20 {
+            device.read(0, PERIOD).unwrap_or_else(|fault| panic!("{trouble:?}: {fault}"));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+/// A service that answers twice puts its client ever farther behind, if that takes one answer each time.
+#[test]
+fn replies_that_nobody_asked_for_do_not_make_readings_old() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    service.set_trouble(Some(Trouble::Twice));
+    tick_until(&mut *device, DVec3::ZERO, "a second", |_| service.messages() > 1000);
+    service.hold(ARM, Held::at(DVec3::Y));
+    let began = Instant::now();
+    tick_until(&mut *device, DVec3::ZERO, "the new place", |said| {
+        said.is_ok_and(|reading| reading.pose.position == DVec3::Y)
+    });
+    assert!(began.elapsed() < Duration::from_millis(100), "{:?}", began.elapsed());
+}
+
+#[test]
+fn the_arm_is_idle_at_once_when_the_device_is_dropped() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    until_force(&mut *device, &service, DVec3::Y);
+    drop(device);
+    let motors = service.motors(ARM);
+    assert_eq!(motors.force, DVec3::ZERO);
+    // By a message, not by the timeout of the service.
+    assert!(motors.at.elapsed() < Duration::from_millis(90), "{:?}", motors.at.elapsed());
+}
+
+/// A loop that stops reading and writing while its device lives.
+#[test]
+fn a_force_that_is_not_repeated_is_taken_off_by_the_driver() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    until_force(&mut *device, &service, DVec3::Y);
+    let (stopped, before) = (Instant::now(), service.messages());
+    while service.motors(ARM).force != DVec3::ZERO {
+        assert!(stopped.elapsed() < Duration::from_millis(60), "the driver's time is 5 ms, the service's 100 ms");
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    std::thread::sleep(Duration::from_millis(50));
+    assert!(service.messages() > before + 20, "measurements go on");
+    // And comes back without a jump.
+    service.take_changes(ARM);
+    until_force(&mut *device, &service, 4.0 * DVec3::Y);
+    let forces: Vec<f64> = service.take_changes(ARM).iter().map(|change| change.force.y).collect();
+    let largest_step = forces.windows(2).map(|pair| pair[1] - pair[0]).fold(forces[0], f64::max);
+    assert!(largest_step < 3.9 && forces.len() > 2, "{forces:?}");
+}
+
+#[test]
+fn the_arms_own_safety_takes_forces_off_until_the_brake_is_released() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    until_force(&mut *device, &service, DVec3::Y);
+    service.trigger_safety("0B02", "ebrake_triggered");
+    std::thread::sleep(Duration::from_millis(30));
+    device.read(0, PERIOD).expect("another arm's brake");
+    service.trigger_safety(ARM, "ebrake_triggered");
+    tick_until(&mut *device, DVec3::Y, "the brake", |said| said == Err(DeviceFault::MotorsOff));
+    for _ in 0..30 {
+        assert_eq!(device.read(0, PERIOD), Err(DeviceFault::MotorsOff));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(service.motors(ARM).force, DVec3::ZERO);
+    service.trigger_safety(ARM, "ebrake_released");
+    tick_until(&mut *device, DVec3::Y, "readings", |said| said.is_ok());
+    service.trigger_safety(ARM, "stall_detected");
+    tick_until(&mut *device, DVec3::Y, "a stall", |said| said == Err(DeviceFault::MotorsOff));
+    tick_until(&mut *device, DVec3::Y, "readings", |said| said.is_ok());
+}
+
+#[test]
+fn a_service_that_starts_anew_is_found_again() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    until_force(&mut *device, &service, DVec3::Y);
+    service.drop_connections();
+    tick_until(&mut *device, DVec3::Y, "the loss", |said| said == Err(DeviceFault::Disconnected));
+    assert_eq!(service.motors(ARM).force, DVec3::ZERO);
+    until_force(&mut *device, &service, DVec3::X);
+    assert_eq!(service.take_complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn grips_fall_asleep_and_wake() {
+    let _alone = alone();
+    let service = service(Persona::V34);
+    let mut device = opened(&service);
+    let turned = glam::DQuat::from_rotation_x(0.3);
+    service.hold(ARM, Held { orientation: turned, ..Held::at(DVec3::ZERO) });
+    service.press(haply_bench::GRIP, Buttons(3));
+    let both = |said: Result<palpate_devices::Reading, DeviceFault>| {
+        said.is_ok_and(|reading| reading.buttons == Buttons(3) && reading.pose.orientation.angle_between(turned) < 1e-6)
+    };
+    tick_until(&mut *device, DVec3::ZERO, "buttons and orientation", both);
+    service.wake(haply_bench::GRIP, false);
+    // What is held is let go, and the tool stays as it was.
+    tick_until(&mut *device, DVec3::ZERO, "no buttons", |said| {
+        said.is_ok_and(|reading| reading.buttons == Buttons(0) && reading.pose.orientation.angle_between(turned) < 1e-6)
+    });
+    service.wake(haply_bench::GRIP, true);
+    tick_until(&mut *device, DVec3::ZERO, "buttons and orientation", both);
+    service.add_grip("61577", GripKind::Wired, ARM);
+}
+
+#[test]
+fn the_version_is_told_by_http() {
+    use std::io::{Read, Write};
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let address = service.address();
+    let port = address.trim_start_matches("ws://").split('?').next().unwrap();
+    let mut stream = std::net::TcpStream::connect(port).unwrap();
+    stream.write_all(b"GET /version HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    assert!(text.starts_with("HTTP/1.1 200 OK") && text.contains("haply-inverse-service"), "{text}");
+}

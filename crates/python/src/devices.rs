@@ -1,0 +1,108 @@
+//! Haptic devices of this machine: what their drivers find, and a check of one by itself.
+
+use std::path::PathBuf;
+
+use palpate_devices::{Connection, FoundDevice, kinds, list};
+use palpate_servo::{LARGEST_FORCE, SelfCheck, Task};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::connection::{LimitsArguments, OpenedDevice, device_error, limits_tuple};
+use crate::errors::to_python;
+
+/// Kinds of devices that there are drivers for.
+#[pyfunction]
+pub fn device_kinds() -> Vec<&'static str> {
+    kinds().collect()
+}
+
+/// What a driver sees: `found` with name, id, limits, obstacle and facts of each device; `missing`; `facts` of the driver. What is
+/// wrong and what to do about it come as a pair.
+#[pyfunction]
+pub fn list_devices<'py>(
+    py: Python<'py>,
+    kind: &str,
+    address: Option<String>,
+    library: Option<PathBuf>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let connection = Connection { id: None, address, library };
+    let listing = py.detach(|| list(kind, &connection)).map_err(|error| device_error(py, &error))?;
+    let found = PyList::empty(py);
+    for FoundDevice { id, name, limits, obstacle, facts } in listing.found {
+        let device = PyDict::new(py);
+        device.set_item("id", id)?;
+        device.set_item("name", name)?;
+        device.set_item("limits", limits_tuple(&limits))?;
+        device.set_item("obstacle", obstacle.map(|why| (why.what, why.advice)))?;
+        device.set_item("facts", facts)?;
+        found.append(device)?;
+    }
+    let told = PyDict::new(py);
+    told.set_item("found", found)?;
+    told.set_item("missing", listing.missing.map(|why| (why.what, why.advice)))?;
+    told.set_item("facts", listing.facts)?;
+    Ok(told)
+}
+
+/// A gentle check of one device: its readings, and small forces that pass the safety stage.
+#[pyclass(module = "palpate._native")]
+pub struct DeviceCheck {
+    check: SelfCheck,
+}
+
+#[pymethods]
+impl DeviceCheck {
+    /// Begins to watch a device.
+    #[new]
+    fn new(py: Python<'_>, device: &mut OpenedDevice) -> PyResult<Self> {
+        let opened = device.take(py)?;
+        let check = py.detach(|| SelfCheck::start(opened)).map_err(|error| to_python(py, error))?;
+        Ok(Self { check })
+    }
+
+    /// Largest force that it can be asked for, N.
+    #[classattr]
+    #[allow(non_upper_case_globals)]
+    const largest_force: f64 = LARGEST_FORCE;
+
+    #[getter]
+    fn name(&self) -> &str {
+        self.check.name()
+    }
+
+    #[getter]
+    fn limits(&self) -> LimitsArguments {
+        limits_tuple(&self.check.limits())
+    }
+
+    /// Pushes along a unit vector with a force, N, that rises over `seconds`, or watches along none.
+    fn begin(&mut self, py: Python<'_>, direction: [f64; 3], force: f64, seconds: f64) -> PyResult<()> {
+        let task = Task { direction: direction.into(), force, seconds };
+        self.check.begin(task).map_err(|error| to_python(py, error))
+    }
+
+    /// What has been seen of it so far; None before its first tick.
+    fn seen<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(seen) = self.check.seen() else { return Ok(None) };
+        let told = PyDict::new(py);
+        told.set_item("time", seen.time)?;
+        told.set_item("readings", seen.readings)?;
+        told.set_item("fresh", seen.fresh)?;
+        told.set_item("longest_gap", seen.longest_gap)?;
+        told.set_item("deviation", seen.deviation.to_array())?;
+        told.set_item("lowest", seen.lowest.to_array())?;
+        told.set_item("highest", seen.highest.to_array())?;
+        told.set_item("moved", (seen.last - seen.first).to_array())?;
+        told.set_item("buttons", seen.buttons)?;
+        told.set_item("largest_force", seen.largest_force)?;
+        told.set_item("done", seen.done)?;
+        told.set_item("ran_away", seen.ran_away)?;
+        told.set_item("fault", seen.fault.map(|fault| fault.to_string()))?;
+        Ok(Some(told))
+    }
+
+    /// Ends the check; the device is left without a force.
+    fn stop(&mut self, py: Python<'_>) {
+        py.detach(|| self.check.stop());
+    }
+}

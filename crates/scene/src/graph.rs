@@ -1,0 +1,147 @@
+//! Bodies and tools as nodes that are added, found and removed by their handles.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use palpate_core::green::GreensFunction;
+use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS, Placement};
+use palpate_core::{Error, Result};
+use palpate_devices::DeviceLimits;
+use palpate_servo::{SafetyLimits, Scheduling};
+
+use crate::body::Body;
+use crate::packed;
+use crate::tool::Tool;
+
+/// Ticks a second where nothing is said, Hz.
+const DEFAULT_RATE: f64 = 1000.0;
+/// Strain of the finite element field at which a tool is held where nothing is said.
+const DEFAULT_STRAIN_LIMIT: f64 = 0.3;
+
+/// Handle of a body: never given to another one of the same scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BodyId(pub u32);
+
+/// Handle of a tool: never given to another one of the same scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ToolId(pub u32);
+
+/// What to touch, and with what.
+#[derive(Clone)]
+pub struct Scene {
+    bodies: Vec<(BodyId, Body)>,
+    tools: Vec<(ToolId, Tool)>,
+    next_body: u32,
+    next_tool: u32,
+    /// Limits kept by the safety stage.
+    pub limits: SafetyLimits,
+    /// How the loop's own thread runs.
+    pub scheduling: Scheduling,
+    /// Largest strain to which tools may take a body; zero for any.
+    pub strain_limit: f64,
+}
+
+impl Default for Scene {
+    /// Without bodies and tools.
+    fn default() -> Self {
+        Self {
+            bodies: Vec::new(),
+            tools: Vec::new(),
+            next_body: 0,
+            next_tool: 0,
+            limits: SafetyLimits::default(),
+            scheduling: Scheduling::at(DEFAULT_RATE),
+            strain_limit: DEFAULT_STRAIN_LIMIT,
+        }
+    }
+}
+
+impl Scene {
+    /// Reads a packed scene (a folder, or the `scene.json` in it) or a bare store.
+    ///
+    /// # Errors
+    /// A file that is missing, damaged, of another format or version, or that does not belong to the others.
+    pub fn load(path: &Path) -> Result<Self> {
+        if path.is_dir() {
+            return packed::read(path);
+        }
+        match path.parent().filter(|_| path.file_name().is_some_and(|name| name == packed::SCENE_FILE)) {
+            Some(folder) => packed::read(folder),
+            None => Self::of_store(path),
+        }
+    }
+
+    /// A store at the origin, and a tool that suits it.
+    ///
+    /// # Errors
+    /// A file that is missing, no store, or damaged.
+    pub fn of_store(path: &Path) -> Result<Self> {
+        let mut scene = Self::default();
+        scene.add_body(Body::of_store(Arc::new(GreensFunction::load(path, None)?))?)?;
+        scene.add_tool(Tool::default())?;
+        Ok(scene)
+    }
+
+    /// Adds a body.
+    ///
+    /// # Errors
+    /// More bodies than a loop takes.
+    pub fn add_body(&mut self, body: Body) -> Result<BodyId> {
+        require_room("bodies", self.bodies.len(), MAX_BODIES)?;
+        let id = BodyId(self.next_body);
+        self.next_body += 1;
+        self.bodies.push((id, body));
+        Ok(id)
+    }
+
+    /// Adds a tool.
+    ///
+    /// # Errors
+    /// More tools than a loop takes.
+    pub fn add_tool(&mut self, tool: Tool) -> Result<ToolId> {
+        require_room("tools", self.tools.len(), MAX_TOOLS)?;
+        let id = ToolId(self.next_tool);
+        self.next_tool += 1;
+        self.tools.push((id, tool));
+        Ok(id)
+    }
+
+    /// Takes a body out; `None` if there is none of that handle.
+    pub fn remove_body(&mut self, id: BodyId) -> Option<Body> {
+        let rank = self.bodies.iter().position(|(other, _)| *other == id)?;
+        Some(self.bodies.remove(rank).1)
+    }
+
+    /// Takes a tool out; `None` if there is none of that handle.
+    pub fn remove_tool(&mut self, id: ToolId) -> Option<Tool> {
+        let rank = self.tools.iter().position(|(other, _)| *other == id)?;
+        Some(self.tools.remove(rank).1)
+    }
+
+    /// The bodies, in the order in which they were added.
+    pub fn bodies(&self) -> impl Iterator<Item = (BodyId, &Body)> + Clone {
+        self.bodies.iter().map(|(id, body)| (*id, body))
+    }
+
+    /// The tools, in the order in which they were added.
+    pub fn tools(&self) -> impl Iterator<Item = (ToolId, &Tool)> + Clone {
+        self.tools.iter().map(|(id, tool)| (*id, tool))
+    }
+
+    /// Moves a body; false if there is none of that handle. Nothing else of a body changes as long as it has its handle.
+    pub fn place_body(&mut self, id: BodyId, placement: Placement) -> bool {
+        let found = self.bodies.iter_mut().find(|(other, _)| *other == id);
+        found.map(|(_, body)| body.placement = placement).is_some()
+    }
+
+    /// States what the device of a tool can render; false if there is none of that handle. Nothing else of a tool changes as
+    /// long as it has its handle.
+    pub fn set_device(&mut self, id: ToolId, limits: DeviceLimits) -> bool {
+        let found = self.tools.iter_mut().find(|(other, _)| *other == id);
+        found.map(|(_, tool)| tool.device = limits).is_some()
+    }
+}
+
+fn require_room(what: &str, count: usize, most: usize) -> Result<()> {
+    if count < most { Ok(()) } else { Err(Error::Invalid(format!("a scene takes at most {most} {what}"))) }
+}

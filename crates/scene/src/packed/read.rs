@@ -1,0 +1,161 @@
+//! A packed scene from its folder.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DVec3;
+use palpate_core::contact::Moduli;
+use palpate_core::contact::shape::{SurfaceShape, ToolShape};
+use palpate_core::dynamics::{Newmark, Rayleigh};
+use palpate_core::fem::{Isotropic, Supports, stiffness};
+use palpate_core::green::{GreensFunction, Interior};
+use palpate_core::mesh::{TetMesh, Tets};
+use palpate_core::simulation::LawKind;
+use palpate_core::strain::{GradientOperator, StrainMeasure};
+use palpate_core::{Error, Result};
+use palpate_servo::{SafetyLimits, Scheduling};
+use safetensors::tensor::Dtype;
+
+use super::arrays::{Arrays, file_of, refused};
+use super::description::{
+    BodyDescription, MotionDescription, SceneDescription, Scheme, ShapeDescription, ToolDescription,
+};
+use crate::body::{Body, Motion, placement};
+use crate::graph::Scene;
+use crate::tool::Tool;
+
+/// The file that describes the scene.
+pub const SCENE_FILE: &str = "scene.json";
+const FORMAT: &str = "palpate-scene";
+const VERSION: u32 = 1;
+
+/// Reads the scene of a folder.
+///
+/// # Errors
+/// A file that is missing, damaged, of another format or version, or that does not belong to the others.
+pub fn read(folder: &Path) -> Result<Scene> {
+    let path = folder.join(SCENE_FILE);
+    let text = fs::read_to_string(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
+    let described = describe(&path, &text)?;
+    let mut scene = Scene::default();
+    scene.strain_limit = described.strain_limit;
+    let device = described.device;
+    scene.limits = SafetyLimits {
+        max_force: device.max_force,
+        max_slew: device.max_slew,
+        ramp: device.ramp,
+        ..SafetyLimits::default()
+    };
+    scene.scheduling = Scheduling { rate: device.rate, cpus: device.cpus, priority: device.priority };
+    for described in described.bodies {
+        scene.add_body(body(folder, described)?)?;
+    }
+    for described in described.tools {
+        scene.add_tool(tool(folder, described)?)?;
+    }
+    Ok(scene)
+}
+
+/// Checks format and version before anything else: the keys of another version may be others.
+fn describe(path: &Path, text: &str) -> Result<SceneDescription> {
+    let foreign = |error: serde_json::Error| refused(path, format!("is not a packed scene: {error}"));
+    let value: serde_json::Value = serde_json::from_str(text).map_err(foreign)?;
+    if value["format"] != FORMAT {
+        return Err(refused(path, "is not a packed scene: write one by 'palpate pack'"));
+    }
+    if value["version"] != VERSION {
+        let version = &value["version"];
+        return Err(refused(
+            path,
+            format!("has version {version}, this program reads {VERSION}; pack the scene again"),
+        ));
+    }
+    serde_json::from_value(value).map_err(foreign)
+}
+
+fn body(folder: &Path, described: BodyDescription) -> Result<Body> {
+    let store = file_of(folder, &described.store.file)?;
+    let green = Arc::new(GreensFunction::load(&store, Some(&described.store.key))?);
+    let arrays = Arrays::read(folder, &described.arrays)?;
+    let (youngs, poissons) = (arrays.optional("youngs", Dtype::F64, 1)?, arrays.optional("poissons", Dtype::F64, 1)?);
+    let moduli = youngs.zip(poissons);
+    Ok(Body {
+        name: described.name,
+        placement: placement(described.position, described.orientation),
+        moduli: moduli.map(|(youngs, poissons)| Moduli { youngs, poissons, homogeneous: described.one_material }),
+        motion: described.motion.map(|described| motion(&arrays, &described)).transpose()?,
+        strain: Some(Arc::new(strain(&arrays, &green)?)),
+        green,
+    })
+}
+
+fn motion(arrays: &Arrays, described: &MotionDescription) -> Result<Motion> {
+    let eigenvalues: Vec<f64> = arrays.numbers("eigenvalues", Dtype::F64, 1)?;
+    let [mass, stiffness] = described.rayleigh;
+    Ok(Motion {
+        shapes: arrays.numbers("shapes", Dtype::F64, eigenvalues.len())?,
+        eigenvalues,
+        newmark: Newmark::new(described.dt, described.alpha, described.delta)?,
+        rayleigh: Rayleigh { mass, stiffness },
+        exact: described.scheme == Scheme::Exact,
+        coupling: described.coupling,
+    })
+}
+
+/// By the elements, whose stiffness is assembled and factorised here; of a body of which only the store was there, by its
+/// surface.
+fn strain(arrays: &Arrays, green: &GreensFunction) -> Result<StrainMeasure> {
+    let Some(nodes) = arrays.optional::<[f64; 3]>("nodes", Dtype::F64, 3)? else {
+        return Ok(StrainMeasure::of_surface(&green.surface));
+    };
+    let nodes: Vec<DVec3> = nodes.into_iter().map(DVec3::from).collect();
+    let tets = match arrays.width("tets")? {
+        10 => Tets::Quadratic(arrays.numbers("tets", Dtype::U32, 10)?),
+        _ => Tets::Linear(arrays.numbers("tets", Dtype::U32, 4)?),
+    };
+    let mesh = TetMesh::new(nodes, tets)?;
+    let materials: Vec<[f64; 3]> = arrays.numbers("materials", Dtype::F64, 3)?;
+    if materials.len() != mesh.tets.len() {
+        return Err(Error::Invalid(format!("{} materials for {} elements", materials.len(), mesh.tets.len())));
+    }
+    let isotropic = |[youngs, poissons, density]: [f64; 3]| Isotropic::new(youngs, poissons, density);
+    let materials = materials.into_iter().map(isotropic).collect::<Result<Vec<_>>>()?;
+    let supports = Supports::new(3 * mesh.nodes.len(), green.fixed_dofs.clone())?;
+    let matrix = stiffness(&mesh, &materials);
+    let interior = Arc::new(Interior::new(&matrix, &supports, &green.surface_nodes, &green.loads)?);
+    let start: Vec<u64> = arrays.numbers("gradient_start", Dtype::U64, 1)?;
+    let gradients = GradientOperator::from_parts(
+        start.into_iter().map(|entry| entry as usize).collect(),
+        arrays.numbers("gradient_nodes", Dtype::U32, 1)?,
+        arrays.numbers("gradients", Dtype::F64, 3)?,
+        mesh.nodes.len(),
+    )?;
+    Ok(StrainMeasure::of_gradients(gradients, interior))
+}
+
+fn tool(folder: &Path, described: ToolDescription) -> Result<Tool> {
+    let shape = match described.shape {
+        ShapeDescription::Sphere { radius } => ToolShape::sphere(radius)?,
+        ShapeDescription::Ellipsoid { semi_axes } => ToolShape::ellipsoid(semi_axes.into())?,
+        ShapeDescription::Capsule { radius, length } => ToolShape::capsule(radius, 0.5 * length)?,
+        ShapeDescription::Punch { radius, rounding } => ToolShape::punch(radius, rounding)?,
+        ShapeDescription::Surface { arrays } => {
+            let arrays = Arrays::read(folder, &arrays)?;
+            let vertices: Vec<[f64; 3]> = arrays.numbers("vertices", Dtype::F64, 3)?;
+            let vertices: Vec<DVec3> = vertices.into_iter().map(DVec3::from).collect();
+            let triangles: Vec<[u32; 3]> = arrays.numbers("triangles", Dtype::U32, 3)?;
+            ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles)?))
+        }
+    };
+    let unknown = || Error::Invalid(format!("there is no contact law '{}'", described.law));
+    Ok(Tool {
+        shape: Some(shape),
+        law: Some(LawKind::parse(&described.law).ok_or_else(unknown)?),
+        contact_radius: Some(described.contact_radius),
+        friction: described.friction,
+        pad_youngs_modulus: described.pad_youngs_modulus,
+        max_stiffness: described.max_stiffness,
+        ..Tool::default()
+    })
+}

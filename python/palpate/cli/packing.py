@@ -1,0 +1,27 @@
+"""The command that writes a scene for programs without Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from palpate.cli.app import app
+
+
+@app.command()
+def pack(
+    scene: Annotated[Path, typer.Argument(help="A scene file (.toml), or a precomputed store.")],
+    out: Annotated[Path, typer.Argument(help="Folder to write; an earlier packed scene there is replaced.")],
+) -> None:
+    """Write a scene as a folder that programs in C, C++ or Rust load without Python.
+
+    Example: palpate pack scene.toml liver.pack
+    """
+    import palpate
+
+    read = palpate.Scene.of_store(scene) if scene.suffix == ".palpate" else palpate.Scene.read(scene)
+    palpate.pack(read, out)
+    size = sum(file.stat().st_size for file in out.iterdir())
+    print(f"{out}: {len(read.bodies)} bodies, {len(read.tools)} tools, {size / 1e6:.1f} MB")

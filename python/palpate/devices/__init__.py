@@ -1,0 +1,26 @@
+"""Haptic devices: those that a program brings, those that the drivers find, and a gentle check of one."""
+
+from palpate.devices.device import Device
+from palpate.devices.listing import FoundDevice, Listing, Obstacle, kinds, listed, listings
+from palpate.devices.reading import DeviceLimits, Reading
+from palpate.devices.self_check import DIRECTIONS, Checked, Push, SelfCheck, Watched
+from palpate.devices.usb import UsbDevice, usb_devices
+
+__all__ = [
+    "DIRECTIONS",
+    "Checked",
+    "Device",
+    "DeviceLimits",
+    "FoundDevice",
+    "Listing",
+    "Obstacle",
+    "Push",
+    "Reading",
+    "SelfCheck",
+    "UsbDevice",
+    "Watched",
+    "kinds",
+    "listed",
+    "listings",
+    "usb_devices",
+]

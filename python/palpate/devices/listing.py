@@ -1,0 +1,131 @@
+"""What the drivers find on this machine, and why they do not find more."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from palpate import _native
+from palpate.devices.reading import DeviceLimits
+from palpate.errors import DeviceError
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Why something is not there.
+
+    Attributes
+    ----------
+    what
+        What is wrong, and where.
+    advice
+        What to do.
+
+    """
+
+    what: str
+    advice: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.advice}"
+
+
+@dataclass(frozen=True)
+class FoundDevice:
+    """A device that a driver sees.
+
+    Attributes
+    ----------
+    id
+        By which a scene names it.
+    name
+        Model.
+    limits
+        What it can render, as far as is known before it is opened.
+    obstacle
+        Why it cannot be opened now; None if it can.
+    facts
+        Such as its firmware, by name.
+
+    """
+
+    id: str
+    name: str
+    limits: DeviceLimits
+    obstacle: Obstacle | None
+    facts: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """What one driver sees.
+
+    Attributes
+    ----------
+    kind
+        Of the driver, as a scene names it.
+    found
+        Its devices.
+    missing
+        Why there are none, or no more; None where nothing is missing.
+    facts
+        Of the driver itself, such as its version and where its library lies, by name.
+
+    """
+
+    kind: str
+    found: tuple[FoundDevice, ...]
+    missing: Obstacle | None
+    facts: dict[str, str]
+
+    @property
+    def ready(self) -> list[FoundDevice]:
+        """Those that can be opened now."""
+        return [device for device in self.found if device.obstacle is None]
+
+
+def kinds() -> list[str]:
+    """Kinds of devices that there are drivers for."""
+    return _native.device_kinds()
+
+
+def listed(kind: str, address: str | None = None, library: str | os.PathLike[str] | None = None) -> Listing:
+    """Ask the driver of a kind what it sees.
+
+    Parameters
+    ----------
+    kind
+        One of :func:`kinds`.
+    address, library
+        Of its service, or the vendor's library; None for the driver's own.
+
+    Raises
+    ------
+    DeviceError
+        No such kind.
+
+    """
+    if kind not in kinds():
+        raise DeviceError(f"there is no driver of kind '{kind}': choose among {', '.join(kinds())}")
+    raw = _native.list_devices(kind, address, library)
+    found = tuple(
+        FoundDevice(
+            device["id"],
+            device["name"],
+            DeviceLimits(*device["limits"]),
+            _obstacle(device["obstacle"]),
+            dict(device["facts"]),
+        )
+        for device in raw["found"]
+    )
+    return Listing(kind, found, _obstacle(raw["missing"]), dict(raw["facts"]))
+
+
+def listings(which: Sequence[str] | None = None) -> list[Listing]:
+    """Ask the drivers of all kinds, or of some."""
+    return [listed(kind) for kind in (kinds() if which is None else which)]
+
+
+def _obstacle(pair: tuple[str, str] | None) -> Obstacle | None:
+    return None if pair is None else Obstacle(*pair)

@@ -1,0 +1,176 @@
+"""A scene for programs without Python: a folder with everything that the force loop needs of it.
+
+The folder holds ``scene.json``, a store for each body, and arrays as safetensors; what the numbers mean is in
+docs/c-api.md. They are those that :class:`palpate.Simulation` hands to its own loop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import _native
+from palpate.atomic import folder_beside
+from palpate.errors import SceneError
+from palpate.green import GreensFunction
+from palpate.scene import BuiltBody, BuiltScene, Scene
+from palpate.scene.tables import SceneTables
+from palpate.simulation.arguments import body_arguments, tool_arguments
+
+# Format of the folder; crates/scene reads it.
+FORMAT, VERSION = "palpate-scene", 1
+SCENE_FILE = "scene.json"
+_TYPES = {"f8": "F64", "u4": "U32", "u8": "U64"}
+
+
+def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str]) -> None:
+    """Write a scene as a folder that programs without Python load: ``palpate_scene_load`` in C.
+
+    Bodies are meshed and precomputed if need be; their stores are linked into the folder, or copied to another file
+    system. An earlier packed scene of that name is replaced, when the new one is complete.
+
+    Raises
+    ------
+    SceneError
+        A place that is no packed scene, or cannot be written.
+    Error
+        As of :meth:`palpate.Scene.build`.
+
+    """
+    where = Path(path)
+    _require_replaceable(where)
+    built = scene if isinstance(scene, BuiltScene) else scene.build()
+    with folder_beside(where) as folder:
+        description = _description(built, folder)
+        text = json.dumps(description, indent=2, allow_nan=False)
+        (folder / SCENE_FILE).write_text(text + "\n")
+
+
+def _require_replaceable(path: Path) -> None:
+    if path.is_dir() and any(path.iterdir()) and not (path / SCENE_FILE).is_file():
+        raise SceneError(f"{path}: is a folder of something else: give another name")
+    if path.exists() and not path.is_dir():
+        raise SceneError(f"{path}: is a file: give another name, or delete it first")
+    if not path.absolute().parent.is_dir():
+        raise SceneError(f"{path}: there is no folder {path.parent}; make it first")
+
+
+def _description(built: BuiltScene, folder: Path) -> dict[str, Any]:
+    """Write stores and arrays into the folder; what ``scene.json`` says of them."""
+    scene, device = built.scene, built.scene.device
+    local = any(tool.contact == "local" for tool in scene.tools)
+    bodies, described = [], []
+    for rank, body in enumerate(built.bodies):
+        store = folder / f"body-{rank}.palpate"
+        _place_store(body.green, store)
+        arguments = body_arguments(body, local)
+        described.append(_body(body, arguments, store, folder / f"body-{rank}.arrays.safetensors"))
+        bodies.append((_native.GreenCore.load(store), *arguments[1:]))
+    tools = [tool_arguments(scene, rank) for rank in range(len(scene.tools))]
+    # Whatever is refused is refused here; and what contact needs beyond the stores is kept beside them.
+    _native.SimulationCore(
+        bodies,
+        tools,
+        (device.max_force, device.max_slew, device.ramp),
+        scene.view.strain_limit,
+        (device.rate, device.cpus, device.priority),
+    )
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "palpate": version("palpate"),
+        "name": scene.name,
+        "bodies": described,
+        "tools": [_tool(scene, rank, tool, folder) for rank, tool in enumerate(tools)],
+        "device": {
+            "max_force": device.max_force,
+            "max_slew": device.max_slew,
+            "ramp": device.ramp,
+            "rate": device.rate,
+            "cpus": list(device.cpus),
+            "priority": device.priority,
+        },
+        "strain_limit": scene.view.strain_limit,
+    }
+
+
+def _place_store(green: GreensFunction, target: Path) -> None:
+    """Link a store into the folder; copy it to another file system, write one that is in memory only."""
+    if green.path is None or not green.path.exists():
+        green.save(target)
+        return
+    with contextlib.suppress(OSError):
+        os.link(green.path, target)
+        return
+    shutil.copyfile(green.path, target)
+
+
+def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) -> dict[str, Any]:
+    _, position, orientation, moving, moduli = arguments
+    arrays: dict[str, np.ndarray] = {}
+    if moduli is not None:
+        arrays["youngs"], arrays["poissons"] = moduli[:2]
+    motion = None
+    if moving is not None:
+        arrays["eigenvalues"], arrays["shapes"], (dt, alpha, delta, mass, stiffness), exact, coupling = moving
+        scheme = {"dt": dt, "alpha": alpha, "delta": delta, "rayleigh": [mass, stiffness], "coupling": coupling}
+        motion = {"scheme": "exact" if exact else "newmark", **scheme}
+    if body.body is not None:
+        start, nodes, gradients = body.green.native_strain_measure.gradients()
+        arrays["nodes"], arrays["tets"], arrays["materials"] = body.body._element_arrays()
+        arrays |= {"gradient_start": start, "gradient_nodes": nodes, "gradients": gradients.reshape(-1, 3)}
+    return {
+        "name": body.name,
+        "store": {"file": store.name, "key": body.green.key},
+        "arrays": _written(path, arrays),
+        "position": list(position),
+        "orientation": list(orientation),
+        "one_material": bool(moduli is not None and moduli[2]),
+        "motion": motion,
+    }
+
+
+def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Path) -> dict[str, Any]:
+    (kind, (a, b, c), vertices, triangles), contact_radius, law, max_stiffness, friction, pad = arguments
+    shapes = {
+        "sphere": {"radius": a},
+        "ellipsoid": {"semi_axes": [a, b, c]},
+        "capsule": {"radius": a, "length": b},
+        "punch": {"radius": a, "rounding": b},
+    }
+    shape: dict[str, Any] = shapes.get(kind, {})
+    if kind == "surface":
+        surface = {"vertices": np.array(vertices, dtype=float), "triangles": np.array(triangles, dtype=np.uint32)}
+        shape = {"arrays": _written(folder / f"tool-{rank}.arrays.safetensors", surface)}
+    return {
+        "shape": {"kind": kind, **shape},
+        "law": law,
+        "contact_radius": contact_radius,
+        "friction": friction,
+        "pad_youngs_modulus": pad,
+        "max_stiffness": max_stiffness,
+    }
+
+
+def _written(path: Path, arrays: Mapping[str, np.ndarray]) -> dict[str, str]:
+    """Write arrays as safetensors (a header of JSON, then the bytes); name and checksum of the file."""
+    header: dict[str, Any] = {"__metadata__": {"format": f"{FORMAT}-arrays"}}
+    blocks, end = [], 0
+    for name, array in arrays.items():
+        block = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<"), copy=False)
+        dtype, begin, end = _TYPES[block.dtype.str[1:]], end, end + block.nbytes
+        header[name] = {"dtype": dtype, "shape": list(block.shape), "data_offsets": [begin, end]}
+        blocks.append(block.tobytes())
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 8)
+    data = b"".join([len(text).to_bytes(8, "little"), text, *blocks])
+    path.write_bytes(data)
+    return {"file": path.name, "checksum": _native.checksum(data)}
