@@ -12,10 +12,11 @@ from palpate.errors import Error
 from palpate.simulation import Simulation
 
 INFINITE = float("inf")
-# Largest force, slew, ramp and strongest damping of a safety stage that changes nothing, and of one whose passivity
-# controller alone is there, with the damping of the strongest device.
+# Largest force, slew, ramp and strongest damping of a safety stage that changes nothing, of one whose passivity
+# controller alone is there, with the damping of the strongest device, and of a scene's after its ramp.
 BARE = (INFINITE, INFINITE, 0.0, 0.0)
 CONTROLLED = (INFINITE, INFINITE, 0.0, 30.0)
+RAMPED_IN = (8.0, 500.0, 0.0, 30.0)
 
 
 @dataclass(frozen=True)
