@@ -119,15 +119,19 @@ def test_without_a_terminal_nothing_is_pushed(pads, monkeypatch):
     assert pads.calls == []
 
 
-def test_the_command_line(tmp_path, monkeypatch):
-    refused(run("devices", "joystick", cwd=tmp_path), "joystick", "haply, touch, forcedimension")
-    # Nobody listens there, and there is no such file.
+def test_what_the_drivers_themselves_say_where_nothing_is(tmp_path, monkeypatch):
+    assert "choose among haply, touch, forcedimension" in str(invoke("joystick").exception)
+    # Nobody listens there, and there are no such files.
     monkeypatch.setenv("PALPATE_HAPLY_ADDRESS", "ws://127.0.0.1:9")
     for name in ("OPENHAPTICS", "FORCEDIMENSION"):
         monkeypatch.setenv(f"PALPATE_{name}_LIBRARY", str(tmp_path / f"lib{name}.so"))
-    result = run("devices", "--json", cwd=tmp_path)
-    assert result.returncode == 1
+    result = invoke("--json")
+    assert result.exit_code == 1
     haply, touch, forcedimension = json.loads(result.stdout)["kinds"]
     assert haply["found"] == [] and "ws://127.0.0.1:9" in haply["missing"]["what"]
     assert str(tmp_path / "libOPENHAPTICS.so") in touch["missing"]["what"]
     assert str(tmp_path / "libFORCEDIMENSION.so") in forcedimension["missing"]["what"]
+
+
+def test_a_mistake_is_one_line(tmp_path):
+    refused(run("devices", "joystick", cwd=tmp_path), "joystick", "haply, touch, forcedimension")

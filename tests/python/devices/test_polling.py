@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 import threading
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -168,6 +172,19 @@ def test_a_device_that_does_not_open_says_why():
         failing.count = 200
         SelfCheck(failing)
     assert failing.calls == ["open", "close"]
+
+
+def test_a_program_that_ends_without_a_word_leaves_no_force_behind():
+    program = (
+        "from held_device import Held\nfrom palpate.devices import SelfCheck\nimport time\n"
+        "class Told(Held):\n    def close(self):\n        print('closed', abs(self.written[-1][1]).max())\n"
+        "check = SelfCheck(Told())\ncheck.watch(0.3)\ncheck._check.begin((1.0, 0.0, 0.0), 0.4, 1.0)\ntime.sleep(0.5)\n"
+        "print(check._program.written[-1][1].max() > 0.1)\n"
+    )
+    paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["True", "closed", "0.0"], done.stderr
 
 
 def test_a_tool_may_leave_the_scene():
