@@ -1,4 +1,6 @@
-"""What a tick costs a program in C++ beside one in Rust: the same scene and path, in turn. `python benches/tick_from_c.py`.
+"""What a tick costs a program in C++ beside one in Rust: the same scene and path, in turn.
+
+Run: .venv/bin/python benches/tick_from_c.py --prefix DIR
 
 Needs g++ and pkg-config, and the library installed: `make install PREFIX=DIR`, then `--prefix DIR`.
 """

@@ -14,10 +14,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -70,13 +71,24 @@ struct Surface {
 
     void update(palpate_loop *loop) { require(palpate_loop_get_positions(loop, 0, positions.data(), rest.size() / 3)); }
 
-    // Highest point at rest, m.
+    // Node at rest closest to the middle of the upper side of the box around the body, m.
     std::array<double, 3> top() const {
-        std::size_t best = 0;
-        for (std::size_t i = 0; i < rest.size(); i += 3) {
-            best = rest[i + 2] > rest[best + 2] ? i : best;
+        std::array<double, 3> low{rest[0], rest[1], rest[2]}, high = low;
+        for (std::size_t i = 0; i < rest.size(); ++i) {
+            low[i % 3] = std::min(low[i % 3], rest[i]);
+            high[i % 3] = std::max(high[i % 3], rest[i]);
         }
-        return {rest[best], rest[best + 1], rest[best + 2]};
+        const std::array<double, 3> goal{0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), high[2]};
+        std::array<double, 3> best{};
+        double closest = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < rest.size(); i += 3) {
+            const double distance = std::hypot(rest[i] - goal[0], rest[i + 1] - goal[1], rest[i + 2] - goal[2]);
+            if (distance < closest) {
+                closest = distance;
+                best = {rest[i], rest[i + 1], rest[i + 2]};
+            }
+        }
+        return best;
     }
 
     double largest_displacement() const {

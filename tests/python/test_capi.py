@@ -15,6 +15,8 @@ from palpate.scene import BuiltScene
 
 ROOT = Path(__file__).resolve().parents[2]
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+# Reached by the presses of the tests.
+STRAIN_LIMIT = 0.08
 TOOLS = ("gcc", "g++", "cmake", "pkg-config", "valgrind", "cargo")
 
 missing = [tool for tool in TOOLS if shutil.which(tool) is None]
@@ -39,7 +41,17 @@ def run(*command: object, **environment: str) -> str:
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory) -> Path:
     """Where the library is installed; built together with the extension, so that both share what is compiled."""
-    run("cargo", "build", "--release", "--quiet", "--manifest-path", ROOT / "Cargo.toml", *("-p", "palpate-capi"), "-p", "palpate-python")
+    run(
+        "cargo",
+        "build",
+        "--release",
+        "--quiet",
+        "--manifest-path",
+        ROOT / "Cargo.toml",
+        *("-p", "palpate-capi"),
+        "-p",
+        "palpate-python",
+    )
     where = tmp_path_factory.mktemp("prefix")
     run(ROOT / "scripts/install_c.sh", where, Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release")
     return where
@@ -47,12 +59,13 @@ def prefix(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def scene(block, block_green) -> BuiltScene:
-    """A block that moves under a sliding ball, beside a turned one of which only the store is there, under a capsule."""
+    """A block under a ball and a capsule that slide."""
     tools = [
         {"radius": 0.006, "contact_radius": 0.008, "contact": "local"},
         {"shape": "capsule", "radius": 0.005, "length": 0.01},
     ]
-    read = palpate.Scene(body={"store": "of a test"}, tool=tools, device={"ramp": 0.05})
+    view = {"strain_limit": STRAIN_LIMIT}
+    read = palpate.Scene(body={"store": "of a test"}, tool=tools, device={"ramp": 0.05}, view=view)
     return BuiltScene.of(read, block, block_green)
 
 
@@ -64,13 +77,29 @@ def packed(scene, tmp_path_factory) -> Path:
 
 
 def flags(prefix: Path, *static: str) -> list[str]:
-    return run("pkg-config", "--cflags", "--libs", *static, "palpate", PKG_CONFIG_PATH=f"{prefix}/lib/pkgconfig").split()
+    return run(
+        "pkg-config", "--cflags", "--libs", *static, "palpate", PKG_CONFIG_PATH=f"{prefix}/lib/pkgconfig"
+    ).split()
 
 
 def compiled(prefix: Path, source: Path, *options: str) -> Path:
     made = prefix / f"{source.stem}{len(options)}"
+    if made.exists():
+        return made
     standard = ["gcc", "-std=c99"] if source.suffix == ".c" else ["g++", "-std=c++17"]
-    run(*standard, *WARNINGS, "-g", *options, source, "-o", made, *flags(prefix), f"-Wl,-rpath,{prefix}/lib", "-lm", "-pthread")
+    run(
+        *standard,
+        *WARNINGS,
+        "-g",
+        *options,
+        source,
+        "-o",
+        made,
+        *flags(prefix),
+        f"-Wl,-rpath,{prefix}/lib",
+        "-lm",
+        "-pthread",
+    )
     return made
 
 
@@ -97,13 +126,14 @@ def test_a_packed_scene_has_the_forces_of_python_to_the_bit(prefix, scene, packe
     assert np.abs(recording.forces).max() > 0.3 and recording.limited.any()
     script, _ = played(prefix, packed, positions, tmp_path)
     assert np.array_equal(script, recording.forces)
-    # When strain is prepared beside a loop that ticks is not the same from run to run: no limit is reached here.
-    shallow = path_of(700, 2)
-    shallow[..., 2] = np.maximum(shallow[..., 2], [0.0545, 0.0535])
-    expected = palpate.Simulation(scene).play(shallow)
-    assert np.abs(expected.forces).max() > 0.03 and not expected.limited.any()
-    script, ticks = played(prefix, packed, shallow, tmp_path)
-    assert np.array_equal(script, expected.forces) and np.array_equal(ticks, expected.forces)
+    # When strain has been prepared beside a loop that ticks is not the same from run to run.
+    tables = scene.scene.model_copy(update={"view": scene.scene.view.model_copy(update={"strain_limit": 0})})
+    free = BuiltScene(tables, scene.bodies)
+    palpate.pack(free, tmp_path / "free.pack")
+    forces = palpate.Simulation(free).run(positions)
+    script, ticks = played(prefix, tmp_path / "free.pack", positions, tmp_path)
+    assert np.array_equal(script, forces) and np.array_equal(ticks, forces)
+    assert np.abs(forces - recording.forces).max() > 0.01
 
 
 def test_a_body_in_motion_and_a_bare_store_too(prefix, block, block_green, tmp_path):
@@ -152,7 +182,8 @@ def test_touch_is_that_of_python(prefix, block_green, tmp_path):
     program = compiled(prefix, ROOT / "examples/c/touch.c")
     said = run(program, store, "2")
     positions = block_green.surface_positions
-    top, radius = positions[positions[:, 2].argmax()], block_green.extents.max() / 16
+    low, high, radius = positions.min(axis=0), positions.max(axis=0), block_green.extents.max() / 16
+    top = [*(0.5 * (low + high))[:2], high[2]]
     answer = block_green.touch(top, (None, None, -0.002), radius)
     force = said.split("body: ")[1].split(" N")[0].split()
     assert np.array_equal(np.array(force, dtype=float), answer.force)
@@ -160,24 +191,46 @@ def test_touch_is_that_of_python(prefix, block_green, tmp_path):
     assert refused.returncode == 2 and "none.palpate" in refused.stderr
 
 
-@pytest.mark.parametrize("tool", ["sanitizer", "valgrind"])
-def test_examples_leak_nothing_and_make_no_mistakes(tool, prefix, packed, tmp_path):
-    options = ["-fsanitize=address,undefined", "-fno-omit-frame-pointer"] if tool == "sanitizer" else ["-O1"]
-    watch = [] if tool == "sanitizer" else ["valgrind", "--quiet", "--leak-check=full", "--error-exitcode=9"]
-    kinds = ["--errors-for-leak-kinds=definite,indirect"] if watch else []
+def test_examples_are_clean_under_the_sanitizers(prefix, packed, tmp_path):
+    options = ["-fsanitize=address,undefined", "-fno-omit-frame-pointer"]
     touch = compiled(prefix, ROOT / "examples/c/touch.c", *options)
     loop = compiled(prefix, ROOT / "examples/cpp/render_loop.cpp", *options)
-    strict = {"ASAN_OPTIONS": "detect_leaks=1"}
-    run(*watch, *kinds, touch, packed / "body-0.palpate", "1", **strict)
+    strict = {"ASAN_OPTIONS": "detect_leaks=1", "UBSAN_OPTIONS": "halt_on_error=1"}
+    run(touch, packed / "body-0.palpate", "1", **strict)
     table = tmp_path / "frames.csv"
-    # Slow enough for a tick under valgrind, so that none is an overrun.
-    run(*watch, *kinds, loop, packed, "--seconds", "1.1", "--rate", "20" if watch else "500", "--out", table, **strict)
+    run(loop, packed, "--seconds", "1.1", "--rate", "500", "--out", table, **strict)
     rows = np.genfromtxt(table, delimiter=",", names=True)
     assert len(rows) == 66 and rows["force_z_N"].max() > 0.1 and rows["largest_displacement_m"].max() > 1e-4
 
 
+def test_examples_are_clean_under_valgrind(prefix, packed, tmp_path):
+    kinds = "leak-kinds=definite,indirect"
+    watch = [
+        "valgrind",
+        "--quiet",
+        "--leak-check=full",
+        f"--errors-for-{kinds}",
+        f"--show-{kinds}",
+        "--error-exitcode=9",
+    ]
+    touch = compiled(prefix, ROOT / "examples/c/touch.c")
+    # One thread at a time runs: those of a pool would only wait for each other.
+    alone = {"RAYON_NUM_THREADS": "1"}
+    run(*watch, touch, packed / "body-0.palpate", "1", **alone)
+    loop = compiled(prefix, ROOT / "examples/cpp/render_loop.cpp")
+    words = ["--seconds", "1.5", "--rate", "20", "--out", tmp_path / "frames.csv"]
+    done = subprocess.run([*watch, loop, packed, *words], env={**os.environ, **alone}, capture_output=True, text=True)
+    # Ticks may take so long there that no force is let out, which ends in 1.
+    assert done.returncode in (0, 1), done.stderr
+    assert "==" not in done.stderr, done.stderr
+
+
 def test_cmake_finds_it_and_its_static_form_links(prefix, tmp_path):
-    options = [f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_FLAGS={' '.join(WARNINGS)}", f"-DCMAKE_CXX_FLAGS={' '.join(WARNINGS)}"]
+    options = [
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_C_FLAGS={' '.join(WARNINGS)}",
+        f"-DCMAKE_CXX_FLAGS={' '.join(WARNINGS)}",
+    ]
     run("cmake", "-S", ROOT / "examples/c", "-B", tmp_path / "build", *options)
     run("cmake", "--build", tmp_path / "build")
     assert (tmp_path / "build/touch").exists() and (tmp_path / "build/render_loop").exists()

@@ -15,7 +15,7 @@ import type {
   Vec3,
 } from "./net/protocol";
 import { groupings } from "./regions";
-import { NO_LAYERS, drivenTool, inControl } from "./store";
+import { NO_LAYERS, shownTool, inControl } from "./store";
 import type { Axis, Layer, Posture, Store, Theme } from "./store";
 
 /** A slider dragged quickly sends no more often than this. */
@@ -194,7 +194,7 @@ export class Control {
   /** How the driven tool is held, or the one that the next press drives. */
   hold(change: Partial<Posture>): void {
     const state = this.store.get();
-    const tool = drivenTool(state) ?? 0;
+    const tool = shownTool(state) ?? 0;
     const { tilt, turn } = { ...state.postures[tool]!, ...change };
     const held = { tilt: Math.min(Math.max(tilt, 0), TILT_MAX), turn: turn - 360 * Math.round(turn / 360) };
     this.store.update({ postures: state.postures.with(tool, held) });
@@ -273,7 +273,7 @@ export class Control {
   /** Of the tool that is driven, or that the next press drives. */
   setContactRadius(radius: number): void {
     const { settings } = this.store.get();
-    const tool = drivenTool(this.store.get()) ?? 0;
+    const tool = shownTool(this.store.get()) ?? 0;
     if (!settings) return;
     this.changedMs = performance.now();
     this.store.update({ settings: { ...settings, contact_radius: settings.contact_radius.with(tool, radius) } });
@@ -283,7 +283,7 @@ export class Control {
   /** Of the tool that is driven, or that the next press drives. */
   setFriction(friction: number): void {
     const { settings } = this.store.get();
-    const tool = drivenTool(this.store.get()) ?? 0;
+    const tool = shownTool(this.store.get()) ?? 0;
     if (!settings) return;
     this.changedMs = performance.now();
     this.store.update({ settings: { ...settings, friction: settings.friction.with(tool, friction) } });
@@ -302,7 +302,7 @@ export class Control {
   /** Of the tool that the next press drives. */
   chooseShape(name: string): void {
     this.release();
-    this.send({ type: "shape", tool: drivenTool(this.store.get()) ?? 0, name });
+    this.send({ type: "shape", tool: shownTool(this.store.get()) ?? 0, name });
   }
 
   /** How many times as large as they are displacements are drawn. */

@@ -8,17 +8,21 @@ mod counting_allocator;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
-use common::{NO_WRENCH, PERIOD, at, done, load, scene_and_loop, store_file};
+use common::{NO_WRENCH, PERIOD, at, done, load, refused, scene_and_loop, store_file};
 use counting_allocator::allocations;
 use palpate::force_loop::{
-    Loop, Target, palpate_loop_free, palpate_loop_set_target, palpate_loop_start, palpate_loop_stop,
+    Loop, Target, palpate_loop_change, palpate_loop_free, palpate_loop_set_target, palpate_loop_start,
+    palpate_loop_stop,
 };
 use palpate::frame::{
     ContactRecord, Frame, palpate_loop_get_contacts, palpate_loop_get_frame, palpate_loop_get_positions,
     palpate_loop_get_rest_positions, palpate_loop_get_surface_size, palpate_loop_get_triangles,
 };
 use palpate::offline::palpate_scene_run;
-use palpate::scene::{SceneGraph, palpate_scene_free};
+use palpate::options::{BodyOptions, ToolOptions};
+use palpate::scene::{
+    SceneGraph, palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_free, palpate_scene_remove_body,
+};
 use palpate::settings::palpate_loop_reset;
 use palpate::statics::palpate_store_touch;
 use palpate::status::Status;
@@ -196,4 +200,53 @@ fn a_thread_of_its_own_presses_by_a_simulated_hand() {
         done(palpate_loop_stop(fixture.own));
     }
     assert!(frame.forces[0][2] > 0.2, "{:?}", frame.forces[0]);
+}
+
+/// Waits for a frame that is as wanted.
+#[track_caller]
+fn wait_until(own: *mut Loop, wanted: impl Fn(&Frame) -> bool) {
+    let mut frame = Frame::default();
+    let seen = (0..300).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        // SAFETY: a living loop and a place.
+        done(unsafe { palpate_loop_get_frame(own, &mut frame) });
+        wanted(&frame)
+    });
+    assert!(seen, "{:?}", frame.forces);
+}
+
+/// A second cube and a second tool come into a running loop, the first ones go on, and the second cube goes again.
+#[test]
+fn bodies_and_tools_come_and_go_while_the_loop_runs() {
+    let fixture = Fixture::new("change");
+    let (own, scene) = (fixture.own, fixture.scene);
+    let pressed =
+        Target { position: [0.05, 0.05, 0.102], orientation: [0.0; 4], velocity: [0.0; 3], active: 1, grab: 0 };
+    let beside = Target { position: [0.25, 0.05, 0.102], ..pressed };
+    let (mut frame, mut body, mut tool) = (Frame::default(), 0, 0);
+    // SAFETY: living objects and places.
+    unsafe {
+        refused(palpate_loop_change(own, scene), Status::PalpateErrorState, "palpate_loop_start first");
+        done(palpate_loop_start(own));
+        done(palpate_loop_set_target(own, 0, &Target { position: [0.05, 0.05, 0.12], ..pressed }));
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        done(palpate_loop_set_target(own, 0, &pressed));
+        wait_until(own, |frame| frame.forces[0][2] > 0.2);
+        let options = BodyOptions { position: [0.2, 0.0, 0.0], ..BodyOptions::default() };
+        done(palpate_scene_add_body(scene, fixture.store, &options, &mut body));
+        done(palpate_scene_add_tool(scene, &ToolOptions { radius: 0.005, ..ToolOptions::default() }, &mut tool));
+        done(palpate_loop_change(own, scene));
+        done(palpate_loop_get_frame(own, &mut frame));
+        assert!(frame.tools == 2 && frame.forces[0][2] > 0.2, "the first contact goes on: {:?}", frame.forces);
+        done(palpate_loop_set_target(own, tool, &Target { position: [0.25, 0.05, 0.12], ..beside }));
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        done(palpate_loop_set_target(own, tool, &beside));
+        wait_until(own, |frame| frame.forces[1][2] > 0.05 && frame.contacts == 2);
+        done(palpate_scene_remove_body(scene, body));
+        done(palpate_loop_change(own, scene));
+        wait_until(own, |frame| frame.forces[1] == [0.0; 3] && frame.forces[0][2] > 0.2 && frame.contacts == 1);
+        let gone = palpate_loop_get_positions(own, body, null_mut(), 0);
+        refused(gone, Status::PalpateErrorArgument, "the loop has no body of the handle 1");
+        done(palpate_loop_stop(own));
+    }
 }

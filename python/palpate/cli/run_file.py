@@ -117,19 +117,26 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
 
 
 def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
-    """Scene whose first tools are moved by devices: of a kind, or of a table by its name."""
-    from palpate.scene.devices import device_ranks
+    """Scene whose first tools are moved by devices: of a table by name, or of a kind, where its own stood."""
+    from palpate.scene.devices import KINDS, device_ranks, moved_by
 
-    tools = list(scene.tools)
-    if len(devices) > len(tools):
-        raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(tools)} of [[tool]]")
-    for rank, device in enumerate(devices):
-        tools[rank] = tools[rank].model_copy(update={"device": device})
+    if len(devices) > len(scene.tools):
+        raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(scene.tools)} of [[tool]]")
+    tables = [scene.device, *scene.further_devices]
+    named = [table.name for table in tables]
+    for tool, device in enumerate(devices):
+        if device in named or any(table.kind == device for table in tables) or device not in KINDS:
+            tools = list(scene.tools)
+            tools[tool] = tools[tool].model_copy(update={"device": device})
+            scene = scene.model_copy(update={"tools": tools})
     try:
-        device_ranks(tools, [scene.device, *scene.further_devices])
+        device_ranks(scene.tools, tables)
     except ValueError as error:
         raise SceneError(f"--device: {error}") from None
-    return scene.model_copy(update={"tools": tools})
+    for tool, device in enumerate(devices):
+        if scene.device_of(tool).kind != device and device not in named:
+            scene = scene.model_copy(update=moved_by(scene, tool, device))
+    return scene
 
 
 def _scheduled(device: Any, options: RunOptions) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Protocol, get_args
+from typing import Annotated, Any, Literal, Protocol, get_args
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -78,6 +78,8 @@ class DeviceTable(Table):
 
 class _Tool(Protocol):
     device: str | None
+
+    def model_copy(self, *, update: dict[str, Any]) -> Any: ...
 
 
 def device_ranks(tools: Sequence[_Tool], tables: Sequence[DeviceTable]) -> list[int | None]:
@@ -166,3 +168,12 @@ def tables_of_tools(scene: _Scene, without: int | None = None) -> list[DeviceTab
         own = scene.device_of(tool).model_dump(exclude_unset=True, exclude={"name", *LOOP_KEYS})
         tables.append(DeviceTable(**own, **(loop if not tables else {})))
     return tables
+
+
+def moved_by(scene: _Scene, tool: int, kind: str) -> dict[str, Any]:
+    """Give the changes of a scene in which a tool has a device of another kind, at the place of the one it had."""
+    tables = tables_of_tools(scene)
+    kept = tables[tool].model_dump(exclude_unset=True, exclude={"id", "address", "library"})
+    tables[tool] = DeviceTable(**{**kept, "kind": kind})
+    tools = [named.model_copy(update={"device": None}) for named in scene.tools]
+    return {"tools": tools, "device": tables[0], "further_devices": tables[1:]}

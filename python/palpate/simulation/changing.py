@@ -14,7 +14,7 @@ from palpate.devices import Device
 from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
-from palpate.scene.devices import KINDS, tables_of_tools
+from palpate.scene.devices import KINDS, moved_by, tables_of_tools
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices
@@ -184,11 +184,7 @@ class Changing:
         kind = device if isinstance(device, str) else "simulated"
         if given is None and kind not in KINDS[1:]:
             raise SceneError(f"there is no kind of device '{kind}' to connect; there are {', '.join(KINDS[1:])}")
-        tables = [table.model_copy(update={"name": None}) for table in tables_of_tools(self.scene)]
-        tables[tool] = tables[tool].model_copy(update={"kind": kind, "id": None, "address": None, "library": None})
-        tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
-        update = {"tools": tools, "device": tables[0], "further_devices": tables[1:]}
-        scene = self.scene.model_copy(update=update)
+        scene = self.scene.model_copy(update=moved_by(self.scene, tool, kind))
         self._devices[tool] = connect_tool(self._core, scene, tool, given)
         self.scene, before = scene, self._given.pop(tool, None)
         if given is not None:

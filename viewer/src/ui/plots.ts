@@ -3,7 +3,7 @@
 import type uPlot from "uplot";
 
 import type { FrameData } from "../net/protocol";
-import { drivenTool } from "../store";
+import { shownTool } from "../store";
 import type { Store, Tab } from "../store";
 import { byId } from "./dom";
 import { HistoryLog } from "./history_log";
@@ -105,7 +105,7 @@ export class Plots {
     store.subscribe(["theme"], () => {
       for (const plot of Object.values(this.plots)) plot.redraw();
     });
-    store.subscribe(["scene", "pressing", "pinned"], (state) => (this.driven = drivenTool(state)));
+    store.subscribe(["scene", "pressing", "pinned"], (state) => (this.driven = shownTool(state)));
     store.subscribe(["frame"], ({ frame, scene }) => {
       this.origin = scene?.motion?.strike ? (frame?.motion?.struck_at ?? null) : null;
       this.refresh();

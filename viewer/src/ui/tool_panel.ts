@@ -3,7 +3,7 @@
 
 import { TILT_MAX, firstPosture } from "../control";
 import type { Control } from "../control";
-import { drivenTool } from "../store";
+import { shownTool } from "../store";
 import type { State, Store } from "../store";
 import { byId, setText } from "./dom";
 import { degrees, millimetres } from "./numbers";
@@ -21,7 +21,7 @@ export class ToolPanel {
   constructor(store: Store, control: Control) {
     byId<HTMLInputElement>("tilt").max = String(TILT_MAX);
     this.shape.onchange = () => control.chooseShape(this.shape.value);
-    const driven = () => drivenTool(store.get()) ?? 0;
+    const driven = () => shownTool(store.get()) ?? 0;
     const complain = (text: string) => control.notice(text);
     const posture = () => {
       const header = store.get().scene?.tools[driven()];
@@ -59,7 +59,7 @@ export class ToolPanel {
   }
 
   private showShape(state: Readonly<State>): void {
-    const tool = drivenTool(state) ?? 0;
+    const tool = shownTool(state) ?? 0;
     const header = state.scene?.tools[tool];
     if (!header) return;
     byId("shape-row").hidden = header.shapes.length < 2;
@@ -73,7 +73,7 @@ export class ToolPanel {
 
   /** A sphere is the same from all sides. */
   private showPosture(state: Readonly<State>): void {
-    const tool = drivenTool(state) ?? 0;
+    const tool = shownTool(state) ?? 0;
     const [header, posture] = [state.scene?.tools[tool], state.postures[tool]];
     for (const id of ["tilt-field", "turn-field", "hint-turn"]) byId(id).hidden = !header || header.shape === "sphere";
     if (!posture) return;
@@ -82,7 +82,7 @@ export class ToolPanel {
   }
 
   private showContact(state: Readonly<State>): void {
-    const tool = drivenTool(state) ?? 0;
+    const tool = shownTool(state) ?? 0;
     const [header, { settings }] = [state.scene?.tools[tool], state];
     if (!header || !settings) return;
     byId("friction-field").hidden = header.contact !== "local";
@@ -98,6 +98,8 @@ export class ToolPanel {
 function showDevices(devices: (string | null)[]): void {
   const moved = devices.flatMap((device, tool) => (device === null ? [] : [{ device, tool }]));
   byId("device-line").hidden = moved.length === 0;
+  // It tells how the pointer presses.
+  if (devices.length > 0 && moved.length === devices.length) byId("hint").hidden = true;
   const several = devices.length > 1;
   const told = moved.map(({ device, tool }) => (several ? `Tool ${tool + 1}: ${device}` : `Moved by ${device}`));
   setText(byId("device-line"), told.join(". "));

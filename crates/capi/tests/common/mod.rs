@@ -8,8 +8,11 @@ use std::ptr::{null, null_mut};
 
 use palpate::force_loop::{Loop, palpate_loop_new};
 use palpate::library::palpate_last_error;
-use palpate::options::{ToolOptions, palpate_tool_options_init};
-use palpate::scene::{SceneGraph, palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_new};
+use palpate::options::{SceneOptions, ToolOptions, palpate_tool_options_init};
+use palpate::scene::{
+    SceneGraph, palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_get_options, palpate_scene_new,
+    palpate_scene_set_options,
+};
 use palpate::status::Status;
 use palpate::store::{Store, palpate_store_load};
 use palpate::tick::{DeviceReading, DeviceWrench};
@@ -53,13 +56,18 @@ pub fn load(path: &std::path::Path) -> *mut Store {
     store
 }
 
-/// The cube under one ball of 5 mm that sticks by a patch of 20 mm, its loop to be ticked.
+/// The cube under one ball of 5 mm that sticks by a patch of 20 mm, its loop to be ticked. Strain is not limited: when it has
+/// been prepared beside a loop is not the same from run to run.
 pub fn scene_and_loop(store: *const Store) -> (*mut SceneGraph, *mut Loop) {
     let (mut scene, mut own) = (null_mut(), null_mut());
     let mut tool = ToolOptions::default();
     // SAFETY: living objects and places.
     unsafe {
         done(palpate_scene_new(&mut scene));
+        let mut options = SceneOptions::default();
+        done(palpate_scene_get_options(scene, &mut options));
+        options.strain_limit = 0.0;
+        done(palpate_scene_set_options(scene, &options));
         done(palpate_scene_add_body(scene, store, null(), null_mut()));
         done(palpate_tool_options_init(&mut tool, size_of::<ToolOptions>()));
         (tool.radius, tool.contact_radius, tool.law) = (0.005, 0.02, palpate::options::PALPATE_LAW_PATCH);
