@@ -205,7 +205,14 @@ def test_examples_are_clean_under_the_sanitizers(prefix, packed, tmp_path):
 
 def test_examples_are_clean_under_valgrind(prefix, packed, tmp_path):
     kinds = "leak-kinds=definite,indirect"
-    watch = ["valgrind", "--quiet", "--leak-check=full", f"--errors-for-{kinds}", f"--show-{kinds}", "--error-exitcode=9"]
+    watch = [
+        "valgrind",
+        "--quiet",
+        "--leak-check=full",
+        f"--errors-for-{kinds}",
+        f"--show-{kinds}",
+        "--error-exitcode=9",
+    ]
     touch = compiled(prefix, ROOT / "examples/c/touch.c")
     # One thread at a time runs: those of a pool would only wait for each other.
     alone = {"RAYON_NUM_THREADS": "1"}

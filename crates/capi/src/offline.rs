@@ -51,7 +51,7 @@ pub unsafe extern "C" fn palpate_scene_run(
         let pose = |(rank, &at): (usize, &[f64; 3])| Pose { position: at.into(), orientation: orientation(rank) };
         let poses: Vec<Pose> = positions.iter().enumerate().map(pose).collect();
         let period = 1.0 / prepared.scheduling.rate;
-        let script = Script { period, poses: &poses, grabs: &[], strikes: &[], watch: &[] };
+        let script = Script { period, poses: &poses, grabs: &[], strikes: &[], watch: &[], devices: &prepared.devices };
         let (model, settings) = (&prepared.model, prepared.settings);
         let recording = palpate_servo::run(model, prepared.limits, settings, &prepared.strain, &script, |_| {})?;
         forces.iter_mut().zip(&recording.forces).for_each(|(to, f)| *to = f.to_array());

@@ -384,11 +384,3 @@ fn the_version_is_told_by_http() {
     stream.read_to_string(&mut text).unwrap();
     assert!(text.starts_with("HTTP/1.1 200 OK") && text.contains("haply-inverse-service"), "{text}");
 }
-
-/// By hand: `cargo test --release -p palpate-emulators --test haply -- --ignored --nocapture minute`.
-#[test]
-#[ignore = "a minute of real time"]
-fn a_minute_at_1_khz() {
-    let _alone = alone();
-    haply_bench::minute();
-}

@@ -7,7 +7,7 @@ use std::time::Duration;
 use glam::DVec3;
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Reading, Wrench, openhaptics};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
+use palpate_emulators::vendor::{MOTORS_OFF, NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
 
 /// There is one library a process, and its devices are the same for all tests.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -244,4 +244,22 @@ fn nonsense_is_survived() {
         steering.disturb(0, NONSENSE);
         let _ = openhaptics::list(&emulated.connection(None));
     }
+}
+
+/// Motors that are too warm are a fault, and come back: the amplifiers let the force through more and more.
+#[test]
+fn warm_motors_are_told_and_cool() {
+    let emulated = emulated("Touch");
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let steering = emulated.steering;
+    let said = ticks(opened, 300, move |tick, devices| {
+        steering.disturb(0, if (5..10).contains(&tick) { MOTORS_OFF } else { 0 });
+        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
+        (said, steering.motors(0).wrench.force.x)
+    });
+    assert_eq!(said[4], (Ok(()), 1.0));
+    assert_eq!(said[7], (Err(DeviceFault::MotorsOff), 0.0));
+    assert!(said[12].0.is_ok() && said[12].1 > 0.0 && said[12].1 < 0.1, "{:?}", said[12]);
+    assert_eq!(said[299], (Ok(()), 1.0));
 }

@@ -24,6 +24,7 @@ from palpate.green import GreensFunction
 from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.tables import SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
+from palpate.simulation.connecting import largest_force
 
 # Format of the folder; crates/scene reads it.
 FORMAT, VERSION = "palpate-scene", 1
@@ -79,7 +80,7 @@ def _description(built: BuiltScene, folder: Path) -> dict[str, Any]:
     _native.SimulationCore(
         bodies,
         tools,
-        (device.max_force, device.max_slew, device.ramp),
+        (largest_force(scene), device.max_slew, device.ramp),
         scene.view.strain_limit,
         (device.rate, device.cpus, device.priority),
     )
@@ -91,7 +92,7 @@ def _description(built: BuiltScene, folder: Path) -> dict[str, Any]:
         "bodies": described,
         "tools": [_tool(scene, rank, tool, folder) for rank, tool in enumerate(tools)],
         "device": {
-            "max_force": device.max_force,
+            "max_force": largest_force(scene),
             "max_slew": device.max_slew,
             "ramp": device.ramp,
             "rate": device.rate,
@@ -140,6 +141,7 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
 
 def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Path) -> dict[str, Any]:
     (kind, (a, b, c), vertices, triangles), contact_radius, law, max_stiffness, friction, pad = arguments
+    device = scene.device_of(rank)
     shapes = {
         "sphere": {"radius": a},
         "ellipsoid": {"semi_axes": [a, b, c]},
@@ -157,6 +159,7 @@ def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Pat
         "friction": friction,
         "pad_youngs_modulus": pad,
         "max_stiffness": max_stiffness,
+        "max_force": device.max_force / device.force_scale,
     }
 
 

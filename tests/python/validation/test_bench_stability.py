@@ -11,7 +11,16 @@ import pytest
 
 import palpate
 from palpate.validation.bench import touches, zwidth
-from palpate.validation.bench.emulation import FIRM, LOOSE, Device, Held, Mechanics, emulate, known_devices
+from palpate.validation.bench.emulation import (
+    FIRM,
+    LOOSE,
+    Device,
+    Held,
+    Mechanics,
+    emulate,
+    frictionless,
+    known_devices,
+)
 from palpate.validation.bench.sampled_loop import bound_for_any_hand, largest_stable
 
 BLOCK = Path(__file__).parents[3] / "examples" / "block.toml"
@@ -53,10 +62,11 @@ def test_a_hand_adds_its_damping(spring, hand):
 
 def test_touches_of_an_example_come_to_rest(devices, shared_cache):
     built = palpate.Scene.read(BLOCK).build(progress=False)
-    for touch in touches.touches(built, [devices[name] for name in ("Touch", "omega")]):
+    chosen = [devices["Touch"], frictionless(devices["Touch"]), frictionless(devices["omega"])]
+    for touch in touches.touches(built, chosen):
         assert touch.stable, touch
-        # It was a touch: the hand pushed, and the force is not that of the stop at the largest one.
-        assert 0.2 < touch.force < devices[touch.device].max_force
+        # It was a touch, and not one that the largest force of the device cut short.
+        assert 0.2 < touch.force < 3.0
 
 
 def test_a_touch_holds_a_firm_body_by_its_limit_and_a_hard_one_shows_instability(spring, devices):

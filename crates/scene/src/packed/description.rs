@@ -80,6 +80,8 @@ pub struct ToolDescription {
     pub friction: f64,
     pub pad_youngs_modulus: Option<f64>,
     pub max_stiffness: f64,
+    /// Largest force in the scene that its device may put out, N.
+    pub max_force: f64,
 }
 
 #[derive(Debug, Deserialize)]

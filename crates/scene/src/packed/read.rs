@@ -14,6 +14,7 @@ use palpate_core::mesh::{TetMesh, Tets};
 use palpate_core::simulation::LawKind;
 use palpate_core::strain::{GradientOperator, StrainMeasure};
 use palpate_core::{Error, Result};
+use palpate_devices::DeviceLimits;
 use palpate_servo::{SafetyLimits, Scheduling};
 use safetensors::tensor::Dtype;
 
@@ -156,6 +157,6 @@ fn tool(folder: &Path, described: ToolDescription) -> Result<Tool> {
         friction: described.friction,
         pad_youngs_modulus: described.pad_youngs_modulus,
         max_stiffness: described.max_stiffness,
-        ..Tool::default()
+        device: DeviceLimits { max_force: described.max_force, ..DeviceLimits::UNLIMITED },
     })
 }

@@ -151,3 +151,8 @@ def emulate(
 def tireless(device: Device) -> Device:
     """Return the device without the limits that it states."""
     return replace(device, max_force=INFINITE, max_stiffness=INFINITE, max_damping=INFINITE)
+
+
+def frictionless(device: Device) -> Device:
+    """Return the device without its dry friction, which would hold a tip at rest that the rest of it does not."""
+    return replace(device, name=f"{device.name}, no friction", mechanics=replace(device.mechanics, dry_friction=0.0))

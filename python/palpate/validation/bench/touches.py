@@ -176,7 +176,7 @@ def controls(spring: Spring, touch_device: Device) -> list[tuple[Touch, bool | N
 
 
 def hardest_at_rest(spring: Spring, device: Device, hand: str) -> float:
-    """Stiffness up to which a touch comes to rest where tools may ask for any, N/m, by bisection to 2 %."""
+    """Stiffness up to which a touch comes to rest before the hand lifts, tools asking for any, N/m, to 2 %."""
     unlimited = replace(device, max_stiffness=UNLIMITED)
 
     def rests(stiffness: float) -> bool:
