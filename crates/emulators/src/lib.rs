@@ -2,7 +2,9 @@
 
 pub mod conformance;
 pub mod inverse_service;
+mod priority;
 mod steered;
 pub mod vendor;
 
+pub use priority::be_on_time;
 pub use steered::{HAND_VARIABLE, SteeredTip, hand_from_environment};

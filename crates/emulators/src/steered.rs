@@ -8,7 +8,7 @@ use palpate_devices::emulated::{Hand, Mechanics, Tip as FreeTip, Wanted, Waypoin
 use crate::conformance::Tip;
 
 /// Environment variable that leads the hand: `time x y z; ...` in s and mm, right, away and up from the middle of the workspace.
-/// At the end it begins anew.
+/// At the end it begins anew. A single place is held loosely.
 pub const HAND_VARIABLE: &str = "PALPATE_EMULATED_HAND";
 
 /// What the hand does when nobody leads it: it comes down, presses, slides to the right and goes up again.
@@ -82,7 +82,11 @@ pub fn hand_from_environment() -> Hand {
         );
         parse(PRESS_AND_SLIDE).unwrap_or_default()
     });
-    Hand::firm(Wanted::Along(repeated(&waypoints)))
+    match waypoints[..] {
+        // One that goes nowhere lets itself be moved, as for a check of the device.
+        [only] => Hand::loose(Wanted::At(only.position)),
+        _ => Hand::firm(Wanted::Along(repeated(&waypoints))),
+    }
 }
 
 /// Waypoints, or the part that is none.

@@ -26,7 +26,10 @@ pub const NONSENSE: u32 = 6;
 /// The device has not been calibrated since it was switched on.
 pub const UNCALIBRATED: u32 = 7;
 
-/// Number of a disturbance; 0 is none, [`NONSENSE`] and [`UNCALIBRATED`] are more.
+/// The motors are off: too warm, or by a button that somebody holds down.
+pub const MOTORS_OFF: u32 = 8;
+
+/// Number of a disturbance; 0 is none; [`NONSENSE`], [`UNCALIBRATED`] and [`MOTORS_OFF`] are more.
 pub fn disturbance_number(disturbance: Option<Disturbance>) -> u32 {
     match disturbance {
         None => 0,
@@ -132,7 +135,8 @@ impl Steering {
         Motors { wrench: Wrench { force: DVec3::new(fx, fy, fz), torque: DVec3::new(tx, ty, tz) }, at }
     }
 
-    /// Makes something go wrong with a device, by the number of [`disturbance_number`] [`NONSENSE`] or [`UNCALIBRATED`].
+    /// Makes something go wrong with a device, by the number of [`disturbance_number`] [`NONSENSE`],
+    /// [`UNCALIBRATED`] or [`MOTORS_OFF`].
     pub fn disturb(&self, device: u32, number: u32) {
         // SAFETY: numbers.
         unsafe { (self.disturb)(device, number) };

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use palpate_devices::{Buttons, Connection, DeviceFault, OpenError, Opened, Wrench, forcedimension};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{NONSENSE, Steering, built_library, disturbance_number};
+use palpate_emulators::vendor::{MOTORS_OFF, NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
 
 /// There is one library a process, and its devices are the same for all tests.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -150,18 +150,56 @@ fn the_list_tells_what_there_is_and_what_is_in_the_way() {
 fn nonsense_is_survived() {
     let emulated = emulated("sigma.7");
     let mut device = forcedimension::open(&emulated.connection(None)).expect("opens").device;
+    let mut good = 0;
     for tick in 0..20_000 {
         // A status of nonsense loses the device from time to time; then it is well for a while, to come back.
         emulated.steering.disturb(0, if tick % 1000 < 900 { NONSENSE } else { 0 });
         if let Ok(reading) = device.read(1_000_000 * tick, 1e-3) {
+            good += 1;
             assert!(reading.pose.is_finite() && reading.twist.linear.is_finite() && reading.twist.angular.is_finite());
         }
         let _ = device.write(Wrench { force: 0.5 * DVec3::X, torque: DVec3::ZERO });
         let force = emulated.steering.motors(0).wrench.force;
         assert!(force == DVec3::ZERO || (force - 0.5 * DVec3::X).length() < 1e-12, "{force}");
     }
+    println!("{good} good readings");
     for _ in 0..200 {
         emulated.steering.disturb(0, NONSENSE);
         let _ = forcedimension::list(&emulated.connection(None));
     }
+}
+
+#[test]
+fn a_device_that_is_not_initialised_gets_no_force() {
+    let emulated = emulated("omega.3");
+    emulated.steering.disturb(0, UNCALIBRATED);
+    let error = forcedimension::open(&emulated.connection(None)).err().expect("refused").to_string();
+    assert!(error.contains("not initialised") && error.contains("Haptic Init"), "{error}");
+    emulated.steering.disturb(0, 0);
+    assert!(forcedimension::open(&emulated.connection(None)).is_ok());
+}
+
+/// Motors that a person has switched off are a fault, and are on again when the person lets them.
+#[test]
+fn motors_that_are_off_are_told_and_come_back() {
+    let emulated = emulated("omega.3");
+    let mut device = forcedimension::open(&emulated.connection(None)).expect("opens").device;
+    let mut until = |wanted: fn(Result<(), DeviceFault>) -> bool| {
+        let began = Instant::now();
+        loop {
+            let said = device.read(began.elapsed().as_nanos() as u64, 1e-3).map(|_| ());
+            let force = if said.is_ok() { DVec3::X } else { DVec3::ZERO };
+            let _ = device.write(Wrench { force, torque: DVec3::ZERO });
+            if wanted(said) {
+                return emulated.steering.motors(0).wrench.force;
+            }
+            assert!(began.elapsed() < Duration::from_secs(10), "{said:?}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    };
+    assert_eq!(until(|said| said.is_ok()), DVec3::X);
+    emulated.steering.disturb(0, MOTORS_OFF);
+    assert_eq!(until(|said| said == Err(DeviceFault::MotorsOff)), DVec3::ZERO);
+    emulated.steering.disturb(0, 0);
+    assert_eq!(until(|said| said.is_ok()), DVec3::X);
 }

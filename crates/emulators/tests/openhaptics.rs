@@ -1,13 +1,13 @@
 //! The driver of the Touch and the PHANTOM devices against an emulated library.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use glam::DVec3;
-use palpate_devices::{Buttons, Connection, DeviceFault, OpenError, Opened, Wrench, openhaptics};
+use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Reading, Wrench, openhaptics};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{NONSENSE, Steering, built_library, disturbance_number};
+use palpate_emulators::vendor::{MOTORS_OFF, NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
 
 /// There is one library a process, and its devices are the same for all tests.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -106,4 +106,160 @@ fn a_minute_at_1_khz() {
     let figures = endure(bench(&emulated), Endurance { ticks: 60_000, hurried: false }).expect("no tick missed");
     println!("{figures:#?}");
     assert!(figures.seconds < 90.0);
+}
+
+/// Ticks of the library, with what a device says in each; a loop that stops after some of them.
+fn ticks<R: Send + 'static>(
+    opened: Vec<Opened>,
+    count: usize,
+    mut each: impl FnMut(usize, &mut [Box<dyn Device>]) -> R + Send + 'static,
+) -> Vec<R> {
+    let scheduler = opened[0].scheduler.clone().expect("the library has its own loop");
+    let mut devices: Vec<Box<dyn Device>> = opened.into_iter().map(|opened| opened.device).collect();
+    let (sender, results) = std::sync::mpsc::channel();
+    let mut tick = 0;
+    let begun = scheduler.start(Box::new(move || {
+        if tick < count {
+            let _ = sender.send(each(tick, &mut devices));
+        }
+        tick += 1;
+    }));
+    begun.expect("the scheduler starts");
+    let all = (0..count).map(|_| results.recv_timeout(Duration::from_secs(20)).expect("a tick")).collect();
+    scheduler.stop();
+    all
+}
+
+#[test]
+fn two_devices_share_a_tick_and_are_told_apart() {
+    let emulated = emulated("Touch, Left=PHANTOM Omni");
+    let opened = vec![
+        openhaptics::open(&emulated.connection(None)).expect("the default device"),
+        openhaptics::open(&emulated.connection(Some("Left"))).expect("the other one"),
+    ];
+    let schedulers = [&opened[0], &opened[1]].map(|one| one.scheduler.clone().expect("the library has its own loop"));
+    assert!(Arc::ptr_eq(&schedulers[0], &schedulers[1]), "a loop must see that they share it");
+    let again = openhaptics::open(&emulated.connection(Some("Left"))).err().expect("in use").to_string();
+    assert!(again.contains("in use"), "{again}");
+    let unknown = openhaptics::open(&emulated.connection(Some("Right"))).err().expect("nobody").to_string();
+    assert!(unknown.contains("Right") && unknown.contains("Touch Setup"), "{unknown}");
+    assert!(opened[1].device.name().contains("PHANTOM Omni"));
+    assert_eq!((opened[0].device.limits().max_stiffness, opened[1].device.limits().max_stiffness), (400.0, 700.0));
+    let steering = emulated.steering;
+    steering.set_tip(0, Tip::at(0.01 * DVec3::X));
+    steering.set_tip(1, Tip::at(0.02 * DVec3::Y));
+    let forces = ticks(opened, 20, move |tick, devices| {
+        // From the middle on, the second one is unplugged; its errors lie on the stack of both.
+        steering.disturb(1, if tick < 10 { 0 } else { disturbance_number(Some(Disturbance::Unplugged)) });
+        let said = [devices[0].read(tick as u64, 1e-3), devices[1].read(tick as u64, 1e-3)];
+        let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
+        let _ = devices[1].write(Wrench { force: DVec3::Z, torque: DVec3::ZERO });
+        (said, [steering.motors(0).wrench.force, steering.motors(1).wrench.force])
+    });
+    let place = |said: Result<Reading, DeviceFault>| said.map(|reading| reading.pose.position);
+    let ([first, second], motors) = forces[5];
+    assert!((place(first).expect("a reading") - 0.01 * DVec3::X).length() < 1e-12);
+    assert!((place(second).expect("a reading") - 0.02 * DVec3::Y).length() < 1e-12);
+    assert_eq!(motors, [DVec3::X, DVec3::Z]);
+    let ([first, second], motors) = forces[15];
+    assert!(first.is_ok(), "{first:?}");
+    assert_eq!(second, Err(DeviceFault::Disconnected));
+    assert_eq!(motors, [DVec3::X, DVec3::ZERO]);
+    assert_eq!(steering.motors(0).wrench.force, DVec3::ZERO);
+}
+
+#[test]
+fn a_device_that_is_not_calibrated_gets_no_force() {
+    let emulated = emulated("Touch");
+    emulated.steering.disturb(0, UNCALIBRATED);
+    let error = openhaptics::open(&emulated.connection(None)).err().expect("refused").to_string();
+    assert!(error.contains("not calibrated") && error.contains("inkwell"), "{error}");
+    emulated.steering.disturb(0, 0);
+    assert!(openhaptics::open(&emulated.connection(None)).is_ok());
+}
+
+/// A tick that panics is not called again, the library goes on, and nobody keeps a force.
+#[test]
+fn a_panic_does_not_reach_the_library() {
+    let emulated = emulated("Touch");
+    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let scheduler = scheduler.expect("the library has its own loop");
+    let mut tick = 0;
+    let begun = scheduler.start(Box::new(move || {
+        tick += 1;
+        let _ = device.read(tick, 1e-3);
+        let _ = device.write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
+        assert!(tick < 5, "as a test");
+    }));
+    begun.expect("the scheduler starts");
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(emulated.steering.motors(0).wrench.force, DVec3::ZERO);
+    let second = scheduler.start(Box::new(|| ())).expect_err("it runs").to_string();
+    assert!(second.contains("in use"), "{second}");
+    scheduler.stop();
+    scheduler.stop();
+}
+
+#[test]
+fn the_list_tells_what_there_is_and_what_is_in_the_way() {
+    let emulated = emulated("Touch");
+    let listing = openhaptics::list(&emulated.connection(None));
+    assert!(listing.missing.is_none() && listing.found.len() == 1 && listing.found[0].obstacle.is_none());
+    assert!(listing.found[0].name.contains("Touch") && listing.found[0].limits.max_stiffness == 400.0);
+    assert!(listing.facts.iter().any(|(name, fact)| *name == "version" && fact == "3.4.0"));
+    let opened = openhaptics::open(&emulated.connection(None)).expect("opens after it was listed");
+    let listing = openhaptics::list(&emulated.connection(None));
+    assert!(listing.found[0].obstacle.as_ref().is_some_and(|obstacle| obstacle.what.contains("in use")));
+    drop(opened);
+    emulated.steering.reset("");
+    let missing = openhaptics::list(&emulated.connection(None)).missing.expect("nothing is there").to_string();
+    assert!(missing.contains("Touch Setup"), "{missing}");
+    let nowhere = Connection { library: Some("/nowhere/libHD.so".into()), ..Connection::default() };
+    let missing = openhaptics::list(&nowhere).missing.expect("no library").to_string();
+    assert!(missing.contains("/nowhere/libHD.so") && missing.contains("PALPATE_OPENHAPTICS_LIBRARY"), "{missing}");
+}
+
+/// Whatever the library says: no panic, no number that is none, no force that nobody wrote.
+#[test]
+fn nonsense_is_survived() {
+    let emulated = emulated("Touch");
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let steering = emulated.steering;
+    steering.hurry(true);
+    let good = ticks(opened, 20_000, move |tick, devices| {
+        // Some errors say that the device is gone; then it is well for a while, to come back.
+        steering.disturb(0, if tick % 1000 < 900 { NONSENSE } else { 0 });
+        let said = devices[0].read(1000 * tick as u64, 1e-3);
+        if let Ok(reading) = said {
+            assert!(reading.pose.is_finite() && reading.twist.linear.is_finite() && reading.twist.angular.is_finite());
+        }
+        let _ = devices[0].write(Wrench { force: 0.5 * DVec3::X, torque: DVec3::ZERO });
+        let force = steering.motors(0).wrench.force;
+        assert!(force == DVec3::ZERO || (force - 0.5 * DVec3::X).length() < 1e-12, "{force}");
+        said.is_ok()
+    });
+    steering.hurry(false);
+    println!("{} good readings of {}", good.iter().filter(|good| **good).count(), good.len());
+    for _ in 0..200 {
+        steering.disturb(0, NONSENSE);
+        let _ = openhaptics::list(&emulated.connection(None));
+    }
+}
+
+/// Motors that are too warm are a fault, and come back: the amplifiers let the force through more and more.
+#[test]
+fn warm_motors_are_told_and_cool() {
+    let emulated = emulated("Touch");
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let steering = emulated.steering;
+    let said = ticks(opened, 300, move |tick, devices| {
+        steering.disturb(0, if (5..10).contains(&tick) { MOTORS_OFF } else { 0 });
+        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
+        (said, steering.motors(0).wrench.force.x)
+    });
+    assert_eq!(said[4], (Ok(()), 1.0));
+    assert_eq!(said[7], (Err(DeviceFault::MotorsOff), 0.0));
+    assert!(said[12].0.is_ok() && said[12].1 > 0.0 && said[12].1 < 0.1, "{:?}", said[12]);
+    assert_eq!(said[299], (Ok(()), 1.0));
 }

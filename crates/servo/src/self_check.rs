@@ -187,6 +187,8 @@ struct Ticker {
     tasks: Output<(u64, Task)>,
     published: Input<Seen>,
     task: Task,
+    /// Time of its first tick, ns.
+    begun_ns: u64,
     seen: Seen,
     /// Sum of squares about the mean, by axis, m^2.
     squares: DVec3,
@@ -213,6 +215,7 @@ impl Ticker {
             tasks,
             published,
             task: Task::default(),
+            begun_ns: 0,
             seen: Seen::default(),
             squares: DVec3::ZERO,
             latest: None,
@@ -223,10 +226,11 @@ impl Ticker {
     fn tick(&mut self, now_ns: u64, period: f64) {
         let (number, task) = *self.tasks.read();
         if number != self.seen.task {
-            (self.task, self.squares) = (task, DVec3::ZERO);
+            (self.task, self.squares, self.begun_ns) = (task, DVec3::ZERO, now_ns);
             self.seen = Seen { task: number, fault: self.seen.fault, ..Seen::default() };
         }
-        self.seen.time += period;
+        // By the clock: ticks that were missed count too.
+        self.seen.time = 1e-9 * now_ns.saturating_sub(self.begun_ns) as f64 + period;
         let said = self.device.read(now_ns, period);
         let reading =
             self.stage.admit(said, now_ns, period).filter(|reading| reading.active && reading.pose.is_finite());

@@ -17,6 +17,9 @@ use common::{TOOL, settings, single_with};
 /// On the cube's top, away from its edges: a tool that holds on there is a linear spring.
 const PLACE: DVec3 = DVec3::new(0.05, 0.05, 0.1);
 
+/// Speed at which the tip is struck, m/s.
+const STRUCK: f64 = 1e-2;
+
 /// The stage without what withholds force or adds any: theory speaks of the loop alone.
 const BARE: SafetyLimits = SafetyLimits {
     max_force: f64::INFINITY,
@@ -50,7 +53,7 @@ impl Held {
         let step = 1e-4;
         let poses: Vec<Pose> =
             [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|axis| Pose::at(PLACE + step * axis)).into();
-        let script = Script { period: 1e-3, poses: &poses, grabs: &[true; 4], strikes: &[], watch: &[] };
+        let script = Script { period: 1e-3, poses: &poses, grabs: &[true; 4], strikes: &[], watch: &[], devices: &[] };
         let recording = run(&model, BARE, settings(), &StrainPreparer::new(&model), &script, |_| {}).expect("a run");
         let column = |axis: usize| -recording.forces[axis + 1] / step;
         let stiffness = DMat3::from_cols(column(0), column(1), column(2));
@@ -77,7 +80,7 @@ impl Held {
     fn is_stable(&self, mechanics: Mechanics, period: f64, stiffness: f64) -> bool {
         // At the edge of stability energy grows or fades with (b - K tau) / m.
         let ticks = (40.0 * mechanics.mass / mechanics.damping / period).max(400.0) as usize;
-        let tip = Tip::new(mechanics, PLACE, None).moving(1e-2 * self.direction);
+        let tip = Tip::new(mechanics, PLACE, None).moving(STRUCK * self.direction);
         let scale = stiffness / self.largest;
         let scaled = self.stiffness * scale;
         let (mut middle, mut end) = (0.0, 0.0);
@@ -95,7 +98,8 @@ impl Held {
             end = if runs_away { f64::INFINITY } else { end };
             if runs_away || tick.number == ticks { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        end < middle
+        // Below that rounding alone moves it.
+        end < middle.max(1e-12 * mechanics.mass * STRUCK * STRUCK)
     }
 
     /// By bisection, N/m, to 0.1 %.

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 SCHEMA = 1
 # How long a device is watched at rest and while it is moved, and how long a force rises, s.
 REST, RANGE, RANGE_UNATTENDED, RISE = 2.0, 10.0, 1.0, 1.5
+# Time in which a hand brings the tip back after a push, s.
+RETURN = 0.5
 FORCE = 0.5
 
 
@@ -131,6 +133,7 @@ def _pushes(check: SelfCheck) -> Iterator[Any]:
     force = min(FORCE, check.limits.max_force)
     for direction, (_, words) in DIRECTIONS.items():
         _say(f"  {direction}: pushes {words}")
+        check.watch(RETURN)
         push = check.push(direction, force, RISE)
         yield push
         if push.fault is not None:
@@ -190,7 +193,7 @@ def _count(number: int) -> str:
 
 def _limits_text(limits: DeviceLimits) -> str:
     parts = ((limits.max_force, "N"), (limits.max_torque, "N m"), (limits.max_stiffness, "N/m"))
-    told = [f"{value:.3g} {unit}" for value, unit in parts if math.isfinite(value) and value > 0]
+    told = [f"{value:.4g} {unit}" for value, unit in parts if math.isfinite(value) and value > 0]
     return f"at most {', '.join(told)}" if told else "without limits of its own"
 
 

@@ -5,6 +5,7 @@ It may wait for the device and for the interpreter; the loop never does.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import threading
 import time
@@ -97,17 +98,19 @@ class Polling:
         self._thread = threading.Thread(
             target=self._run, args=(native,), name=f"palpate-device {self.name}", daemon=True
         )
+        # A program that ends without a word leaves no force behind: a daemon is not waited for.
+        atexit.register(self.stop)
         self._thread.start()
         if not self._ready.wait(OPENING):
-            self._ending.set()
-            raise DeviceError(f"{self.name}: open and the first read took more than {OPENING:g} s")
+            self._refusal = DeviceError(f"{self.name}: open and the first read took more than {OPENING:g} s")
         if self._refusal is not None:
-            self._thread.join(CLOSING)
+            self.stop()
             raise self._refusal
         return native.opened()
 
     def stop(self) -> None:
         """Put out zero, close the device and end the thread; a call of it that does not return is left behind."""
+        atexit.unregister(self.stop)
         self._ending.set()
         thread, self._thread = self._thread, None
         if thread is None:

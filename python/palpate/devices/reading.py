@@ -25,7 +25,8 @@ class DeviceLimits:
     max_force, max_torque
         Largest force, N, and torque, N m; 0 N m for a device without rotary motors.
     max_stiffness
-        Stiffest contact that it holds without oscillating, N/m. A tool that may ask for more is refused.
+        Stiffest contact that it holds without oscillating, N/m. Where a scene asks for more, contacts are rendered as
+        soft as that, and warned of.
     max_damping, max_angular_damping
         Strongest damping that it holds, N s/m and N m s/rad.
     own_damping

@@ -29,7 +29,7 @@ DIRECTIONS = {
     "-z": ((0.0, 0.0, -1.0), "down"),
 }
 # Tip movements below this show no direction, m: several times what encoders of desktop devices resolve.
-VISIBLE = 3e-4
+VISIBLE = 2e-4
 # A loop at 1 kHz wants readings as often; above this gap a device looks unplugged to the safety stage, s.
 LOWEST_RATE, LONGEST_GAP = 500.0, 0.05
 # Rate of the loop of a check, and between two looks at it, s.

@@ -18,7 +18,7 @@ INFINITE = float("inf")
 UNLIMITED = (INFINITE, INFINITE, INFINITE, INFINITE, INFINITE, None, 0.0, None, None)
 
 
-def require_devices(given: Mapping[int, Device]) -> None:
+def require_devices(devices: Mapping[int, Device]) -> None:
     """Refuse what is no device.
 
     Raises
@@ -27,10 +27,10 @@ def require_devices(given: Mapping[int, Device]) -> None:
         The tool, and what it was given.
 
     """
-    for tool, device in given.items():
+    for tool, device in devices.items():
         if not isinstance(device, Device):
-            kind = type(device).__name__
-            raise DeviceError(f"the device of tool {tool} must be an object of a palpate.Device, got {kind}")
+            given = f"the class {device.__name__}" if isinstance(device, type) else type(device).__name__
+            raise DeviceError(f"the device of tool {tool} must be an object of a palpate.Device, got {given}")
 
 
 def largest_force(scene: SceneTables) -> float:

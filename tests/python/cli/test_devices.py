@@ -6,7 +6,7 @@ import json
 
 import pytest
 from command_line import refused, run
-from held_device import Held
+from held_device import Held, unstarved
 from typer.testing import CliRunner
 
 import palpate.devices
@@ -40,13 +40,20 @@ def pads(monkeypatch):
     monkeypatch.setattr(palpate.devices, "usb_devices", list)
     monkeypatch.setattr(palpate.devices, "SelfCheck", lambda kind, id: SelfCheck(held))
     monkeypatch.setattr(command, "is_terminal", lambda: True)
-    for name, value in {"REST": 0.3, "RANGE": 0.2, "RANGE_UNATTENDED": 0.2, "RISE": 0.2}.items():
+    for name, value in {"REST": 0.3, "RANGE": 0.2, "RANGE_UNATTENDED": 0.2, "RISE": 0.2, "RETURN": 0.1}.items():
         monkeypatch.setattr(command, name, value)
+    # How fast a program is polled is the machine's affair.
+    monkeypatch.setattr(palpate.devices.self_check, "LOWEST_RATE", 1.0)
+    monkeypatch.setattr(palpate.devices.self_check, "LONGEST_GAP", 1.0)
     return held
 
 
 def invoke(*words, answers=""):
-    return CliRunner().invoke(app, ["devices", *words], input=answers)
+    def attempt():
+        result = CliRunner().invoke(app, ["devices", *words], input=answers)
+        return result, result.output
+
+    return unstarved(attempt)
 
 
 def test_what_is_found_and_why_something_is_not(pads):
@@ -86,6 +93,8 @@ def test_a_check_pushes_along_every_axis_and_passes(pads):
     lines = [line for line in result.stdout.splitlines() if line.startswith("force")]
     assert [line.split()[1] for line in lines] == ["+x", "-x", "+y", "-y", "+z", "-z"]
     assert all("along it" in line for line in lines)
+    moved = [float(line.split("moved")[1].split()[0]) for line in lines]
+    assert max(moved) - min(moved) < 0.2, "each begins where the tip has come back to"
     assert "to the right" in lines[0] and "towards you" in lines[3] and "down" in lines[5]
     assert result.stdout.splitlines()[-1] == "check: passed"
     assert max(abs(force).max() for _, force in pads.written) == pytest.approx(0.4, rel=0.02), "the device's own limit"
@@ -117,7 +126,19 @@ def test_without_a_terminal_nothing_is_pushed(pads, monkeypatch):
     assert pads.calls == []
 
 
-def test_the_command_line(tmp_path):
-    refused(run("devices", "joystick", cwd=tmp_path), "joystick", "haply")
-    result = run("devices", "--json", cwd=tmp_path)
-    assert result.returncode == (0 if any(kind["found"] for kind in json.loads(result.stdout)["kinds"]) else 1)
+def test_what_the_drivers_themselves_say_where_nothing_is(tmp_path, monkeypatch):
+    assert "choose among haply, touch, forcedimension" in str(invoke("joystick").exception)
+    # Nobody listens there, and there are no such files.
+    monkeypatch.setenv("PALPATE_HAPLY_ADDRESS", "ws://127.0.0.1:9")
+    for name in ("OPENHAPTICS", "FORCEDIMENSION"):
+        monkeypatch.setenv(f"PALPATE_{name}_LIBRARY", str(tmp_path / f"lib{name}.so"))
+    result = invoke("--json")
+    assert result.exit_code == 1
+    haply, touch, forcedimension = json.loads(result.stdout)["kinds"]
+    assert haply["found"] == [] and "ws://127.0.0.1:9" in haply["missing"]["what"]
+    assert str(tmp_path / "libOPENHAPTICS.so") in touch["missing"]["what"]
+    assert str(tmp_path / "libFORCEDIMENSION.so") in forcedimension["missing"]["what"]
+
+
+def test_a_mistake_is_one_line(tmp_path):
+    refused(run("devices", "joystick", cwd=tmp_path), "joystick", "haply, touch, forcedimension")

@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 from conftest import box_mesh
+from emulators import inverse_service
 
 import palpate
 
@@ -140,3 +141,27 @@ def test_what_cannot_be_is_refused(green, tmp_path):
         simulation.stop_recording()
         simulation.remove_tool(3)
         assert len(simulation.frame().forces) == 3
+
+
+def test_devices_come_and_go_while_the_loop_runs(green, monkeypatch):
+    with inverse_service("--hand", "rest") as (address, process), palpate.Simulation(scene_of(green)) as simulation:
+        monkeypatch.setenv("PALPATE_HAPLY_ADDRESS", address)
+        with pytest.warns(palpate.DeviceWarning, match="800 N/m"):
+            tool = simulation.add_tool("haply", radius="6mm", contact="patch", contact_radius="12mm")
+        assert simulation.devices == {1: "Haply Inverse3 0A01"} and simulation.frame().active.tolist() == [False, True]
+        with pytest.raises(palpate.SceneError, match="tool 1 is moved by Haply"):
+            simulation.move((0.0, 0.0, 0.0), tool=tool)
+        simulation.remove_tool(tool)
+        assert simulation.devices == {}
+        # The arm is free again: another tool takes it.
+        with pytest.warns(palpate.DeviceWarning, match="800 N/m"):
+            assert simulation.connect(0, "haply") == "Haply Inverse3 0A01"
+        assert simulation.frame().active.tolist() == [True]
+        process.kill()
+        deadline = time.monotonic() + 20
+        while simulation.frame().statistics["fault"] is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert "the device is disconnected" in simulation.frame().statistics["fault"]
+        with pytest.raises(palpate.DeviceError, match="no Haply Inverse Service listens"):
+            simulation.add_tool("haply")
+        assert len(simulation.scene.tools) == 1

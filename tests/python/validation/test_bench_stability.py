@@ -11,7 +11,16 @@ import pytest
 
 import palpate
 from palpate.validation.bench import touches, zwidth
-from palpate.validation.bench.emulation import FIRM, LOOSE, Device, Held, Mechanics, emulate, known_devices
+from palpate.validation.bench.emulation import (
+    FIRM,
+    LOOSE,
+    Device,
+    Held,
+    Mechanics,
+    emulate,
+    frictionless,
+    known_devices,
+)
 from palpate.validation.bench.sampled_loop import bound_for_any_hand, largest_stable
 
 BLOCK = Path(__file__).parents[3] / "examples" / "block.toml"
@@ -34,9 +43,8 @@ def test_the_loop_holds_what_the_eigenvalues_say_and_the_stage_changes_nothing(s
     assert row.controlled == pytest.approx(row.eigenvalue, rel=0.01)
     assert row.whole == pytest.approx(row.eigenvalue, rel=0.01)
     # A heavy tip needs all its damping, a light one less.
-    assert (
-        row.eigenvalue / row.any_hand == pytest.approx(1.0, abs=0.02) if mass > 0.01 else row.bare > 1.1 * row.any_hand
-    )
+    low, high = (1.0, 1.02) if mass > 0.01 else (1.05, 1.2)
+    assert low < row.eigenvalue / row.any_hand < high
     zwidth.write([row], tmp_path / "map.csv")
     with (tmp_path / "map.csv").open() as file:
         assert float(next(csv.DictReader(file))["bare"]) == row.bare
@@ -54,19 +62,19 @@ def test_a_hand_adds_its_damping(spring, hand):
 
 def test_touches_of_an_example_come_to_rest(devices, shared_cache):
     built = palpate.Scene.read(BLOCK).build(progress=False)
-    for touch in touches.touches(built, [devices[name] for name in ("Touch", "omega")]):
+    chosen = [devices["Touch"], frictionless(devices["Touch"]), frictionless(devices["omega"])]
+    for touch in touches.touches(built, chosen):
         assert touch.stable, touch
-        # It was a touch: the hand pushed, and the force is not that of the stop at the largest one.
-        assert 0.3 < touch.force < devices[touch.device].max_force
+        # It was a touch, and not one that the largest force of the device cut short.
+        assert 0.2 < touch.force < 3.0
 
 
-def test_a_touch_holds_a_firm_body_by_its_limit_and_a_hard_one_shows_instability(devices):
-    for touch, expected in touches.controls(devices["Touch"]):
+def test_a_touch_holds_a_firm_body_by_its_limit_and_a_hard_one_shows_instability(spring, devices):
+    for touch, expected in touches.controls(spring, devices["Touch"]):
         assert expected is None or touch.stable == expected, touch
 
 
-def test_a_tool_that_may_ask_for_more_than_the_device_holds_is_refused(devices):
-    spring = zwidth.Spring()
+def test_a_tool_that_may_ask_for_more_than_the_device_holds_is_refused(spring, devices):
     device = devices["Touch"]
     simulation = spring.pressed(800.0, 800.0)
     with pytest.raises(palpate.Error, match="at most 400 N/m: lower max_stiffness to 400"):

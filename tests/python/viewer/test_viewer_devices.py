@@ -1,4 +1,4 @@
-"""A tool that a device moves, as the page sees it: felt, not driven by the pointer, let go of when the device is gone."""
+"""A tool that a device moves, as the page sees it: felt, not driven by the pointer, let go of when the device goes."""
 
 from __future__ import annotations
 

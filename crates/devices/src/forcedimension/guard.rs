@@ -145,7 +145,7 @@ fn watch(shared: &Shared, id: Id) -> Option<Id> {
                 if let Some(lost) = open.take() {
                     shared.dhd.close(lost);
                 }
-                if look % LOOKS_AN_ATTEMPT == 0 {
+                if look.is_multiple_of(LOOKS_AN_ATTEMPT) {
                     open = reopen(shared);
                 }
             }
@@ -164,7 +164,7 @@ fn watch_open(shared: &Shared, id: Id, look: u32) {
         // The tick notices what is wrong, if it still ticks.
         let _ = shared.release(id);
     }
-    if look % LOOKS_A_STATUS != 0 {
+    if !look.is_multiple_of(LOOKS_A_STATUS) {
         return;
     }
     match shared.dhd.status(id) {
@@ -174,7 +174,7 @@ fn watch_open(shared: &Shared, id: Id, look: u32) {
             let cause = status[status::FORCE_OFF_CAUSE];
             // Those that a person holds down end by themselves.
             let by_hand = matches!(cause, force_off::BUTTON | force_off::DEAD_MAN);
-            if !by_hand && look % LOOKS_AN_ATTEMPT == 0 && shared.dhd.enable_force(true, id).is_ok() {
+            if !by_hand && look.is_multiple_of(LOOKS_AN_ATTEMPT) && shared.dhd.enable_force(true, id).is_ok() {
                 let _ = shared.release(id);
             }
         }

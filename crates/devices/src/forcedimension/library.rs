@@ -29,6 +29,9 @@ static LIBRARIES: Libraries<Api> = Libraries::new();
 /// Earliest version of the SDK whose functions are the ones declared here.
 const FIRST_VERSION: c_int = 3;
 
+/// Facts by name.
+pub type Facts = Vec<(&'static str, String)>;
+
 /// The library, loaded.
 #[derive(Clone, Copy)]
 pub struct Dhd(&'static Api);
@@ -44,7 +47,7 @@ pub enum Freshness {
 
 impl Dhd {
     /// Finds and loads it, and looks whether it is of a version that works.
-    pub fn load(connection: &Connection) -> Result<(Self, Vec<(&'static str, String)>), OpenError> {
+    pub fn load(connection: &Connection) -> Result<(Self, Facts), OpenError> {
         let Loaded { path, api } = LIBRARIES.get(&SEARCH, connection, Api::bind)?;
         let mut version = [0; 4];
         let [major, minor, release, revision] = &mut version;

@@ -155,8 +155,8 @@ fn describe(dhd: Dhd, rank: i8, is_open: bool) -> FoundDevice {
 }
 
 fn nothing_found() -> OpenError {
-    let advice = "plug it in and switch it on; on Linux the rule SUBSYSTEM==\"usb\", ATTRS{idVendor}==\"1451\", \
-                  MODE=\"0666\" (for a Falcon \"0403\") in /etc/udev/rules.d lets you use it";
+    let advice =
+        "plug it in and switch it on; on Linux a udev rule must let you use it, which 'palpate devices' prints";
     OpenError::new("no Force Dimension device is found", advice)
 }
 

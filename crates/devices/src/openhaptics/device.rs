@@ -133,6 +133,8 @@ impl Device for TouchDevice {
         let Wrench { force, torque } = wrench;
         let finite = force.is_finite() && torque.is_finite();
         self.begin(handle);
+        // Other devices have begun their frames since.
+        self.hd.make_current(handle);
         // The library has set the force to zero when the frame began.
         if finite {
             let limits = &self.slot.traits.limits;

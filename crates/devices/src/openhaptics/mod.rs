@@ -15,12 +15,11 @@ mod models;
 mod scheduler;
 
 use std::ffi::CString;
-use std::sync::Arc;
 
 use self::device::TouchDevice;
 use self::ffi::{Enum, Handle, calibration, capability, error, parameter};
 use self::library::Hd;
-use self::scheduler::{Handout, HdScheduler};
+use self::scheduler::HdScheduler;
 use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Opened};
 
 /// Earliest version of OpenHaptics whose functions are the ones declared here.
@@ -77,7 +76,7 @@ pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
     let scheduler = HdScheduler::of(hd);
     let slot = scheduler.add(name)?;
     let device = TouchDevice::new(scheduler, slot);
-    Ok(Opened { device: Box::new(device), scheduler: Some(Arc::new(Handout(scheduler))) })
+    Ok(Opened { device: Box::new(device), scheduler: Some(scheduler.handout()) })
 }
 
 /// What does not change of an open device.

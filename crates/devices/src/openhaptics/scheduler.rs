@@ -9,7 +9,7 @@
 use std::ffi::{CString, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -87,6 +87,10 @@ pub struct HdScheduler {
     /// Set while the library's scheduler is stopped for a device that is unplugged.
     dormant: AtomicBool,
     stopping: AtomicBool,
+    /// The tick has panicked.
+    panicked: AtomicBool,
+    /// The same for all devices, so that a loop sees that they share it.
+    handout: OnceLock<Arc<dyn Scheduler>>,
 }
 
 /// Called by the library at each of its ticks.
@@ -117,9 +121,16 @@ impl HdScheduler {
             ticking: AtomicBool::new(false),
             dormant: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
+            panicked: AtomicBool::new(false),
+            handout: OnceLock::new(),
         }));
         all.push(scheduler);
         scheduler
+    }
+
+    /// What a loop has of it.
+    pub fn handout(&'static self) -> Arc<dyn Scheduler> {
+        self.handout.get_or_init(|| Arc::new(Handout(self))).clone()
     }
 
     fn slots(&self) -> RwLockReadGuard<'_, Vec<Arc<Slot>>> {
@@ -141,19 +152,14 @@ impl HdScheduler {
         let (Ok(slots), Ok(mut tick)) = (self.slots.try_read(), self.tick.try_lock()) else { return };
         slots.iter().for_each(|slot| slot.framed.store(false, Ordering::Relaxed));
         self.ticking.store(true, Ordering::Release);
-        let panicked = match tick.as_mut() {
-            // A panic must not reach the library. The loop catches its own, so that this one comes from elsewhere.
-            Some(tick) => catch_unwind(AssertUnwindSafe(tick)).is_err(),
-            None => false,
-        };
+        let callable = tick.as_mut().filter(|_| !self.panicked.load(Ordering::Acquire));
+        // A panic must not reach the library. A loop catches its own; a tick that panics all the same is not called again.
+        let panicked = callable.is_some_and(|tick| catch_unwind(AssertUnwindSafe(tick)).is_err());
         if !self.is_dormant() {
             slots.iter().for_each(|slot| self.release(slot));
         }
         self.ticking.store(false, Ordering::Release);
-        if panicked {
-            // Neither called again nor dropped on this thread: what it owns may panic once more.
-            std::mem::forget(tick.take());
-        }
+        self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
     /// A frame without a force for a device that has had none in this tick: it would keep its last one.
@@ -336,7 +342,7 @@ impl HdScheduler {
 }
 
 /// What a loop has of the scheduler.
-pub struct Handout(pub &'static HdScheduler);
+struct Handout(&'static HdScheduler);
 
 impl Scheduler for Handout {
     fn rate(&self) -> f64 {
@@ -351,6 +357,7 @@ impl Scheduler for Handout {
         }
         *locked(&scheduler.tick) = Some(tick);
         scheduler.stopping.store(false, Ordering::Release);
+        scheduler.panicked.store(false, Ordering::Release);
         let hd = scheduler.hd;
         hd.first_error();
         let data = std::ptr::from_ref(scheduler).cast_mut().cast::<c_void>();

@@ -18,6 +18,9 @@ const WATCHDOG_LENIENCY: Duration = Duration::from_millis(200);
 /// Speed of the tip above which the device brakes, m/s, until somebody sets another.
 const USUAL_FASTEST: f64 = 2.0;
 
+/// Cause of motors that are off: a button.
+const BUTTON: i32 = 1;
+
 /// What the motors do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
@@ -137,6 +140,15 @@ impl Device {
         self.tip.write(DVec3::ZERO);
     }
 
+    /// By a button that somebody holds down, or lets go.
+    pub fn switch_motors_off(&mut self, down: bool) {
+        match (down, self.force_off_cause) {
+            (true, _) => self.motors_off(Mode::Brake, BUTTON),
+            (false, BUTTON) => self.motors_off(Mode::Force, 0),
+            (false, _) => (),
+        }
+    }
+
     pub fn put(&mut self, tip: Tip) {
         self.go_on();
         self.tip.put(tip);
@@ -155,6 +167,9 @@ impl Device {
     }
 
     pub fn enable(&mut self, on: bool) {
+        if on && self.force_off_cause == BUTTON {
+            return;
+        }
         let mode = match (on, self.mode) {
             (true, _) => Mode::Force,
             (false, _) => Mode::Brake,

@@ -57,6 +57,8 @@ pub struct Device {
     /// Everything that is said is random.
     pub nonsense: bool,
     pub uncalibrated: bool,
+    /// The motors are too warm.
+    warm: bool,
     pub initialised: bool,
     /// Unplugged while it was initialised: it stays so for who has it.
     pub broken: bool,
@@ -95,6 +97,7 @@ impl Device {
             disturbance: None,
             nonsense: false,
             uncalibrated: false,
+            warm: false,
             initialised: false,
             broken: false,
             enabled: Vec::new(),
@@ -175,6 +178,10 @@ impl Device {
         if self.disturbance == Some(Disturbance::DriverError) {
             return Err(error::TIMER);
         }
+        if self.warm {
+            self.drop_out();
+            return Err(error::WARM_MOTORS);
+        }
         let speed = 1e3 * self.snapshot.tip.velocity.length();
         let limited = self.is_enabled(capability::SOFTWARE_VELOCITY_LIMIT) && !self.tip.is_put();
         if limited && speed > self.limits.speed {
@@ -182,6 +189,11 @@ impl Device {
             return Err(error::EXCEEDED_MAX_VELOCITY);
         }
         Ok(())
+    }
+
+    /// Until they have cooled.
+    pub fn switch_motors_off(&mut self, warm: bool) {
+        self.warm = warm;
     }
 
     /// Amplifiers off, from where they come back.

@@ -112,7 +112,7 @@ pub extern "system" fn hdIsEnabled(one: u32) -> u8 {
 #[unsafe(no_mangle)]
 pub extern "system" fn hdGetError() -> ErrorInfo {
     let mut world = world();
-    if world.talks_nonsense() && world.bits() % 8 == 0 {
+    if world.talks_nonsense() && world.bits().is_multiple_of(8) {
         let (code, device) = (world.bits() as u32 % 0x700, world.bits() as u32 % 3);
         return ErrorInfo { code, internal: -1, device };
     }
@@ -149,7 +149,11 @@ pub extern "system" fn hdCheckCalibration() -> u32 {
 pub extern "system" fn hdUpdateCalibration(_style: u32) {}
 
 #[unsafe(no_mangle)]
-pub extern "system" fn hdScheduleAsynchronous(callback: Callback, data: *mut c_void, priority: c_ushort) -> c_ulong {
+pub unsafe extern "system" fn hdScheduleAsynchronous(
+    callback: Callback,
+    data: *mut c_void,
+    priority: c_ushort,
+) -> c_ulong {
     if is_servo() {
         // SAFETY: the caller has promised that it may be called with its data.
         if unsafe { callback(data) } == 0 {
@@ -160,7 +164,7 @@ pub extern "system" fn hdScheduleAsynchronous(callback: Callback, data: *mut c_v
 }
 
 #[unsafe(no_mangle)]
-pub extern "system" fn hdScheduleSynchronous(callback: Callback, data: *mut c_void, priority: c_ushort) {
+pub unsafe extern "system" fn hdScheduleSynchronous(callback: Callback, data: *mut c_void, priority: c_ushort) {
     if is_servo() || !is_running() {
         // SAFETY: as above.
         while unsafe { callback(data) } != 0 {}
@@ -208,4 +212,124 @@ pub extern "system" fn hdSetSchedulerRate(hertz: c_ulong) {
 #[unsafe(no_mangle)]
 pub extern "system" fn hdGetSchedulerTimeStamp() -> c_double {
     scheduler::since_tick()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::frames::{hdBeginFrame, hdEndFrame};
+    use super::numbers::parameter;
+    use super::steering::{palpate_emulator_hurry, palpate_emulator_reset};
+    use super::values::{hdGetDoublev, hdGetIntegerv, hdSetDoublev, hdSetLongv};
+    use super::*;
+
+    fn popped() -> u32 {
+        hdGetError().code
+    }
+
+    /// A device that is fresh, with forces on.
+    fn fresh() -> u32 {
+        // SAFETY: a string.
+        unsafe { palpate_emulator_reset(c"Touch".as_ptr()) };
+        // SAFETY: null is the default device.
+        let handle = unsafe { hdInitDevice(std::ptr::null()) };
+        assert_eq!((handle, popped()), (0, 0));
+        assert_eq!(hdIsEnabled(capability::FORCE_OUTPUT), 0);
+        hdEnable(capability::FORCE_OUTPUT);
+        handle
+    }
+
+    fn frame(handle: u32, force: Option<[f64; 3]>) -> [f64; 3] {
+        hdBeginFrame(handle);
+        if let Some(force) = force {
+            // SAFETY: three numbers.
+            unsafe { hdSetDoublev(parameter::CURRENT_FORCE, force.as_ptr()) };
+        }
+        hdEndFrame(handle);
+        let (force, _) = world().devices[handle as usize].motors();
+        device::to_vendor(force).to_array()
+    }
+
+    /// One test, for the library has one state.
+    #[test]
+    fn the_rules_that_the_vendor_documents() {
+        frames_and_errors();
+        limits_and_ramp();
+        callbacks_by_priority();
+    }
+
+    fn frames_and_errors() {
+        let handle = fresh();
+        assert_eq!(frame(handle, Some([0.5, 1.0, 0.0])), [0.5, 1.0, 0.0]);
+        assert_eq!(frame(handle, None), [0.0; 3], "the force is zero when a frame begins");
+        hdEndFrame(handle);
+        assert_eq!(popped(), error::ILLEGAL_END);
+        // SAFETY: three numbers; so below.
+        unsafe { hdSetDoublev(parameter::CURRENT_FORCE, [1.0; 3].as_ptr()) };
+        assert_eq!(popped(), error::FRAME);
+        hdBeginFrame(handle);
+        hdBeginFrame(handle);
+        assert_eq!(popped(), error::ILLEGAL_BEGIN);
+        // SAFETY: as above.
+        unsafe { hdSetDoublev(parameter::CURRENT_FORCE, [1.0; 3].as_ptr()) };
+        hdSetLongv(parameter::CURRENT_MOTOR_DAC_VALUES, std::ptr::null());
+        hdEndFrame(handle);
+        assert_eq!(popped(), error::FORCE_ERROR);
+        let mut number = 0;
+        // SAFETY: room for what is asked.
+        unsafe { hdGetIntegerv(parameter::CURRENT_INKWELL_SWITCH, &mut number) };
+        // SAFETY: as above.
+        unsafe { hdGetDoublev(0x1234, &mut 0.0) };
+        // The newest first.
+        assert_eq!((popped(), popped(), popped()), (error::INVALID_ENUM, error::INVALID_INPUT_TYPE, 0));
+        // SAFETY: as above.
+        assert_eq!(unsafe { hdInitDevice(std::ptr::null()) }, INVALID_HANDLE);
+        assert_eq!(popped(), error::DEVICE_ALREADY_INITIATED);
+        hdMakeCurrentDevice(7);
+        assert_eq!(popped(), error::BAD_HANDLE);
+        hdUnschedule(12_345);
+        assert_eq!(popped(), error::INVALID_OPERATION);
+        hdSetSchedulerRate(1234);
+        assert_eq!(popped(), error::INVALID_VALUE);
+    }
+
+    /// 3.3 N, then nothing, and back at 20 N/s: 0.02 N a frame of 1 ms.
+    fn limits_and_ramp() {
+        let handle = fresh();
+        assert_eq!(frame(handle, Some([4.0, 0.0, 0.0])), [0.0; 3]);
+        assert_eq!(popped(), error::EXCEEDED_MAX_FORCE);
+        let forces: Vec<f64> = (0..400).map(|_| frame(handle, Some([1.0, 0.0, 0.0]))[0]).collect();
+        assert_eq!(forces[0], 0.0);
+        assert!((forces[33] - 33.0 * 0.02 / 3.3).abs() < 1e-9, "{}", forces[33]);
+        assert_eq!(forces[399], 1.0);
+        assert_eq!(popped(), 0);
+        hdEnable(capability::MAX_FORCE_CLAMPING);
+        assert!((frame(handle, Some([4.0, 0.0, 0.0]))[0] - 3.3).abs() < 1e-12);
+        assert_eq!(popped(), 0);
+    }
+
+    static CALLS: AtomicU32 = AtomicU32::new(0);
+
+    /// Writes its number down behind the others; done from the third tick on.
+    unsafe extern "system" fn note(number: *mut c_void) -> u32 {
+        let before = CALLS.load(Ordering::Relaxed);
+        CALLS.store(10 * before + number as u32, Ordering::Relaxed);
+        u32::from(before < 1_000)
+    }
+
+    fn callbacks_by_priority() {
+        CALLS.store(0, Ordering::Relaxed);
+        // SAFETY: the callback reads its pointer as a number; so below.
+        let low = unsafe { hdScheduleAsynchronous(note, std::ptr::without_provenance_mut(1), 10) };
+        // SAFETY: as above.
+        unsafe { hdScheduleAsynchronous(note, std::ptr::without_provenance_mut(2), 60_000) };
+        palpate_emulator_hurry(1);
+        hdStartScheduler();
+        hdWaitForCompletion(low, 1);
+        hdStopScheduler();
+        palpate_emulator_hurry(0);
+        // Three ticks, in each the one of the higher priority first.
+        assert_eq!(CALLS.load(Ordering::Relaxed), 212_121);
+    }
 }

@@ -72,6 +72,7 @@ pub mod error {
     pub const INVALID_OPERATION: u32 = 0x0102;
     pub const INVALID_INPUT_TYPE: u32 = 0x0103;
     pub const BAD_HANDLE: u32 = 0x0104;
+    pub const WARM_MOTORS: u32 = 0x0200;
     pub const EXCEEDED_MAX_FORCE: u32 = 0x0201;
     pub const EXCEEDED_MAX_FORCE_IMPULSE: u32 = 0x0202;
     pub const EXCEEDED_MAX_VELOCITY: u32 = 0x0203;

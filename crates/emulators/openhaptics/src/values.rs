@@ -96,7 +96,7 @@ fn numbers(asked: u32, kind: Kind) -> Option<([f64; LONGEST], usize)> {
         parameter::CURRENT_TRANSFORM if broken => numbers[12] = f64::NAN,
         _ => (),
     }
-    if nonsense && world.bits() % 2 == 0 {
+    if nonsense && world.bits().is_multiple_of(2) {
         numbers[..count].fill_with(|| world.number());
     }
     Some((numbers, count))
@@ -176,7 +176,7 @@ fn set(asked: u32, numbers: [f64; 3], limit: f64) {
         parameter::SOFTWARE_VELOCITY_LIMIT
         | parameter::SOFTWARE_FORCE_IMPULSE_LIMIT
         | parameter::FORCE_RAMPING_RATE
-            if !(limit > 0.0) =>
+            if limit.is_nan() || limit <= 0.0 =>
         {
             Err(error::INVALID_VALUE)
         }

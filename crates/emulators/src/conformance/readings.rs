@@ -20,8 +20,8 @@ pub fn checks<B: Bench>() -> Vec<Check<B>> {
 }
 
 pub fn close_to(what: &str, seen: DVec3, expected: DVec3, tolerance: f64) -> Verdict {
-    // Negated, so that a number that is none fails.
-    if !((seen - expected).length() <= tolerance) {
+    let distance = (seen - expected).length();
+    if distance.is_nan() || distance > tolerance {
         return Err(format!("{what} is {seen}, not {expected} within {tolerance}"));
     }
     Ok(())
@@ -34,7 +34,7 @@ fn names_itself<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     }
     let positive = [limits.max_force, limits.max_stiffness, limits.max_damping, limits.max_speed.unwrap_or(1.0)];
     let none_negative = [limits.max_torque, limits.max_angular_damping, limits.delay];
-    if positive.iter().any(|limit| !(*limit > 0.0)) || none_negative.iter().any(|limit| !(*limit >= 0.0)) {
+    if !positive.iter().all(|limit| *limit > 0.0) || !none_negative.iter().all(|limit| *limit >= 0.0) {
         return Err(format!("its limits are {limits:?}"));
     }
     Ok(())

@@ -77,7 +77,10 @@ fn clamps<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     let within = write_and_settle(rig, Wrench { force: 0.95 * largest * direction, torque: DVec3::ZERO })?;
     close_to("a force within the limit", within.force, 0.95 * largest * direction, tolerance)?;
     let beyond = write_and_settle(rig, Wrench { force: 3.0 * largest * direction, torque: DVec3::ZERO })?;
-    if !(beyond.force.length() <= largest + tolerance) || beyond.force.dot(direction) < 0.9 * largest {
+    if !beyond.force.is_finite()
+        || beyond.force.length() > largest + tolerance
+        || beyond.force.dot(direction) < 0.9 * largest
+    {
         return Err(format!("three times the largest force, {largest} N, reaches the motors as {}", beyond.force));
     }
     close_to("the direction of a clamped force", beyond.force.normalize(), direction, 1e-2)?;

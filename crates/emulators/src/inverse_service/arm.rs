@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::motion::{Measured, Motion};
+use super::steering::{ArmEnd, Commanded, MotorForce};
 
 /// Most changes of the motors' force that are remembered.
 const MOST_CHANGES: usize = 1 << 16;
@@ -31,15 +32,6 @@ impl Default for Condition {
     }
 }
 
-/// What the motors were told, and when.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotorForce {
-    /// On the hand, N.
-    pub force: DVec3,
-    /// When it came onto the motors.
-    pub at: Instant,
-}
-
 /// An arm.
 pub struct Arm {
     /// Four hexadecimal digits.
@@ -63,11 +55,13 @@ pub struct Arm {
     /// Motion is known up to this time, s.
     time: f64,
     began: Instant,
+    /// To the test that steers it.
+    end: ArmEnd,
 }
 
 impl Arm {
     /// At rest.
-    pub fn new(id: &str, kind: &'static str, mut motion: Motion, began: Instant) -> Self {
+    pub fn new((id, kind): (&str, &'static str), mut motion: Motion, (began, end): (Instant, ArmEnd)) -> Self {
         let motors = MotorForce { force: DVec3::ZERO, at: began };
         Self {
             id: id.into(),
@@ -81,11 +75,15 @@ impl Arm {
             command: None,
             time: 0.0,
             began,
+            end,
         }
     }
 
     /// Moves on to a time, s; a command that has not been repeated ends on the way.
     pub fn advance(&mut self, to: f64) {
+        if let Some((held, since)) = self.end.newly_held() {
+            self.motion = Motion::Held(held, since);
+        }
         if let Some((_, until)) = self.command.filter(|(_, until)| *until <= to) {
             self.move_to(until);
             self.release();
@@ -127,7 +125,10 @@ impl Arm {
     }
 
     fn set_motors(&mut self, force: DVec3) {
-        let at = self.began + Duration::from_secs_f64(self.time);
+        let moment = |time: f64| self.began + Duration::from_secs_f64(time);
+        let at = moment(self.time);
+        let until = self.command.map(|(_, until)| moment(until));
+        self.end.tell(Commanded { motors: MotorForce { force, at }, until });
         if force != self.motors.force && self.changes.len() < MOST_CHANGES {
             self.changes.push(MotorForce { force, at });
         }
@@ -138,12 +139,13 @@ impl Arm {
 #[cfg(test)]
 mod tests {
     use super::super::motion::Held;
+    use super::super::steering::ends;
     use super::*;
 
     #[test]
     fn a_command_that_is_not_repeated_ends_at_its_time() {
         let began = Instant::now();
-        let mut arm = Arm::new("0A01", "inverse3", Motion::Held(Held::at(DVec3::X), 0.0), began);
+        let mut arm = Arm::new(("0A01", "inverse3"), Motion::Held(Held::at(DVec3::X), 0.0), (began, ends(began).1));
         let limits = (10.0, Duration::from_millis(100));
         arm.advance(1.0);
         arm.command(1, DVec3::new(1.0, 0.0, -20.0), limits);

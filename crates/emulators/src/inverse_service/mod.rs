@@ -17,12 +17,14 @@ mod server;
 mod session;
 mod shared;
 mod state;
+mod steering;
 mod trouble;
 mod world;
 
-pub use arm::{Arm, Condition, MIDDLE, MotorForce};
+pub use arm::{Condition, MIDDLE};
 pub use grip::GripKind;
-pub use motion::{Held, Motion};
+pub use motion::Held;
 pub use persona::Persona;
 pub use server::{InverseService, Options};
+pub use steering::MotorForce;
 pub use trouble::Trouble;

@@ -1,21 +1,23 @@
 //! The service as a whole: its sockets, and what a test does to it.
 
+use std::collections::BTreeMap;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use palpate_devices::{Buttons, emulated};
 use serde_json::json;
 
-use super::arm::{Arm, Condition, MotorForce};
+use super::arm::{Arm, Condition};
 use super::grip::{Grip, GripKind};
 use super::motion::{Held, Motion};
 use super::persona::Persona;
 use super::session;
 use super::shared::{Shared, locked};
+use super::steering::{MotorForce, TestEnd, ends};
 use super::trouble::Trouble;
 use super::world::World;
 
@@ -64,6 +66,8 @@ pub struct InverseService {
     address: SocketAddr,
     events: SocketAddr,
     began: Instant,
+    /// To the arms.
+    ends: Mutex<BTreeMap<String, TestEnd>>,
 }
 
 impl InverseService {
@@ -80,7 +84,7 @@ impl InverseService {
         (world.idle_timeout, world.max_force) = (options.idle_timeout, options.max_force);
         let shared = Arc::new(Shared::new(world, options.latency, options.jitter));
         let stop = Arc::new(AtomicBool::new(false));
-        let mut service = Self { shared, stop, threads: Vec::new(), address, events, began };
+        let mut service = Self { shared, stop, threads: Vec::new(), address, events, began, ends: Mutex::default() };
         service.listen(listener, |stream, shared| {
             thread::spawn(move || {
                 if !answer_http(&stream) {
@@ -120,14 +124,18 @@ impl InverseService {
 
     /// Adds an arm that a test holds in the middle of its workspace.
     pub fn add_held_arm(&self, id: &str, kind: &'static str) {
-        let motion = Motion::Held(Held::at(glam::DVec3::ZERO), self.began.elapsed().as_secs_f64());
-        locked(&self.shared.world).arms.push(Arm::new(id, kind, motion, self.began));
+        self.add(id, kind, Motion::Held(Held::at(glam::DVec3::ZERO), self.began.elapsed().as_secs_f64()));
     }
 
     /// Adds an arm that its mechanics and a hand move, in metres from the middle of its workspace.
     pub fn add_arm(&self, id: &str, kind: &'static str, tip: emulated::Tip) {
-        let motion = Motion::Free(Box::new(tip));
-        locked(&self.shared.world).arms.push(Arm::new(id, kind, motion, self.began));
+        self.add(id, kind, Motion::Free(Box::new(tip)));
+    }
+
+    fn add(&self, id: &str, kind: &'static str, motion: Motion) {
+        let (test_end, arm_end) = ends(self.began);
+        locked(&self.ends).insert(id.into(), test_end);
+        locked(&self.shared.world).arms.push(Arm::new((id, kind), motion, (self.began, arm_end)));
     }
 
     /// Adds a grip that is paired with an arm.
@@ -136,8 +144,12 @@ impl InverseService {
     }
 
     /// Holds the tip of an arm somewhere.
+    ///
+    /// # Panics
+    /// No such arm.
     pub fn hold(&self, id: &str, held: Held) {
-        self.change_arm(id, |arm, time| arm.motion = Motion::Held(held, time));
+        let since = self.began.elapsed().as_secs_f64();
+        locked(&self.ends).get_mut(id).expect("an arm of the emulator").hold(held, since);
     }
 
     /// Holds buttons of a grip.
@@ -152,7 +164,7 @@ impl InverseService {
 
     /// Changes what the status of an arm says; its cable aside.
     pub fn set_condition(&self, id: &str, condition: Condition) {
-        self.change_arm(id, |arm, _| {
+        self.change_arm(id, |arm| {
             let plugged = arm.condition.plugged;
             arm.condition = Condition { plugged, ..condition };
             arm.release();
@@ -193,7 +205,7 @@ impl InverseService {
     /// # Panics
     /// No such arm.
     pub fn motors(&self, id: &str) -> MotorForce {
-        self.change_arm(id, |arm, _| arm.motors).expect("an arm of the emulator")
+        locked(&self.ends).get_mut(id).expect("an arm of the emulator").motors()
     }
 
     /// All forces that have been on the motors of an arm since the last call, oldest first.
@@ -201,7 +213,7 @@ impl InverseService {
     /// # Panics
     /// No such arm.
     pub fn take_changes(&self, id: &str) -> Vec<MotorForce> {
-        self.change_arm(id, |arm, _| std::mem::take(&mut arm.changes)).expect("an arm of the emulator")
+        self.change_arm(id, |arm| std::mem::take(&mut arm.changes)).expect("an arm of the emulator")
     }
 
     /// How many commands to an arm were larger than its motors.
@@ -209,7 +221,7 @@ impl InverseService {
     /// # Panics
     /// No such arm.
     pub fn clamped(&self, id: &str) -> u64 {
-        self.change_arm(id, |arm, _| arm.clamped).expect("an arm of the emulator")
+        self.change_arm(id, |arm| arm.clamped).expect("an arm of the emulator")
     }
 
     /// What clients sent since the last call that the service would not take.
@@ -227,12 +239,10 @@ impl InverseService {
         locked(&self.shared.world).sessions.values().map(|session| session.profile.clone()).collect()
     }
 
-    /// Does something to an arm at the present time, s.
-    pub fn change_arm<R>(&self, id: &str, change: impl FnOnce(&mut Arm, f64) -> R) -> Option<R> {
+    fn change_arm<R>(&self, id: &str, change: impl FnOnce(&mut Arm) -> R) -> Option<R> {
         let mut world = locked(&self.shared.world);
         world.advance();
-        let time = world.time();
-        world.arm(id).map(|arm| change(arm, time))
+        world.arm(id).map(change)
     }
 
     fn change_grip(&self, id: &str, change: impl FnOnce(&mut Grip)) {

@@ -12,6 +12,7 @@ use tungstenite::{Error, Message, WebSocket};
 use super::shared::{Shared, locked};
 use super::state::render;
 use super::trouble::Trouble;
+use crate::priority::be_on_time;
 
 /// Longest time until a client has shaken hands, and for which one may take nothing.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -37,6 +38,7 @@ pub fn serve(stream: TcpStream, shared: &Shared) {
         return;
     }
     let Ok(socket) = tungstenite::accept_with_config(stream, Some(config)) else { return };
+    be_on_time();
     let number = locked(&shared.world).begin_session();
     Client { socket, number, due: VecDeque::new() }.converse(shared, generation);
     locked(&shared.world).end_session(number);

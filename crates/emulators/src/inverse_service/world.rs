@@ -180,13 +180,14 @@ mod tests {
 
     use super::super::motion::{Held, Motion};
     use super::super::state::render;
+    use super::super::steering::ends;
     use super::*;
 
     /// Takes messages whatever is in them: motors stay within their force, and states are JSON.
     fn takes(messages: &[String], persona: Persona) {
         let began = Instant::now();
         let mut world = World::new(persona, began);
-        world.arms.push(Arm::new("0A01", "inverse3", Motion::Held(Held::at(DVec3::X), 0.0), began));
+        world.arms.push(Arm::new(("0A01", "inverse3"), Motion::Held(Held::at(DVec3::X), 0.0), (began, ends(began).1)));
         let session = world.begin_session();
         for message in messages {
             let full = world.take(session, message);

@@ -1,6 +1,7 @@
 //! The emulated service as the shared suite wants it.
 
 mod closed_loop;
+mod figures;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -8,7 +9,8 @@ use std::time::Duration;
 use glam::DVec3;
 use palpate_devices::haply::open;
 use palpate_devices::{Buttons, Connection, DeviceFault, OpenError, Opened, Wrench};
-use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, endure};
+use palpate_emulators::be_on_time;
+use palpate_emulators::conformance::{Bench, Disturbance, Facts, Motors, Tip};
 use palpate_emulators::inverse_service::{GripKind, Held, InverseService, MIDDLE, Options, Persona, Trouble};
 use serde_json::json;
 
@@ -18,8 +20,9 @@ pub const GRIP: &str = "61576";
 
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Tests of times run one after another.
+/// Tests of times run one after another, and on time.
 pub fn alone() -> MutexGuard<'static, ()> {
+    be_on_time();
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -53,7 +56,7 @@ impl Bench for HaplyBench {
             turns: true,
             buttons: 3,
             // An exchange takes less than one; the rest is for a machine that runs other things too.
-            late_ticks: 30,
+            late_ticks: 10,
             stale_after: Duration::from_millis(50),
             force_holds: Duration::from_millis(100),
             recovers_within: Duration::from_secs(4),
@@ -93,25 +96,4 @@ impl Bench for HaplyBench {
             _ => None,
         });
     }
-}
-
-/// A minute of real time at 1 kHz, and what it cost.
-pub fn minute() {
-    let bench = HaplyBench::new(Persona::V35);
-    let limits = open(&Connection { address: Some(bench.service.address()), ..Connection::default() });
-    let limits = limits.expect("opens").device.limits();
-    let (before, messages) = (processor_time(), bench.service.messages());
-    let _ = messages;
-    let figures = endure(bench, Endurance { ticks: 60_000, hurried: false }).expect("a minute without a fault");
-    let spent = processor_time() - before;
-    println!("{figures:?}\ndelay {:.3} ms", 1e3 * limits.delay);
-    println!("processor: {:.1} % of one core for loop, driver and emulator", 100.0 * spent / figures.seconds);
-}
-
-/// Processor time of this process, s.
-fn processor_time() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
-    let ticks = |rank: usize| fields.get(rank).and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
-    (ticks(11) + ticks(12)) / 100.0
 }

@@ -12,10 +12,11 @@ from palpate.errors import Error
 from palpate.simulation import Simulation
 
 INFINITE = float("inf")
-# Largest force, slew, ramp and strongest damping of a safety stage that changes nothing, and of one whose passivity
-# controller alone is there, with the damping of the strongest device.
+# Largest force, slew, ramp and strongest damping of a safety stage that changes nothing, of one whose passivity
+# controller alone is there, with the damping of the strongest device, and of a scene's after its ramp.
 BARE = (INFINITE, INFINITE, 0.0, 0.0)
 CONTROLLED = (INFINITE, INFINITE, 0.0, 30.0)
+RAMPED_IN = (8.0, 500.0, 0.0, 30.0)
 
 
 @dataclass(frozen=True)
@@ -150,3 +151,8 @@ def emulate(
 def tireless(device: Device) -> Device:
     """Return the device without the limits that it states."""
     return replace(device, max_force=INFINITE, max_stiffness=INFINITE, max_damping=INFINITE)
+
+
+def frictionless(device: Device) -> Device:
+    """Return the device without its dry friction, which would hold a tip at rest that the rest of it does not."""
+    return replace(device, name=f"{device.name}, no friction", mechanics=replace(device.mechanics, dry_friction=0.0))

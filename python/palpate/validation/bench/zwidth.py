@@ -20,6 +20,7 @@ from palpate.validation.bench.emulation import (
     CONTROLLED,
     FIRM,
     LOOSE,
+    RAMPED_IN,
     Device,
     Hand,
     Held,
@@ -38,12 +39,13 @@ PERIOD = 1e-3
 DAMPING = 1.0
 MASSES = (0.002, 0.005, 0.02, 0.05, 0.2, 1.0)
 DELAYS = (0.0, 0.25e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3)
-# The tip is struck at this speed, m/s, and watched for so many times as its energy takes to fade by damping alone.
-KICK, TIMES = 1e-2, 40.0
+# The tip of the map is struck at this speed, known devices as hard as by a tap, for friction holds a light one, m/s.
+# It is watched for so many times as its energy takes to fade by damping alone.
+KICK, TAP, TIMES = 1e-2, 0.1, 40.0
 # Relative width at which bisection ends; a tip this far away, m, has run away.
 WIDTH, REACH = 1e-3, 0.5
 # Stages under which the map is measured.
-STAGES = {"bare": BARE, "controlled": CONTROLLED, "whole": None}
+STAGES = {"bare": BARE, "controlled": CONTROLLED, "whole": RAMPED_IN}
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Row:
     eigenvalue
         Of the sampled system of the mass alone.
     bare, controlled, whole
-        Measured: the loop alone, with the passivity controller, and with the whole safety stage of a scene.
+        Measured: the loop alone, with the passivity controller, and with the whole safety stage, ramped in.
 
     """
 
@@ -85,7 +87,7 @@ class DeviceRow:
     loose, firm
         From the eigenvalues of tip and hand, friction and encoder apart.
     loose_measured, firm_measured
-        With friction and encoder.
+        With friction and encoder, tapped.
 
     """
 
@@ -106,57 +108,58 @@ class Spring:
         green = green_of(body, touch=top_nodes(body, 0.03))
         self.radius = 0.01
         tool = {"shape": "sphere", "radius": self.radius, "contact": "patch", "contact_radius": 0.015}
-        self._loop = lambda device: loop_of(body, green, [tool], device)
-        self._loops = [self._loop(device) for device in (None, {"max_stiffness": 1e9})]
+        self._loop_on = lambda device: loop_of(body, green, [tool], device)
+        self._loop = self._loop_on(None)
         low, high = body.mesh.bounds
         self.place = np.array([*(low + high)[:2] / 2, high[2]])
         self.matrix = self._measured()
         values, vectors = np.linalg.eigh(self.matrix)
-        self._modulus = self._loops[0].youngs_modulus
+        self._modulus = self._loop.youngs_modulus
         self.largest, self.direction = float(values[-1]), vectors[:, -1]
 
     def _measured(self) -> np.ndarray:
         """Stiffness (3, 3), N/m, as the loop has it."""
         step = 1e-4
         path = self.place + step * np.vstack([np.zeros(3), np.eye(3)])
-        forces = self._loops[0].play(path, grabs=np.ones(len(path), dtype=bool)).forces
+        forces = self._loop.play(path, grabs=np.ones(len(path), dtype=bool)).forces
         matrix = -forces[1:].T / step
         return (matrix + matrix.T) / 2
 
     def pressed(self, stiffness: float, max_stiffness: float) -> Simulation:
         """Loop whose block pushes back along its normal with a stiffness, under a tool that is limited, N/m."""
-        simulation = self._loop({"max_stiffness": max_stiffness})
+        simulation = self._loop_on({"max_stiffness": max_stiffness})
         simulation.set_youngs_modulus(self._modulus * stiffness / self.matrix[2, 2])
         return simulation
 
-    def is_stable(self, device: Device, hand: Hand | None, stage: str, stiffness: float) -> bool:
+    def is_stable(self, device: Device, hand: Hand | None, stage: str, stiffness: float, speed: float = KICK) -> bool:
         """Whether a tip that is struck along the stiffest direction ends with less energy than it began with."""
-        simulation = self._loops[stage == "whole"]
         scale = stiffness / self.largest
-        simulation.set_youngs_modulus(self._modulus * scale)
-        held = Held(tireless(device), self.place, KICK * self.direction, hand, grab=True)
+        self._loop.set_youngs_modulus(self._modulus * scale)
+        held = Held(tireless(device), self.place, speed * self.direction, hand, grab=True)
         mass, damping = device.mechanics.mass, device.mechanics.damping
         matrix = scale * self.matrix
         if hand is not None:
             mass, damping = mass + hand.mass, damping + hand.damping
             matrix = matrix + hand.stiffness * np.eye(3)
         ticks = max(int(TIMES * mass / damping / PERIOD), 400)
-        motion = emulate(simulation, [held], PERIOD, ticks, STAGES[stage], REACH)
+        motion = emulate(self._loop, [held], PERIOD, ticks, STAGES[stage], REACH)
         if len(motion) < ticks:
             return False
-        away, speed = motion.positions[:, 0] - self.place, motion.velocities[:, 0]
-        energy = mass * (speed**2).sum(1) + np.einsum("ti,ij,tj->t", away, matrix, away)
+        away, velocity = motion.positions[:, 0] - self.place, motion.velocities[:, 0]
+        energy = mass * (velocity**2).sum(1) + np.einsum("ti,ij,tj->t", away, matrix, away)
         fifth = ticks // 5
         return bool(energy[-fifth:].mean() < energy[:fifth].mean())
 
-    def largest_stable(self, device: Device, hand: Hand | None = None, stage: str = "bare") -> float:
-        """By bisection, N/m."""
+    def largest_stable(
+        self, device: Device, hand: Hand | None = None, stage: str = "bare", speed: float = KICK
+    ) -> float:
+        """By bisection, N/m, of a tip that is struck at a speed, m/s."""
         stable = unstable = 0.5 * bound_for_any_hand(device.mechanics.damping, PERIOD, device.mechanics.delay)
-        while self.is_stable(device, hand, stage, unstable):
+        while self.is_stable(device, hand, stage, unstable, speed):
             stable, unstable = unstable, 2 * unstable
         while unstable > (1 + WIDTH) * stable:
             middle = float(np.sqrt(stable * unstable))
-            held = self.is_stable(device, hand, stage, middle)
+            held = self.is_stable(device, hand, stage, middle, speed)
             stable, unstable = (middle, unstable) if held else (stable, middle)
         return stable
 
@@ -187,7 +190,8 @@ def measured(spring: Spring, mechanics: Mechanics) -> Row:
 def measured_device(spring: Spring, device: Device) -> DeviceRow:
     """Measure one known device in both hands."""
     mechanics = device.mechanics
-    pairs = ((largest_stable(mechanics, PERIOD, hand), spring.largest_stable(device, hand)) for hand in (LOOSE, FIRM))
+    hands = (LOOSE, FIRM)
+    pairs = [(largest_stable(mechanics, PERIOD, h), spring.largest_stable(device, h, speed=TAP)) for h in hands]
     bound = bound_for_any_hand(mechanics.damping, PERIOD, mechanics.delay)
     (loose, loose_measured), (firm, firm_measured) = pairs
     return DeviceRow(device.name, device.max_stiffness, bound, loose, loose_measured, firm, firm_measured)

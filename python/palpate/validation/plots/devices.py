@@ -42,7 +42,6 @@ def plot_z_width(rows: Sequence[Mapping[str, float]], damping: float, period: fl
     left.set_ylabel("largest stable stiffness [N/m]")
     left.legend(frameon=False, fontsize=8, title="measured; lines: eigenvalues", title_fontsize=8)
     right.axhline(1.0, color="k", linestyle="--", linewidth=1)
-    right.set_yscale("log")
     right.set_ylabel("over b / (T/2 + d)")
     for axes in (left, right):
         axes.set_xlabel("delay [ms]")
