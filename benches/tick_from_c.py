@@ -2,7 +2,7 @@
 
 Run: .venv/bin/python benches/tick_from_c.py --prefix DIR
 
-Needs g++ and pkg-config, and the library installed: `make install PREFIX=DIR`, then `--prefix DIR`.
+Needs g++ and pkg-config, and the library installed: `make install PREFIX=DIR`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ def main() -> None:
     ).stdout.split()
     with tempfile.TemporaryDirectory() as folder:
         packed, positions, program = (Path(folder) / name for name in ("liver.pack", "positions", "tick_from_c"))
-        scene = palpate.Scene(body={"model": "liver"}, tool={"radius": 0.006}, view={"strain_limit": 0}).build()
+        scene = palpate.Scene(
+            body={"model": "liver", "paper": True}, tool={"radius": 0.006}, view={"strain_limit": 0}
+        ).build()
         palpate.pack(scene, packed)
         surface = scene.bodies[0].green.surface_positions
         positions.write_bytes(path_of(surface[surface[:, 2].argmax()]).tobytes())
@@ -52,8 +54,9 @@ def main() -> None:
         subprocess.run(
             ["g++", "-O2", "-std=c++17", source, "-o", program, *flags, f"-Wl,-rpath,{prefix}/lib"], check=True
         )
-        built = ["cargo", "build", "--release", "--quiet", "-p", "palpate-capi", "--example", "ticks"]
-        subprocess.run(built, cwd=ROOT, check=True)
+        # Together with the extension, so that both share what is compiled.
+        packages = ["-p", "palpate-capi", "-p", "palpate-python", "--example", "ticks"]
+        subprocess.run(["cargo", "build", "--release", "--quiet", *packages], cwd=ROOT, check=True)
         rust = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/examples/ticks"
         times = np.array([[_time(which, packed, positions) for which in (rust, program)] for _ in range(ROUNDS)])
     (of_rust, of_c), ratio = 1e-3 * np.median(times, axis=0), np.median(times[:, 1] / times[:, 0])

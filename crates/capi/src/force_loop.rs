@@ -47,8 +47,8 @@ pub(crate) struct FrameSide {
 
 /// Who ticks.
 enum Runner {
-    Program { handle: LoopHandle, _worker: StrainWorker },
-    Thread { servo: Servo, targets: Vec<simulated::Handle> },
+    Program { handle: Box<LoopHandle>, _worker: StrainWorker },
+    Thread { servo: Box<Servo>, targets: Vec<simulated::Handle> },
 }
 
 impl FrameSide {
@@ -96,7 +96,7 @@ fn to_be_ticked(prepared: &Prepared, settings: Settings) -> Outcome<(TickSide, R
     let (mut force_loop, mut handle) = ForceLoop::new(prepared.model.clone(), devices, prepared.limits, settings)?;
     let worker = force_loop.limit_strain(&mut handle, prepared.strain.clone())?;
     let side = TickSide { force_loop: Some(force_loop), ends, count: 0 };
-    Ok((side, Runner::Program { handle, _worker: worker }))
+    Ok((side, Runner::Program { handle: Box::new(handle), _worker: worker }))
 }
 
 impl Loop {
@@ -139,7 +139,7 @@ impl Loop {
         let (model, scheduling, strain) = (model.clone(), scheduling.clone(), strain.clone());
         let servo = Servo::start(model, devices, *limits, frame.settings, scheduling, strain, None)?;
         tick.force_loop = None;
-        frame.runner = Runner::Thread { servo, targets };
+        frame.runner = Runner::Thread { servo: Box::new(servo), targets };
         Ok(())
     }
 

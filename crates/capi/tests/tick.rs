@@ -111,7 +111,7 @@ fn a_held_press_is_the_static_answer() {
         let down = depth * (count as f64 / 400.0).min(1.0);
         tick(fixture.own, count, &at(0.005 - down)).1
     });
-    let held = last.last().expect("a tick");
+    let held = last.fold(None, |_, now| Some(now)).expect("a tick");
     let mut force = [0.0; 3];
     // SAFETY: a living store, three numbers each.
     done(unsafe {
@@ -127,7 +127,7 @@ fn frames_tell_of_the_latest_tick_and_surfaces_follow_the_tool() {
     let fixture = Fixture::new("frames");
     let own = fixture.own;
     let last = (0..800).map(|count| tick(own, count, &at(0.005 - 0.003 * (count as f64 / 400.0).min(1.0))));
-    let (_, wrench) = last.last().expect("a tick");
+    let (_, wrench) = last.fold(None, |_, now| Some(now)).expect("a tick");
     let (mut frame, mut nodes, mut triangles, mut count) = (Frame::default(), 0, 0, 0);
     // SAFETY: a living loop, and places of the sizes that are stated.
     unsafe {

@@ -5,10 +5,13 @@ mod haply_bench;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
+use palpate_devices::emulated::{Hand, Tip, Wanted, known};
 use palpate_devices::haply::{list, open};
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, Wrench};
 use palpate_emulators::conformance::assert_conforms;
-use palpate_emulators::inverse_service::{Condition, GripKind, Held, InverseService, MIDDLE, Persona, Trouble};
+use palpate_emulators::inverse_service::{
+    Condition, GripKind, Held, InverseService, MIDDLE, Options, Persona, Trouble,
+};
 use serde_json::json;
 
 use haply_bench::{ARM, HaplyBench, alone, service};
@@ -347,6 +350,33 @@ fn a_service_that_starts_anew_is_found_again() {
     assert_eq!(service.motors(ARM).force, DVec3::ZERO);
     until_force(&mut *device, &service, DVec3::X);
     assert_eq!(service.take_complaints(), Vec::<String>::new());
+}
+
+/// Through thread, socket and service: hand and wall share the way by their stiffnesses, as two springs in series do.
+#[test]
+fn a_hand_that_presses_on_a_wall_comes_to_rest_where_the_springs_balance() {
+    let _alone = alone();
+    let service = InverseService::start(&Options { persona: Persona::V34, ..Options::default() }).expect("a free port");
+    let (wall, wanted) = (300.0, -0.02 * DVec3::Z);
+    let hand = Hand::loose(Wanted::At(wanted));
+    let mechanics = known::mechanics("Inverse3").expect("known");
+    let expected = wanted.z * hand.stiffness / (wall + hand.stiffness);
+    // Friction holds the tip within this.
+    let play = 1.1 * mechanics.dry_friction / (wall + hand.stiffness);
+    service.add_arm(ARM, "inverse3", Tip::new(mechanics, DVec3::ZERO, Some(hand)));
+    let mut device = opened(&service);
+    let mut depths = Vec::new();
+    for _ in 0..1500 {
+        let depth = device.read(0, PERIOD).expect("a reading").pose.position.z - MIDDLE.z;
+        depths.push(depth);
+        let force = -wall * depth.min(0.0) * DVec3::Z;
+        device.write(Wrench { force, ..Wrench::default() }).expect("a device that is well");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    for depth in &depths[1300..] {
+        assert!((depth - expected).abs() < play, "{depth} m, not {expected} m within {play} m");
+    }
+    assert!((service.motors(ARM).force.z + wall * expected).abs() < wall * play);
 }
 
 #[test]

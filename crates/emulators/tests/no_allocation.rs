@@ -1,4 +1,4 @@
-//! Neither driver of a vendor's library allocates in a tick. The emulated libraries have allocators of their own.
+//! No driver allocates in a tick. The emulated libraries have allocators of their own.
 #![allow(unsafe_code)] // a counting allocator
 
 #[path = "../../core/tests/common/counting_allocator.rs"]
@@ -8,7 +8,8 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use glam::DVec3;
-use palpate_devices::{Connection, Device, Opened, Wrench, forcedimension, openhaptics};
+use palpate_devices::{Connection, Device, Opened, Wrench, forcedimension, haply, openhaptics};
+use palpate_emulators::inverse_service::{InverseService, Options};
 use palpate_emulators::vendor::built_library;
 
 use counting_allocator::allocations;
@@ -25,6 +26,19 @@ fn counted(device: &mut dyn Device, tick: u64) -> u64 {
 
 fn connection(library: &str) -> Connection {
     Connection { library: Some(built_library(library)), ..Connection::default() }
+}
+
+#[test]
+fn a_tick_of_haply() {
+    let service = InverseService::start(&Options::default()).expect("a free port");
+    service.add_held_arm("0A01", "inverse3");
+    let connection = Connection { address: Some(service.address()), ..Connection::default() };
+    let mut device = haply::open(&connection).expect("opens").device;
+    let ticks = (0..500).map(|tick| {
+        std::thread::sleep(Duration::from_micros(100));
+        counted(&mut *device, tick)
+    });
+    assert_eq!(ticks.max(), Some(0));
 }
 
 #[test]

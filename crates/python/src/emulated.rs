@@ -61,8 +61,8 @@ pub fn emulate<'py>(
                 let said = tick.readings[tool].pose.position;
                 let row = [truth.position, truth.velocity, said, tick.wrenches[tool].force];
                 columns.iter_mut().zip(row).for_each(|(column, vector)| column.extend(vector.to_array()));
-                // Not a number is away too.
-                runs_away |= !(truth.position.distance(*start) <= reach);
+                let away = truth.position.distance(*start);
+                runs_away |= away > reach || !away.is_finite();
             }
             fault = fault.or(tick.fault);
             if runs_away || tick.number + 1 >= ticks { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -19,7 +19,7 @@ const TICKS: u64 = 900;
 
 fn said(tool: usize, tick: u64) -> Result<Reading, DeviceFault> {
     if tool == 1 && tick > 800 {
-        return Err(if tick % 2 == 0 { DeviceFault::Driver(-7) } else { DeviceFault::Program });
+        return Err(if tick.is_multiple_of(2) { DeviceFault::Driver(-7) } else { DeviceFault::Program });
     }
     let t = PERIOD * tick as f64;
     let x = if tool == 0 { 0.03 + 0.02 * t } else { 0.24 - 0.1 * t };

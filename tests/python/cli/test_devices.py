@@ -6,7 +6,7 @@ import json
 
 import pytest
 from command_line import refused, run
-from held_device import Held
+from held_device import Held, unstarved
 from typer.testing import CliRunner
 
 import palpate.devices
@@ -42,11 +42,18 @@ def pads(monkeypatch):
     monkeypatch.setattr(command, "is_terminal", lambda: True)
     for name, value in {"REST": 0.3, "RANGE": 0.2, "RANGE_UNATTENDED": 0.2, "RISE": 0.2, "RETURN": 0.1}.items():
         monkeypatch.setattr(command, name, value)
+    # How fast a program is polled is the machine's affair.
+    monkeypatch.setattr(palpate.devices.self_check, "LOWEST_RATE", 1.0)
+    monkeypatch.setattr(palpate.devices.self_check, "LONGEST_GAP", 1.0)
     return held
 
 
 def invoke(*words, answers=""):
-    return CliRunner().invoke(app, ["devices", *words], input=answers)
+    def attempt():
+        result = CliRunner().invoke(app, ["devices", *words], input=answers)
+        return result, result.output
+
+    return unstarved(attempt)
 
 
 def test_what_is_found_and_why_something_is_not(pads):

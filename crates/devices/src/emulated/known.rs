@@ -35,10 +35,10 @@ pub fn mechanics(name: &str) -> Option<Mechanics> {
 impl Hand {
     /// A hand that holds a stylus loosely, with little damping: 0.1 kg, 2 N s/m, 100 N/m, wishing to be at a place.
     ///
-    /// Between it and [`Hand::firm`] lie what was measured at the end effector of a haptic device held by hand and arm, such as
-    /// 0.55 kg, 6.5 N s/m and 135 N/m (van Beek et al., Scientific Reports 5:18004, 2015, figure 3; of the mass only a part moves
-    /// at the frequencies of an unstable contact), and at the tip of a finger that pushes with 2 to 20 N: 4 to 7.4 N s/m and
-    /// 255 to 1255 N/m (Hajian and Howe, J. Biomechanical Engineering 119, 1997).
+    /// It and [`Hand::firm`] are of the order of what was measured: a hand with its arm at a haptic device, 0.55 kg, 6.5 N s/m and
+    /// 135 N/m (van Beek et al., Scientific Reports 5:18004, 2015, figure 3; of that mass only a part moves as fast as an
+    /// unstable contact); the tip of a finger that pushes with 2 to 20 N, 4 to 7.4 N s/m and 255 to 1255 N/m (Hajian and Howe,
+    /// J. Biomechanical Engineering 119, 1997, as it is commonly quoted).
     pub fn loose(wanted: Wanted) -> Self {
         Self { mass: 0.1, damping: 2.0, stiffness: 100.0, wanted }
     }

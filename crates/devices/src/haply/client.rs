@@ -155,7 +155,7 @@ impl Client {
             Phase::Absent(ABSENT_FORCES..) => KEEPALIVE,
             Phase::Forces | Phase::Absent(_) => self.message.of(force),
         })?;
-        let reply = self.reply(sent)?;
+        let reply = self.reply(sent, force)?;
         self.round_trip = sent.elapsed();
         self.take(&reply);
         Ok(())
@@ -180,13 +180,15 @@ impl Client {
 
     /// Waits for the reply. Where it is late, the force is taken off by a message of its own, and the reply to that is the
     /// one that counts.
-    fn reply(&mut self, sent: Instant) -> Result<Utf8Bytes, SocketError> {
+    fn reply(&mut self, sent: Instant, force: DVec3) -> Result<Utf8Bytes, SocketError> {
         let socket = self.socket.as_mut().ok_or(SocketError::Closed)?;
         match socket.receive(sent + self.service.address.hold) {
             Err(SocketError::TimedOut) => {}
             reply => return reply,
         }
-        self.output.withhold();
+        if force != DVec3::ZERO {
+            self.output.withhold();
+        }
         socket.send(self.message.of(DVec3::ZERO))?;
         let mut owed = 2;
         while sent.elapsed() < DEAD && !self.stop.load(Ordering::Relaxed) {

@@ -38,6 +38,11 @@ impl Output {
         let elapsed = 1e-9 * now_ns.saturating_sub(self.chosen_ns) as f64;
         self.chosen_ns = now_ns;
         let is_late = now_ns.saturating_sub(asked.written_ns) > asked.hold_ns;
+        if asked.force == DVec3::ZERO {
+            // The next one comes in as the loop wants it.
+            self.allowance = f64::INFINITY;
+            return DVec3::ZERO;
+        }
         if !measured || asked.knew != Some(faults) || is_late || !asked.force.is_finite() {
             self.withhold();
             return DVec3::ZERO;
@@ -49,7 +54,7 @@ impl Output {
         asked.force.clamp_length_max(MAX_FORCE.min(self.allowance))
     }
 
-    /// No force is put out: the next one comes in from zero.
+    /// A force is taken off: the next one comes in from zero.
     pub fn withhold(&mut self) {
         self.allowance = 0.0;
     }
@@ -94,5 +99,8 @@ mod tests {
         }
         assert_eq!(output.choose(&asked(8.0, 16), 0, true, 16 * MS).z, 8.0);
         assert_eq!(output.choose(&asked(80.0, 30), 0, true, 30 * MS).z, MAX_FORCE);
+        // A loop that asked for none knows of its next one.
+        output.choose(&asked(0.0, 40), 0, false, 40 * MS);
+        assert_eq!(output.choose(&asked(8.0, 41), 0, true, 41 * MS).z, 8.0);
     }
 }

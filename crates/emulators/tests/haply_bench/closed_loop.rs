@@ -15,8 +15,11 @@ use super::{ARM, alone, service};
 
 /// Troubles one after another.
 const TROUBLES: usize = 60;
-/// Ticks of each, and as many without.
+/// Ticks of each, and twice as many without.
 const TICKS: usize = 20;
+/// Every so many troubles the loop hangs, for so long.
+const HANGS: usize = 6;
+const HANG: Duration = Duration::from_millis(80);
 /// Ticks after a fault until the loop is reset.
 const RESET: usize = 8;
 /// By how much a busy machine may delay a thread.
@@ -130,11 +133,15 @@ fn whatever_the_service_replies_no_force_is_stale() {
     let connection = Connection { address: Some(service.address()), ..Connection::default() };
     let mut device = open(&connection).expect("the emulated arm opens").device;
     let (mut ticks, mut runner) = (Loop::default(), TestRunner::deterministic());
-    for _ in 0..TROUBLES {
+    for rank in 0..TROUBLES {
         let trouble = any_trouble().new_tree(&mut runner).expect("a trouble").current();
         service.set_trouble(Some(trouble));
         (0..TICKS).for_each(|_| ticks.tick(&mut *device));
         service.set_trouble(None);
+        (0..TICKS).for_each(|_| ticks.tick(&mut *device));
+        if rank % HANGS == 0 {
+            std::thread::sleep(HANG);
+        }
         (0..TICKS).for_each(|_| ticks.tick(&mut *device));
     }
     drop(device);
