@@ -39,7 +39,7 @@ pub mod error {
 
 /// Length of the array of `dhdGetStatus`, and what is where in it.
 pub mod status {
-    pub const LENGTH: usize = 17;
+    pub const LENGTH: usize = 64;
     pub const POWER: usize = 0;
     pub const CONNECTED: usize = 1;
     pub const RESET: usize = 3;

@@ -177,7 +177,7 @@ impl Dhd {
 
     pub fn status(self, id: Id) -> Result<[c_int; status::LENGTH], c_int> {
         let mut status = [0; status::LENGTH];
-        // SAFETY: as many integers of the caller as the vendor's header says.
+        // SAFETY: more integers of the caller than the vendor's header says.
         self.check(unsafe { (self.0.status)(&mut status, id) })?;
         Ok(status)
     }
