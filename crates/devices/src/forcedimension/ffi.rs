@@ -99,8 +99,9 @@ api! {
         system_type = c"dhdGetSystemType": unsafe extern "system" fn(Id) -> c_int;
         system_name = c"dhdGetSystemName": unsafe extern "system" fn(Id) -> *const c_char;
         status = c"dhdGetStatus": unsafe extern "system" fn(*mut [c_int; status::LENGTH], Id) -> c_int;
-        has_wrist = c"dhdHasWrist": unsafe extern "system" fn(Id) -> bool;
-        has_active_wrist = c"dhdHasActiveWrist": unsafe extern "system" fn(Id) -> bool;
+        /// C++'s `bool`, of which another compiler need not keep that it is 0 or 1.
+        has_wrist = c"dhdHasWrist": unsafe extern "system" fn(Id) -> u8;
+        has_active_wrist = c"dhdHasActiveWrist": unsafe extern "system" fn(Id) -> u8;
         last_error = c"dhdErrorGetLast": unsafe extern "system" fn() -> c_int;
         error_text = c"dhdErrorGetStr": unsafe extern "system" fn(c_int) -> *const c_char;
         sdk_version = c"dhdGetSDKVersion": unsafe extern "system" fn(*mut c_int, *mut c_int, *mut c_int, *mut c_int);

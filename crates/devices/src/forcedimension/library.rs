@@ -197,7 +197,7 @@ impl Dhd {
     /// Whether it senses orientation, and whether it has motors of rotation.
     pub fn wrist(self, id: Id) -> (bool, bool) {
         // SAFETY: as above.
-        unsafe { ((self.0.has_wrist)(id), (self.0.has_active_wrist)(id)) }
+        unsafe { ((self.0.has_wrist)(id) != 0, (self.0.has_active_wrist)(id) != 0) }
     }
 
     /// A limit of force that has been set in the library, N.
