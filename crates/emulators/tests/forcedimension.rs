@@ -203,3 +203,22 @@ fn motors_that_are_off_are_told_and_come_back() {
     emulated.steering.disturb(0, 0);
     assert_eq!(until(|said| said.is_ok()), DVec3::X);
 }
+
+const PATIENCE: Duration = Duration::from_secs(5);
+
+#[test]
+fn a_force_does_not_outlive_motors_that_were_off() {
+    let emulated = emulated("omega.3");
+    let mut device = forcedimension::open(&emulated.connection(None)).expect("opens").device;
+    device.write(Wrench { force: DVec3::X, torque: DVec3::ZERO }).expect("written");
+    emulated.steering.disturb(0, MOTORS_OFF);
+    let began = Instant::now();
+    // The loop writes on until the guard has found out.
+    while device.read(began.elapsed().as_nanos() as u64, 1e-3) != Err(DeviceFault::MotorsOff) {
+        let _ = device.write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
+        assert!(began.elapsed() < PATIENCE);
+    }
+    std::thread::sleep(Duration::from_millis(100));
+    emulated.steering.disturb(0, 0);
+    assert_eq!(emulated.steering.motors(0).wrench.force, DVec3::ZERO);
+}

@@ -160,8 +160,8 @@ fn watch(shared: &Shared, id: Id) -> Option<Id> {
 fn watch_open(shared: &Shared, id: Id, look: u32) {
     let state = shared.state();
     let age_ns = shared.now_ns().saturating_sub(shared.written_ns.load(Ordering::Relaxed));
-    if age_ns > HOLD_NS && matches!(state, State::Ready(_)) {
-        // The tick notices what is wrong, if it still ticks.
+    if age_ns > HOLD_NS || state == State::MotorsOff {
+        // The tick notices what is wrong, if it still ticks. Motors that are off must not come back with a force of before.
         let _ = shared.release(id);
     }
     if !look.is_multiple_of(LOOKS_A_STATUS) {

@@ -175,6 +175,14 @@ impl Dhd {
         self.check(returned)
     }
 
+    /// No force, and where there are motors of rotation no torque.
+    pub fn release(self, has_active_wrist: bool, id: Id) -> Result<Freshness, c_int> {
+        match has_active_wrist {
+            true => self.set_force_and_torque(DVec3::ZERO, DVec3::ZERO, id),
+            false => self.set_force(DVec3::ZERO, id),
+        }
+    }
+
     pub fn status(self, id: Id) -> Result<[c_int; status::LENGTH], c_int> {
         let mut status = [0; status::LENGTH];
         // SAFETY: more integers of the caller than the vendor's header says.

@@ -104,10 +104,12 @@ fn prepared(dhd: Dhd, rank: i8) -> Result<(Id, Traits), OpenError> {
         let failed = |code| does_not_open(dhd, rank, code);
         dhd.compensate_gravity(id).map_err(failed)?;
         dhd.enable_force(true, id).map_err(failed)?;
-        dhd.set_force(glam::DVec3::ZERO, id).map_err(failed)?;
+        dhd.release(traits.has_active_wrist, id).map_err(failed)?;
         dhd.watch(WATCHDOG, id);
         Ok((id, traits))
     };
+        // A force of before must not come back with the motors; a library may refuse one while they are off.
+        let _ = dhd.release(traits.has_active_wrist, id);
     readied().inspect_err(|_: &OpenError| dhd.close(id))
 }
 

@@ -3,7 +3,8 @@
 //! From the vendor's documentation: results below zero are errors, told apart by the calling thread's last error, 1 is
 //! a measurement that is repeated because it was asked for too early, 2 a motor that saturates; no forces before they are
 //! enabled; a watchdog, a brake for a tip that is too fast, causes of motors that are off. Which error an unplugged device
-//! answers with is an assumption (2, communication), as is that the device has to be opened anew afterwards.
+//! answers with is an assumption (2, communication), as is that the device has to be opened anew afterwards. Assumed for the
+//! worst: motors that have been off and are on again put out what they were told last.
 //!
 //! `PALPATE_EMULATED_FORCEDIMENSION` names the models that are plugged in (`omega.3`, `omega.6`, `omega.7`, `delta.3`, `sigma.7`,
 //! `lambda.7`, `falcon`, by commas), `PALPATE_EMULATED_HAND` leads the hand that holds each.
