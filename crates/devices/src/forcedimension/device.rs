@@ -33,10 +33,13 @@ impl ForceDimensionDevice {
     }
 
     /// Notes what an error means for the tick and for the guard.
-    fn failed(&self, code: c_int) -> DeviceFault {
+    fn failed(&self, code: c_int, id: Id) -> DeviceFault {
         let fault = fault(code);
         if fault == DeviceFault::Disconnected {
             self.guard.lose();
+            // Nothing is written from now on, and what cannot be read may still hear.
+            let _ = self.dhd.release(self.traits.has_active_wrist, id);
+            let _ = self.dhd.enable_force(false, id);
         }
         fault
     }
@@ -83,7 +86,7 @@ impl Device for ForceDimensionDevice {
             State::MotorsOff => return Err(DeviceFault::MotorsOff),
             State::Ready(id) => id,
         };
-        let reading = self.measured(id, now_ns).map_err(|code| self.failed(code))?;
+        let reading = self.measured(id, now_ns).map_err(|code| self.failed(code, id))?;
         let Reading { pose, twist, timestamp_ns, .. } = reading;
         if !pose.is_finite() || !twist.linear.is_finite() || !twist.angular.is_finite() {
             return Err(DeviceFault::NotFinite);
@@ -117,7 +120,7 @@ impl Device for ForceDimensionDevice {
         if let Err(code) = written {
             // A force that cannot be replaced is switched off; the guard switches on again what is well.
             let _ = self.dhd.enable_force(false, id);
-            return Err(self.failed(code));
+            return Err(self.failed(code, id));
         }
         if finite { Ok(()) } else { Err(DeviceFault::NotFinite) }
     }

@@ -80,6 +80,9 @@ impl Guard {
     /// The tick has found it unplugged.
     pub fn lose(&self) {
         self.shared.state.store(LOST, Ordering::Release);
+        if let Some(thread) = &self.thread {
+            thread.thread().unpark();
+        }
     }
 
     /// The tick has written a force.

@@ -42,6 +42,8 @@ pub struct Device {
     /// Everything that is said is random.
     pub nonsense: bool,
     pub uncalibrated: bool,
+    /// Measuring fails, and nothing else.
+    pub reads_fail: bool,
     pub open: bool,
     /// Unplugged while it was open: it stays so for who has it open.
     broken: bool,
@@ -72,6 +74,7 @@ impl Device {
             disturbance: None,
             nonsense: false,
             uncalibrated: false,
+            reads_fail: false,
             open: false,
             broken: false,
             mode: Mode::Idle,
@@ -190,6 +193,9 @@ impl Device {
     /// What the device measures, and whether this was measured before.
     pub fn measure(&mut self) -> Result<(Tip, bool), i32> {
         self.check_geometry()?;
+        if self.reads_fail {
+            return Err(error::COMMUNICATION);
+        }
         let slow = self.disturbance == Some(Disturbance::SlowReplies);
         let cached = self.measured_at.is_some_and(|at| slow || at.elapsed() < self.timeguard);
         if !cached {
