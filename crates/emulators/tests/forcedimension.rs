@@ -254,3 +254,22 @@ fn a_device_that_cannot_be_read_is_let_go_at_once() {
         emulated.steering.disturb(0, 0);
     }
 }
+
+/// Ranks count what is plugged in: that of an unplugged device is the next one's.
+#[test]
+fn a_device_that_comes_back_is_the_same_one() {
+    let emulated = emulated("omega.3,omega.3");
+    let mut device = forcedimension::open(&emulated.connection(None)).expect("the first").device;
+    let places = [0.01 * DVec3::X, 0.02 * DVec3::X];
+    (0..2).for_each(|rank| emulated.steering.set_tip(rank, Tip::at(places[rank as usize])));
+    emulated.steering.disturb(0, disturbance_number(Some(Disturbance::Unplugged)));
+    assert_eq!(said_within(&mut *device, PATIENCE, Some(DeviceFault::Disconnected)), Err(DeviceFault::Disconnected));
+    // Time for some attempts.
+    let other = said_within(&mut *device, Duration::from_millis(700), None);
+    assert_eq!(other, Err(DeviceFault::Disconnected), "another device was taken for it");
+    let listing = forcedimension::list(&emulated.connection(None));
+    assert!(listing.found[0].obstacle.is_some(), "nobody can tell which one it is");
+    emulated.steering.disturb(0, 0);
+    let back = said_within(&mut *device, PATIENCE, None).expect("it is back");
+    assert!((back - places[0]).length() < 1e-12, "{back}");
+}

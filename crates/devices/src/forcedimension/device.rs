@@ -5,6 +5,7 @@ use std::ffi::c_int;
 use glam::{DMat3, DQuat, DVec3};
 
 use super::guard::{Guard, State};
+use super::held::Held;
 use super::library::{Dhd, Freshness, fault};
 use super::{Traits, ffi::Id};
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Frame, OpenError, Pose, Reading, Twist, Wrench};
@@ -27,8 +28,8 @@ pub struct ForceDimensionDevice {
 }
 
 impl ForceDimensionDevice {
-    pub fn new(dhd: Dhd, rank: i8, id: Id, traits: Traits) -> Result<Self, OpenError> {
-        let guard = Guard::start(dhd, rank, id, traits.clone())?;
+    pub fn new(dhd: Dhd, place: Held, id: Id, traits: Traits) -> Result<Self, OpenError> {
+        let guard = Guard::start(dhd, place, id, traits.clone())?;
         Ok(Self { dhd, traits, guard, fresh_ns: None })
     }
 
@@ -36,10 +37,10 @@ impl ForceDimensionDevice {
     fn failed(&self, code: c_int, id: Id) -> DeviceFault {
         let fault = fault(code);
         if fault == DeviceFault::Disconnected {
-            self.guard.lose();
             // Nothing is written from now on, and what cannot be read may still hear.
             let _ = self.dhd.release(self.traits.has_active_wrist, id);
             let _ = self.dhd.enable_force(false, id);
+            self.guard.lose();
         }
         fault
     }

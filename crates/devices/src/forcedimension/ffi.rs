@@ -2,7 +2,7 @@
 //! that the vendor documents; each takes the device's number last, where -1 is the default device.
 #![allow(unsafe_code)]
 
-use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint};
+use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
 
 use libloading::Library;
 
@@ -37,7 +37,8 @@ pub mod error {
     pub const DEVICE_IN_USE: c_int = 20;
 }
 
-/// Length of the array of `dhdGetStatus`, and what is where in it.
+/// Length of the array of `dhdGetStatus`, and what is where in it. Version 3 writes 17; the rest is for a library that writes
+/// more.
 pub mod status {
     pub const LENGTH: usize = 64;
     pub const POWER: usize = 0;
@@ -110,6 +111,7 @@ api! {
         angular_velocity = c"dhdGetAngularVelocityRad": Doubles;
         max_force = c"dhdGetMaxForce": unsafe extern "system" fn(Id) -> c_double;
         expert_mode = c"dhdEnableExpertMode": unsafe extern "system" fn() -> c_int;
+        serial_number = c"dhdGetSerialNumber": unsafe extern "system" fn(*mut c_ushort, Id) -> c_int;
         watchdog = c"dhdSetWatchdog": unsafe extern "system" fn(c_uchar, Id) -> c_int;
     }
 }

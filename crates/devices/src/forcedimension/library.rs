@@ -196,6 +196,14 @@ impl Dhd {
         unsafe { (self.0.system_type)(id) }
     }
 
+    /// Of the device; none where the library or the device does not tell it.
+    pub fn serial(self, id: Id) -> Option<u16> {
+        let mut serial = 0;
+        // SAFETY: a number of the caller.
+        let returned = unsafe { (self.0.serial_number?)(&mut serial, id) };
+        (returned >= 0 && serial != 0).then_some(serial)
+    }
+
     /// Name of the model; empty if there is none.
     pub fn system_name(self, id: Id) -> String {
         // SAFETY: the library's constant string, or null.

@@ -49,9 +49,9 @@ pub struct Device {
     broken: bool,
     pub mode: Mode,
     pub force_off_cause: i32,
+    /// What the motors were told last, which they put out whenever they are on.
     force: DVec3,
     torque: DVec3,
-    /// What the motors were told last, which they put out whenever they are on.
     pub told: Instant,
     pub gravity: bool,
     pub max_force: Option<f64>,

@@ -19,7 +19,7 @@ mod motion;
 mod steering;
 mod world;
 
-use std::ffi::{CStr, c_char, c_double, c_int, c_uchar, c_uint};
+use std::ffi::{CStr, c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
 use std::time::Duration;
 
 use palpate_emulators::conformance::Disturbance;
@@ -188,6 +188,23 @@ pub extern "system" fn dhdGetSystemType(id: c_char) -> c_int {
         Some(rank) => world.devices[rank].model.system_type,
         None => returned(Err(error::INVALID_INDEX)),
     }
+}
+
+/// Each device has its own, whatever else is plugged in.
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn dhdGetSerialNumber(serial: *mut c_ushort, id: c_char) -> c_int {
+    let mut world = world();
+    let number = match world.find(id) {
+        Some(rank) if world.devices[rank].nonsense => world.bits() as c_ushort,
+        Some(rank) if world.devices[rank].open && !serial.is_null() => 1000 + rank as c_ushort,
+        _ => return returned(Err(error::INVALID_INDEX)),
+    };
+    if serial.is_null() {
+        return returned(Err(error::NULL_ARGUMENT));
+    }
+    // SAFETY: not null, and the caller's number.
+    unsafe { serial.write(number) };
+    returned(Ok(0))
 }
 
 /// Null where there is none.
