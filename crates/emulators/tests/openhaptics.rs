@@ -263,3 +263,30 @@ fn warm_motors_are_told_and_cool() {
     assert!(said[12].0.is_ok() && said[12].1 > 0.0 && said[12].1 < 0.1, "{:?}", said[12]);
     assert_eq!(said[299], (Ok(()), 1.0));
 }
+
+const PUSHED: Wrench = Wrench { force: DVec3::X, torque: DVec3::ZERO };
+
+/// A loop that another one replaces is dropped by whoever asked for it, while the library's thread ticks.
+#[test]
+fn another_thread_than_the_librarys_calls_nothing_of_it() {
+    let emulated = emulated("Touch");
+    let steering = emulated.steering;
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let said = ticks(opened, 3, move |tick, devices| {
+        let before = steering.motors(0).wrench.force;
+        let first = &mut devices[0];
+        let elsewhere = (tick == 1).then(|| {
+            std::thread::scope(|scope| {
+                let other = scope.spawn(|| (first.write(Wrench::default()), first.write(PUSHED).is_err()));
+                other.join().expect("no panic")
+            })
+        });
+        if elsewhere.is_none() {
+            let _ = first.read(tick as u64, 1e-3);
+            let _ = first.write(PUSHED);
+        }
+        (elsewhere, before)
+    });
+    assert_eq!(said[1], (Some((Ok(()), true)), DVec3::X));
+    assert_eq!(said[2], (None, DVec3::ZERO), "the frame without a force is the library's thread's");
+}

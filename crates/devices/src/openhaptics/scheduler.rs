@@ -6,6 +6,7 @@
 //! drivers; those of this one say that they are disconnected.
 #![allow(unsafe_code)] // The callback gets its scheduler as an untyped pointer.
 
+use std::cell::Cell;
 use std::ffi::{CString, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -29,6 +30,11 @@ const FAREWELL: Duration = Duration::from_millis(60);
 
 /// Time between two attempts to find an unplugged device.
 const ATTEMPT: Duration = Duration::from_millis(500);
+
+thread_local! {
+    /// The scheduler whose tick this thread is in.
+    static TICKING: Cell<*const HdScheduler> = const { Cell::new(std::ptr::null()) };
+}
 
 type Tick = Box<dyn FnMut() + Send>;
 
@@ -82,8 +88,6 @@ pub struct HdScheduler {
     /// Changed only while the library's scheduler is stopped: in a tick they can always be read.
     slots: RwLock<Vec<Arc<Slot>>>,
     tick: Mutex<Option<Tick>>,
-    /// Set while the tick runs.
-    ticking: AtomicBool,
     /// Set while the library's scheduler is stopped for a device that is unplugged.
     dormant: AtomicBool,
     stopping: AtomicBool,
@@ -118,7 +122,6 @@ impl HdScheduler {
             control: Mutex::default(),
             slots: RwLock::default(),
             tick: Mutex::default(),
-            ticking: AtomicBool::new(false),
             dormant: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
@@ -137,9 +140,9 @@ impl HdScheduler {
         self.slots.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether devices may be read and written now: in a tick of the library.
+    /// Whether this thread may read and write devices now: in a tick of the library.
     pub fn is_ticking(&self) -> bool {
-        self.ticking.load(Ordering::Acquire) && !self.dormant.load(Ordering::Acquire)
+        std::ptr::eq(TICKING.get(), self) && !self.is_dormant()
     }
 
     /// Whether the library's scheduler is stopped for a device that is unplugged.
@@ -151,14 +154,14 @@ impl HdScheduler {
     fn tick(&self) {
         let (Ok(slots), Ok(mut tick)) = (self.slots.try_read(), self.tick.try_lock()) else { return };
         slots.iter().for_each(|slot| slot.framed.store(false, Ordering::Relaxed));
-        self.ticking.store(true, Ordering::Release);
+        TICKING.set(self);
         let callable = tick.as_mut().filter(|_| !self.panicked.load(Ordering::Acquire));
         // A panic must not reach the library. A loop catches its own; a tick that panics all the same is not called again.
         let panicked = callable.is_some_and(|tick| catch_unwind(AssertUnwindSafe(tick)).is_err());
         if !self.is_dormant() {
             slots.iter().for_each(|slot| self.release(slot));
         }
-        self.ticking.store(false, Ordering::Release);
+        TICKING.set(std::ptr::null());
         self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
