@@ -7,7 +7,9 @@ use std::time::Duration;
 use glam::DVec3;
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Reading, Wrench, openhaptics};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{MOTORS_OFF, NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
+use palpate_emulators::vendor::{
+    MOTORS_OFF, NONSENSE, READS_FAIL, Steering, UNCALIBRATED, built_library, disturbance_number,
+};
 
 /// There is one library a process, and its devices are the same for all tests.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -289,4 +291,22 @@ fn another_thread_than_the_librarys_calls_nothing_of_it() {
     });
     assert_eq!(said[1], (Some((Ok(()), true)), DVec3::X));
     assert_eq!(said[2], (None, DVec3::ZERO), "the frame without a force is the library's thread's");
+}
+
+/// A device that says it is broken and is not: the tick that says so has no force on the motors any more.
+#[test]
+fn a_device_that_cannot_be_read_is_let_go_at_once() {
+    let emulated = emulated("Touch");
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let steering = emulated.steering;
+    let said = ticks(opened, 12, move |tick, devices| {
+        if tick == 10 {
+            steering.disturb(0, READS_FAIL);
+        }
+        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(if said.is_ok() { PUSHED } else { Wrench::default() });
+        (said, steering.motors(0).wrench.force)
+    });
+    assert_eq!(said[9], (Ok(()), DVec3::X));
+    assert_eq!(said[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
 }

@@ -63,6 +63,12 @@ impl Slot {
     pub fn lose(&self) {
         self.lost.store(true, Ordering::Release);
     }
+    /// Its number, while the library has it: one that is taken for lost may still hear.
+    pub fn last_handle(&self) -> Option<Handle> {
+        let handle = self.handle.load(Ordering::Acquire);
+        (handle != INVALID_HANDLE).then_some(handle)
+    }
+
 
     pub fn note_frame(&self) {
         self.framed.store(true, Ordering::Relaxed);
@@ -165,9 +171,10 @@ impl HdScheduler {
         self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
-    /// A frame without a force for a device that has had none in this tick: it would keep its last one.
+    /// A frame without a force for a device that has had none in this tick: it would keep its last one, even one that is
+    /// taken for lost.
     fn release(&self, slot: &Slot) {
-        let Some(handle) = slot.handle().filter(|_| !slot.framed.load(Ordering::Relaxed)) else { return };
+        let Some(handle) = slot.last_handle().filter(|_| !slot.framed.load(Ordering::Relaxed)) else { return };
         self.hd.begin_frame(handle);
         self.hd.end_frame(handle);
         if self.errors(handle) == Some(error::COMMUNICATION) {
@@ -191,7 +198,7 @@ impl HdScheduler {
         match self.slots.try_read() {
             Ok(slots) => slots
                 .iter()
-                .find(|slot| slot.handle() == Some(device))
+                .find(|slot| slot.last_handle() == Some(device))
                 .inspect(|slot| slot.foreign_error.store(code, Ordering::Relaxed))
                 .is_some(),
             Err(_) => false,
