@@ -310,3 +310,19 @@ fn a_device_that_cannot_be_read_is_let_go_at_once() {
     assert_eq!(said[9], (Ok(()), DVec3::X));
     assert_eq!(said[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
 }
+
+#[test]
+fn a_loop_that_runs_is_not_stopped_for_another_device() {
+    let emulated = emulated("Touch, Left=PHANTOM Omni");
+    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let scheduler = scheduler.expect("the library has its own loop");
+    let begun = scheduler.start(Box::new(move || {
+        let _ = device.read(0, 1e-3);
+        let _ = device.write(PUSHED);
+    }));
+    begun.expect("the scheduler starts");
+    let refused = openhaptics::open(&emulated.connection(Some("Left"))).err().map(|error| error.to_string());
+    scheduler.stop();
+    assert!(refused.as_ref().is_some_and(|error| error.contains("stop the loop first")), "{refused:?}");
+    assert!(openhaptics::open(&emulated.connection(Some("Left"))).is_ok());
+}

@@ -205,30 +205,30 @@ impl HdScheduler {
         }
     }
 
-    /// Adds a device, with the scheduler stopped for that time.
+    /// Adds a device while no loop runs: its own would have neither measurements nor forces meanwhile.
     pub fn add(&self, name: Option<CString>) -> Result<Arc<Slot>, OpenError> {
         let control = self.control_in_time()?;
-        self.paused(&control, || {
-            self.sweep();
-            if self.slots().iter().any(|slot| slot.name == name) {
-                return Err(OpenError::new(
-                    "the device is in use by this program",
-                    "use another one, or close it first",
-                ));
-            }
-            let (handle, traits) = prepared(self.hd, name.as_ref())?;
-            let slot = Arc::new(Slot {
-                name,
-                traits,
-                handle: AtomicU32::new(handle),
-                lost: AtomicBool::new(false),
-                closing: AtomicBool::new(false),
-                framed: AtomicBool::new(false),
-                foreign_error: AtomicU32::new(error::SUCCESS),
-            });
-            self.slots.write().unwrap_or_else(PoisonError::into_inner).push(Arc::clone(&slot));
-            Ok(slot)
-        })
+        if self.open().iter().any(|slot| slot.name == name) {
+            let what = "the device is in use by this program";
+            return Err(OpenError::new(what, "use another one, or close it first"));
+        }
+        if control.running.is_some() {
+            let what = "a loop of this program runs with OpenHaptics, which takes no other device meanwhile";
+            return Err(OpenError::new(what, "stop the loop first, and open all its devices before it starts"));
+        }
+        self.sweep();
+        let (handle, traits) = prepared(self.hd, name.as_ref())?;
+        let slot = Arc::new(Slot {
+            name,
+            traits,
+            handle: AtomicU32::new(handle),
+            lost: AtomicBool::new(false),
+            closing: AtomicBool::new(false),
+            framed: AtomicBool::new(false),
+            foreign_error: AtomicU32::new(error::SUCCESS),
+        });
+        self.slots.write().unwrap_or_else(PoisonError::into_inner).push(Arc::clone(&slot));
+        Ok(slot)
     }
 
     /// The lock of who stops the scheduler. The keeper has it for long only while it waits for a device.
@@ -272,9 +272,14 @@ impl HdScheduler {
         self.slots().iter().filter(|slot| !slot.closing.load(Ordering::Acquire)).cloned().collect()
     }
 
-    /// Whether the tick is being called.
-    pub fn is_running(&self) -> bool {
-        self.control.try_lock().map_or(true, |control| control.running.is_some())
+    /// Does something that no tick may interrupt, unless a loop runs.
+    pub fn while_idle<R>(&self, act: impl FnOnce() -> R) -> Option<R> {
+        let control = self.control.try_lock().ok()?;
+        if control.running.is_some() {
+            return None;
+        }
+        self.sweep();
+        Some(act())
     }
 
     /// Closes the devices that nobody has. The scheduler is stopped.
