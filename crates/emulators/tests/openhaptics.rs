@@ -311,6 +311,30 @@ fn a_device_that_cannot_be_read_is_let_go_at_once() {
     assert_eq!(said[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
 }
 
+/// Before the library is stopped for a device that is lost, the others have no force: they would keep it.
+#[test]
+fn no_force_outlives_the_ticks_of_the_library() {
+    let emulated = emulated("Touch, Left=PHANTOM Omni");
+    let opened = vec![
+        openhaptics::open(&emulated.connection(None)).expect("the default device"),
+        openhaptics::open(&emulated.connection(Some("Left"))).expect("the other one"),
+    ];
+    let steering = emulated.steering;
+    let said = ticks(opened, 300, move |tick, devices| {
+        if tick == 10 {
+            steering.disturb(1, disturbance_number(Some(Disturbance::Unplugged)));
+        }
+        let kept = steering.motors(0).wrench.force;
+        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(PUSHED);
+        let _ = devices[1].read(tick as u64, 1e-3);
+        let _ = devices[1].write(Wrench::default());
+        (said, kept)
+    });
+    let first = said.iter().find(|(said, _)| *said == Err(DeviceFault::Disconnected)).expect("the library is stopped");
+    assert_eq!(first.1, DVec3::ZERO);
+}
+
 #[test]
 fn a_loop_that_runs_is_not_stopped_for_another_device() {
     let emulated = emulated("Touch, Left=PHANTOM Omni");

@@ -152,7 +152,7 @@ impl Device for TouchDevice {
         // Other devices have begun their frames since.
         self.hd.make_current(handle);
         // The library has set the force to zero when the frame began.
-        if finite {
+        if finite && !self.scheduler.is_quiet() {
             let limits = &self.slot.traits.limits;
             let force = FRAME.to_vendor(force.clamp_length_max(limits.max_force));
             self.hd.set_doubles(parameter::CURRENT_FORCE, force.to_array());

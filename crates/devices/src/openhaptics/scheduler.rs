@@ -9,7 +9,7 @@
 use std::cell::Cell;
 use std::ffi::{CString, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -30,6 +30,9 @@ const FAREWELL: Duration = Duration::from_millis(60);
 
 /// Time between two attempts to find an unplugged device.
 const ATTEMPT: Duration = Duration::from_millis(500);
+
+/// Longest time for which the ticks without force are waited for before the scheduler is stopped.
+const HUSH: Duration = Duration::from_millis(50);
 
 thread_local! {
     /// The scheduler whose tick this thread is in.
@@ -94,6 +97,10 @@ pub struct HdScheduler {
     /// Changed only while the library's scheduler is stopped: in a tick they can always be read.
     slots: RwLock<Vec<Arc<Slot>>>,
     tick: Mutex<Option<Tick>>,
+    /// Ticks that are over.
+    ticks: AtomicU64,
+    /// Set before the library's scheduler is stopped: frames have no force.
+    quiet: AtomicBool,
     /// Set while the library's scheduler is stopped for a device that is unplugged.
     dormant: AtomicBool,
     stopping: AtomicBool,
@@ -128,6 +135,8 @@ impl HdScheduler {
             control: Mutex::default(),
             slots: RwLock::default(),
             tick: Mutex::default(),
+            ticks: AtomicU64::new(0),
+            quiet: AtomicBool::new(false),
             dormant: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
@@ -151,6 +160,11 @@ impl HdScheduler {
         std::ptr::eq(TICKING.get(), self) && !self.is_dormant()
     }
 
+    /// Whether frames are to have no force.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet.load(Ordering::Acquire)
+    }
+
     /// Whether the library's scheduler is stopped for a device that is unplugged.
     pub fn is_dormant(&self) -> bool {
         self.dormant.load(Ordering::Acquire)
@@ -168,6 +182,7 @@ impl HdScheduler {
             slots.iter().for_each(|slot| self.release(slot));
         }
         TICKING.set(std::ptr::null());
+        self.ticks.fetch_add(1, Ordering::AcqRel);
         self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
@@ -245,10 +260,22 @@ impl HdScheduler {
         Err(OpenError::new(what, "plug it in or close it, then try again"))
     }
 
+    /// Stops the library's scheduler, behind two ticks without force: devices would keep their last one.
+    fn stop_quietly(&self) {
+        self.quiet.store(true, Ordering::Release);
+        // The first may have begun before.
+        let (enough, began) = (self.ticks.load(Ordering::Acquire) + 3, Instant::now());
+        while self.ticks.load(Ordering::Acquire) < enough && began.elapsed() < HUSH {
+            std::thread::sleep(Duration::from_micros(500));
+        }
+        self.hd.stop_scheduler();
+        self.quiet.store(false, Ordering::Release);
+    }
+
     /// With the scheduler stopped, and started again afterwards if it ran.
     fn paused<R>(&self, control: &Control, act: impl FnOnce() -> R) -> R {
         if control.running.is_some() {
-            self.hd.stop_scheduler();
+            self.stop_quietly();
         }
         let result = act();
         if control.running.is_some() {
@@ -406,15 +433,13 @@ impl Scheduler for Handout {
         let scheduler = self.0;
         scheduler.stopping.store(true, Ordering::Release);
         // The keeper may wait for a device with the lock; told to stop, it lets go of it.
-        let (keeper, running) = {
-            let mut control = locked(&scheduler.control);
-            (control.keeper.take(), control.running.take())
-        };
+        let keeper = locked(&scheduler.control).keeper.take();
         if let Some(keeper) = keeper {
             let _ = keeper.join();
         }
-        let Some(scheduled) = running else { return };
-        scheduler.hd.stop_scheduler();
+        let mut control = locked(&scheduler.control);
+        let Some(scheduled) = control.running.take() else { return };
+        scheduler.stop_quietly();
         scheduler.hd.unschedule(scheduled);
         scheduler.hd.first_error();
         // What it owns closes its devices, with the scheduler stopped.
@@ -423,3 +448,4 @@ impl Scheduler for Handout {
         scheduler.sweep();
     }
 }
+        drop(control);

@@ -135,7 +135,8 @@ pub fn start() {
     }
 }
 
-/// When it returns, no callback runs, unless one of them has called it. The motors are off.
+/// When it returns, no callback runs, unless one of them has called it. The motors keep their force until the amplifiers drop
+/// out.
 pub fn stop() {
     RUNNING.store(false, Ordering::Release);
     if is_servo() {
@@ -145,7 +146,6 @@ pub fn stop() {
     if let Some(thread) = thread {
         let _ = thread.join();
     }
-    world().devices.iter_mut().for_each(crate::device::Device::motors_off);
 }
 
 fn run() {
