@@ -8,7 +8,7 @@ use glam::DVec3;
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Reading, Wrench, openhaptics};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
 use palpate_emulators::vendor::{
-    MOTORS_OFF, NONSENSE, READS_FAIL, Steering, UNCALIBRATED, built_library, disturbance_number,
+    MOTORS_OFF, NO_SCHEDULER, NONSENSE, READS_FAIL, Steering, UNCALIBRATED, built_library, disturbance_number,
 };
 
 /// There is one library a process, and its devices are the same for all tests.
@@ -349,4 +349,31 @@ fn a_loop_that_runs_is_not_stopped_for_another_device() {
     scheduler.stop();
     assert!(refused.as_ref().is_some_and(|error| error.contains("stop the loop first")), "{refused:?}");
     assert!(openhaptics::open(&emulated.connection(Some("Left"))).is_ok());
+}
+
+/// The loop goes on and says what is wrong, and is well again with the library.
+#[test]
+fn a_scheduler_that_does_not_start_again_is_a_fault() {
+    let emulated = emulated("Touch");
+    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let scheduler = scheduler.expect("the library has its own loop");
+    let (sender, said) = std::sync::mpsc::channel();
+    let begun = scheduler.start(Box::new(move || {
+        let _ = sender.send(device.read(0, 1e-3).map(|_| ()));
+        let _ = device.write(Wrench::default());
+    }));
+    begun.expect("the scheduler starts");
+    let until = |wanted: Result<(), DeviceFault>| {
+        while said.recv_timeout(Duration::from_secs(5)).expect("the loop ticks") != wanted {}
+    };
+    until(Ok(()));
+    emulated.steering.disturb(0, disturbance_number(Some(Disturbance::Unplugged)));
+    until(Err(DeviceFault::Disconnected));
+    emulated.steering.disturb(0, NO_SCHEDULER);
+    std::thread::sleep(Duration::from_millis(1500));
+    while said.try_recv().is_ok() {}
+    assert_eq!(said.recv_timeout(Duration::from_millis(300)), Ok(Err(DeviceFault::Disconnected)));
+    emulated.steering.disturb(0, 0);
+    until(Ok(()));
+    scheduler.stop();
 }

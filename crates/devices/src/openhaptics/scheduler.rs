@@ -63,15 +63,15 @@ impl Slot {
         (handle != INVALID_HANDLE && !self.lost.load(Ordering::Acquire)).then_some(handle)
     }
 
-    pub fn lose(&self) {
-        self.lost.store(true, Ordering::Release);
-    }
     /// Its number, while the library has it: one that is taken for lost may still hear.
     pub fn last_handle(&self) -> Option<Handle> {
         let handle = self.handle.load(Ordering::Acquire);
         (handle != INVALID_HANDLE).then_some(handle)
     }
 
+    pub fn lose(&self) {
+        self.lost.store(true, Ordering::Release);
+    }
 
     pub fn note_frame(&self) {
         self.framed.store(true, Ordering::Relaxed);
@@ -260,6 +260,18 @@ impl HdScheduler {
         Err(OpenError::new(what, "plug it in or close it, then try again"))
     }
 
+    /// Does something with the scheduler stopped, and starts it again. For as long as it does not start, the devices say that
+    /// they are disconnected.
+    fn paused(&self, act: impl FnOnce()) {
+        self.stop_quietly();
+        act();
+        while !self.starts() {
+            self.hd.stop_scheduler();
+            self.hd.first_error();
+            self.tick_dormant();
+        }
+    }
+
     /// Stops the library's scheduler, behind two ticks without force: devices would keep their last one.
     fn stop_quietly(&self) {
         self.quiet.store(true, Ordering::Release);
@@ -272,16 +284,17 @@ impl HdScheduler {
         self.quiet.store(false, Ordering::Release);
     }
 
-    /// With the scheduler stopped, and started again afterwards if it ran.
-    fn paused<R>(&self, control: &Control, act: impl FnOnce() -> R) -> R {
-        if control.running.is_some() {
-            self.stop_quietly();
+    /// Starts the library's scheduler; whether it ticks then, or is to stop anyway. Its stack of errors is read by its ticks.
+    fn starts(&self) -> bool {
+        let (before, began) = (self.ticks.load(Ordering::Acquire), Instant::now());
+        self.hd.start_scheduler();
+        while self.ticks.load(Ordering::Acquire) == before && !self.stopping.load(Ordering::Acquire) {
+            if began.elapsed() > ATTEMPT {
+                return false;
+            }
+            std::thread::sleep(Duration::from_micros(500));
         }
-        let result = act();
-        if control.running.is_some() {
-            self.hd.start_scheduler();
-        }
-        result
+        true
     }
 
     /// A device that nobody has any more: closed at once, or by the keeper.
@@ -334,35 +347,33 @@ impl HdScheduler {
             if !lost && !closing {
                 continue;
             }
-            let Ok(control) = self.control.try_lock() else { continue };
+            let Ok(_control) = self.control.try_lock() else { continue };
             if lost {
                 std::thread::sleep(FAREWELL);
             }
-            self.paused(&control, || {
-                self.sweep();
-                self.wait_for_lost();
-            });
+            self.paused(|| self.wait_for_lost());
         }
     }
 
-    /// Ticks without the library until every lost device is back. The scheduler is stopped.
+    /// Closes what nobody has, and waits until every lost device is back. The scheduler is stopped.
     fn wait_for_lost(&self) {
         let is_lost = |slot: &Slot| slot.lost.load(Ordering::Acquire);
-        if !self.any(is_lost) {
-            return;
+        loop {
+            self.sweep();
+            let lost: Vec<Arc<Slot>> = self.slots().iter().filter(|slot| is_lost(slot)).cloned().collect();
+            lost.iter().for_each(|slot| self.bring_back(slot));
+            if !self.any(is_lost) || self.stopping.load(Ordering::Acquire) {
+                return;
+            }
+            self.tick_dormant();
         }
+    }
+
+    /// Ticks without the library until the next attempt. The scheduler is stopped.
+    fn tick_dormant(&self) {
         self.dormant.store(true, Ordering::Release);
-        let mut attempted: Option<Instant> = None;
-        while !self.stopping.load(Ordering::Acquire) {
-            if attempted.is_none_or(|last| last.elapsed() > ATTEMPT) {
-                self.sweep();
-                let lost: Vec<Arc<Slot>> = self.slots().iter().filter(|slot| is_lost(slot)).cloned().collect();
-                lost.iter().for_each(|slot| self.bring_back(slot));
-                attempted = Some(Instant::now());
-            }
-            if !self.any(is_lost) {
-                break;
-            }
+        let began = Instant::now();
+        while began.elapsed() < ATTEMPT && !self.stopping.load(Ordering::Acquire) {
             self.tick();
             std::thread::sleep(Duration::from_secs_f64(1.0 / RATE));
         }
@@ -444,8 +455,8 @@ impl Scheduler for Handout {
         scheduler.hd.first_error();
         // What it owns closes its devices, with the scheduler stopped.
         let tick = locked(&scheduler.tick).take();
+        drop(control);
         drop(tick);
         scheduler.sweep();
     }
 }
-        drop(control);
