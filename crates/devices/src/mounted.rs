@@ -83,9 +83,13 @@ impl Mounted {
     fn clutched(&mut self, reading: &mut Reading) {
         let Some(button) = self.workspace.clutch else { return };
         let bit = 1u32.checked_shl(u32::from(button)).unwrap_or(0);
-        let pressed = reading.buttons.0 & bit != 0 && reading.active;
+        let pressed = reading.buttons.0 & bit != 0;
         reading.buttons.0 &= !bit;
         let position = reading.pose.position;
+        // A device that is away, or measures nothing, says nothing of its button either.
+        if !reading.active || !position.is_finite() {
+            return;
+        }
         match (pressed, self.held_at) {
             (true, None) => self.held_at = Some(position),
             (false, Some(held)) => {
@@ -238,6 +242,14 @@ mod tests {
         assert!(free.active && free.buttons.grab());
         assert!((free.pose.position.x - 0.2).abs() < 1e-15, "it goes on from where it was");
         assert!((tick(-0.04, 0).pose.position.x - 0.22).abs() < 1e-15);
+        // Away while the button is held: it is where it was when it is back.
+        assert!(!tick(-0.04, 0b10).active);
+        *said.lock().expect("not poisoned") = Reading::default();
+        assert!(!device.read(0, 1e-3).expect("a reading").active);
+        *said.lock().expect("not poisoned") = reading(DVec3::new(f64::NAN, 0.0, 0.0), 0);
+        assert!(device.read(0, 1e-3).expect("a reading").pose.position.x.is_nan());
+        *said.lock().expect("not poisoned") = reading(DVec3::new(-0.04, 0.0, 0.0), 0);
+        assert!((device.read(0, 1e-3).expect("a reading").pose.position.x - 0.22).abs() < 1e-15);
     }
 
     #[test]

@@ -162,7 +162,7 @@ fn what_was_dropped_is_counted_and_told() {
     let told: Vec<_> = told.filter(|message| message.channel.topic == "/events").collect();
     let text = |data: &[u8]| String::from_utf8_lossy(data).into_owned();
     let told: String = told.iter().map(|message| text(&message.data)).collect();
-    for expected in ["12 ticks were not recorded", "strike of 0.001 N s on body 0", "tool 1: the device's driver"] {
+    for expected in ["12 ticks were not recorded", "strike of 0.001 N s on body 0", "tool 1: the device's program"] {
         assert!(told.contains(expected), "{expected}: {told}");
     }
     let (again, ending) = read(of_bytes(&bytes).expect("a file of ours"));

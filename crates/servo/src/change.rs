@@ -84,12 +84,25 @@ impl<T> ChangeHandle<T> {
         if self.incoming.push(Box::new(Offer { item, decided: decided.clone() })).is_err() {
             return false;
         }
+        if self.comes_back() {
+            return true;
+        }
+        if decided.compare_exchange(OPEN, GIVEN_UP, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+            return false;
+        }
+        // Taken at the last moment: its tick is under way.
+        self.comes_back();
+        true
+    }
+
+    /// Waits for what a tick gives back.
+    fn comes_back(&mut self) -> bool {
         for _ in 0..MOST_WAITS {
             if self.outgoing.pop().is_ok() {
                 return true;
             }
             std::thread::sleep(WAIT);
         }
-        decided.compare_exchange(OPEN, GIVEN_UP, Ordering::AcqRel, Ordering::Acquire).is_err()
+        false
     }
 }

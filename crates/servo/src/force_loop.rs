@@ -7,7 +7,7 @@ use palpate_core::Result;
 use palpate_core::simulation::{Input, Kept, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
 use palpate_devices::{Device, Wrench};
 
-use crate::change::{ChangeEnd, ChangeHandle, change_ends};
+use crate::change::{ChangeEnd, ChangeHandle, Taken, change_ends};
 use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
@@ -189,7 +189,7 @@ impl ForceLoop {
     #[inline(never)]
     fn guarded_tick(&mut self, now_ns: u64, period: f64) {
         self.timing.begin(now_ns);
-        self.take_change();
+        let changed = self.take_change();
         self.begin_record(now_ns, period);
         let mut input = self.receive(period);
         self.read_devices(&mut input, now_ns, period);
@@ -198,6 +198,8 @@ impl ForceLoop {
         self.ask_for_strain(&input);
         self.account(now_ns, &output);
         self.publish();
+        // Not before: whoever waits for it reads what was published.
+        changed.into_iter().for_each(|taken| self.changes.give_back(taken));
         let (took_ns, overrun) = self.timing.end(period, &self.limits, &mut self.status);
         if let Some(row) = &mut self.row {
             row.compute_us = 1e-3 * took_ns as f64;
@@ -206,25 +208,38 @@ impl ForceLoop {
         overrun.into_iter().for_each(|reason| self.latch(reason));
     }
 
-    /// Goes on as the loop that has come in, if one has. Never allocates or frees.
-    fn take_change(&mut self) {
-        let Some(mut taken) = self.changes.take() else { return };
+    /// Goes on as the loop that has come in, if one has; what it replaces. Never allocates or frees.
+    fn take_change(&mut self) -> Option<Taken<Successor>> {
+        let mut taken = self.changes.take()?;
         let Successor { force_loop, kept, keeps_device } = taken.item();
         force_loop.go_on_from(self, kept, keeps_device);
         std::mem::swap(self, force_loop);
         // Whoever waits does so at the ends of the loop that was there first.
         std::mem::swap(&mut self.changes, &mut force_loop.changes);
-        self.changes.give_back(taken);
+        Some(taken)
     }
 
-    /// Takes over what goes on from the loop before.
+    /// Takes over what goes on from the loop before, whose other devices are left without a wrench.
     fn go_on_from(&mut self, before: &mut ForceLoop, kept: &Kept, keeps_device: &[bool]) {
+        // A tool with another device is another hand at another place: what it held is let go of.
+        let mut kept = *kept;
+        for (tool, keeps) in kept.tools.iter_mut().zip(keeps_device) {
+            *tool = tool.filter(|&old| *keeps && old < before.devices.len());
+        }
+        let kept = &kept;
         self.state.take_over(&mut before.state, kept);
-        for (tool, (old, _)) in kept.tools.iter().zip(keeps_device).enumerate().filter(|(_, (_, keeps))| **keeps) {
-            let Some(old) = old.filter(|&old| old < before.devices.len()) else { continue };
+        let moves = self.model.bodies.iter().any(|body| body.moves());
+        for (tool, old) in kept.tools.iter().enumerate() {
+            let Some(old) = *old else { continue };
             std::mem::swap(&mut self.devices[tool], &mut before.devices[old]);
             std::mem::swap(&mut self.stages[tool], &mut before.stages[old]);
+            self.stages[tool].keep_energy(moves);
         }
+        for device in &mut before.devices {
+            let _ = device.write(Wrench::default());
+        }
+        // Asked for before the change, and not yet seen.
+        (self.settings.resets, self.settings.strikes) = (before.settings.resets, before.settings.strikes);
         self.status = Status {
             readings: by_new_rank(&before.status.readings, kept),
             wrenches: by_new_rank(&before.status.wrenches, kept),
@@ -366,8 +381,8 @@ impl ForceLoop {
 /// A loop that is to take the place of the running one: with another scene, at rest.
 ///
 /// Everything that depends on the scene is made anew beside the loop. It takes over what goes on: contacts between bodies and
-/// tools that stay go on without a step in their force; a new tool's forces ramp in; a device that leaves is left without a
-/// wrench.
+/// tools that stay go on without a step in their force; a new tool's or device's forces ramp in; a device that leaves is left
+/// without a wrench.
 pub(crate) struct Successor {
     pub force_loop: ForceLoop,
     /// Which bodies and tools stay.

@@ -230,7 +230,8 @@ fn on_a_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -
     };
     let thread = std::thread::Builder::new().name("palpate-servo".into()).spawn(ticks);
     let thread = thread.map_err(|source| Error::Io { path: "palpate-servo".into(), source })?;
-    let realtime = ready_out.recv().unwrap_or_else(|_| Ok(RealtimeStatus::default()))?;
+    let ended = || Error::Invalid("the loop's thread ended before its first tick".into());
+    let realtime = ready_out.recv().map_err(|_| ended())??;
     Ok((Caller::Thread { stop, thread: Some(thread) }, realtime))
 }
 

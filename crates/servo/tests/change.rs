@@ -161,6 +161,39 @@ fn what_goes_is_let_go_of_and_what_comes_ramps_in() {
     servo.stop();
 }
 
+/// The hand on it may be anywhere: it would be pushed from where the other one pressed.
+#[test]
+fn another_device_lets_go_of_what_the_tool_held() {
+    let model = scene(false, false);
+    let (first, got) = pressing(0.03);
+    let (second, _) = pressing(0.18);
+    let (mut servo, ticks) = started(&model, vec![first, second]);
+    let mut tick = ticks.recv().expect("a tick");
+    (0..200).for_each(|_| tick());
+    assert!(got.lock().expect("no poison")[199] > 0.01);
+    let other_got: Got = Arc::new(Mutex::new(Vec::with_capacity(100_000)));
+    let gets = Arc::clone(&other_got);
+    let deep = Reading { pose: Pose::at(DVec3::new(0.05, 0.05, 0.09)), active: true, ..Reading::default() };
+    let read = move |_| Ok(deep);
+    let write = move |wrench: Wrench| {
+        gets.lock().expect("no poison").push(wrench.force.length());
+        Ok(())
+    };
+    let other = Box::new(Scripted { read, write, limits: DeviceLimits::UNLIMITED });
+    let exchanged =
+        SceneChange { devices: vec![Some(other), None], ..change(&model, &[0, 1], &[Some(0), Some(1)], None) };
+    // A reset that the loop has not seen when the change comes is not lost.
+    servo.set(Settings { resets: 1, ..settings() }).expect("settings");
+    let exchanged = SceneChange { settings: Settings { resets: 1, ..settings() }, ..exchanged };
+    ticks_through(&mut tick, &mut servo, exchanged).expect("changed");
+    assert_eq!(got.lock().expect("no poison").last(), Some(&0.0));
+    (0..300).for_each(|_| tick());
+    let felt = other_got.lock().expect("no poison").iter().copied().fold(0.0, f64::max);
+    assert!(felt < 1e-9, "{felt} N on a hand that has only just come");
+    assert!(servo.latest().status.readings[0].active);
+    servo.stop();
+}
+
 #[test]
 fn changes_that_cannot_be_leave_the_loop_as_it_was() {
     let model = scene(false, false);

@@ -17,7 +17,7 @@ from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
 from palpate.scene.devices import KINDS, moved_by, tables_of_tools
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.connecting import connect_tool, require_devices
+from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
 from palpate.vectors import three_numbers
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -138,6 +138,7 @@ class Changing:
         if self._running and (given is not None or kind != "simulated"):
             try:
                 self._devices[rank] = connect_tool(self._core, self.scene, rank, given)
+                warn_if_limited(self._core, rank, self._devices[rank])
             except BaseException:
                 self.remove_tool(rank)
                 raise
@@ -191,6 +192,7 @@ class Changing:
             self._given[tool] = given
         if before is not None:
             before.close_for_loop()
+        warn_if_limited(self._core, tool, self._devices[tool])
         return self._devices[tool]
 
     def _exchange(

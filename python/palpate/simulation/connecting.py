@@ -72,6 +72,8 @@ def connect(core: _native.SimulationCore, scene: SceneTables, given: Mapping[int
         for tool in range(len(scene.tools)):
             if tool in given or scene.device_of(tool).kind != "simulated":
                 names[tool] = connect_tool(core, scene, tool, given.get(tool))
+        for tool, name in names.items():
+            warn_if_limited(core, tool, name)
     except BaseException:
         disconnect(core, given, names)
         raise
@@ -100,15 +102,19 @@ def connect_tool(core: _native.SimulationCore, scene: SceneTables, tool: int, gi
         if given is not None:
             given.close_for_loop()
         raise
+    return opened.name
+
+
+def warn_if_limited(core: _native.SimulationCore, tool: int, name: str) -> None:
+    """Warn of a device that holds less than the scene asks for."""
     asked, held = _native.tool_stiffness(core)[tool]
     if held < asked:
         warnings.warn(
-            f"tool {tool}: {opened.name} holds contacts up to {held:.4g} N/m in this scene, which asks for "
-            f"{asked:.4g}: what is stiffer feels as stiff as that",
+            f"tool {tool}: {name} holds contacts up to {held:.4g} N/m in this scene, which asks for {asked:.4g}: what "
+            "is stiffer feels as stiff as that",
             DeviceWarning,
             stacklevel=4,
         )
-    return opened.name
 
 
 def workspace_of(table: DeviceTable) -> tuple[Any, ...]:

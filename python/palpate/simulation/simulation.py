@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -29,6 +31,15 @@ from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
+
+# A program that ends without a word leaves no device pushing.
+RUNNING: weakref.WeakSet[Simulation] = weakref.WeakSet()
+
+
+@atexit.register
+def _stop_all() -> None:
+    for simulation in list(RUNNING):
+        simulation.stop()
 
 
 class Simulation(Adjustable, Changing):
@@ -138,18 +149,20 @@ class Simulation(Adjustable, Changing):
         if not self._running:
             self._arm_strain_limit()
             self._devices = connect(self._core, self.scene, self._given)
+            RUNNING.add(self)
             try:
                 start_loop(self._core, self.scene.device)
+                self._running = True
+                if self._to_record is not None:
+                    path, self._to_record = self._to_record, None
+                    self._begin_recording(path)
             except BaseException:
                 self.stop()
                 raise
-            self._running = True
-            if self._to_record is not None:
-                path, self._to_record = self._to_record, None
-                self._begin_recording(path)
 
     def stop(self) -> None:
         """Stop the loop; devices are left at zero force, and closed."""
+        RUNNING.discard(self)
         self._core.stop()
         self._running = False
         disconnect(self._core, self._given, self._devices)

@@ -36,7 +36,7 @@ def told():
     with inverse_service("--hand", "rest") as (address, _):
         environment = {
             **os.environ,
-            "PALPATE_HAPLY_ADDRESS": f"{address}?hold=50",
+            "PALPATE_HAPLY_ADDRESS": f"{address}&hold=50",
             "PALPATE_OPENHAPTICS_LIBRARY": library("hd"),
             "PALPATE_FORCEDIMENSION_LIBRARY": library("dhd"),
             "PALPATE_EMULATED_FORCEDIMENSION": "omega.3",

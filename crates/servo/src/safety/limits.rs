@@ -103,7 +103,8 @@ impl SafetyLimits {
             max_angular_damping: self.max_angular_damping.min(device.max_angular_damping),
             max_force: self.max_force.min(device.max_force),
             max_torque: self.max_torque.min(device.max_torque),
-            max_speed: device.max_speed.map_or(f64::INFINITY, |speed| self.max_speed.min(speed)),
+            // In the scene, which may be many times as large as the workspace of the hand.
+            max_speed: device.max_speed.unwrap_or(f64::INFINITY),
             ..*self
         })
     }

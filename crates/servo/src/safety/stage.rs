@@ -54,6 +54,11 @@ impl SafetyStage {
         }
     }
 
+    /// From now on in a scene whose bodies move, or that has none any more.
+    pub(crate) fn keep_energy(&mut self, keeps_energy: bool) {
+        self.keeps_energy = keeps_energy;
+    }
+
     /// Energy at the device's port since the start.
     pub fn energy(&self) -> PortEnergy {
         self.port.energy()
