@@ -29,7 +29,14 @@ pub const UNCALIBRATED: u32 = 7;
 /// The motors are off: too warm, or by a button that somebody holds down.
 pub const MOTORS_OFF: u32 = 8;
 
-/// Number of a disturbance; 0 is none; [`NONSENSE`], [`UNCALIBRATED`] and [`MOTORS_OFF`] are more.
+/// Measuring fails as if the device were unplugged. It is not: its motors keep what they have been told.
+pub const READS_FAIL: u32 = 9;
+
+/// The library's scheduler does not start.
+pub const NO_SCHEDULER: u32 = 10;
+
+/// Number of a disturbance; 0 is none; [`NONSENSE`], [`UNCALIBRATED`], [`MOTORS_OFF`], [`READS_FAIL`] and [`NO_SCHEDULER`] are
+/// more.
 pub fn disturbance_number(disturbance: Option<Disturbance>) -> u32 {
     match disturbance {
         None => 0,
@@ -135,8 +142,8 @@ impl Steering {
         Motors { wrench: Wrench { force: DVec3::new(fx, fy, fz), torque: DVec3::new(tx, ty, tz) }, at }
     }
 
-    /// Makes something go wrong with a device, by the number of [`disturbance_number`] [`NONSENSE`],
-    /// [`UNCALIBRATED`] or [`MOTORS_OFF`].
+    /// Makes something go wrong with a device, by the number of [`disturbance_number`], [`NONSENSE`], [`UNCALIBRATED`],
+    /// [`MOTORS_OFF`], [`READS_FAIL`] or [`NO_SCHEDULER`].
     pub fn disturb(&self, device: u32, number: u32) {
         // SAFETY: numbers.
         unsafe { (self.disturb)(device, number) };

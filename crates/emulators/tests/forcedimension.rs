@@ -5,9 +5,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
-use palpate_devices::{Buttons, Connection, DeviceFault, OpenError, Opened, Wrench, forcedimension};
+use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Wrench, forcedimension};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{MOTORS_OFF, NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
+use palpate_emulators::vendor::{
+    MOTORS_OFF, NONSENSE, READS_FAIL, Steering, UNCALIBRATED, built_library, disturbance_number,
+};
 
 /// There is one library a process, and its devices are the same for all tests.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -202,4 +204,72 @@ fn motors_that_are_off_are_told_and_come_back() {
     assert_eq!(until(|said| said == Err(DeviceFault::MotorsOff)), DVec3::ZERO);
     emulated.steering.disturb(0, 0);
     assert_eq!(until(|said| said.is_ok()), DVec3::X);
+}
+
+/// Ticks without a force until a device says what is wanted; or for a time, and then what it said last.
+fn said_within(device: &mut dyn Device, time: Duration, wanted: Option<DeviceFault>) -> Result<DVec3, DeviceFault> {
+    let began = Instant::now();
+    loop {
+        let said = device.read(began.elapsed().as_nanos() as u64, 1e-3).map(|reading| reading.pose.position);
+        let _ = device.write(Wrench::default());
+        if said.err() == wanted || began.elapsed() > time {
+            return said;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+const PATIENCE: Duration = Duration::from_secs(5);
+
+#[test]
+fn a_force_does_not_outlive_motors_that_were_off() {
+    let emulated = emulated("omega.3");
+    let mut device = forcedimension::open(&emulated.connection(None)).expect("opens").device;
+    device.write(Wrench { force: DVec3::X, torque: DVec3::ZERO }).expect("written");
+    emulated.steering.disturb(0, MOTORS_OFF);
+    let began = Instant::now();
+    // The loop writes on until the guard has found out.
+    while device.read(began.elapsed().as_nanos() as u64, 1e-3) != Err(DeviceFault::MotorsOff) {
+        let _ = device.write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
+        assert!(began.elapsed() < PATIENCE);
+    }
+    std::thread::sleep(Duration::from_millis(100));
+    emulated.steering.disturb(0, 0);
+    assert_eq!(emulated.steering.motors(0).wrench.force, DVec3::ZERO);
+}
+
+/// The tick that says so has no force on the motors any more.
+#[test]
+fn a_device_that_cannot_be_read_is_let_go_at_once() {
+    let emulated = emulated("sigma.7");
+    let mut device = forcedimension::open(&emulated.connection(None)).expect("opens").device;
+    for _ in 0..5 {
+        assert!(said_within(&mut *device, PATIENCE, None).is_ok());
+        let pushed = Wrench { force: DVec3::X, torque: 0.01 * DVec3::Z };
+        device.write(pushed).expect("written");
+        assert_eq!(emulated.steering.motors(0).wrench, pushed);
+        emulated.steering.disturb(0, READS_FAIL);
+        assert_eq!(device.read(0, 1e-3), Err(DeviceFault::Disconnected));
+        assert_eq!(emulated.steering.motors(0).wrench, Wrench::default());
+        emulated.steering.disturb(0, 0);
+    }
+}
+
+/// Ranks count what is plugged in: that of an unplugged device is the next one's.
+#[test]
+fn a_device_that_comes_back_is_the_same_one() {
+    let emulated = emulated("omega.3,omega.3");
+    let mut device = forcedimension::open(&emulated.connection(None)).expect("the first").device;
+    let places = [0.01 * DVec3::X, 0.02 * DVec3::X];
+    (0..2).for_each(|rank| emulated.steering.set_tip(rank, Tip::at(places[rank as usize])));
+    emulated.steering.disturb(0, disturbance_number(Some(Disturbance::Unplugged)));
+    assert_eq!(said_within(&mut *device, PATIENCE, Some(DeviceFault::Disconnected)), Err(DeviceFault::Disconnected));
+    // Time for some attempts.
+    let other = said_within(&mut *device, Duration::from_millis(700), None);
+    assert_eq!(other, Err(DeviceFault::Disconnected), "another device was taken for it");
+    let listing = forcedimension::list(&emulated.connection(None));
+    assert!(listing.found[0].obstacle.is_some(), "nobody can tell which one it is");
+    emulated.steering.disturb(0, 0);
+    let back = said_within(&mut *device, PATIENCE, None).expect("it is back");
+    assert!((back - places[0]).length() < 1e-12, "{back}");
 }

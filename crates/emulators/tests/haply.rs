@@ -240,6 +240,22 @@ fn bad_replies_are_faults_and_take_the_force_off() {
     }
 }
 
+/// Messages that are too large, after which the driver breaks the connection off.
+#[test]
+fn a_connection_is_not_given_up_with_a_force_on_the_motors() {
+    let _alone = alone();
+    let service = service(Persona::V35);
+    let mut device = opened(&service);
+    for _ in 0..3 {
+        until_force(&mut *device, &service, DVec3::Y);
+        service.set_trouble(Some(Trouble::Huge(1 << 20)));
+        tick_until(&mut *device, DVec3::Y, "the loss", |said| said == Err(DeviceFault::Disconnected));
+        service.set_trouble(None);
+        tick_until(&mut *device, DVec3::ZERO, "readings again", |said| said.is_ok());
+    }
+    assert_eq!(service.take_complaints(), Vec::<String>::new());
+}
+
 /// Wrong types where nothing is needed, and grips that are none, are no faults.
 #[test]
 fn oddities_are_tolerated() {

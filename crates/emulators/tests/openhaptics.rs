@@ -7,7 +7,9 @@ use std::time::Duration;
 use glam::DVec3;
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Reading, Wrench, openhaptics};
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{MOTORS_OFF, NONSENSE, Steering, UNCALIBRATED, built_library, disturbance_number};
+use palpate_emulators::vendor::{
+    MOTORS_OFF, NO_SCHEDULER, NONSENSE, READS_FAIL, Steering, UNCALIBRATED, built_library, disturbance_number,
+};
 
 /// There is one library a process, and its devices are the same for all tests.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -262,4 +264,116 @@ fn warm_motors_are_told_and_cool() {
     assert_eq!(said[7], (Err(DeviceFault::MotorsOff), 0.0));
     assert!(said[12].0.is_ok() && said[12].1 > 0.0 && said[12].1 < 0.1, "{:?}", said[12]);
     assert_eq!(said[299], (Ok(()), 1.0));
+}
+
+const PUSHED: Wrench = Wrench { force: DVec3::X, torque: DVec3::ZERO };
+
+/// A loop that another one replaces is dropped by whoever asked for it, while the library's thread ticks.
+#[test]
+fn another_thread_than_the_librarys_calls_nothing_of_it() {
+    let emulated = emulated("Touch");
+    let steering = emulated.steering;
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let said = ticks(opened, 3, move |tick, devices| {
+        let before = steering.motors(0).wrench.force;
+        let first = &mut devices[0];
+        let elsewhere = (tick == 1).then(|| {
+            std::thread::scope(|scope| {
+                let other = scope.spawn(|| (first.write(Wrench::default()), first.write(PUSHED).is_err()));
+                other.join().expect("no panic")
+            })
+        });
+        if elsewhere.is_none() {
+            let _ = first.read(tick as u64, 1e-3);
+            let _ = first.write(PUSHED);
+        }
+        (elsewhere, before)
+    });
+    assert_eq!(said[1], (Some((Ok(()), true)), DVec3::X));
+    assert_eq!(said[2], (None, DVec3::ZERO), "the frame without a force is the library's thread's");
+}
+
+/// A device that says it is broken and is not: the tick that says so has no force on the motors any more.
+#[test]
+fn a_device_that_cannot_be_read_is_let_go_at_once() {
+    let emulated = emulated("Touch");
+    let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
+    let steering = emulated.steering;
+    let said = ticks(opened, 12, move |tick, devices| {
+        if tick == 10 {
+            steering.disturb(0, READS_FAIL);
+        }
+        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(if said.is_ok() { PUSHED } else { Wrench::default() });
+        (said, steering.motors(0).wrench.force)
+    });
+    assert_eq!(said[9], (Ok(()), DVec3::X));
+    assert_eq!(said[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
+}
+
+/// Before the library is stopped for a device that is lost, the others have no force: they would keep it.
+#[test]
+fn no_force_outlives_the_ticks_of_the_library() {
+    let emulated = emulated("Touch, Left=PHANTOM Omni");
+    let opened = vec![
+        openhaptics::open(&emulated.connection(None)).expect("the default device"),
+        openhaptics::open(&emulated.connection(Some("Left"))).expect("the other one"),
+    ];
+    let steering = emulated.steering;
+    let said = ticks(opened, 300, move |tick, devices| {
+        if tick == 10 {
+            steering.disturb(1, disturbance_number(Some(Disturbance::Unplugged)));
+        }
+        let kept = steering.motors(0).wrench.force;
+        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(PUSHED);
+        let _ = devices[1].read(tick as u64, 1e-3);
+        let _ = devices[1].write(Wrench::default());
+        (said, kept)
+    });
+    let first = said.iter().find(|(said, _)| *said == Err(DeviceFault::Disconnected)).expect("the library is stopped");
+    assert_eq!(first.1, DVec3::ZERO);
+}
+
+#[test]
+fn a_loop_that_runs_is_not_stopped_for_another_device() {
+    let emulated = emulated("Touch, Left=PHANTOM Omni");
+    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let scheduler = scheduler.expect("the library has its own loop");
+    let begun = scheduler.start(Box::new(move || {
+        let _ = device.read(0, 1e-3);
+        let _ = device.write(PUSHED);
+    }));
+    begun.expect("the scheduler starts");
+    let refused = openhaptics::open(&emulated.connection(Some("Left"))).err().map(|error| error.to_string());
+    scheduler.stop();
+    assert!(refused.as_ref().is_some_and(|error| error.contains("stop the loop first")), "{refused:?}");
+    assert!(openhaptics::open(&emulated.connection(Some("Left"))).is_ok());
+}
+
+/// The loop goes on and says what is wrong, and is well again with the library.
+#[test]
+fn a_scheduler_that_does_not_start_again_is_a_fault() {
+    let emulated = emulated("Touch");
+    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let scheduler = scheduler.expect("the library has its own loop");
+    let (sender, said) = std::sync::mpsc::channel();
+    let begun = scheduler.start(Box::new(move || {
+        let _ = sender.send(device.read(0, 1e-3).map(|_| ()));
+        let _ = device.write(Wrench::default());
+    }));
+    begun.expect("the scheduler starts");
+    let until = |wanted: Result<(), DeviceFault>| {
+        while said.recv_timeout(Duration::from_secs(5)).expect("the loop ticks") != wanted {}
+    };
+    until(Ok(()));
+    emulated.steering.disturb(0, disturbance_number(Some(Disturbance::Unplugged)));
+    until(Err(DeviceFault::Disconnected));
+    emulated.steering.disturb(0, NO_SCHEDULER);
+    std::thread::sleep(Duration::from_millis(1500));
+    while said.try_recv().is_ok() {}
+    assert_eq!(said.recv_timeout(Duration::from_millis(300)), Ok(Err(DeviceFault::Disconnected)));
+    emulated.steering.disturb(0, 0);
+    until(Ok(()));
+    scheduler.stop();
 }

@@ -2,7 +2,7 @@
 //! that the vendor documents; each takes the device's number last, where -1 is the default device.
 #![allow(unsafe_code)]
 
-use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint};
+use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
 
 use libloading::Library;
 
@@ -37,9 +37,10 @@ pub mod error {
     pub const DEVICE_IN_USE: c_int = 20;
 }
 
-/// Length of the array of `dhdGetStatus`, and what is where in it.
+/// Length of the array of `dhdGetStatus`, and what is where in it. Version 3 writes 17; the rest is for a library that writes
+/// more.
 pub mod status {
-    pub const LENGTH: usize = 17;
+    pub const LENGTH: usize = 64;
     pub const POWER: usize = 0;
     pub const CONNECTED: usize = 1;
     pub const RESET: usize = 3;
@@ -99,8 +100,9 @@ api! {
         system_type = c"dhdGetSystemType": unsafe extern "system" fn(Id) -> c_int;
         system_name = c"dhdGetSystemName": unsafe extern "system" fn(Id) -> *const c_char;
         status = c"dhdGetStatus": unsafe extern "system" fn(*mut [c_int; status::LENGTH], Id) -> c_int;
-        has_wrist = c"dhdHasWrist": unsafe extern "system" fn(Id) -> bool;
-        has_active_wrist = c"dhdHasActiveWrist": unsafe extern "system" fn(Id) -> bool;
+        /// C++'s `bool`, of which another compiler need not keep that it is 0 or 1.
+        has_wrist = c"dhdHasWrist": unsafe extern "system" fn(Id) -> u8;
+        has_active_wrist = c"dhdHasActiveWrist": unsafe extern "system" fn(Id) -> u8;
         last_error = c"dhdErrorGetLast": unsafe extern "system" fn() -> c_int;
         error_text = c"dhdErrorGetStr": unsafe extern "system" fn(c_int) -> *const c_char;
         sdk_version = c"dhdGetSDKVersion": unsafe extern "system" fn(*mut c_int, *mut c_int, *mut c_int, *mut c_int);
@@ -109,6 +111,7 @@ api! {
         angular_velocity = c"dhdGetAngularVelocityRad": Doubles;
         max_force = c"dhdGetMaxForce": unsafe extern "system" fn(Id) -> c_double;
         expert_mode = c"dhdEnableExpertMode": unsafe extern "system" fn() -> c_int;
+        serial_number = c"dhdGetSerialNumber": unsafe extern "system" fn(*mut c_ushort, Id) -> c_int;
         watchdog = c"dhdSetWatchdog": unsafe extern "system" fn(c_uchar, Id) -> c_int;
     }
 }

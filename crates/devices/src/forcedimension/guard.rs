@@ -6,11 +6,10 @@ use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use glam::DVec3;
-
 use super::ffi::{Id, force_off, status};
+use super::held::{Held, held};
 use super::library::Dhd;
-use super::{Traits, open_ranks, prepared};
+use super::{Traits, opened, readied};
 use crate::OpenError;
 
 /// Time between two looks.
@@ -42,7 +41,8 @@ const MOTORS_OFF: i32 = -2;
 
 struct Shared {
     dhd: Dhd,
-    rank: i8,
+    /// Where it was when it was opened.
+    place: Held,
     traits: Traits,
     /// The device's number when it is ready; [`LOST`], [`MOTORS_OFF`].
     state: AtomicI32,
@@ -58,10 +58,10 @@ pub struct Guard {
 }
 
 impl Guard {
-    pub fn start(dhd: Dhd, rank: i8, id: Id, traits: Traits) -> Result<Self, OpenError> {
+    pub fn start(dhd: Dhd, place: Held, id: Id, traits: Traits) -> Result<Self, OpenError> {
         let (began, written_ns, closing) = (Instant::now(), AtomicU64::new(0), AtomicBool::new(false));
         let state = AtomicI32::new(id.into());
-        let shared = Arc::new(Shared { dhd, rank, traits, state, began, written_ns, closing });
+        let shared = Arc::new(Shared { dhd, place, traits, state, began, written_ns, closing });
         let watched = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("palpate-forcedimension".to_owned())
@@ -80,6 +80,9 @@ impl Guard {
     /// The tick has found it unplugged.
     pub fn lose(&self) {
         self.shared.state.store(LOST, Ordering::Release);
+        if let Some(thread) = &self.thread {
+            thread.thread().unpark();
+        }
     }
 
     /// The tick has written a force.
@@ -98,9 +101,12 @@ impl Drop for Guard {
         if let Some(id) = open {
             let _ = self.shared.release(id);
             let _ = self.shared.dhd.enable_force(false, id);
+        }
+        let mut held = held();
+        if let Some(id) = open {
             self.shared.dhd.close(id);
         }
-        open_ranks().retain(|rank| *rank != self.shared.rank);
+        held.retain(|one| one.rank != self.shared.place.rank);
     }
 }
 
@@ -119,11 +125,18 @@ impl Shared {
 
     /// No force, and none of rotation.
     fn release(&self, id: Id) -> Result<(), i32> {
-        match self.traits.has_active_wrist {
-            true => self.dhd.set_force_and_torque(DVec3::ZERO, DVec3::ZERO, id),
-            false => self.dhd.set_force(DVec3::ZERO, id),
-        }
-        .map(|_| ())
+        self.dhd.release(self.traits.has_active_wrist, id).map(|_| ())
+    }
+
+    fn close(&self, id: Id) {
+        let mut held = held();
+        self.dhd.close(id);
+        self.note(&mut held, None);
+    }
+
+    /// Writes down by which number it is open.
+    fn note(&self, held: &mut [Held], id: Option<Id>) {
+        held.iter_mut().filter(|one| one.rank == self.place.rank).for_each(|one| one.id = id);
     }
 
     /// Changes the state, unless the tick has changed it meanwhile.
@@ -143,7 +156,7 @@ fn watch(shared: &Shared, id: Id) -> Option<Id> {
         match (shared.state(), open) {
             (State::Lost, _) => {
                 if let Some(lost) = open.take() {
-                    shared.dhd.close(lost);
+                    shared.close(lost);
                 }
                 if look.is_multiple_of(LOOKS_AN_ATTEMPT) {
                     open = reopen(shared);
@@ -160,8 +173,8 @@ fn watch(shared: &Shared, id: Id) -> Option<Id> {
 fn watch_open(shared: &Shared, id: Id, look: u32) {
     let state = shared.state();
     let age_ns = shared.now_ns().saturating_sub(shared.written_ns.load(Ordering::Relaxed));
-    if age_ns > HOLD_NS && matches!(state, State::Ready(_)) {
-        // The tick notices what is wrong, if it still ticks.
+    if age_ns > HOLD_NS || state == State::MotorsOff {
+        // The tick notices what is wrong, if it still ticks. Motors that are off must not come back with a force of before.
         let _ = shared.release(id);
     }
     if !look.is_multiple_of(LOOKS_A_STATUS) {
@@ -184,14 +197,30 @@ fn watch_open(shared: &Shared, id: Id, look: u32) {
     }
 }
 
-/// The same device, if it is back.
+/// The same device, if it is back: at any rank if its serial number is known, else where it was among as many.
 fn reopen(shared: &Shared) -> Option<Id> {
-    let (id, traits) = prepared(shared.dhd, shared.rank).ok()?;
-    if traits.system_type != shared.traits.system_type {
-        shared.dhd.close(id);
-        return None;
-    }
+    let mut held = held();
+    let (own, count) = (shared.place.rank, shared.dhd.count() as i8);
+    let as_many = count == shared.place.count;
+    let may_be = |rank: &i8| match shared.traits.serial {
+        Some(_) => *rank == own || !as_many || held.iter().all(|one| one.rank != *rank),
+        None => *rank == own && as_many,
+    };
+    let own_first = std::iter::once(own).filter(|own| *own < count).chain((0..count).filter(|rank| *rank != own));
+    let id = own_first.filter(may_be).find_map(|rank| back_at(shared, rank, &held))?;
+    shared.note(&mut held, Some(id));
     shared.written_ns.store(shared.now_ns(), Ordering::Relaxed);
     shared.state.store(id.into(), Ordering::Release);
     Some(id)
+}
+
+/// The same device, if it is of this rank now.
+fn back_at(shared: &Shared, rank: i8, held: &[Held]) -> Option<Id> {
+    let (id, traits) = opened(shared.dhd, rank, held).ok()?;
+    let is_same = (traits.serial, traits.system_type) == (shared.traits.serial, shared.traits.system_type);
+    if !is_same {
+        shared.dhd.close(id);
+        return None;
+    }
+    readied(shared.dhd, rank, id, &traits).is_ok().then_some(id)
 }

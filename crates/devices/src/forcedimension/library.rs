@@ -175,9 +175,17 @@ impl Dhd {
         self.check(returned)
     }
 
+    /// No force, and where there are motors of rotation no torque.
+    pub fn release(self, has_active_wrist: bool, id: Id) -> Result<Freshness, c_int> {
+        match has_active_wrist {
+            true => self.set_force_and_torque(DVec3::ZERO, DVec3::ZERO, id),
+            false => self.set_force(DVec3::ZERO, id),
+        }
+    }
+
     pub fn status(self, id: Id) -> Result<[c_int; status::LENGTH], c_int> {
         let mut status = [0; status::LENGTH];
-        // SAFETY: as many integers of the caller as the vendor's header says.
+        // SAFETY: more integers of the caller than the vendor's header says.
         self.check(unsafe { (self.0.status)(&mut status, id) })?;
         Ok(status)
     }
@@ -186,6 +194,14 @@ impl Dhd {
     pub fn system_type(self, id: Id) -> c_int {
         // SAFETY: as above.
         unsafe { (self.0.system_type)(id) }
+    }
+
+    /// Of the device; none where the library or the device does not tell it.
+    pub fn serial(self, id: Id) -> Option<u16> {
+        let mut serial = 0;
+        // SAFETY: a number of the caller.
+        let returned = unsafe { (self.0.serial_number?)(&mut serial, id) };
+        (returned >= 0 && serial != 0).then_some(serial)
     }
 
     /// Name of the model; empty if there is none.
@@ -197,7 +213,7 @@ impl Dhd {
     /// Whether it senses orientation, and whether it has motors of rotation.
     pub fn wrist(self, id: Id) -> (bool, bool) {
         // SAFETY: as above.
-        unsafe { ((self.0.has_wrist)(id), (self.0.has_active_wrist)(id)) }
+        unsafe { ((self.0.has_wrist)(id) != 0, (self.0.has_active_wrist)(id) != 0) }
     }
 
     /// A limit of force that has been set in the library, N.

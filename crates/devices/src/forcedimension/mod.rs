@@ -11,23 +11,16 @@
 mod device;
 mod ffi;
 mod guard;
+mod held;
 mod library;
 mod models;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use self::device::ForceDimensionDevice;
 use self::ffi::{Id, error, status};
+use self::held::{Held, held, ranks_have_moved};
 use self::library::Dhd;
 use self::models::{Model, model};
 use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Opened};
-
-/// Ranks of the devices that this process has opened.
-static OPEN: Mutex<Vec<i8>> = Mutex::new(Vec::new());
-
-fn open_ranks() -> MutexGuard<'static, Vec<i8>> {
-    OPEN.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// The devices that there are, by rank.
 pub fn list(connection: &Connection) -> Listing {
@@ -35,9 +28,9 @@ pub fn list(connection: &Connection) -> Listing {
         Ok(loaded) => loaded,
         Err(error) => return Listing { found: Vec::new(), missing: Some(error), facts: Vec::new() },
     };
-    let ranks = open_ranks();
-    let found: Vec<FoundDevice> =
-        (0..dhd.count() as i8).map(|rank| describe(dhd, rank, ranks.contains(&rank))).collect();
+    let held = held();
+    let count = dhd.count() as i8;
+    let found: Vec<FoundDevice> = (0..count).map(|rank| describe(dhd, rank, &held, count)).collect();
     let missing = found.is_empty().then(nothing_found);
     Listing { found, missing, facts }
 }
@@ -48,7 +41,7 @@ pub fn list(connection: &Connection) -> Listing {
 /// A library that is not there or too old; no such device, or one that is in use or not initialised.
 pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
     let (dhd, _) = Dhd::load(connection)?;
-    let mut ranks = open_ranks();
+    let mut held = held();
     let count = dhd.count() as i8;
     if count == 0 {
         return Err(nothing_found());
@@ -58,14 +51,16 @@ pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
             let what = format!("there is no Force Dimension device {asked:?}");
             OpenError::new(what, format!("choose one from 0 to {}", count - 1))
         })?,
-        None => (0..count).find(|rank| !ranks.contains(rank)).unwrap_or(0),
+        None => (0..count).find(|rank| held.iter().all(|one| one.rank != *rank)).unwrap_or(0),
     };
-    if ranks.contains(&rank) {
+    if held.iter().any(|one| one.rank == rank) {
         return Err(in_use(rank));
     }
-    let (id, traits) = prepared(dhd, rank)?;
-    let device = ForceDimensionDevice::new(dhd, rank, id, traits)?;
-    ranks.push(rank);
+    let (id, traits) = opened(dhd, rank, &held)?;
+    readied(dhd, rank, id, &traits)?;
+    let place = Held { rank, id: Some(id), count };
+    let device = ForceDimensionDevice::new(dhd, place, id, traits)?;
+    held.push(place);
     Ok(Opened { device: Box::new(device), scheduler: None })
 }
 
@@ -73,6 +68,7 @@ pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
 #[derive(Clone, Debug, PartialEq)]
 struct Traits {
     system_type: i32,
+    serial: Option<u16>,
     name: String,
     limits: DeviceLimits,
     has_wrist: bool,
@@ -89,26 +85,37 @@ fn traits(dhd: Dhd, id: Id) -> Traits {
     limits.max_force = dhd.max_force(id).map_or(limits.max_force, |set| limits.max_force.min(set));
     let said = dhd.system_name(id);
     let name = if said.is_empty() { name.to_owned() } else { said };
-    Traits { system_type, name: format!("Force Dimension {name}"), limits, has_wrist, has_active_wrist }
+    let name = format!("Force Dimension {name}");
+    Traits { system_type, serial: dhd.serial(id), name, limits, has_wrist, has_active_wrist }
 }
 
 /// Longest watchdog, in steps of 125 microseconds: 32 ms without a force.
 const WATCHDOG: u8 = 255;
 
-/// Opens a device, and readies it for forces: these are zero until one is written.
-fn prepared(dhd: Dhd, rank: i8) -> Result<(Id, Traits), OpenError> {
+/// Opens a device that nobody in this process holds, whatever its rank has been.
+fn opened(dhd: Dhd, rank: i8, held: &[Held]) -> Result<(Id, Traits), OpenError> {
     let id = dhd.open(rank).map_err(|code| does_not_open(dhd, rank, code))?;
-    let readied = || {
-        let traits = traits(dhd, id);
+    if held.iter().any(|one| one.id == Some(id)) {
+        // Not opened anew, and not to be closed.
+        return Err(in_use(rank));
+    }
+    Ok((id, traits(dhd, id)))
+}
+
+/// Readies an open device for forces, which are zero until one is written, or closes it.
+fn readied(dhd: Dhd, rank: i8, id: Id, traits: &Traits) -> Result<(), OpenError> {
+    let ready = || {
         obstacle(dhd, id, &traits.name)?;
         let failed = |code| does_not_open(dhd, rank, code);
         dhd.compensate_gravity(id).map_err(failed)?;
+        // A force of before must not come back with the motors; a library may refuse one while they are off.
+        let _ = dhd.release(traits.has_active_wrist, id);
         dhd.enable_force(true, id).map_err(failed)?;
-        dhd.set_force(glam::DVec3::ZERO, id).map_err(failed)?;
+        dhd.release(traits.has_active_wrist, id).map_err(failed)?;
         dhd.watch(WATCHDOG, id);
-        Ok((id, traits))
+        Ok(())
     };
-    readied().inspect_err(|_: &OpenError| dhd.close(id))
+    ready().inspect_err(|_: &OpenError| dhd.close(id))
 }
 
 /// Why an open device cannot be used.
@@ -127,7 +134,16 @@ fn obstacle(dhd: Dhd, id: Id, name: &str) -> Result<(), OpenError> {
     Ok(())
 }
 
-fn describe(dhd: Dhd, rank: i8, is_open: bool) -> FoundDevice {
+/// Why a device may not be opened to be described.
+fn hindrance(rank: i8, held: &[Held], count: i8) -> Option<OpenError> {
+    if ranks_have_moved(held, count) {
+        let what = format!("Force Dimension device {rank} cannot be told from those in use: some have come or gone");
+        return Some(OpenError::new(what, "close those of this program, then look again"));
+    }
+    held.iter().any(|one| one.rank == rank).then(|| in_use(rank))
+}
+
+fn describe(dhd: Dhd, rank: i8, held: &[Held], count: i8) -> FoundDevice {
     let unknown = |error| FoundDevice {
         id: rank.to_string(),
         name: "Force Dimension device".to_owned(),
@@ -135,14 +151,13 @@ fn describe(dhd: Dhd, rank: i8, is_open: bool) -> FoundDevice {
         obstacle: Some(error),
         facts: Vec::new(),
     };
-    if is_open {
-        return unknown(in_use(rank));
+    if let Some(hindrance) = hindrance(rank, held, count) {
+        return unknown(hindrance);
     }
-    let id = match dhd.open(rank) {
-        Ok(id) => id,
-        Err(code) => return unknown(does_not_open(dhd, rank, code)),
+    let (id, traits) = match opened(dhd, rank, held) {
+        Ok(opened) => opened,
+        Err(error) => return unknown(error),
     };
-    let traits = traits(dhd, id);
     let obstacle = obstacle(dhd, id, &traits.name).err();
     dhd.close(id);
     let wrist = match (traits.has_wrist, traits.has_active_wrist) {

@@ -35,7 +35,7 @@ const ABSENT_FORCES: u32 = 16;
 const ABSENT_PERIOD: Duration = Duration::from_millis(20);
 /// First and longest time between two attempts to connect.
 const RETRY: [Duration; 2] = [Duration::from_millis(50), Duration::from_millis(1000)];
-/// Longest time for the last message, which takes the force off.
+/// Longest time for the last message, which takes the force off, and again for the end of the connection.
 const FAREWELL: Duration = Duration::from_millis(20);
 /// Time between two looks at the channel of events, ns.
 const EVENTS_NS: u64 = 5_000_000;
@@ -130,7 +130,7 @@ impl Client {
                 }
             }
         }
-        self.leave();
+        self.say_goodbye();
     }
 
     /// One message and its reply.
@@ -244,7 +244,7 @@ impl Client {
     }
 
     fn connect_again(&mut self) {
-        self.socket = None;
+        self.say_goodbye();
         let [mut wait, longest] = RETRY;
         while !self.is_stopped() {
             if let Ok((socket, snapshot)) = self.service.connect() {
@@ -280,12 +280,12 @@ impl Client {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Takes the force off and says goodbye.
-    fn leave(mut self) {
+    /// Takes the force off, if the other end still takes messages, and closes the connection.
+    fn say_goodbye(&mut self) {
         let Some(mut socket) = self.socket.take() else { return };
         if socket.send(self.message.of(DVec3::ZERO)).is_ok() {
             let _ = socket.receive(Instant::now() + FAREWELL);
         }
-        socket.close();
+        socket.close(Instant::now() + FAREWELL);
     }
 }

@@ -25,7 +25,7 @@ const LONGEST_TRIAL: Duration = Duration::from_millis(1500);
 pub fn list(connection: &Connection) -> Listing {
     let connected = Service::of(connection).and_then(|service| {
         let (socket, snapshot) = service.connect()?;
-        socket.close();
+        socket.close(Instant::now());
         Ok((service, snapshot))
     });
     let (service, snapshot) = match connected {

@@ -172,8 +172,12 @@ impl Socket {
         timed.stream.set_nonblocking(nothing).map_err(|_| SocketError::Closed)
     }
 
-    /// Says goodbye; what the other end answers does not matter.
-    pub fn close(mut self) {
+    /// Says goodbye. What the other end still sends is thrown away until it closes too, or until `until`: a connection that is
+    /// dropped with bytes unread is reset, and what was sent last may be lost with it.
+    pub fn close(mut self, until: Instant) {
         let _ = self.socket.close(None);
+        let timed = self.socket.get_mut();
+        timed.until = Some(until);
+        while matches!(timed.read(&mut [0; BUFFER]), Ok(1..)) {}
     }
 }

@@ -56,6 +56,17 @@ impl TouchDevice {
         }
     }
 
+    /// Ends a frame that has begun, without a force, of a device that may be gone and may still hear.
+    fn end_without_force(&mut self) {
+        if std::mem::take(&mut self.framed)
+            && self.scheduler.is_ticking()
+            && let Some(handle) = self.slot.last_handle()
+        {
+            self.end(handle);
+            self.scheduler.errors(handle);
+        }
+    }
+
     fn end(&mut self, handle: Handle) {
         self.hd.end_frame(handle);
         self.framed = false;
@@ -107,7 +118,13 @@ impl Device for TouchDevice {
     }
 
     fn read(&mut self, now_ns: u64, _period: f64) -> Result<Reading, DeviceFault> {
-        let handle = self.handle().inspect_err(|_| self.framed = false)?;
+        let handle = match self.handle() {
+            Ok(handle) => handle,
+            Err(fault) => {
+                self.end_without_force();
+                return Err(fault);
+            }
+        };
         let late = self.read_ns.is_some_and(|last_ns| now_ns.saturating_sub(last_ns) > STALE_AFTER_NS);
         self.read_ns = Some(now_ns);
         self.begin(handle);
@@ -124,11 +141,10 @@ impl Device for TouchDevice {
         let handle = match self.handle() {
             Ok(handle) => handle,
             // The scheduler is stopped and the motors are off, or the device is gone.
-            Err(_) if wrench == Wrench::default() => {
-                self.framed = false;
-                return Ok(());
+            Err(fault) => {
+                self.end_without_force();
+                return if wrench == Wrench::default() { Ok(()) } else { Err(fault) };
             }
-            Err(fault) => return Err(fault),
         };
         let Wrench { force, torque } = wrench;
         let finite = force.is_finite() && torque.is_finite();
@@ -136,7 +152,7 @@ impl Device for TouchDevice {
         // Other devices have begun their frames since.
         self.hd.make_current(handle);
         // The library has set the force to zero when the frame began.
-        if finite {
+        if finite && !self.scheduler.is_quiet() {
             let limits = &self.slot.traits.limits;
             let force = FRAME.to_vendor(force.clamp_length_max(limits.max_force));
             self.hd.set_doubles(parameter::CURRENT_FORCE, force.to_array());

@@ -48,13 +48,14 @@ pub fn list(connection: &Connection) -> Listing {
         });
     }
     // While the scheduler runs nobody else may call the library.
-    if !scheduler.is_running() && listing.found.iter().all(|found| found.id != DEFAULT) {
-        match describe_default(hd) {
-            Ok((found, version)) => {
+    if listing.found.iter().all(|found| found.id != DEFAULT) {
+        match scheduler.while_idle(|| describe_default(hd)) {
+            Some(Ok((found, version))) => {
                 listing.found.push(found);
                 listing.facts.push(("version", version));
             }
-            Err(error) => listing.missing = Some(error),
+            Some(Err(error)) => listing.missing = Some(error),
+            None => (),
         }
     }
     listing

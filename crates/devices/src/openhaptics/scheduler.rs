@@ -6,9 +6,10 @@
 //! drivers; those of this one say that they are disconnected.
 #![allow(unsafe_code)] // The callback gets its scheduler as an untyped pointer.
 
+use std::cell::Cell;
 use std::ffi::{CString, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -29,6 +30,14 @@ const FAREWELL: Duration = Duration::from_millis(60);
 
 /// Time between two attempts to find an unplugged device.
 const ATTEMPT: Duration = Duration::from_millis(500);
+
+/// Longest time for which the ticks without force are waited for before the scheduler is stopped.
+const HUSH: Duration = Duration::from_millis(50);
+
+thread_local! {
+    /// The scheduler whose tick this thread is in.
+    static TICKING: Cell<*const HdScheduler> = const { Cell::new(std::ptr::null()) };
+}
 
 type Tick = Box<dyn FnMut() + Send>;
 
@@ -52,6 +61,12 @@ impl Slot {
     pub fn handle(&self) -> Option<Handle> {
         let handle = self.handle.load(Ordering::Acquire);
         (handle != INVALID_HANDLE && !self.lost.load(Ordering::Acquire)).then_some(handle)
+    }
+
+    /// Its number, while the library has it: one that is taken for lost may still hear.
+    pub fn last_handle(&self) -> Option<Handle> {
+        let handle = self.handle.load(Ordering::Acquire);
+        (handle != INVALID_HANDLE).then_some(handle)
     }
 
     pub fn lose(&self) {
@@ -82,8 +97,10 @@ pub struct HdScheduler {
     /// Changed only while the library's scheduler is stopped: in a tick they can always be read.
     slots: RwLock<Vec<Arc<Slot>>>,
     tick: Mutex<Option<Tick>>,
-    /// Set while the tick runs.
-    ticking: AtomicBool,
+    /// Ticks that are over.
+    ticks: AtomicU64,
+    /// Set before the library's scheduler is stopped: frames have no force.
+    quiet: AtomicBool,
     /// Set while the library's scheduler is stopped for a device that is unplugged.
     dormant: AtomicBool,
     stopping: AtomicBool,
@@ -118,7 +135,8 @@ impl HdScheduler {
             control: Mutex::default(),
             slots: RwLock::default(),
             tick: Mutex::default(),
-            ticking: AtomicBool::new(false),
+            ticks: AtomicU64::new(0),
+            quiet: AtomicBool::new(false),
             dormant: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
@@ -137,9 +155,14 @@ impl HdScheduler {
         self.slots.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether devices may be read and written now: in a tick of the library.
+    /// Whether this thread may read and write devices now: in a tick of the library.
     pub fn is_ticking(&self) -> bool {
-        self.ticking.load(Ordering::Acquire) && !self.dormant.load(Ordering::Acquire)
+        std::ptr::eq(TICKING.get(), self) && !self.is_dormant()
+    }
+
+    /// Whether frames are to have no force.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet.load(Ordering::Acquire)
     }
 
     /// Whether the library's scheduler is stopped for a device that is unplugged.
@@ -151,20 +174,22 @@ impl HdScheduler {
     fn tick(&self) {
         let (Ok(slots), Ok(mut tick)) = (self.slots.try_read(), self.tick.try_lock()) else { return };
         slots.iter().for_each(|slot| slot.framed.store(false, Ordering::Relaxed));
-        self.ticking.store(true, Ordering::Release);
+        TICKING.set(self);
         let callable = tick.as_mut().filter(|_| !self.panicked.load(Ordering::Acquire));
         // A panic must not reach the library. A loop catches its own; a tick that panics all the same is not called again.
         let panicked = callable.is_some_and(|tick| catch_unwind(AssertUnwindSafe(tick)).is_err());
         if !self.is_dormant() {
             slots.iter().for_each(|slot| self.release(slot));
         }
-        self.ticking.store(false, Ordering::Release);
+        TICKING.set(std::ptr::null());
+        self.ticks.fetch_add(1, Ordering::AcqRel);
         self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
-    /// A frame without a force for a device that has had none in this tick: it would keep its last one.
+    /// A frame without a force for a device that has had none in this tick: it would keep its last one, even one that is
+    /// taken for lost.
     fn release(&self, slot: &Slot) {
-        let Some(handle) = slot.handle().filter(|_| !slot.framed.load(Ordering::Relaxed)) else { return };
+        let Some(handle) = slot.last_handle().filter(|_| !slot.framed.load(Ordering::Relaxed)) else { return };
         self.hd.begin_frame(handle);
         self.hd.end_frame(handle);
         if self.errors(handle) == Some(error::COMMUNICATION) {
@@ -188,37 +213,37 @@ impl HdScheduler {
         match self.slots.try_read() {
             Ok(slots) => slots
                 .iter()
-                .find(|slot| slot.handle() == Some(device))
+                .find(|slot| slot.last_handle() == Some(device))
                 .inspect(|slot| slot.foreign_error.store(code, Ordering::Relaxed))
                 .is_some(),
             Err(_) => false,
         }
     }
 
-    /// Adds a device, with the scheduler stopped for that time.
+    /// Adds a device while no loop runs: its own would have neither measurements nor forces meanwhile.
     pub fn add(&self, name: Option<CString>) -> Result<Arc<Slot>, OpenError> {
         let control = self.control_in_time()?;
-        self.paused(&control, || {
-            self.sweep();
-            if self.slots().iter().any(|slot| slot.name == name) {
-                return Err(OpenError::new(
-                    "the device is in use by this program",
-                    "use another one, or close it first",
-                ));
-            }
-            let (handle, traits) = prepared(self.hd, name.as_ref())?;
-            let slot = Arc::new(Slot {
-                name,
-                traits,
-                handle: AtomicU32::new(handle),
-                lost: AtomicBool::new(false),
-                closing: AtomicBool::new(false),
-                framed: AtomicBool::new(false),
-                foreign_error: AtomicU32::new(error::SUCCESS),
-            });
-            self.slots.write().unwrap_or_else(PoisonError::into_inner).push(Arc::clone(&slot));
-            Ok(slot)
-        })
+        if self.open().iter().any(|slot| slot.name == name) {
+            let what = "the device is in use by this program";
+            return Err(OpenError::new(what, "use another one, or close it first"));
+        }
+        if control.running.is_some() {
+            let what = "a loop of this program runs with OpenHaptics, which takes no other device meanwhile";
+            return Err(OpenError::new(what, "stop the loop first, and open all its devices before it starts"));
+        }
+        self.sweep();
+        let (handle, traits) = prepared(self.hd, name.as_ref())?;
+        let slot = Arc::new(Slot {
+            name,
+            traits,
+            handle: AtomicU32::new(handle),
+            lost: AtomicBool::new(false),
+            closing: AtomicBool::new(false),
+            framed: AtomicBool::new(false),
+            foreign_error: AtomicU32::new(error::SUCCESS),
+        });
+        self.slots.write().unwrap_or_else(PoisonError::into_inner).push(Arc::clone(&slot));
+        Ok(slot)
     }
 
     /// The lock of who stops the scheduler. The keeper has it for long only while it waits for a device.
@@ -235,16 +260,41 @@ impl HdScheduler {
         Err(OpenError::new(what, "plug it in or close it, then try again"))
     }
 
-    /// With the scheduler stopped, and started again afterwards if it ran.
-    fn paused<R>(&self, control: &Control, act: impl FnOnce() -> R) -> R {
-        if control.running.is_some() {
+    /// Does something with the scheduler stopped, and starts it again. For as long as it does not start, the devices say that
+    /// they are disconnected.
+    fn paused(&self, act: impl FnOnce()) {
+        self.stop_quietly();
+        act();
+        while !self.starts() {
             self.hd.stop_scheduler();
+            self.hd.first_error();
+            self.tick_dormant();
         }
-        let result = act();
-        if control.running.is_some() {
-            self.hd.start_scheduler();
+    }
+
+    /// Stops the library's scheduler, behind two ticks without force: devices would keep their last one.
+    fn stop_quietly(&self) {
+        self.quiet.store(true, Ordering::Release);
+        // The first may have begun before.
+        let (enough, began) = (self.ticks.load(Ordering::Acquire) + 3, Instant::now());
+        while self.ticks.load(Ordering::Acquire) < enough && began.elapsed() < HUSH {
+            std::thread::sleep(Duration::from_micros(500));
         }
-        result
+        self.hd.stop_scheduler();
+        self.quiet.store(false, Ordering::Release);
+    }
+
+    /// Starts the library's scheduler; whether it ticks then, or is to stop anyway. Its stack of errors is read by its ticks.
+    fn starts(&self) -> bool {
+        let (before, began) = (self.ticks.load(Ordering::Acquire), Instant::now());
+        self.hd.start_scheduler();
+        while self.ticks.load(Ordering::Acquire) == before && !self.stopping.load(Ordering::Acquire) {
+            if began.elapsed() > ATTEMPT {
+                return false;
+            }
+            std::thread::sleep(Duration::from_micros(500));
+        }
+        true
     }
 
     /// A device that nobody has any more: closed at once, or by the keeper.
@@ -262,9 +312,14 @@ impl HdScheduler {
         self.slots().iter().filter(|slot| !slot.closing.load(Ordering::Acquire)).cloned().collect()
     }
 
-    /// Whether the tick is being called.
-    pub fn is_running(&self) -> bool {
-        self.control.try_lock().map_or(true, |control| control.running.is_some())
+    /// Does something that no tick may interrupt, unless a loop runs.
+    pub fn while_idle<R>(&self, act: impl FnOnce() -> R) -> Option<R> {
+        let control = self.control.try_lock().ok()?;
+        if control.running.is_some() {
+            return None;
+        }
+        self.sweep();
+        Some(act())
     }
 
     /// Closes the devices that nobody has. The scheduler is stopped.
@@ -292,35 +347,33 @@ impl HdScheduler {
             if !lost && !closing {
                 continue;
             }
-            let Ok(control) = self.control.try_lock() else { continue };
+            let Ok(_control) = self.control.try_lock() else { continue };
             if lost {
                 std::thread::sleep(FAREWELL);
             }
-            self.paused(&control, || {
-                self.sweep();
-                self.wait_for_lost();
-            });
+            self.paused(|| self.wait_for_lost());
         }
     }
 
-    /// Ticks without the library until every lost device is back. The scheduler is stopped.
+    /// Closes what nobody has, and waits until every lost device is back. The scheduler is stopped.
     fn wait_for_lost(&self) {
         let is_lost = |slot: &Slot| slot.lost.load(Ordering::Acquire);
-        if !self.any(is_lost) {
-            return;
+        loop {
+            self.sweep();
+            let lost: Vec<Arc<Slot>> = self.slots().iter().filter(|slot| is_lost(slot)).cloned().collect();
+            lost.iter().for_each(|slot| self.bring_back(slot));
+            if !self.any(is_lost) || self.stopping.load(Ordering::Acquire) {
+                return;
+            }
+            self.tick_dormant();
         }
+    }
+
+    /// Ticks without the library until the next attempt. The scheduler is stopped.
+    fn tick_dormant(&self) {
         self.dormant.store(true, Ordering::Release);
-        let mut attempted: Option<Instant> = None;
-        while !self.stopping.load(Ordering::Acquire) {
-            if attempted.is_none_or(|last| last.elapsed() > ATTEMPT) {
-                self.sweep();
-                let lost: Vec<Arc<Slot>> = self.slots().iter().filter(|slot| is_lost(slot)).cloned().collect();
-                lost.iter().for_each(|slot| self.bring_back(slot));
-                attempted = Some(Instant::now());
-            }
-            if !self.any(is_lost) {
-                break;
-            }
+        let began = Instant::now();
+        while began.elapsed() < ATTEMPT && !self.stopping.load(Ordering::Acquire) {
             self.tick();
             std::thread::sleep(Duration::from_secs_f64(1.0 / RATE));
         }
@@ -391,19 +444,18 @@ impl Scheduler for Handout {
         let scheduler = self.0;
         scheduler.stopping.store(true, Ordering::Release);
         // The keeper may wait for a device with the lock; told to stop, it lets go of it.
-        let (keeper, running) = {
-            let mut control = locked(&scheduler.control);
-            (control.keeper.take(), control.running.take())
-        };
+        let keeper = locked(&scheduler.control).keeper.take();
         if let Some(keeper) = keeper {
             let _ = keeper.join();
         }
-        let Some(scheduled) = running else { return };
-        scheduler.hd.stop_scheduler();
+        let mut control = locked(&scheduler.control);
+        let Some(scheduled) = control.running.take() else { return };
+        scheduler.stop_quietly();
         scheduler.hd.unschedule(scheduled);
         scheduler.hd.first_error();
         // What it owns closes its devices, with the scheduler stopped.
         let tick = locked(&scheduler.tick).take();
+        drop(control);
         drop(tick);
         scheduler.sweep();
     }

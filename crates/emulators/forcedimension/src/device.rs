@@ -42,11 +42,14 @@ pub struct Device {
     /// Everything that is said is random.
     pub nonsense: bool,
     pub uncalibrated: bool,
+    /// Measuring fails, and nothing else.
+    pub reads_fail: bool,
     pub open: bool,
     /// Unplugged while it was open: it stays so for who has it open.
     broken: bool,
     pub mode: Mode,
     pub force_off_cause: i32,
+    /// What the motors were told last, which they put out whenever they are on.
     force: DVec3,
     torque: DVec3,
     pub told: Instant,
@@ -71,6 +74,7 @@ impl Device {
             disturbance: None,
             nonsense: false,
             uncalibrated: false,
+            reads_fail: false,
             open: false,
             broken: false,
             mode: Mode::Idle,
@@ -96,7 +100,8 @@ impl Device {
         self.disturbance = disturbance;
         if !self.is_plugged() {
             self.broken = self.open;
-            self.motors_off(Mode::Idle, 5);
+            self.forget();
+            self.switch(Mode::Idle, 5);
         }
     }
 
@@ -123,7 +128,7 @@ impl Device {
         if self.mode == Mode::Force && self.watchdog > 0 {
             let allowed = Duration::from_micros(125 * u64::from(self.watchdog)) + WATCHDOG_LENIENCY;
             if now - self.told > allowed {
-                self.motors_off(Mode::Brake, 3);
+                self.switch(Mode::Brake, 3);
             }
         }
         if self.mode == Mode::Brake && !self.tip.is_put() {
@@ -134,17 +139,21 @@ impl Device {
         self.moved = now;
     }
 
-    fn motors_off(&mut self, mode: Mode, cause: i32) {
-        (self.mode, self.force_off_cause) = (mode, cause);
-        (self.force, self.torque, self.told) = (DVec3::ZERO, DVec3::ZERO, Instant::now());
-        self.tip.write(DVec3::ZERO);
+    /// Motors off, or on again with what they were told last.
+    fn switch(&mut self, mode: Mode, cause: i32) {
+        (self.mode, self.force_off_cause, self.told) = (mode, cause, Instant::now());
+        self.tip.write(self.motors().0);
+    }
+
+    fn forget(&mut self) {
+        (self.force, self.torque) = (DVec3::ZERO, DVec3::ZERO);
     }
 
     /// By a button that somebody holds down, or lets go.
     pub fn switch_motors_off(&mut self, down: bool) {
         match (down, self.force_off_cause) {
-            (true, _) => self.motors_off(Mode::Brake, BUTTON),
-            (false, BUTTON) => self.motors_off(Mode::Force, 0),
+            (true, _) => self.switch(Mode::Brake, BUTTON),
+            (false, BUTTON) => self.switch(Mode::Force, 0),
             (false, _) => (),
         }
     }
@@ -158,12 +167,14 @@ impl Device {
         self.go_on();
         (self.open, self.broken) = (true, false);
         (self.watchdog, self.measured_at, self.gravity) = (0, None, true);
-        self.motors_off(Mode::Idle, 0);
+        self.forget();
+        self.switch(Mode::Idle, 0);
     }
 
     pub fn close(&mut self) {
         (self.open, self.broken) = (false, false);
-        self.motors_off(Mode::Brake, 0);
+        self.forget();
+        self.switch(Mode::Brake, 0);
     }
 
     pub fn enable(&mut self, on: bool) {
@@ -175,20 +186,23 @@ impl Device {
             (false, _) => Mode::Brake,
         };
         if mode != self.mode {
-            self.motors_off(mode, if on { 0 } else { 4 });
+            self.switch(mode, if on { 0 } else { 4 });
         }
     }
 
     /// What the device measures, and whether this was measured before.
     pub fn measure(&mut self) -> Result<(Tip, bool), i32> {
         self.check_geometry()?;
+        if self.reads_fail {
+            return Err(error::COMMUNICATION);
+        }
         let slow = self.disturbance == Some(Disturbance::SlowReplies);
         let cached = self.measured_at.is_some_and(|at| slow || at.elapsed() < self.timeguard);
         if !cached {
             self.measured = self.tip.measure();
             self.measured_at = Some(Instant::now());
             if !self.tip.is_put() && self.measured.velocity.length() > self.fastest && self.mode == Mode::Force {
-                self.motors_off(Mode::Brake, 2);
+                self.switch(Mode::Brake, 2);
             }
         }
         Ok((self.measured, cached))
@@ -202,16 +216,17 @@ impl Device {
     /// Tells the motors; whether they saturate. The force keeps its direction.
     pub fn tell(&mut self, force: DVec3, torque: DVec3) -> Result<bool, i32> {
         self.check_geometry()?;
-        if self.mode != Mode::Force {
-            return Err(error::NOT_ENABLED);
-        }
         if !force.is_finite() || !torque.is_finite() {
             return Err(error::INVALID);
         }
         let largest = self.max_force.map_or(self.model.max_force, |set| set.min(self.model.max_force));
         let put_force = force.clamp_length_max(largest);
         let put_torque = torque.clamp_length_max(self.model.max_torque);
-        (self.force, self.torque, self.told) = (put_force, put_torque, Instant::now());
+        (self.force, self.torque) = (put_force, put_torque);
+        if self.mode != Mode::Force {
+            return Err(error::NOT_ENABLED);
+        }
+        self.told = Instant::now();
         self.tip.write(put_force);
         // What rounding does to a force at the limit is no saturation.
         let saturated =
@@ -221,7 +236,7 @@ impl Device {
 
     /// What the motors put out: force, torque.
     pub fn motors(&self) -> (DVec3, DVec3) {
-        (self.force, self.torque)
+        if self.mode == Mode::Force { (self.force, self.torque) } else { (DVec3::ZERO, DVec3::ZERO) }
     }
 
     pub fn status(&self) -> [i32; 17] {

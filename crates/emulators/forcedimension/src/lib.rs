@@ -3,7 +3,8 @@
 //! From the vendor's documentation: results below zero are errors, told apart by the calling thread's last error, 1 is
 //! a measurement that is repeated because it was asked for too early, 2 a motor that saturates; no forces before they are
 //! enabled; a watchdog, a brake for a tip that is too fast, causes of motors that are off. Which error an unplugged device
-//! answers with is an assumption (2, communication), as is that the device has to be opened anew afterwards.
+//! answers with is an assumption (2, communication), as is that the device has to be opened anew afterwards. Assumed for the
+//! worst: motors that have been off and are on again put out what they were told last.
 //!
 //! `PALPATE_EMULATED_FORCEDIMENSION` names the models that are plugged in (`omega.3`, `omega.6`, `omega.7`, `delta.3`, `sigma.7`,
 //! `lambda.7`, `falcon`, by commas), `PALPATE_EMULATED_HAND` leads the hand that holds each.
@@ -18,7 +19,7 @@ mod motion;
 mod steering;
 mod world;
 
-use std::ffi::{CStr, c_char, c_double, c_int, c_uchar, c_uint};
+use std::ffi::{CStr, c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
 use std::time::Duration;
 
 use palpate_emulators::conformance::Disturbance;
@@ -187,6 +188,23 @@ pub extern "system" fn dhdGetSystemType(id: c_char) -> c_int {
         Some(rank) => world.devices[rank].model.system_type,
         None => returned(Err(error::INVALID_INDEX)),
     }
+}
+
+/// Each device has its own, whatever else is plugged in.
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn dhdGetSerialNumber(serial: *mut c_ushort, id: c_char) -> c_int {
+    let mut world = world();
+    let number = match world.find(id) {
+        Some(rank) if world.devices[rank].nonsense => world.bits() as c_ushort,
+        Some(rank) if world.devices[rank].open && !serial.is_null() => 1000 + rank as c_ushort,
+        _ => return returned(Err(error::INVALID_INDEX)),
+    };
+    if serial.is_null() {
+        return returned(Err(error::NULL_ARGUMENT));
+    }
+    // SAFETY: not null, and the caller's number.
+    unsafe { serial.write(number) };
+    returned(Ok(0))
 }
 
 /// Null where there is none.

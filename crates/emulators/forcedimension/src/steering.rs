@@ -3,7 +3,7 @@
 use std::ffi::{CStr, c_char};
 
 use palpate_emulators::vendor::{
-    MOTORS_LENGTH, MOTORS_OFF, NONSENSE, TIP_LENGTH, UNCALIBRATED, disturbance, tip_of_numbers,
+    MOTORS_LENGTH, MOTORS_OFF, NONSENSE, READS_FAIL, TIP_LENGTH, UNCALIBRATED, disturbance, tip_of_numbers,
 };
 
 use crate::device::Device;
@@ -51,6 +51,7 @@ pub extern "C" fn palpate_emulator_disturb(rank: u32, number: u32) {
     with_device(rank, |device| {
         device.nonsense = number == NONSENSE;
         device.uncalibrated = number == UNCALIBRATED;
+        device.reads_fail = number == READS_FAIL;
         device.switch_motors_off(number == MOTORS_OFF);
         device.disturb(disturbance(number));
     });

@@ -57,6 +57,8 @@ pub struct Device {
     /// Everything that is said is random.
     pub nonsense: bool,
     pub uncalibrated: bool,
+    /// Frames begin with a fault of the device, and go on.
+    pub reads_fail: bool,
     /// The motors are too warm.
     warm: bool,
     pub initialised: bool,
@@ -97,6 +99,7 @@ impl Device {
             disturbance: None,
             nonsense: false,
             uncalibrated: false,
+            reads_fail: false,
             warm: false,
             initialised: false,
             broken: false,
@@ -175,6 +178,9 @@ impl Device {
         }
         self.last = self.snapshot;
         self.snapshot = Snapshot { tip: self.tip.measure(), buttons: self.buttons };
+        if self.reads_fail {
+            return Err(error::DEVICE_FAULT);
+        }
         if self.disturbance == Some(Disturbance::DriverError) {
             return Err(error::TIMER);
         }

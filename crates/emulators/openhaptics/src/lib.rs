@@ -4,7 +4,8 @@
 //! and tick, which hold measurements still and set the force to zero when they begin; forces that are off until they are
 //! enabled, limits after which the amplifiers drop out and ramp back; a scheduler of 1000 Hz with priorities. Assumed: what an
 //! unplugged device answers (0x0302, until it is disabled and initialised anew), that amplifiers drop out 20 ms after the last
-//! frame, and that calls from other threads while the scheduler runs are errors (0x0102), which the vendor only warns of.
+//! frame and not when the scheduler stops, and that calls from other threads while the scheduler runs are errors (0x0102),
+//! which the vendor only warns of.
 //!
 //! `PALPATE_EMULATED_OPENHAPTICS` names what is plugged in (`Touch, Left=PHANTOM Omni`), `PALPATE_EMULATED_HAND` leads the hand
 //! that holds each.

@@ -41,6 +41,7 @@ static SCHEDULE: Mutex<Schedule> =
     Mutex::new(Schedule { scheduled: Vec::new(), next: 1, thread: None, rate: 1000, tick_began: None });
 static RUNNING: AtomicBool = AtomicBool::new(false);
 static HURRIED: AtomicBool = AtomicBool::new(false);
+static REFUSES: AtomicBool = AtomicBool::new(false);
 static TICKS: AtomicU64 = AtomicU64::new(0);
 
 thread_local! {
@@ -120,7 +121,15 @@ pub fn remove(handle: c_ulong) -> bool {
     before
 }
 
+/// Whether it does not start from now on.
+pub fn refuse_to_start(refuses: bool) {
+    REFUSES.store(refuses, Ordering::Release);
+}
+
 pub fn start() {
+    if REFUSES.load(Ordering::Acquire) {
+        return world().raise(error::TIMER, crate::numbers::INVALID_HANDLE);
+    }
     let mut schedule = schedule();
     if RUNNING.swap(true, Ordering::AcqRel) {
         return;
@@ -135,7 +144,8 @@ pub fn start() {
     }
 }
 
-/// When it returns, no callback runs, unless one of them has called it. The motors are off.
+/// When it returns, no callback runs, unless one of them has called it. The motors keep their force until the amplifiers drop
+/// out.
 pub fn stop() {
     RUNNING.store(false, Ordering::Release);
     if is_servo() {
@@ -145,7 +155,6 @@ pub fn stop() {
     if let Some(thread) = thread {
         let _ = thread.join();
     }
-    world().devices.iter_mut().for_each(crate::device::Device::motors_off);
 }
 
 fn run() {

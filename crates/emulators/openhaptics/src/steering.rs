@@ -3,7 +3,8 @@
 use std::ffi::{CStr, c_char};
 
 use palpate_emulators::vendor::{
-    MOTORS_LENGTH, MOTORS_OFF, NONSENSE, TIP_LENGTH, UNCALIBRATED, disturbance, tip_of_numbers,
+    MOTORS_LENGTH, MOTORS_OFF, NO_SCHEDULER, NONSENSE, READS_FAIL, TIP_LENGTH, UNCALIBRATED, disturbance,
+    tip_of_numbers,
 };
 
 use crate::device::Device;
@@ -21,6 +22,7 @@ fn with_device(rank: u32, act: impl FnOnce(&mut Device)) {
 pub unsafe extern "C" fn palpate_emulator_reset(models: *const c_char) {
     // SAFETY: by the caller a string.
     let models = unsafe { CStr::from_ptr(models) }.to_string_lossy();
+    scheduler::refuse_to_start(false);
     *world() = World::new(&models);
 }
 
@@ -48,9 +50,11 @@ pub unsafe extern "C" fn palpate_emulator_motors(rank: u32, numbers: *mut [f64; 
 
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_emulator_disturb(rank: u32, number: u32) {
+    scheduler::refuse_to_start(number == NO_SCHEDULER);
     with_device(rank, |device| {
         device.nonsense = number == NONSENSE;
         device.uncalibrated = number == UNCALIBRATED;
+        device.reads_fail = number == READS_FAIL;
         device.switch_motors_off(number == MOTORS_OFF);
         device.disturb(disturbance(number));
     });

@@ -76,7 +76,7 @@ impl Client {
                 }
                 Ok(_) => {}
                 Err(Error::Io(error)) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-                Err(_) => return,
+                Err(_) => return locked(&shared.world).note_broken(self.number),
             }
         }
     }

@@ -111,6 +111,12 @@ impl World {
         self.arms.iter_mut().filter(|arm| arm.commanded_by() == Some(number)).for_each(Arm::release);
     }
 
+    /// A session's connection has broken off: its client should have taken its force off before.
+    pub fn note_broken(&mut self, number: u64) {
+        let left = self.arms.iter().filter(|arm| arm.commanded_by() == Some(number) && arm.motors.force != DVec3::ZERO);
+        self.complaints.extend(left.map(|arm| format!("a connection has broken off with a force on {}", arm.id)));
+    }
+
     /// Puts a cable in or out.
     pub fn plug(&mut self, id: &str, plugged: bool) {
         self.advance();
