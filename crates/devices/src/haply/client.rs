@@ -130,7 +130,7 @@ impl Client {
                 }
             }
         }
-        self.leave();
+        self.hang_up();
     }
 
     /// One message and its reply.
@@ -244,7 +244,7 @@ impl Client {
     }
 
     fn connect_again(&mut self) {
-        self.socket = None;
+        self.hang_up();
         let [mut wait, longest] = RETRY;
         while !self.is_stopped() {
             if let Ok((socket, snapshot)) = self.service.connect() {
@@ -280,8 +280,8 @@ impl Client {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Takes the force off and says goodbye.
-    fn leave(mut self) {
+    /// Takes the force off, which whoever sends what cannot be understood may still obey, and says goodbye.
+    fn hang_up(&mut self) {
         let Some(mut socket) = self.socket.take() else { return };
         if socket.send(self.message.of(DVec3::ZERO)).is_ok() {
             let _ = socket.receive(Instant::now() + FAREWELL);

@@ -1,6 +1,7 @@
 //! The emulated service as the shared suite wants it.
 
 mod closed_loop;
+mod farewell;
 mod figures;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
