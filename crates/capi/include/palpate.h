@@ -22,6 +22,7 @@
  *                   PALPATE_ERROR_BUSY. All other palpate_loop_ functions from any other threads meanwhile: they wait
  *                   for each other, never for the tick. Frames come through a wait-free hand-off.
  *   palpate_loop_free, palpate_scene_free, palpate_store_free: when no other thread is in a call with the object.
+ *   The library must not be unloaded (dlclose) while a loop is alive: the loop's threads run in it.
  *
  * The interface is stable within a major number (PALPATE_ABI_MAJOR), which stands in the library's run-time name.
  */

@@ -10,6 +10,14 @@ fn null(name: &str) -> Refusal {
     Refusal::argument(format!("{name} is a null pointer"))
 }
 
+/// Refuses a length in bytes that nothing in memory has, and no slice may have.
+fn require_size<T>(count: usize, name: &str) -> Outcome<()> {
+    match count.checked_mul(size_of::<T>()) {
+        Some(bytes) if bytes <= isize::MAX as usize => Ok(()),
+        _ => Err(Refusal::argument(format!("{name} has {count} elements, more than memory holds"))),
+    }
+}
+
 /// An object behind a handle.
 ///
 /// # Safety
@@ -33,6 +41,7 @@ pub unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Outcome<&'a mut T
 /// # Safety
 /// The pointer is null or points to `count` elements.
 pub unsafe fn array<'a, T>(pointer: *const T, count: usize, name: &str) -> Outcome<&'a [T]> {
+    require_size::<T>(count, name)?;
     match count {
         0 => Ok(&[]),
         _ if pointer.is_null() => Err(null(name)),
@@ -46,6 +55,7 @@ pub unsafe fn array<'a, T>(pointer: *const T, count: usize, name: &str) -> Outco
 /// # Safety
 /// The pointer is null or points to `count` elements that nobody else uses meanwhile.
 pub unsafe fn array_mut<'a, T>(pointer: *mut T, count: usize, name: &str) -> Outcome<&'a mut [T]> {
+    require_size::<T>(count, name)?;
     match count {
         0 => Ok(&mut []),
         _ if pointer.is_null() => Err(null(name)),

@@ -18,6 +18,7 @@ use crate::arguments::{hand_out, shared, take_back};
 use crate::device::{DeviceEnd, brought};
 use crate::scene::SceneGraph;
 use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::store::Store;
 
 /// A force loop. One thread at a time may tick it; any other threads may read frames and change settings meanwhile.
 pub struct Loop {
@@ -25,7 +26,16 @@ pub struct Loop {
     frame: Mutex<FrameSide>,
     /// Held while another scene is prepared.
     changing: Mutex<()>,
+    /// Number of the scene that it was made of.
+    scene: u64,
 }
+
+// What the header says of threads.
+const _: fn() = || {
+    fn is_shared_by_threads<T: Sync>() {}
+    is_shared_by_threads::<Loop>();
+    is_shared_by_threads::<Store>();
+};
 
 /// What a tick needs.
 pub(crate) struct TickSide {
@@ -108,7 +118,7 @@ impl Loop {
             Runner::Thread { servo, .. } => servo.latest().clone(),
         };
         let frame = FrameSide { runner, settings: prepared.settings, latest, prepared };
-        Ok(Self { tick: Mutex::new(tick), frame: Mutex::new(frame), changing: Mutex::new(()) })
+        Ok(Self { tick: Mutex::new(tick), frame: Mutex::new(frame), changing: Mutex::new(()), scene: graph.number })
     }
 
     /// The side of frames and settings; waits for others who are there, never for a tick.
@@ -156,6 +166,10 @@ impl Loop {
     }
 
     fn change(&self, graph: &SceneGraph) -> Outcome<()> {
+        if graph.number != self.scene {
+            // Its handles are other bodies and tools.
+            return Err(Refusal::argument("scene is not the one that the loop was made of"));
+        }
         let _one_at_a_time = self.changing.lock().unwrap_or_else(PoisonError::into_inner);
         // Beside the loop, frames and settings.
         let before = self.frame().prepared.clone();
@@ -168,6 +182,8 @@ impl Loop {
             ));
         };
         next.settings = next.settings_after(settings, &kept);
+        // Those of the scene are for loops that are made from now on.
+        (next.limits, next.scheduling) = (before.limits, before.scheduling);
         let (mut moved, mut devices) = (Vec::new(), Vec::new());
         for old in &kept.tools[..next.tools.len()] {
             let (handle, device) = match old {

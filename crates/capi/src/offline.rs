@@ -9,7 +9,7 @@ use palpate_servo::Script;
 
 use crate::arguments::{array, array_mut, optional_mut, require_count, shared};
 use crate::scene::SceneGraph;
-use crate::status::{Status, guarded, tell};
+use crate::status::{Refusal, Status, guarded, tell};
 
 /// Moves the tools of a scene through positions, one tick a row: `positions` (ticks x tools, x y z, m; NAN takes a tool out of the
 /// scene) and `orientations` (ticks x tools, w x y z; null does not turn them). `forces` gets the force on each device
@@ -30,7 +30,9 @@ pub unsafe extern "C" fn palpate_scene_run(
         // SAFETY: the caller's pointer.
         let prepared = unsafe { shared(scene, "scene") }?.scene.prepare()?;
         require_count("tools", tools, prepared.model.tools.len())?;
-        let count = ticks * tools;
+        let count = ticks
+            .checked_mul(tools)
+            .ok_or_else(|| Refusal::argument(format!("ticks is {ticks}, more than memory holds")))?;
         // SAFETY: the caller's pointers, to `count` of three or four numbers.
         let (positions, forces, torques) = unsafe {
             (

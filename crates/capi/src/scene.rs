@@ -3,6 +3,7 @@
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
 use std::ffi::c_char;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use palpate_core::contact::Moduli;
 use palpate_scene::{Body, BodyId, Scene, ToolId, placement};
@@ -19,6 +20,15 @@ const UNIT_LENGTH: f64 = 1e-6;
 /// What to touch, and with what. One thread at a time may use it.
 pub struct SceneGraph {
     pub(crate) scene: Scene,
+    /// Of this scene alone, for as long as the program runs.
+    pub(crate) number: u64,
+}
+
+impl SceneGraph {
+    fn new(scene: Scene) -> Self {
+        static LATEST: AtomicU64 = AtomicU64::new(0);
+        Self { scene, number: LATEST.fetch_add(1, Ordering::Relaxed) }
+    }
 }
 
 /// Makes a scene without bodies and tools.
@@ -26,7 +36,7 @@ pub struct SceneGraph {
 pub unsafe extern "C" fn palpate_scene_new(scene: *mut *mut SceneGraph) -> Status {
     guarded(|| {
         // SAFETY: the caller's pointer.
-        unsafe { hand_out(SceneGraph { scene: Scene::default() }, scene, "scene") }?;
+        unsafe { hand_out(SceneGraph::new(Scene::default()), scene, "scene") }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -39,7 +49,7 @@ pub unsafe extern "C" fn palpate_scene_load(file: *const c_char, scene: *mut *mu
         let file = unsafe { path(file, "file") }?;
         let loaded = Scene::load(file)?;
         // SAFETY: the caller's pointer.
-        unsafe { hand_out(SceneGraph { scene: loaded }, scene, "scene") }?;
+        unsafe { hand_out(SceneGraph::new(loaded), scene, "scene") }?;
         Ok(Status::PalpateOk)
     })
 }

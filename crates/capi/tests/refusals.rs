@@ -8,9 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use common::{NO_WRENCH, PERIOD, at, done, load, refused, scene_and_loop, store_file};
 use palpate::force_loop::{
-    Loop, Target, palpate_loop_free, palpate_loop_new, palpate_loop_set_target, palpate_loop_start, palpate_loop_stop,
+    Loop, Target, palpate_loop_change, palpate_loop_free, palpate_loop_new, palpate_loop_set_target,
+    palpate_loop_start, palpate_loop_stop,
 };
 use palpate::frame::{Frame, palpate_loop_get_frame, palpate_loop_get_positions};
+use palpate::offline::palpate_scene_run;
 use palpate::options::{DeviceOptions, ToolOptions, palpate_device_limits_known};
 use palpate::scene::{
     palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_free, palpate_scene_load, palpate_scene_new,
@@ -59,6 +61,12 @@ fn null_pointers_lengths_and_handles_are_refused_by_name() {
             "tools is 2, it must be 1",
         );
         refused(call(null_mut(), 1, PERIOD, &at(0.0), &mut wrench, 1), ARGUMENT, "loop is a null pointer");
+        // Lengths that wrap around to none, and lengths of no array.
+        done(palpate_scene_add_tool(scene, null(), null_mut()));
+        for ticks in [usize::MAX / 2 + 1, usize::MAX / 32] {
+            let run = palpate_scene_run(scene, ticks, 2, null(), null(), null_mut(), null_mut());
+            refused(run, ARGUMENT, "more than memory holds");
+        }
         palpate_loop_free(own);
         palpate_scene_free(scene);
         palpate_store_free(store);
@@ -146,6 +154,11 @@ fn who_ticks_is_one_at_a_time() {
         done(palpate_loop_start(own));
         refused(palpate_loop_start(own), Status::PalpateErrorState, "runs already");
         done(palpate_loop_set_target(own, 0, &target));
+        let (other, of_other) = scene_and_loop(store);
+        refused(palpate_loop_change(own, other), ARGUMENT, "scene is not the one");
+        done(palpate_loop_change(own, scene));
+        palpate_loop_free(of_other);
+        palpate_scene_free(other);
         refused(
             palpate_loop_tick(own, 1, PERIOD, &at(0.0), &mut wrench, 1),
             Status::PalpateErrorState,

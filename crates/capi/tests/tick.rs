@@ -11,17 +11,18 @@ use std::ptr::{null, null_mut};
 use common::{NO_WRENCH, PERIOD, at, done, load, refused, scene_and_loop, store_file};
 use counting_allocator::allocations;
 use palpate::force_loop::{
-    Loop, Target, palpate_loop_change, palpate_loop_free, palpate_loop_set_target, palpate_loop_start,
-    palpate_loop_stop,
+    Loop, Target, palpate_loop_change, palpate_loop_free, palpate_loop_new, palpate_loop_set_target,
+    palpate_loop_start, palpate_loop_stop,
 };
 use palpate::frame::{
     ContactRecord, Frame, palpate_loop_get_contacts, palpate_loop_get_frame, palpate_loop_get_positions,
     palpate_loop_get_rest_positions, palpate_loop_get_surface_size, palpate_loop_get_triangles,
 };
 use palpate::offline::palpate_scene_run;
-use palpate::options::{BodyOptions, ToolOptions};
+use palpate::options::{BodyOptions, SceneOptions, ToolOptions};
 use palpate::scene::{
-    SceneGraph, palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_free, palpate_scene_remove_body,
+    SceneGraph, palpate_scene_add_body, palpate_scene_add_tool, palpate_scene_free, palpate_scene_get_options,
+    palpate_scene_remove_body, palpate_scene_set_options,
 };
 use palpate::settings::palpate_loop_reset;
 use palpate::statics::palpate_store_touch;
@@ -248,5 +249,30 @@ fn bodies_and_tools_come_and_go_while_the_loop_runs() {
         let gone = palpate_loop_get_positions(own, body, null_mut(), 0);
         refused(gone, Status::PalpateErrorArgument, "the loop has no body of the handle 1");
         done(palpate_loop_stop(own));
+    }
+}
+
+/// A loop keeps its own limits through a change and a stop.
+#[test]
+fn limits_of_a_scene_are_for_loops_that_are_made_later() {
+    let fixture = Fixture::new("limits");
+    let (own, scene, mut later) = (fixture.own, fixture.scene, null_mut());
+    let mut options = SceneOptions::default();
+    let strongest = |own| {
+        let force = |count| tick(own, count, &at(0.005 - 0.003 * (count as f64 / 400.0).min(1.0))).1.force[2];
+        (0..600).map(force).fold(0.0, f64::max)
+    };
+    // SAFETY: living objects and places.
+    unsafe {
+        done(palpate_scene_get_options(scene, &mut options));
+        options.max_force = 0.05;
+        done(palpate_loop_start(own));
+        done(palpate_scene_set_options(scene, &options));
+        done(palpate_loop_change(own, scene));
+        done(palpate_loop_stop(own));
+        done(palpate_loop_new(scene, &mut later));
+        let (kept, new) = (strongest(own), strongest(later));
+        assert!(kept > 0.1 && new <= 0.05 * (1.0 + 1e-12) && new > 0.04, "{kept} N and {new} N");
+        palpate_loop_free(later);
     }
 }

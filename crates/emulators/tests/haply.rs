@@ -14,7 +14,7 @@ use palpate_emulators::inverse_service::{
 };
 use serde_json::json;
 
-use haply_bench::{ARM, HaplyBench, alone, service};
+use haply_bench::{ARM, HaplyBench, alone, beside_others, service};
 
 const PERIOD: f64 = 1e-3;
 
@@ -51,26 +51,8 @@ fn until_force(device: &mut dyn Device, service: &InverseService, force: DVec3) 
 }
 
 #[test]
-fn conforms_with_services_of_3_5() {
-    let _alone = alone();
-    assert_conforms(HaplyBench::new(Persona::V35));
-}
-
-#[test]
-fn conforms_with_services_of_3_4() {
-    let _alone = alone();
-    assert_conforms(HaplyBench::new(Persona::V34));
-}
-
-#[test]
-fn conforms_with_services_of_3_1() {
-    let _alone = alone();
-    assert_conforms(HaplyBench::new(Persona::V31));
-}
-
-#[test]
 fn the_origin_is_the_middle_of_the_workspace_where_it_can_be_chosen() {
-    let _alone = alone();
+    let _beside = beside_others();
     for (persona, origin) in [(Persona::V31, MIDDLE), (Persona::V34, MIDDLE), (Persona::V35, DVec3::ZERO)] {
         let service = service(persona);
         let mut device = opened(&service);
@@ -102,7 +84,7 @@ fn limits_tell_the_measured_delay() {
 
 #[test]
 fn lists_what_there_is_and_says_what_to_do() {
-    let _alone = alone();
+    let _beside = beside_others();
     let service = service(Persona::V34);
     service.add_held_arm("0B02", "minverse");
     service.set_condition("0B02", Condition { calibrated: false, ..Condition::default() });
@@ -128,7 +110,7 @@ fn lists_what_there_is_and_says_what_to_do() {
 
 #[test]
 fn what_does_not_answer_as_the_service_does_is_refused_in_time() {
-    let _alone = alone();
+    let _beside = beside_others();
     let service = service(Persona::V35);
     let refused = |expected: &str| {
         let began = Instant::now();
@@ -259,7 +241,7 @@ fn a_connection_is_not_given_up_with_a_force_on_the_motors() {
 /// Wrong types where nothing is needed, and grips that are none, are no faults.
 #[test]
 fn oddities_are_tolerated() {
-    let _alone = alone();
+    let _beside = beside_others();
     let service = service(Persona::V35);
     let mut device = opened(&service);
     for trouble in [
@@ -370,8 +352,8 @@ fn a_service_that_starts_anew_is_found_again() {
 
 /// Through thread, socket and service: hand and wall share the way by their stiffnesses, as two springs in series do.
 #[test]
-fn a_hand_that_presses_on_a_wall_comes_to_rest_where_the_springs_balance() {
-    let _alone = alone();
+fn the_way_into_a_wall_is_where_hand_and_wall_balance() {
+    let _beside = beside_others();
     let service = InverseService::start(&Options { persona: Persona::V34, ..Options::default() }).expect("a free port");
     let (wall, wanted) = (300.0, -0.02 * DVec3::Z);
     let hand = Hand::loose(Wanted::At(wanted));
@@ -397,7 +379,7 @@ fn a_hand_that_presses_on_a_wall_comes_to_rest_where_the_springs_balance() {
 
 #[test]
 fn grips_fall_asleep_and_wake() {
-    let _alone = alone();
+    let _beside = beside_others();
     let service = service(Persona::V34);
     let mut device = opened(&service);
     let turned = glam::DQuat::from_rotation_x(0.3);
@@ -420,7 +402,7 @@ fn grips_fall_asleep_and_wake() {
 #[test]
 fn the_version_is_told_by_http() {
     use std::io::{Read, Write};
-    let _alone = alone();
+    let _beside = beside_others();
     let service = service(Persona::V35);
     let address = service.address();
     let port = address.trim_start_matches("ws://").split('?').next().unwrap();
@@ -429,4 +411,17 @@ fn the_version_is_told_by_http() {
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     assert!(text.starts_with("HTTP/1.1 200 OK") && text.contains("haply-inverse-service"), "{text}");
+}
+
+/// With all releases at the same time: the suite runs again what fails while the machine stalls. Tests
+/// begin in the order of their names: this one and the long ones after it run beside each other.
+#[test]
+fn the_suite_passes_with_services_of_3_1_to_3_5() {
+    let _beside = beside_others();
+    std::thread::scope(|scope| {
+        for persona in [Persona::V31, Persona::V34, Persona::V35] {
+            let named = std::thread::Builder::new().name(format!("service of {}", persona.name()));
+            named.spawn_scoped(scope, move || assert_conforms(HaplyBench::new(persona))).expect("a thread");
+        }
+    });
 }

@@ -1,7 +1,8 @@
 //! VerseGrips: orientation and buttons of the tool that the arm holds.
 //!
-//! The service's messages do not say which grip is paired with which arm. With as many grips as arms the order of both is
-//! taken; a single grip belongs to every arm. An unpaired grip is not refreshed by the arm's commands.
+//! The service's messages do not say which grip is paired with which arm: the order of both is taken, that of grips asleep
+//! included, so that none changes its arm when another falls asleep. A single arm has the only grip that is awake. An unpaired
+//! grip is not refreshed by the arm's commands.
 
 use glam::{DQuat, DVec3};
 use serde_json::Value;
@@ -30,19 +31,29 @@ pub struct Grip {
     pub buttons: Buttons,
 }
 
-/// Grips that are awake, by identity and entry: one that is in two arrays counts once.
-pub fn awake(message: &Value) -> Vec<(String, &Value)> {
-    let mut found: Vec<(String, &Value)> = Vec::new();
-    let all = ARRAYS.iter().filter_map(|array| message.get(array)?.as_array()).flatten();
-    for entry in all {
-        let asleep = ["connected", "awake", "ready"].iter().any(|name| entries::flag(entry, name) == Some(false));
-        let broken = entry.get("status").and_then(|status| status.get("error")?.as_i64()).unwrap_or(0) != 0;
-        let Some(id) = entries::id(entry).filter(|_| !asleep && !broken) else { continue };
-        if found.iter().all(|(known, _)| *known != id) {
-            found.push((id, entry));
+/// Identities of the grips that are awake.
+pub fn awake(message: &Value) -> Vec<String> {
+    all(message).into_iter().filter_map(|(id, entry)| entry.map(|_| id)).collect()
+}
+
+/// All grips by identity, each with its entry if it is awake: one that is in two arrays counts once.
+fn all(message: &Value) -> Vec<(String, Option<&Value>)> {
+    let mut found: Vec<(String, Option<&Value>)> = Vec::new();
+    for entry in ARRAYS.iter().filter_map(|array| message.get(array)?.as_array()).flatten() {
+        let Some(id) = entries::id(entry) else { continue };
+        let entry = Some(entry).filter(|entry| is_awake(entry));
+        match found.iter_mut().find(|(known, _)| *known == id) {
+            Some((_, known)) => *known = known.or(entry),
+            None => found.push((id, entry)),
         }
     }
     found
+}
+
+fn is_awake(entry: &Value) -> bool {
+    let asleep = ["connected", "awake", "ready"].iter().any(|name| entries::flag(entry, name) == Some(false));
+    let error = entry.get("status").and_then(|status| status.get("error")?.as_i64());
+    !asleep && error.unwrap_or(0) == 0
 }
 
 /// The grip of the arm of a rank among all arms.
@@ -51,11 +62,13 @@ pub fn awake(message: &Value) -> Vec<(String, &Value)> {
 /// A number of its orientation that is none. Anything else that is wrong with a grip is as if it were not there: an arm works
 /// without.
 pub fn of_arm(message: &Value, rank: usize) -> Result<Option<Grip>, ReplyFault> {
-    let grips = awake(message);
-    let Some((_, entry)) = grips.get(rank).or(if grips.len() == 1 { grips.first() } else { None }) else {
-        return Ok(None);
+    let grips = all(message);
+    let own = grips.get(rank).and_then(|(_, entry)| *entry);
+    let only = || {
+        let mut awake = grips.iter().filter_map(|(_, entry)| *entry);
+        awake.next().filter(|_| awake.next().is_none() && entries::inverses(message).is_ok_and(|arms| arms.len() == 1))
     };
-    let Some(state) = entry.get("state") else { return Ok(None) };
+    let Some(state) = own.or_else(only).and_then(|entry| entry.get("state")) else { return Ok(None) };
     match numbers::rotation(state.get("orientation")) {
         Ok(orientation) => Ok(Some(Grip { orientation, buttons: buttons(state) })),
         Err(ReplyFault::NotFinite) => Err(ReplyFault::NotFinite),
@@ -137,18 +150,23 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_takes_the_grip_of_its_rank_that_is_awake() {
+    fn an_arm_takes_the_grip_of_its_rank() {
         let wired = json!({"device_id": 7, "status": {"ready": true, "error": 0}, "state": {"button": true, "orientation": quaternion(UNIT)}});
         let asleep = json!({"device_id": "A", "status": {"awake": false}, "state": {"orientation": quaternion(UNIT)}});
         let twice = json!({"device_id": "B", "state": {"buttons": {"b": true}, "orientation": quaternion([0.0, 1.0, 0.0, 0.0])}});
         let message =
             json!({"verse_grip": [wired], "wireless_verse_grip": [asleep, twice], "custom_verse_grip": [twice]});
         let grip = |rank| of_arm(&message, rank).unwrap();
-        assert_eq!(grip(0), Some(Grip { orientation: DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0), buttons: Buttons(2) }));
-        assert_eq!(grip(1), Some(Grip { orientation: DQuat::IDENTITY, buttons: Buttons(1) }));
-        assert_eq!(grip(2), None);
-        let single = json!({"verse_grip": [wired]});
-        assert!(of_arm(&single, 3).unwrap().is_some());
+        // That of the first arm sleeps: it has none, and takes no other's.
+        assert_eq!(grip(0), None);
+        assert_eq!(grip(1), Some(Grip { orientation: DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0), buttons: Buttons(2) }));
+        assert_eq!(grip(2), Some(Grip { orientation: DQuat::IDENTITY, buttons: Buttons(1) }));
+        assert_eq!(grip(3), None);
+        assert_eq!(awake(&message), ["B", "7"]);
+        let single = |arms: Value| json!({"inverse3": arms, "wireless_verse_grip": [asleep], "verse_grip": [wired]});
+        let grip_of_first = |arms| of_arm(&single(arms), 0).unwrap().map(|grip| grip.buttons);
+        assert_eq!(grip_of_first(json!([{}])), Some(Buttons(1)));
+        assert_eq!(grip_of_first(json!([{}, {}])), None);
         let broken =
             json!({"verse_grip": [{"device_id": 1, "state": {"orientation": {"w": null, "x": 0, "y": 0, "z": 0}}}]});
         assert_eq!(of_arm(&broken, 0), Err(ReplyFault::NotFinite));

@@ -88,7 +88,7 @@ impl Snapshot {
         let basis = message.pointer("/session/config/basis/permutation").and_then(Value::as_str);
         Ok(Self {
             arms: arms.iter().enumerate().filter_map(|(rank, entry)| arm(rank, entry)).collect(),
-            grips: grips::awake(&message).into_iter().map(|(id, _)| id).collect(),
+            grips: grips::awake(&message),
             has_session: message.get("session").is_some_and(Value::is_object),
             other_basis: basis.filter(|&basis| basis != "XYZ").map(String::from),
         })

@@ -28,7 +28,7 @@ fn every_flaw_is_found_by_the_check_that_is_about_it() {
         (Flaw::ForceFromNan, "a force that is not a number is none"),
         (Flaw::ForceWithoutLoop, "motors are off when the loop stops writing"),
         (Flaw::ForceAfterClosing, "motors are off when it is closed, and it opens again"),
-        (Flaw::SometimesFaulty, "no tick of thousands is missed"),
+        (Flaw::SometimesFaulty, "no tick of many is missed"),
         (Flaw::SilentWhenUnplugged, "unplugged: no force, and plugged in it works again"),
         (Flaw::Unrecovered, "unplugged: no force, and plugged in it works again"),
         (Flaw::ForceAfterFault, "a driver's error: no force, and then it works again"),

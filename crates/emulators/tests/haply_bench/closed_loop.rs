@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::{ARM, alone, service};
 
 /// Troubles one after another.
-const TROUBLES: usize = 60;
+const TROUBLES: usize = 40;
 /// Ticks of each, and twice as many without.
 const TICKS: usize = 20;
 /// Every so many troubles the loop hangs, for so long.

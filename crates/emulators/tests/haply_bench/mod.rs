@@ -1,9 +1,10 @@
 //! The emulated service as the shared suite wants it.
 
 mod closed_loop;
+mod farewell;
 mod figures;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::Duration;
 
 use glam::DVec3;
@@ -18,12 +19,18 @@ use serde_json::json;
 pub const ARM: &str = "0A01";
 pub const GRIP: &str = "61576";
 
-static ALONE: Mutex<()> = Mutex::new(());
+static MACHINE: RwLock<()> = RwLock::new(());
 
 /// Tests of times run one after another, and on time.
-pub fn alone() -> MutexGuard<'static, ()> {
+pub fn alone() -> RwLockWriteGuard<'static, ()> {
     be_on_time();
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+    MACHINE.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Tests that a few late milliseconds do not fail run beside each other.
+pub fn beside_others() -> RwLockReadGuard<'static, ()> {
+    be_on_time();
+    MACHINE.read().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A service with an arm and a grip.
