@@ -14,8 +14,8 @@ from emulators import inverse_service, library
 VARIABLES = ("PALPATE_HAPLY_ADDRESS", "PALPATE_OPENHAPTICS_LIBRARY", "PALPATE_FORCEDIMENSION_LIBRARY")
 # Above the top of the block, whose corner is the origin: there the middle of the device's workspace lies.
 TABLE = "[[device]]\nposition = [{}, 0.025, 0.056]\n"
-# Of the emulated libraries: down to 4 mm below first touch within 0.3 s.
-PRESS = "0 0 0 5; 0.3 0 0 -4"
+# Of the emulated libraries: down to 8 mm below first touch and up again, every second.
+PRESS = "0 0 0 5; 0.5 0 0 -8; 1 0 0 5"
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def scene(block_green, tmp_path_factory) -> Path:
     return folder / "scene.toml"
 
 
-def run(scene: Path, *devices: str, seconds: float = 1.0, **variables: str) -> subprocess.CompletedProcess[str]:
+def run(scene: Path, *devices: str, seconds: float = 2.0, **variables: str) -> subprocess.CompletedProcess[str]:
     environment = {name: value for name, value in os.environ.items() if name not in VARIABLES}
     options = [option for device in devices for option in ("--device", device)]
     command = [sys.executable, "-m", "palpate", "run", scene.name, "--headless", str(seconds), "--record", "run.mcap"]

@@ -22,8 +22,8 @@ def test_a_device_is_shown_and_its_fault_told(block, block_green):
             await client.say(type="press", tool=0, position=[0.04, 0.025, 0.06], grab=False)
             notice, _ = await client.receive("error")
             assert notice["text"] == "press: tool 0 is moved by Haply Inverse3 0A01"
-            # The pointer has the other one.
-            await client.say(type="press", tool=1, position=[0.06, 0.025, 0.054], grab=False)
+            # The pointer has the other one, and presses deeper than the device bends the block.
+            await client.say(type="press", tool=1, position=[0.06, 0.025, 0.044], grab=False)
             await client.frame_where(lambda header: header["tools"][1]["force"][2] > 0.0)
             process.kill()
             gone, _ = await client.frame_where(lambda header: header["fault"] is not None)
