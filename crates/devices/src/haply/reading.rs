@@ -54,7 +54,7 @@ mod tests {
             })
         };
         json!({
-            "wireless_verse_grip": [{
+            "wireless_verse_grip": [{"device_id": "61575", "status": {"awake": false}}, {
                 "device_id": "61576",
                 "state": {"orientation": {"x": 1, "w": 0, "y": 0, "z": 0}, "buttons": {"a": true, "b": false, "c": true}},
                 "status": {"awake": true, "connected": true, "ready": true},
