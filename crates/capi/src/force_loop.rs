@@ -181,7 +181,7 @@ impl Loop {
                 "the scene changes under the loop's own thread only: call palpate_loop_start first, or make a new loop",
             ));
         };
-        next.settings = next.settings_after(settings, &kept);
+        next.settings = settings.carried_over(&next.settings, &kept);
         // Those of the scene are for loops that are made from now on.
         (next.limits, next.scheduling) = (before.limits, before.scheduling);
         let (mut moved, mut devices) = (Vec::new(), Vec::new());

@@ -7,7 +7,7 @@ use palpate_core::{Error, Result};
 use palpate_devices::simulated::{Handle, Target, simulated};
 use palpate_devices::{Device, DeviceLimits, Mounted, Workspace};
 use palpate_scene::placement;
-use palpate_servo::{SceneChange, Settings, StrainPreparer};
+use palpate_servo::{SceneChange, Settings};
 use pyo3::prelude::*;
 
 use crate::connection::{
@@ -45,11 +45,11 @@ pub fn connect(
         return Err(to_python(py, Error::Invalid(message.into())));
     }
     let model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
-    let (bodies, tools) = (ranks(model.bodies.len()), ranks(model.tools.len()));
+    let kept = kept_of(&ranks(model.bodies.len()), &ranks(model.tools.len()));
     let mut devices: Vec<_> = model.tools.iter().map(|_| None).collect();
     let limits = connected.limits;
     devices[tool] = Some(core.device_of(tool, Some(connected)));
-    core.exchange(py, model, (&bodies, &tools), devices, core.settings)?;
+    core.exchange(py, model, kept, devices, core.settings)?;
     core.device_limits[tool] = limits;
     Ok(())
 }
@@ -120,7 +120,11 @@ pub fn change(
         Ok((Arc::new(model), tools))
     };
     let (model, tools) = py.detach(make).map_err(|e| to_python(py, e))?;
-    let settings = changed_settings(&core.settings, &body_ranks, &tool_ranks, &tools);
+    let (mut fresh, kept) = (Settings::default(), kept_of(&body_ranks, &tool_ranks));
+    for (rank, (_, own)) in tools.iter().enumerate() {
+        (fresh.contact_radius[rank], fresh.friction[rank]) = own.unwrap_or_default();
+    }
+    let settings = core.settings.carried_over(&fresh, &kept);
     let radii = settings.contact_radius[..model.tools.len()].to_vec();
     let checked = py.detach(|| radii.iter().try_for_each(|&radius| model.check_contact_radius(radius)));
     checked.map_err(|e| to_python(py, e))?;
@@ -129,7 +133,7 @@ pub fn change(
         None => Some(core.device_of(usize::MAX, None)),
     });
     let devices: Vec<_> = devices.collect();
-    core.exchange(py, model.clone(), (&body_ranks, &tool_ranks), devices, settings)?;
+    core.exchange(py, model.clone(), kept, devices, settings)?;
     let moved = |rank: &Option<usize>| rank.map_or(DeviceLimits::UNLIMITED, |rank| core.device_limits[rank]);
     core.device_limits = tool_ranks.iter().map(moved).collect();
     let asked = tool_ranks.iter().zip(&model.tools);
@@ -146,28 +150,12 @@ fn ranks(count: usize) -> Ranks {
     (0..count).map(Some).collect()
 }
 
-/// Settings by new ranks; those of new tools are their own.
-fn changed_settings(
-    before: &Settings,
-    bodies: &[Option<usize>],
-    tools: &[Option<usize>],
-    models: &[(ToolModel, Option<(f64, f64)>)],
-) -> Settings {
-    let mut settings = *before;
-    settings.contact_radius = Settings::default().contact_radius;
-    settings.friction = Settings::default().friction;
-    settings.stiffness_scale = Settings::default().stiffness_scale;
-    for (tool, (rank, (_, own))) in tools.iter().zip(models).enumerate() {
-        let kept = rank.map(|rank| (before.contact_radius[rank], before.friction[rank]));
-        (settings.contact_radius[tool], settings.friction[tool]) = kept.or(*own).unwrap_or_default();
-    }
-    for (body, rank) in bodies.iter().enumerate() {
-        rank.iter().for_each(|&rank| settings.stiffness_scale[body] = before.stiffness_scale[rank]);
-    }
-    let new_rank = |old: usize| bodies.iter().position(|&rank| rank == Some(old));
-    settings.watch = before.watch.and_then(|(body, node)| Some((new_rank(body)?, node)));
-    settings.strike.body = new_rank(before.strike.body).unwrap_or(0);
-    settings
+/// By ranks before, in the new order.
+fn kept_of(bodies: &[Option<usize>], tools: &[Option<usize>]) -> Kept {
+    let mut kept = Kept::default();
+    kept.bodies.iter_mut().zip(bodies).for_each(|(to, &rank)| *to = rank);
+    kept.tools.iter_mut().zip(tools).for_each(|(to, &rank)| *to = rank);
+    kept
 }
 
 impl SimulationCore {
@@ -208,23 +196,20 @@ impl SimulationCore {
         Ok(Arc::new(self.model.changed(self.model.bodies.clone(), tools.collect())?))
     }
 
-    /// Takes a model whose bodies and tools were at these ranks, in the loop too if it runs, with devices where they are new.
+    /// Takes a model some of whose bodies and tools were there before, in the loop too if it runs, with devices where they are new.
     fn exchange(
         &mut self,
         py: Python<'_>,
         model: Arc<Model>,
-        (bodies, tools): (&[Option<usize>], &[Option<usize>]),
+        kept: Kept,
         devices: Vec<Option<LoopDevice>>,
         settings: Settings,
     ) -> PyResult<()> {
-        let mut kept = Kept::default();
-        kept.bodies.iter_mut().zip(bodies).for_each(|(to, &rank)| *to = rank);
-        kept.tools.iter_mut().zip(tools).for_each(|(to, &rank)| *to = rank);
+        let tools = &kept.tools[..model.tools.len()];
         let strain = self.strain.changed(&model, &kept);
         let (handles, devices): (Vec<_>, Vec<_>) =
             devices.into_iter().map(|new| new.map_or((None, None), |new| (Some(new.handle), Some(new.device)))).unzip();
-        let change =
-            SceneChange { model: model.clone(), kept, devices, settings, strain: StrainPreparer::clone(&strain) };
+        let change = SceneChange { model: model.clone(), kept, devices, settings, strain: strain.clone() };
         if let Some(servo) = self.servo() {
             py.detach(|| servo.change(change)).map_err(|e| to_python(py, e))?;
             let mut before: Vec<_> = std::mem::take(&mut self.handles).into_iter().map(Some).collect();

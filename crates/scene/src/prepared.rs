@@ -103,22 +103,6 @@ impl Scene {
 }
 
 impl Prepared {
-    /// Settings of a loop that ran with `settings` until this came in: what was changed of tools and bodies that stay is kept.
-    pub fn settings_after(&self, settings: &Settings, kept: &Kept) -> Settings {
-        let mut now = Settings { watch: None, ..*settings };
-        now.strike.body = 0;
-        for (rank, old) in kept.tools.iter().enumerate() {
-            let of = |from: &Settings, rank: usize| (from.contact_radius[rank], from.friction[rank]);
-            (now.contact_radius[rank], now.friction[rank]) =
-                old.map_or_else(|| of(&self.settings, rank), |old| of(settings, old));
-        }
-        for (rank, old) in kept.bodies.iter().enumerate() {
-            now.stiffness_scale[rank] =
-                old.map_or(self.settings.stiffness_scale[rank], |old| settings.stiffness_scale[old]);
-        }
-        now
-    }
-
     /// Rank of a body.
     pub fn rank_of_body(&self, id: BodyId) -> Option<usize> {
         self.bodies.iter().position(|other| *other == id)

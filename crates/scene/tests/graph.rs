@@ -60,7 +60,7 @@ fn a_change_keeps_bodies_tools_and_what_was_set_of_them() {
     let (next, kept) = scene.prepare_change(&before).expect("a scene");
     assert!(next.model.bodies[0].is_same(&before.model.bodies[1]) && next.model.bodies[0].placement == moved);
     assert_eq!((kept.bodies[0], kept.tools[0], kept.tools[1]), (Some(1), before.rank_of_tool(old), None));
-    let now = next.settings_after(&settings, &kept);
+    let now = settings.carried_over(&next.settings, &kept);
     assert_eq!((now.friction[..2].to_vec(), now.stiffness_scale[0]), (vec![0.7, 0.2], 2.0));
 }
 

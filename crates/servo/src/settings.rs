@@ -1,6 +1,6 @@
 //! What may be changed while the loop runs.
 
-use palpate_core::simulation::{Controls, MAX_BODIES, MAX_TOOLS, Model, Strike};
+use palpate_core::simulation::{Controls, Kept, MAX_BODIES, MAX_TOOLS, Model, Strike};
 use palpate_core::{Error, Result};
 
 /// What the frame side may change while the loop runs.
@@ -70,6 +70,23 @@ impl Settings {
         }
         check_body(model, self.strike.body, "strike")?;
         self.watch.map_or(Ok(()), |(body, node)| check_node(model, body, node))
+    }
+
+    /// What goes on where a scene changes: of bodies and tools that stay what they have, of new ones that of `fresh`.
+    pub fn carried_over(&self, fresh: &Settings, kept: &Kept) -> Settings {
+        let mut now = *self;
+        for (rank, old) in kept.tools.iter().enumerate() {
+            let (of, old) = old.map_or((fresh, rank), |old| (self, old));
+            (now.contact_radius[rank], now.friction[rank]) = (of.contact_radius[old], of.friction[old]);
+        }
+        for (rank, old) in kept.bodies.iter().enumerate() {
+            let (of, old) = old.map_or((fresh, rank), |old| (self, old));
+            now.stiffness_scale[rank] = of.stiffness_scale[old];
+        }
+        let new_rank = |old: usize| kept.bodies.iter().position(|&rank| rank == Some(old));
+        now.watch = self.watch.and_then(|(body, node)| Some((new_rank(body)?, node)));
+        now.strike.body = new_rank(self.strike.body).unwrap_or(0);
+        now
     }
 
     /// What a tick makes of them, given those of the tick before; the strain of some bodies cannot be limited.
