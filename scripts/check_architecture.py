@@ -35,7 +35,7 @@ FORBIDDEN = {
 # all of them, the package itself, which exports the public names, where its name stands.
 PYTHON_ORDER = (
     *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation", "palpation"),
-    "sessions",
+    *("sessions", "study"),
     *("palpate", "viewer", "validation/plots", "exam", "validation/verify", "validation/bench", "validation/doctor"),
     "cli",
 )

@@ -11,6 +11,7 @@ from palpate.devices import Device, DeviceLimits, Reading
 from palpate.dynamics import Energy, ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.errors import (
     BodyError,
+    ClusterError,
     DeviceError,
     DeviceWarning,
     Error,
@@ -54,6 +55,7 @@ __all__ = [
     "Answer",
     "Body",
     "BodyError",
+    "ClusterError",
     "Comparison",
     "Contact",
     "Device",

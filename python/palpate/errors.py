@@ -60,6 +60,10 @@ class DeviceError(Error):
     """A haptic device that cannot be found or opened, or a device of a program that does not do what it says."""
 
 
+class ClusterError(Error):
+    """Workers that cannot be reached or used, or a computation that they did not finish."""
+
+
 class PalpateWarning(UserWarning):
     """Base of everything Palpate warns of: the answer stands, but not as well as asked."""
 

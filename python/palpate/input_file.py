@@ -1,10 +1,17 @@
-"""The one check of a file that is to be read."""
+"""The one check of a file that is to be read, and the one reader of TOML."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import Any
 
 from palpate.errors import Error
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 
 def require_file(path: Path, error: type[Error]) -> None:
@@ -23,6 +30,23 @@ def require_file(path: Path, error: type[Error]) -> None:
         raise error(f"{path}: no such file" + (f"; there is {near.name}" if near else ""))
     if path.is_file() and path.stat().st_size == 0:
         raise error(f"{path}: the file is empty")
+
+
+def read_toml(path: Path, error: type[Error]) -> tuple[str, dict[str, Any]]:
+    """Text of a TOML file, for the lines of mistakes in it, and its tables.
+
+    Raises
+    ------
+    Error
+        Of the class ``error``: not a file that can be read, or not TOML.
+
+    """
+    require_file(path, error)
+    text = path.read_text(errors="replace")
+    try:
+        return text, tomllib.loads(text)
+    except tomllib.TOMLDecodeError as mistake:
+        raise error(f"{path}: {mistake}") from None
 
 
 def require_writable(path: Path, error: type[Error]) -> None:

@@ -7,13 +7,22 @@ import sys
 from collections.abc import Callable, Iterator
 
 
+class Reporter:
+    """Is called with what is done and all there is to do; ``phase`` is told what is being done."""
+
+    def __init__(self, told: Callable[[int, int], None], phase: Callable[[str], None]):
+        self._told, self.phase = told, phase
+
+    def __call__(self, done: int, total: int) -> None:
+        """Tell how far it is."""
+        self._told(done, total)
+
+
 @contextlib.contextmanager
-def progress_reporter(
-    title: str, progress: bool | Callable[[int, int], None]
-) -> Iterator[Callable[[int, int], None] | None]:
-    """Yield a function of (done, total), or None where nobody watches."""
+def progress_reporter(title: str, progress: bool | Callable[[int, int], None]) -> Iterator[Reporter | None]:
+    """Yield who is told of the progress, or None where nobody watches."""
     if callable(progress):
-        yield progress
+        yield Reporter(progress, lambda _: None)
         return
     if not progress or not sys.stderr.isatty():
         yield None
@@ -24,7 +33,10 @@ def progress_reporter(
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        yield Reporter(
+            lambda done, total: bar.update(task, completed=done, total=total),
+            lambda phase: bar.update(task, description=f"{title}: {phase}"),
+        )
 
 
 @contextlib.contextmanager

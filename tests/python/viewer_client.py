@@ -11,12 +11,20 @@ import numpy as np
 from websockets.asyncio.client import connect
 
 from palpate.viewer import messages
+from palpate.viewer.pose_code import PoseCoder, PoseReader
 from palpate.viewer.server import ViewerServer
+from palpate.viewer.session import Session, Wants
 
 # Frames come as fast as a busy machine lets them: a wait ends by what they hold, and fails only after this time, s.
 PATIENCE = 60.0
 # So far apart forces are compared, in ticks of the loop, which may be late too.
 TICKS_APART = 15
+
+
+def frame_of(session: Session, wants: Wants) -> tuple[dict, dict[str, np.ndarray]]:
+    """Header and arrays of a frame that a new client gets."""
+    header, arrays = messages.decode(session.frame_message(1, (0, 0), wants, PoseCoder())[0])
+    return header, PoseReader().read(header, arrays)
 
 
 class Page:
@@ -25,6 +33,7 @@ class Page:
     def __init__(self, server: ViewerServer, socket):
         self.server, self.socket = server, socket
         self.texts: list[dict] = []
+        self.poses = PoseReader()
 
     async def say(self, **message):
         await self.socket.send(json.dumps(message))
@@ -38,6 +47,7 @@ class Page:
                 if isinstance(raw, bytes):
                     header, arrays = messages.decode(raw)
                     if header["type"] == "frame":
+                        arrays = self.poses.read(header, arrays)
                         await self.say(type="ack", frame=header["frame"])
                 else:
                     header, arrays = json.loads(raw), {}

@@ -32,6 +32,9 @@ export const TILT_MAX = 90;
 export const NO_INSIDE =
   "A store holds the surface of a body only: what is inside is not in the file. Open the scene or the mesh that it was made from to cut it open.";
 
+/** Why a large body is not. */
+const TOO_LARGE_TO_CUT = "A body that is drawn by fewer triangles than its surface has is not cut open.";
+
 export class Control {
   private changedMs = -Infinity;
   private readonly limits = new Map<string, { limit: RateLimit; message: ClientMessage }>();
@@ -55,6 +58,8 @@ export class Control {
         return this.store.update({ recorded: message });
       case "exam":
         return this.takeExam(message);
+      case "computed":
+        return this.store.update({ computed: message });
       case "error":
         this.store.update({ answering: false });
         return this.notice(message.text);
@@ -82,6 +87,7 @@ export class Control {
       },
       frame: null,
       answering: false,
+      ...(before?.name === scene.name ? {} : { paintTool: null, strokes: [], asked: [] }),
       postures: scene.tools.map(posture),
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,
@@ -127,7 +133,7 @@ export class Control {
     if (exam) return;
     const on = !layers[layer];
     if (layer === "cutaway") {
-      if (on && !(scene && hasInside(scene))) return this.notice(NO_INSIDE);
+      if (on && !(scene && hasInside(scene))) return this.notice(whyWhole(scene));
       this.send({ type: "cutaway", on });
     }
     this.store.update({ layers: { ...layers, [layer]: on } });
@@ -403,5 +409,10 @@ export function firstPosture(shape: ShapeName): Posture {
 
 /** Whether any body can be cut open. */
 export function hasInside(scene: SceneMessage): boolean {
-  return scene.bodies.some(({ tets }) => tets > 0);
+  return scene.bodies.some(({ tets, drawn }) => tets > 0 && !drawn);
+}
+
+/** Why no body can. */
+export function whyWhole(scene: SceneMessage | null): string {
+  return scene?.bodies.some(({ drawn }) => drawn) ? TOO_LARGE_TO_CUT : NO_INSIDE;
 }

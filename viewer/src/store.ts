@@ -2,6 +2,7 @@
 // it, change it by `update`, and hear of changes of the keys they name.
 
 import type { ConnectionState } from "./net/connection";
+import type { ComputedMessage } from "./net/computed_messages";
 import type { RecordedMessage } from "./net/session_messages";
 import type {
   Choice,
@@ -20,6 +21,10 @@ export type Layer = "colors" | "wireframe" | "supports" | "cutaway" | "plots";
 export type Coloring = "field" | "region" | "material";
 export type Theme = "dark" | "light";
 export type Tab = "motion" | "force" | "loop" | "modes";
+/** What the pointer marks nodes of the surface by. */
+export type PaintTool = "brush" | "lasso";
+/** Nodes of the surface of each body that one stroke has marked. */
+export type Stroke = readonly Uint32Array[];
 /** Displacements may be drawn so many times as large as they are. */
 export const SHOWN_SCALE_MAX = 10;
 /** A cut takes away this share of the extent at first. */
@@ -54,6 +59,8 @@ export interface State {
   notices: readonly string[];
   /** The recording that ended last, until it is dismissed. */
   recorded: RecordedMessage | null;
+  /** How far the columns of the bodies are; null before the server has told. */
+  computed: ComputedMessage | null;
   /** null where nothing is examined. */
   exam: ExamMessage | null;
   /** Whether an answer is on its way: the next body is not there yet. */
@@ -73,6 +80,13 @@ export interface State {
   /** The body that stiffness and legend belong to. */
   body: number;
   tab: Tab;
+
+  /** What the pointer paints with; null where it presses. Radius of the brush, pixels. */
+  paintTool: PaintTool | null;
+  brushRadius: number;
+  /** What is painted and not asked for yet, and which nodes of each body have been asked for by this page. */
+  strokes: readonly Stroke[];
+  asked: readonly ReadonlySet<number>[];
 
   /** Whether a press holds on to the surface; whether a click strikes; the impulse of a strike, N s. */
   grab: boolean;
@@ -109,6 +123,7 @@ export function initialState(): State {
     frame: null,
     notices: [],
     recorded: null,
+    computed: null,
     exam: null,
     answering: false,
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
@@ -120,6 +135,10 @@ export function initialState(): State {
     theme: "dark",
     body: 0,
     tab: "force",
+    paintTool: null,
+    brushRadius: 24,
+    strokes: [],
+    asked: [],
     grab: false,
     strike: false,
     impulse: 0,

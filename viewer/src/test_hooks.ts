@@ -31,6 +31,8 @@ export interface ViewerState {
   frames: number;
   frameNumber: number;
   framesPerSecond: number;
+  /** Spent on all frames so far, by part, ms. */
+  tookMs: { read: number; move: number };
   pointerEvents: number;
   ticks: number;
   strain: number;
@@ -105,6 +107,7 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     frames: statistics.frames,
     frameNumber: frame?.frame ?? 0,
     framesPerSecond: statistics.framesPerSecond,
+    tookMs: statistics.tookMs,
     pointerEvents: pointer.events,
     ticks: frame?.ticks ?? 0,
     strain: frame?.strain ?? 0,

@@ -1,13 +1,16 @@
 // The page put together: what arrives is kept until the next drawing, drawn, and acknowledged.
 
 import { Control } from "./control";
+import { PaintPointer } from "./input/paint_pointer";
 import { Pointer } from "./input/pointer";
 import { listenToKeys } from "./input/keyboard";
 import { TouchPan } from "./input/touch_pan";
 import { Connection } from "./net/connection";
 import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
-import type { FrameData, SceneData } from "./net/protocol";
+import { PoseReader } from "./net/poses";
+import type { FrameData, PosedFrame, SceneData } from "./net/protocol";
+import { Painting } from "./painting";
 import { Stage } from "./scene/stage";
 import { sidesOf } from "./scene/surface";
 import { Viewport } from "./scene/viewport";
@@ -20,6 +23,8 @@ import { showHint } from "./ui/hint";
 import { Legend } from "./ui/legend";
 import { MotionPanel } from "./ui/motion_panel";
 import { followNotices } from "./ui/notices";
+import { PaintMarks } from "./ui/paint_overlay";
+import { PaintPanel } from "./ui/paint_panel";
 import { Panel } from "./ui/panel";
 import { Plots } from "./ui/plots";
 import { RecordButton } from "./ui/record_button";
@@ -38,9 +43,11 @@ export class Viewer {
   private readonly store = new Store();
   private readonly connection: Connection;
   private readonly frames = new FrameQueue((frame) => this.connection.send({ type: "ack", frame }));
+  private readonly poses = new PoseReader();
   private readonly control = new Control(this.store, (message) => this.connection.send(message));
   private readonly stage: Stage;
   private readonly plots: Plots;
+  private readonly statistics: Statistics;
   private firstStrike = 0;
 
   constructor(token: string) {
@@ -50,7 +57,7 @@ export class Viewer {
       onState: (state) => this.takeConnection(state),
       onText: (message) => control.takeText(message),
       onScene: (scene) => this.takeScene(scene),
-      onFrame: (frame) => this.frames.push(frame),
+      onFrame: (frame) => this.takeFrame(frame),
       onUnreadable: (reason) => control.notice(`A message could not be read: ${reason}`),
     });
     const viewport = new Viewport(
@@ -60,13 +67,16 @@ export class Viewer {
       () => this.frames.answer(),
     );
     this.stage = new Stage(viewport, store);
+    const painting = new Painting(store, (message) => this.connection.send(message));
+    // Before the pointer that presses.
+    new PaintPointer(this.stage, store, painting, new PaintMarks());
     const pointer = new Pointer(this.stage, store, control);
     new TouchPan(viewport);
-    listenToKeys(control, viewport, toggleHelp);
+    listenToKeys(control, painting, viewport, toggleHelp);
     // Before what reads its colours.
     followTheme(store, control);
     this.plots = new Plots(store);
-    const statistics = new Statistics(store);
+    this.statistics = new Statistics(store);
     new Readout(store);
     new Legend(store, control);
     new ScaleView(viewport, store);
@@ -74,11 +84,12 @@ export class Viewer {
     new SettingsPanel(store, control);
     new ToolPanel(store, control);
     new MotionPanel(store, control);
+    new PaintPanel(store, painting);
     new RecordButton(store, control);
     new TimeLine(store, control);
     new ExamPanel(store, control);
     followNotices(store, control);
-    installTestHooks({ store, stage: this.stage, pointer, statistics, history: this.plots.history });
+    installTestHooks({ store, stage: this.stage, pointer, statistics: this.statistics, history: this.plots.history });
   }
 
   start(): void {
@@ -110,13 +121,21 @@ export class Viewer {
     this.firstStrike = window.setTimeout(() => this.control.repeatStrike(), FIRST_STRIKE_MS);
   }
 
+  /** A frame that differs from one that is not known is left out, and the next one asked for as a whole. */
+  private takeFrame(frame: FrameData): void {
+    const { frame: number, poses } = frame.header;
+    const bodies = this.statistics.timed("read", () => this.poses.read(number, poses, frame.bodies));
+    if (bodies) this.frames.push({ ...frame, bodies });
+    else this.connection.send({ type: "ack", frame: number, whole: true });
+  }
+
   /** Takes in what has arrived since the last drawing: all of the log, and the newest frame. Tells whether the picture changes. */
   private takeFrames(): boolean {
-    const frames: FrameData[] = this.frames.take();
+    const frames: PosedFrame[] = this.frames.take();
     const newest = frames.at(-1);
     if (!newest) return false;
     for (const frame of frames) this.plots.append(frame);
-    const changed = this.stage.update(newest);
+    const changed = this.statistics.timed("move", () => this.stage.update(newest));
     this.control.takeFrame(newest.header);
     return changed;
   }

@@ -85,22 +85,32 @@ pub fn assume_devices(py: Python<'_>, core: &mut SimulationCore, limits: Vec<Lim
 }
 
 /// Takes other bodies and tools: those that stay by their ranks, others in order; all bodies with their places. Devices of
-/// new tools are simulated. The loop goes on if it runs.
+/// new tools are simulated. The loop goes on if it runs. A body that stays may come with another store of the same surface,
+/// in `exchanged` by its rank.
 #[pyfunction]
+#[pyo3(signature = (core, bodies, tools, exchanged=None))]
 pub fn change(
     py: Python<'_>,
     core: &mut SimulationCore,
     bodies: (Ranks, Vec<BodyArguments<'_>>, Places),
     tools: (Ranks, Vec<ToolArguments>),
+    exchanged: Option<(usize, BodyArguments<'_>)>,
 ) -> PyResult<()> {
     let ((body_ranks, new_bodies, places), (tool_ranks, new_tools)) = (bodies, tools);
     let parts = new_bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
+    let exchanged = exchanged.map(|(rank, body)| PyResult::Ok((rank, scene_body(&body)?))).transpose()?;
     let before = core.model.clone();
     let make = || -> Result<_> {
         let mut built = parts.into_iter().map(|part| part.model());
         let mut made = new_tools.into_iter().map(tool);
+        let mut exchanged = exchanged.map(|(rank, part)| Ok::<_, Error>((rank, part.model()?))).transpose()?;
         let bodies = body_ranks.iter().zip(places).map(|(rank, place)| {
             let body: BodyModel = match rank {
+                Some(rank) if exchanged.as_ref().is_some_and(|(of, _)| of == rank) => {
+                    let body = exchanged.take().map(|(_, body)| body).ok_or_else(missing)?;
+                    same_surface(before.bodies.get(*rank).ok_or_else(missing)?, &body)?;
+                    body
+                }
                 Some(rank) => before.bodies.get(*rank).cloned().ok_or_else(missing)?,
                 None => built.next().ok_or_else(missing)??,
             };
@@ -139,6 +149,15 @@ pub fn change(
     let asked = tool_ranks.iter().zip(&model.tools);
     core.asked = asked.map(|(rank, new)| rank.map_or_else(|| new.clone(), |rank| core.asked[rank].clone())).collect();
     Ok(())
+}
+
+/// Refuses a store of another surface.
+fn same_surface(one: &BodyModel, other: &BodyModel) -> Result<()> {
+    let (one, other) = (one.green(), other.green());
+    if one.surface_nodes == other.surface_nodes && one.surface.positions == other.surface.positions {
+        return Ok(());
+    }
+    Err(Error::Invalid("the other store is not of the same body: its surface differs".into()))
 }
 
 fn missing() -> Error {

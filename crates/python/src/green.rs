@@ -1,15 +1,14 @@
 //! The Green's function: precompute, store, answers.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Duration;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::fem::Supports;
 use palpate_core::green::{
-    Found, GreensFunction, Plan, Precision, Problem, Target, Wanted, plan, precompute, precompute_to,
+    Found, GreensFunction, Growth, Phase, Plan, Precision, Problem, Target, Wanted, plan, precompute, precompute_to,
 };
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, capacitance, contact};
@@ -18,6 +17,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::body::{self, indices, materials, vectors};
 use crate::errors::to_python;
+use crate::watched::{run_watched, run_watched_and};
 
 /// A Green's function in memory, or in memory and its store.
 #[pyclass(frozen, module = "palpate._native")]
@@ -27,7 +27,7 @@ pub struct GreenCore {
 
 /// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_faces, touch, loads)`;
 /// `loads` (3n) in N, empty for none.
-fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
+pub(crate) fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
     type Arguments<'py> = (
         PyReadonlyArray2<'py, f64>,
         PyReadonlyArray2<'py, u32>,
@@ -62,7 +62,7 @@ fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
 }
 
 /// The format of a name, if one is named.
-fn named(py: Python<'_>, name: Option<&str>) -> PyResult<Option<Precision>> {
+pub(crate) fn named(py: Python<'_>, name: Option<&str>) -> PyResult<Option<Precision>> {
     name.map(|name| precision(py, name)).transpose()
 }
 
@@ -118,6 +118,7 @@ impl GreenCore {
         let problem = problem(arguments)?;
         let precision = precision(py, precision_name)?;
         let total = 3 * problem.touch.len();
+        crate::allocator::return_large_blocks();
         let mut green = run_watched(py, total, progress.as_ref(), |note| precompute(&problem, precision, note))?;
         green.description = description;
         Ok(Self { green: Arc::new(green) })
@@ -126,8 +127,12 @@ impl GreenCore {
     /// Solves the reference problem into a file within `memory` bytes, going on where an interrupted computation of the
     /// same thing stopped. Returns how many columns it had finished, and whether something else was thrown away. Without a
     /// name of the format it is the cheapest whose typical contacts are right to `within`.
+    ///
+    /// `growth` is `(first, next, ready)`: ranks of the surface nodes that are computed first, a function that gives those
+    /// to come next or `None`, and one that is told of each store on the way by its number of touchable nodes.
+    /// `phase` is told the name of each phase as it begins.
     #[staticmethod]
-    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None))]
+    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None, growth=None, phase=None))]
     #[allow(clippy::too_many_arguments)] // one call of one caller
     fn precompute_to(
         py: Python<'_>,
@@ -138,14 +143,42 @@ impl GreenCore {
         progress: Option<Py<PyAny>>,
         path: PathBuf,
         memory: Option<usize>,
+        growth: Option<(PyReadonlyArray1<'_, u32>, Py<PyAny>, Py<PyAny>)>,
+        phase: Option<Py<PyAny>>,
     ) -> PyResult<(usize, bool)> {
         let problem = problem(arguments)?;
         let precision = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
         let total = 3 * problem.touch.len();
-        let target = Target { path: &path, precision, memory, description };
-        let found = run_watched(py, total, progress.as_ref(), |note| {
+        let phase = |begun: Phase| {
+            if let Some(phase) = &phase {
+                // What it raises is for nobody: a computation does not end because its name cannot be shown.
+                drop(Python::attach(|py| phase.call1(py, (begun.name(),))));
+            }
+        };
+        let target = Target { path: &path, precision, memory, description, phase: &phase };
+        let (first, next, ready) = match growth {
+            Some((first, next, ready)) => (indices(&first), Some(next), Some(ready)),
+            None => (Vec::new(), None, None),
+        };
+        let (asked, written) = (Mutex::new(Vec::new()), AtomicUsize::new(0));
+        let lock = || asked.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut meanwhile = || -> PyResult<()> {
+            if let Some(next) = &next {
+                let nodes: Option<Vec<u32>> = next.call0(py)?.extract(py)?;
+                lock().extend(nodes.unwrap_or_default());
+            }
+            match (written.swap(0, Ordering::Relaxed), &ready) {
+                (0, _) | (_, None) => Ok(()),
+                (nodes, Some(ready)) => ready.call1(py, (nodes,)).map(|_| ()),
+            }
+        };
+        crate::allocator::return_large_blocks();
+        let found = run_watched_and(py, total, progress.as_ref(), &mut meanwhile, |note| {
+            let next = || Some(std::mem::take(&mut *lock())).filter(|nodes| !nodes.is_empty());
+            let ready = |nodes| written.store(nodes, Ordering::Relaxed);
+            let growth = Growth { first: &first, next: &next, ready: &ready };
             let mut found = Found::default();
-            precompute_to(&problem, &target, &mut |f| found = f, note)?;
+            precompute_to(&problem, &target, &growth, &mut |f| found = f, note)?;
             Ok(found)
         })?;
         Ok((found.resumed, found.discarded))
@@ -224,8 +257,12 @@ impl GreenCore {
 
     /// Whether a contact of this radius, m, can be weighed everywhere on the surface.
     fn accepts_contact_radius(&self, py: Python<'_>, radius: f64) -> bool {
-        let surface = &self.green.surface;
-        py.detach(|| contact::PatchGeometry::new(surface).check_radius(surface, radius).is_ok())
+        py.detach(|| contact::PatchGeometry::new(&self.green.surface).check_radius(&self.green, radius).is_ok())
+    }
+
+    /// Largest contact radius up to `limit`, m, that can be weighed everywhere, to about a hundredth.
+    fn largest_contact_radius(&self, py: Python<'_>, limit: f64) -> f64 {
+        py.detach(|| palpate_scene::largest_contact_radius(&self.green, limit))
     }
 
     /// One entry of the operator.
@@ -324,6 +361,12 @@ impl GreenCore {
     }
 }
 
+/// Multiplies matrices so many times on every thread, in single precision or in double; the operations that took.
+#[pyfunction]
+pub(crate) fn products(py: Python<'_>, single: bool, count: usize) -> f64 {
+    py.detach(|| palpate_core::green::products(single, count))
+}
+
 fn plan_dict<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("precision", plan.precision.name())?;
@@ -339,52 +382,4 @@ fn plan_dict<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> 
     dict.set_item("memory", plan.memory)?;
     dict.set_item("store", plan.store)?;
     Ok(dict)
-}
-
-/// Runs some long work on its own thread, while this one reports progress and listens for Ctrl-C. The work calls the
-/// function it is given with what is done and all there is to do, and stops when that returns false.
-fn run_watched<Made: Send>(
-    py: Python<'_>,
-    total: usize,
-    progress: Option<&Py<PyAny>>,
-    work: impl FnOnce(&(dyn Fn(usize, usize) -> bool + Sync)) -> Result<Made> + Send,
-) -> PyResult<Made> {
-    let (done, total) = (AtomicUsize::new(0), AtomicUsize::new(total));
-    let stop = AtomicBool::new(false);
-    let note = |finished: usize, all: usize| {
-        done.fetch_max(finished, Ordering::Relaxed);
-        total.store(all, Ordering::Relaxed);
-        !stop.load(Ordering::Relaxed)
-    };
-    std::thread::scope(|scope| {
-        let worker = scope.spawn(|| work(&note));
-        while !worker.is_finished() {
-            py.detach(|| wait_a_little(&worker));
-            let report = || match progress {
-                Some(callback) => {
-                    callback.call1(py, (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed))).map(|_| ())
-                }
-                None => Ok(()),
-            };
-            if let Err(error) = py.check_signals().and_then(|()| report()) {
-                stop.store(true, Ordering::Relaxed);
-                let _ = py.detach(|| worker.join());
-                return Err(error);
-            }
-        }
-        match worker.join() {
-            Ok(result) => result.map_err(|e| to_python(py, e)),
-            Err(_) => Err(to_python(py, Error::Invalid("the precomputation failed unexpectedly".into()))),
-        }
-    })
-}
-
-/// Up to a tenth of a second, less when the worker ends.
-fn wait_a_little<T>(worker: &std::thread::ScopedJoinHandle<'_, T>) {
-    for _ in 0..20 {
-        if worker.is_finished() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
 }

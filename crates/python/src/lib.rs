@@ -1,10 +1,13 @@
 //! `palpate._native`: the numerical core for Python. Arguments are checked arrays; the Python package names things for
 //! people. The interpreter lock is released in everything long.
 
+mod allocator;
 mod body;
 mod changes;
+mod columns;
 mod connection;
 mod devices;
+mod drawing;
 mod dynamics;
 mod emulated;
 mod errors;
@@ -18,6 +21,7 @@ mod scene;
 mod simulation;
 mod strain;
 mod surface;
+mod watched;
 
 use pyo3::prelude::*;
 
@@ -26,6 +30,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
+    module.add_function(wrap_pyfunction!(green::products, module)?)?;
     module.add_function(wrap_pyfunction!(body::mass, module)?)?;
     module.add_function(wrap_pyfunction!(body::determinant_ranges, module)?)?;
     module.add_function(wrap_pyfunction!(body::volumes, module)?)?;
@@ -39,6 +44,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<dynamics::DirectMotion>()?;
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
+    module.add_class::<columns::ColumnJob>()?;
+    module.add_class::<columns::ColumnLayout>()?;
+    module.add_class::<columns::ColumnStore>()?;
     module.add_class::<simulation::SimulationCore>()?;
     module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
     module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
@@ -57,6 +65,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;
     module.add_class::<surface::SurfaceSearch>()?;
+    module.add_function(wrap_pyfunction!(drawing::simplified, module)?)?;
     module.add_class::<strain::StrainMeasure>()?;
     module.add_class::<strain::StrainResponse>()?;
     module.add_function(wrap_pyfunction!(scene::checksum, module)?)?;

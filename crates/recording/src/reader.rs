@@ -115,6 +115,9 @@ fn decoded<T: for<'a> Deserialize<'a>>(data: &[u8]) -> std::result::Result<T, St
     decoded.map(|(message, _)| message)
 }
 
+/// Longest record that is believed, bytes; ours are chunks of some megabytes. A damaged length would be allocated.
+const LONGEST_RECORD: usize = 256 << 20;
+
 /// All records, out of their chunks.
 struct Records<R> {
     read: R,
@@ -125,7 +128,10 @@ struct Records<R> {
 
 impl<R: Read> Records<R> {
     fn new(read: R) -> Self {
-        let options = LinearReaderOptions::default().with_skip_end_magic(true).with_prevalidate_chunk_crcs(true);
+        let options = LinearReaderOptions::default()
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LONGEST_RECORD);
         Self { read, reader: LinearReader::new_with_options(options), cut: false }
     }
 

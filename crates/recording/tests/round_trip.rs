@@ -132,6 +132,22 @@ fn a_file_that_was_cut_gives_all_up_to_there() {
     }
 }
 
+/// The length of a record is read before any checksum can be: one of 2^56 bytes is an error, not an allocation.
+#[test]
+fn a_damaged_length_is_found() {
+    let mut bytes = written(&records(), TICKS);
+    let (magic, chunk) = (8, 6);
+    let mut at = magic;
+    let length = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("eight bytes"));
+    while bytes[at] != chunk {
+        at += 9 + length(&bytes, at) as usize;
+    }
+    bytes[at + 8] ^= 1;
+    let again = of_bytes(&bytes).expect("the beginning is whole").collect::<palpate_core::Result<Vec<_>>>();
+    let error = again.expect_err("a length beyond all memory").to_string();
+    assert!(error.starts_with("the recording is damaged: "), "{error}");
+}
+
 /// A bit that has changed is found, or it was none of a tick's.
 #[test]
 fn damage_is_found() {

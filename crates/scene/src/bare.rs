@@ -57,7 +57,7 @@ pub fn suiting_radius(green: &GreensFunction) -> f64 {
 /// Largest contact radius up to `limit`, m, that can be weighed everywhere on a body, to about a hundredth.
 pub fn largest_contact_radius(green: &GreensFunction, limit: f64) -> f64 {
     let geometry = PatchGeometry::new(&green.surface);
-    let accepted = |radius: f64| geometry.check_radius(&green.surface, radius).is_ok();
+    let accepted = |radius: f64| geometry.check_radius(green, radius).is_ok();
     let (mut low, mut high) = (0.0, limit);
     if accepted(high) {
         return high;

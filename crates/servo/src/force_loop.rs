@@ -227,7 +227,7 @@ impl ForceLoop {
             *tool = tool.filter(|&old| *keeps && old < before.devices.len());
         }
         let kept = &kept;
-        self.state.take_over(&mut before.state, kept);
+        self.state.take_over(&mut before.state, kept, &self.model);
         let moves = self.model.bodies.iter().any(|body| body.moves());
         for (tool, old) in kept.tools.iter().enumerate() {
             let Some(old) = *old else { continue };

@@ -8,16 +8,19 @@ from palpate.body.moduli import moduli_of_store, surface_moduli
 from palpate.body.predicate import parse
 from palpate.body.problem import description, problem_arrays
 from palpate.body.supports import Fixed
+from palpate.body.surface_region import SurfaceRegion, surface_region
 
 __all__ = [
     "Body",
     "Fixed",
     "Loads",
     "Material",
+    "SurfaceRegion",
     "description",
     "free_end",
     "moduli_of_store",
     "parse",
     "problem_arrays",
     "surface_moduli",
+    "surface_region",
 ]

@@ -11,9 +11,11 @@ from palpate.cli import (  # noqa: F401  they register their commands
     palpating,
     recordings,
     running,
+    scaling,
     session_bench,
     sessions,
     stability,
+    studying,
     verification,
 )
 from palpate.cli.app import main

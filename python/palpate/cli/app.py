@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from palpate.cli.bodies import ElementChoice, MaxSize, Repair, Unit, body_of, in_unit, is_surface, read_any
+from palpate.cli.bodies import Dask, ElementChoice, MaxSize, Repair, Unit, body_of, in_unit, is_surface, read_any
 from palpate.cli.completion import precisions, units
 
 if TYPE_CHECKING:
@@ -107,36 +107,54 @@ def precompute(
             autocompletion=precisions,
         ),
     ] = None,
-    touch: Annotated[str | None, typer.Option(help="Touchable surface nodes, such as 'z > 3cm'; default: all.")] = None,
+    touch: Annotated[
+        str | None, typer.Option(help="Touchable surface: 'z > 3cm', or a region of the mesh file; default: all.")
+    ] = None,
+    first: Annotated[
+        str | None,
+        typer.Option(help="Part of it that is computed first: the store is written as soon as that can be touched."),
+    ] = None,
     element: ElementChoice = None,
     max_size: MaxSize = None,
     repair: Repair = False,
-    memory: Annotated[str | None, typer.Option(help="Peak memory allowed, such as 8GB.")] = None,
+    memory: Annotated[
+        str | None, typer.Option(help="Peak memory allowed, such as 8GB; with --dask of each worker.")
+    ] = None,
+    dask: Dask = None,
 ) -> None:
     """Solve the body once, so that any touch is answered in microseconds.
 
+    What it will need is printed first, and refused where it does not fit.
+    Ctrl-C keeps what is finished in STORE.partial; the same command goes on from there, with --dask or without.
+
     Example: palpate precompute liver.vtu --fix "z < min + 5mm" -E 10kPa --nu 0.45 -o liver.palpate
+
+    Example: palpate precompute liver.vtu --fix "z < min + 5mm" --touch "z > 2cm" --first "z > 3cm" -o a.palpate
     """
     import palpate
     from palpate import units
-    from palpate.body import parse
+    from palpate.body import surface_region
+    from palpate.cli.bodies import cluster
     from palpate.input_file import require_writable
 
     if out is not None:
         require_writable(out, palpate.StoreError)
     material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
-    body = body_of(made, material, fix, loads)
-    region = None
-    if touch is not None:
-        surface = body.mesh.surface_nodes
-        region = surface[parse(touch)(body.mesh.nodes[surface])]
-        if len(region) == 0:
-            raise palpate.BodyError(f"no surface node satisfies --touch '{touch}'")
-    planned = palpate.plan(body, precision=precision, touch=region, memory=memory)
-    print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
-    green = palpate.precompute(body, precision=precision, touch=region, path=out, memory=memory)
+    with cluster(dask) as workers:
+        made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
+        body = body_of(made, material, fix, loads)
+        region = None if touch is None else surface_region(body, touch, "--touch")
+        planned = palpate.plan(body, precision=precision, touch=region, first=first, path=out, memory=memory)
+        print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
+
+        def ready(green: palpate.GreensFunction) -> None:
+            print(f"{green.path}: {len(green.touchable_nodes)} nodes can be touched by now")
+
+        asked = {"precision": precision, "touch": region, "first": first}
+        if workers is None:
+            asked["ready"] = ready
+        green = palpate.precompute(body, **asked, path=out, memory=memory, dask=workers)
     print(f"{green.path}: {_green_line(green)}")
     print(_precision_line(green))
 

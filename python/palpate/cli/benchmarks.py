@@ -235,6 +235,32 @@ def precompute(
         print(f"{peer} was left out: pip install {package}")
 
 
+@bench_app.command()
+def surface(
+    tets: Annotated[str, typer.Option(help="Tetrahedra of the cube, such as 5k or 100k.")] = "100k",
+    precision: Annotated[str, typer.Option(help="Number formats.")] = "f16,f32",
+    folder: Annotated[Path | None, typer.Option(help="Where the stores go meanwhile.")] = None,
+) -> None:
+    """All of a surface in stages, with its plan, beside direct solutions by SuperLU at 20 random nodes.
+
+    Example: palpate bench surface --tets 100k --precision f16
+    """
+    from palpate.validation.bench import surface as bench
+
+    count = int(float(tets.removesuffix("k")) * (1000 if tets.endswith("k") else 1))
+    for chosen in precision.split(","):
+        planned, found = bench.run(count, chosen, folder)
+        print(
+            f"{found.tets} tetrahedra, {found.surface_nodes} surface nodes, {chosen}, {found.stages} stores on the way"
+        )
+        print(planned)
+        print(f"columns in {found.precompute_s:.3g} s, store {found.store_bytes / 1e9:.3g} GB")
+        print(
+            f"20 random nodes beside SuperLU ({found.direct_s:.3g} s): largest error of a displacement "
+            f"{found.largest:.2g}, {found.stated:.2g} of the error stated"
+        )
+
+
 def _print_precompute(results: list[Result]) -> None:
     from rich.console import Console
     from rich.table import Table
@@ -334,15 +360,21 @@ def _print_tick(rows: list[TickRow]) -> None:
 def viewer(
     paper: Annotated[bool, typer.Option("--paper", help="The meshes in the size of the paper; quicker.")] = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long each model is pressed.")] = 4.0,
+    surfaces: Annotated[bool, typer.Option("--surfaces", help="Large surfaces: frames, and a page.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """How long the viewer's server stalls while a page presses, moves sliders and changes the model.
 
-    100 presses and 25 settings a second; each model with an empty cache first, then from the cache.
+    100 presses and 25 settings a second; each model with an empty cache first, then from the cache. With --surfaces:
+    what frames of 20,000, 100,000 and 500,000 triangles weigh, drawn whole and by fewer, and how long a page takes.
 
     Example: palpate bench viewer --seconds 2
     """
     from palpate.progress import narrated
+
+    if surfaces:
+        _bench_surfaces(as_json)
+        return
     from palpate.validation.bench import viewer as bench
 
     with narrated("measuring; an empty cache takes a minute or two"):
@@ -351,6 +383,48 @@ def viewer(
         print(json.dumps(bench.as_json(rows), indent=2))
         return
     _print_viewer(rows)
+
+
+def _bench_surfaces(as_json: bool) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from palpate.progress import narrated
+    from palpate.validation.bench import surfaces as bench
+
+    with narrated("measuring frames and a page"):
+        rows = bench.run()
+    if as_json:
+        print(json.dumps(bench.as_json(rows), indent=2))
+        return
+    table = Table(title="Large surfaces in the page", title_justify="left")
+    titles = (
+        "triangles",
+        "drawn",
+        "scene MB",
+        "32 bits kB",
+        "whole",
+        "moves",
+        "deflated",
+        "still",
+        "code ms",
+        "deflate",
+    )
+    for title in (*titles, "frames/s", "read ms", "move ms"):
+        table.add_column(title, justify="right")
+    for row in rows:
+        lengths = (row.float_kb, row.whole_kb, row.pressed_kb, row.deflated_kb, row.still_kb)
+        page = (row.frames_per_second, row.read_ms, row.move_ms)
+        table.add_row(
+            *(f"{row.triangles:,}", f"{row.drawn:,}", f"{row.scene_mb:.1f}"),
+            *(f"{length:.0f}" for length in lengths),
+            *(f"{row.code_ms:.1f}", f"{row.deflate_ms:.1f}"),
+            *("-" if value is None else f"{value:.1f}" for value in page),
+        )
+    Console(width=150).print(table)
+    print(
+        "frames in kB: 32 bits a number; 16 bits, whole; differences of a dent that moves, and deflated; nothing moves"
+    )
 
 
 def _print_viewer(rows: list[ViewerRow]) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +14,8 @@ import typer
 from palpate.cli.completion import units
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
 
@@ -37,6 +40,26 @@ ElementChoice = Annotated[
     Element | None,
     typer.Option(help="Tetrahedra with 4 or 10 nodes; default: quadratic for a surface, a volume mesh as it is."),
 ]
+
+Dask = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Let the workers of a Dask scheduler compute, such as tcp://10.0.0.1:8786."),
+]
+
+
+@contextlib.contextmanager
+def cluster(address: str | None) -> Iterator[Client | None]:
+    """Client of a scheduler, whose workers and page are told; None where none is named."""
+    if address is None:
+        yield None
+        return
+    from palpate.cluster import connected, dashboard, threads_of_workers
+
+    with connected(address) as client:
+        threads, page = threads_of_workers(client), dashboard(client)
+        said = f"{address}: {len(threads)} workers with {sum(threads.values())} threads"
+        print(said + (f", dashboard at {page}" if page else ""))
+        yield client
 
 
 def is_surface(path: Path) -> bool:

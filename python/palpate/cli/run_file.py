@@ -13,6 +13,7 @@ from palpate.cli.bodies import Element, body_of, likely_units, read_any
 from palpate.errors import SceneError
 
 if TYPE_CHECKING:
+    from palpate.green import BackgroundPrecompute
     from palpate.scene import BuiltScene, Scene
 
 # A bare body is held in this part of its height, from below.
@@ -66,8 +67,8 @@ FLAGS = {
 }
 
 
-def built_from(file: Path, options: RunOptions) -> BuiltScene:
-    """Scene of a file, ready to run.
+def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPrecompute] | None = None) -> BuiltScene:
+    """Scene of a file, ready to run; what is computed on beside it goes into ``growing``, if there is one.
 
     Raises
     ------
@@ -88,7 +89,11 @@ def built_from(file: Path, options: RunOptions) -> BuiltScene:
     else:
         return _bare(file, options)
     with narrated(f"preparing {scene.name}"):
-        return scene.build()
+        if growing is None:
+            return scene.build()
+        built, rest = scene.build_first()
+        growing.update(rest)
+        return built
 
 
 def scene_with(scene: Scene, options: RunOptions) -> Scene:

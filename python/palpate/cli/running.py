@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +16,7 @@ from palpate.cli.completion import devices, models, units
 
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
+    from palpate.green import BackgroundPrecompute
     from palpate.scene import BuiltScene, Scene
     from palpate.viewer.surface_map import SurfaceMap
 
@@ -138,6 +139,8 @@ def run(
 
     Example: palpate run scene.toml --record press.mcap
 
+    A scene whose [touch] says what comes first opens when that can be touched; the rest follows beside the loop.
+
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
     """
     from palpate.cli.run_file import RunOptions, built_from
@@ -145,7 +148,10 @@ def run(
     lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
     of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
-    built = built_from(file, RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop))
+    # What opens when a part is ready goes on with the rest beside the loop.
+    growing: dict[int, BackgroundPrecompute] = {}
+    options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
+    built = built_from(file, options, growing if headless is None else None)
     if headless is not None:
         _scripted(built, file.stem, headless, out, record)
         return
@@ -154,7 +160,7 @@ def run(
         from palpate.viewer.surface_map import read_map
 
         maps = read_map(surface_map, built)
-    _view(built, _Page(host, port, browser, recordings), record=record, maps=maps)
+    _view(built, _Page(host, port, browser, recordings), record=record, maps=maps, growing=growing)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -181,12 +187,13 @@ def _view(
     scene_of: Callable[[str], Scene] | None = None,
     record: Path | None = None,
     maps: Sequence[SurfaceMap | None] | None = None,
+    growing: Mapping[int, BackgroundPrecompute] | None = None,
 ) -> None:
     from palpate.viewer.live import open_viewer
     from palpate.viewer.server import ViewerServer
 
     page.recordings.mkdir(parents=True, exist_ok=True)
-    files = {"record": record, "recordings": page.recordings, "maps": maps}
+    files = {"record": record, "recordings": page.recordings, "maps": maps, "growing": growing}
     server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
     open_viewer(server, browser=page.browser)
 
@@ -222,6 +229,8 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
     compute, wakeup = statistics["compute_us"], statistics["wakeup_us"]
     print(_force_line(record, built.scene.device.max_force))
     print(_strain_line(record, built.scene.view.strain_limit))
+    if record.refused is not None:
+        print(f"where the tool reached the body without a force: {record.refused}")
     print("us            p50      p99    p99.9      max")
     for title, row in (("computing", compute), ("wake-up", wakeup)):
         print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")

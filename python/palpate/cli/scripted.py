@@ -42,6 +42,8 @@ class PressRecord:
         Largest on the body in any frame, N; the device's own is within its limits.
     interrupted
         Whether Ctrl-C ended it early.
+    refused
+        Why the tool was in no contact in some frame though it reached the body; None if that was in none.
 
     """
 
@@ -53,6 +55,7 @@ class PressRecord:
     limited: bool
     force: float
     interrupted: bool
+    refused: str | None = None
 
 
 def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = None) -> PressRecord:
@@ -63,7 +66,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
     rest, depth = _target(built)
     logs, depths, sampled = [], [], []
     limited: list[Frame] = []
-    interrupted = False
+    interrupted, refused = False, None
     simulation = Simulation(built)
     if recording is not None:
         simulation.record(recording)
@@ -85,6 +88,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
                 if STRAIN_SAMPLES * elapsed >= len(sampled) * seconds:
                     sampled.append(frame)
                 hardest = max(hardest, frame, key=_force_on_body)
+                refused = refused or frame.statistics["refused"][0]
                 if frame.limited[0]:
                     limited = [max(*limited, frame, key=_force_on_body)] if limited else [frame]
         except KeyboardInterrupt:
@@ -97,7 +101,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
     columns = (_at_ticks(log["time"], depths), _at_ticks(log["time"], strains))
     most = AT_LIMIT * built.scene.view.strain_limit
     held = any(frame.largest_strain >= most for frame in limited)
-    return PressRecord(log, *columns, hardest, last, held, _force_on_body(hardest), interrupted)
+    return PressRecord(log, *columns, hardest, last, held, _force_on_body(hardest), interrupted, refused)
 
 
 def _target(built: BuiltScene) -> tuple[np.ndarray, float]:

@@ -16,6 +16,7 @@ import numpy as np
 from palpate.scene import BuiltScene
 from palpate.simulation import Contact
 from palpate.viewer.messages import by_body, encode
+from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.session import Session, Wants
 from palpate.viewer.tool_shapes import by_tool, outline
 
@@ -46,7 +47,6 @@ class HiddenSession(Session):
         super().__init__(built)
         self._loud_force = loud_force
         self._touched: np.ndarray | None = None
-        self._count = len(built.bodies[0].green.surface_nodes)
 
     def takes(self, kind: str) -> bool:
         """Whether a client may send messages of a kind."""
@@ -78,10 +78,14 @@ class HiddenSession(Session):
         }
         return encode(header, {**by_body([shown.arrays()]), **by_tool([arrays for _, arrays in shapes])})
 
-    def frame_message(self, number: int, log_seen: tuple[int, int], wants: Wants) -> tuple[bytes, tuple[int, int]]:
+    def frame_message(
+        self, number: int, log_seen: tuple[int, int], wants: Wants, coder: PoseCoder
+    ) -> tuple[bytes, tuple[int, int]]:
         """Where the tool is and the force on the device, over a body that does not deform."""
         frame = self._latest()
         self._follow(frame.contacts)
+        rows = len(self._bodies[0].drawn.nodes)
+        coded = coder.code(number, [(np.zeros((rows, 3)), np.zeros(rows), self._bodies[0].extent)])
         header = {
             "type": "frame",
             "frame": number,
@@ -95,13 +99,13 @@ class HiddenSession(Session):
             "motion": None,
             "fields": [NOTHING],
             "interior": [False],
+            "poses": coded.headers,
             "recording": None,
             "replay": None,
             "loudness": min(float(np.linalg.norm(frame.forces[0])) / self._loud_force, 1.0),
         }
-        still = {"displacements": ("f4", np.zeros((self._count, 3))), "scalar": ("u1", np.zeros(self._count))}
-        rows = {"log": ("f4", np.zeros((0, 3))), "history": ("f4", np.zeros((0, 8)))}
-        return encode(header, {**by_body([still]), **rows}), log_seen
+        empty = {"log": ("f4", np.zeros((0, 3))), "history": ("f4", np.zeros((0, 8)))}
+        return encode(header, {**by_body(coded.arrays), **empty}), log_seen
 
     @property
     def touched(self) -> list[float] | None:

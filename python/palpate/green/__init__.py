@@ -1,9 +1,20 @@
 """Green's functions: what a precomputation will need, the precomputation, and the answers."""
 
 from palpate.green.answer import Answer, Touch
+from palpate.green.background import BackgroundPrecompute
 from palpate.green.bounds import error_text
 from palpate.green.function import GreensFunction, require_precise
 from palpate.green.plan import Plan, plan
 from palpate.green.precompute import precompute
 
-__all__ = ["Answer", "GreensFunction", "Plan", "Touch", "error_text", "plan", "precompute", "require_precise"]
+__all__ = [
+    "Answer",
+    "BackgroundPrecompute",
+    "GreensFunction",
+    "Plan",
+    "Touch",
+    "error_text",
+    "plan",
+    "precompute",
+    "require_precise",
+]

@@ -302,13 +302,7 @@ class GreensFunction:
 
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
-        low, high = 0.0, limit
-        if self.accepts_contact_radius(high):
-            return high
-        while high - low > 0.01 * limit:
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.accepts_contact_radius(middle) else (low, middle)
-        return low
+        return self._core.largest_contact_radius(float(limit))
 
     def _reactions(self, surface_forces: np.ndarray, fixed_dof_forces: np.ndarray) -> np.ndarray:
         """`K u` at the fixed nodes; a free component carries the loads on it."""

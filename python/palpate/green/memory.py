@@ -17,10 +17,29 @@ def memory_in_use() -> int:
         return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     if sys.platform == "win32":
         return 0
+    return peak_memory()
+
+
+def peak_memory() -> int:
+    """Bytes that this process has held at its peak."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        lines = status.read_text().splitlines()
+        return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
     import resource
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
+
+
+def available_memory() -> int | None:
+    """Bytes that this machine can still give, as far as the system tells; None where it does not."""
+    meminfo = Path("/proc/meminfo")
+    if not meminfo.exists():
+        return None
+    lines = dict(line.split(":", 1) for line in meminfo.read_text().splitlines())
+    kilobytes = lines.get("MemAvailable", "").split()
+    return 1024 * int(kilobytes[0]) if kilobytes else None
 
 
 def allowed_memory(limit: int | str) -> int:

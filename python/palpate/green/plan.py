@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import time
 from dataclasses import dataclass
 
-import numpy as np
-
 from palpate import _native
-from palpate.body import Body, problem_arrays
-from palpate.green.memory import allowed_memory, memory_in_use
+from palpate.body import Body, SurfaceRegion
+from palpate.green.disk import DiskUse, free_bytes
+from palpate.green.job import Job
+from palpate.green.memory import memory_in_use
+
+# Operations of factor and columns a second, over those of a product of large matrices: assumed, for what is told is an
+# estimate.
+EFFICIENCY = 0.5
+# Time over which the product is repeated, s.
+CALIBRATION = 0.1
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,13 @@ class Plan:
         Peak memory of the process, bytes: what it held when the plan was made, and what the precomputation adds.
     store
         Size of the operator in its file, bytes.
+    disk
+        Most that its files take at once, bytes: the store, what is finished beside it, the store of the stage before.
+    disk_free
+        Bytes free where they go, by now.
+    seconds
+        Estimate of the time it takes on this machine, s, by its operations and the speed of short products of
+        matrices; other work on the machine makes it longer.
 
     """
 
@@ -50,9 +64,12 @@ class Plan:
     tasks: int
     memory: int
     store: int
+    disk: int
+    disk_free: int
+    seconds: float
 
     def __str__(self) -> str:
-        """Two lines for people."""
+        """Three lines for people."""
         factor, sweeps, other = (
             f"{n / 1e9:.3g}" for n in (self.factor_flops, self.sweep_flops, self.surface_last_flops)
         )
@@ -60,7 +77,9 @@ class Plan:
             f"{self.columns} columns of {self.rows} rows: factor {factor} Gflop, columns {sweeps} Gflop by sweeps "
             f"(surface last: at least {other})\n"
             f"peak memory {self.memory / 1e9:.2f} GB, {self.tasks} tasks with {self.block} columns each, "
-            f"store {self.store / 1e9:.3g} GB in {self.precision}"
+            f"store {self.store / 1e9:.3g} GB in {self.precision}\n"
+            f"disk {self.disk / 1e9:.3g} GB at most of {self.disk_free / 1e9:.3g} GB free, "
+            f"time about {_time_text(self.seconds)}, estimated"
         )
 
 
@@ -68,7 +87,9 @@ def plan(
     body: Body,
     *,
     precision: str | None = None,
-    touch: Sequence[int] | np.ndarray | None = None,
+    touch: SurfaceRegion | None = None,
+    first: SurfaceRegion | None = None,
+    path: str | os.PathLike[str] | None = None,
     memory: int | str | None = None,
 ) -> Plan:
     """Count what :func:`palpate.precompute` would do with the same arguments.
@@ -77,10 +98,35 @@ def plan(
     ------
     BodyError
         A bound of memory that cannot be kept, and what it refuses.
+    StoreError
+        Files that have no room on the disk.
 
     """
-    body.require_supported()
-    problem = problem_arrays(body, touch)
+    job = Job.of(body, precision, touch, first, path)
     used = memory_in_use()
-    counts = _native.GreenCore.plan(problem, precision, None if memory is None else allowed_memory(memory))
-    return Plan(**{**counts, "memory": used + counts["memory"]})
+    allowed = job.allowed(memory)
+    counts = _native.GreenCore.plan(job.problem, precision, allowed)
+    disk = DiskUse.of(counts["columns"], counts["rows"], counts["precision"], 0 < len(job.first) < len(job.region))
+    # The factor is always computed in double precision, columns of sixteen bits in single.
+    double = _product_rate(single=False)
+    rate = _product_rate(single=True) if counts["precision"] == "f16" else double
+    seconds = (counts["factor_flops"] / double + counts["sweep_flops"] / rate) / EFFICIENCY
+    added = {"disk": disk.peak, "disk_free": free_bytes(job.target), "seconds": seconds}
+    return Plan(**{**counts, "memory": used + counts["memory"]}, **added)
+
+
+def _product_rate(single: bool) -> float:
+    """Operations a second of a product of matrices on all threads."""
+    best, until = 0.0, time.perf_counter() + CALIBRATION
+    # The quickest of several: what else runs on the machine only makes some of them longer.
+    while time.perf_counter() < until:
+        begun = time.perf_counter()
+        operations = _native.products(single, 1)
+        best = max(best, operations / (time.perf_counter() - begun))
+    return best
+
+
+def _time_text(seconds: float) -> str:
+    if seconds < 90:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

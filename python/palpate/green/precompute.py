@@ -2,36 +2,39 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate import _native
-from palpate.body import Body, description, problem_arrays
-from palpate.cache import cache_directory
-from palpate.errors import BodyError, PrecisionWarning, StoreError, StoreWarning
+from palpate.body import Body, SurfaceRegion, surface_region
+from palpate.cluster import connected
+from palpate.errors import ClusterError, PrecisionWarning, StoreWarning
 from palpate.green.bounds import CHOSEN, WARNED, error_text, remedy
 from palpate.green.function import GreensFunction
-from palpate.green.memory import allowed_memory
-from palpate.input_file import require_writable
-from palpate.leftovers import remove_leftovers
+from palpate.green.gathering import precompute_on
+from palpate.green.job import Job
 from palpate.progress import progress_reporter
-from palpate.units import brief_repr
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 def precompute(
     body: Body,
     *,
     precision: str | None = None,
-    touch: Sequence[int] | np.ndarray | None = None,
+    touch: SurfaceRegion | None = None,
+    first: SurfaceRegion | None = None,
     path: str | os.PathLike[str] | None = None,
     memory: int | str | None = None,
     progress: bool | Callable[[int, int], None] = True,
+    ready: Callable[[GreensFunction], None] | None = None,
+    painted: Callable[[], Sequence[int] | None] | None = None,
+    dask: str | Client | None = None,
 ) -> GreensFunction:
     """Green's function of a body, from its file if that matches, else computed and written there.
 
@@ -47,20 +50,38 @@ def precompute(
         double from what is stored. None: the cheapest in which typical contacts of this body are right to 0.03 %, as
         measured on some columns.
     touch
-        Surface nodes that may be touched; None: all.
+        Region of the surface that may be touched: surface nodes, a mask of all nodes, a predicate such as
+        ``"z > 3cm"``, a region of the mesh file by name or number, or a solid of :mod:`palpate.shapes`; None: all.
+    first
+        Region that is computed first. The store is then written as soon as that is ready, complete and valid for the
+        nodes that can be touched, and again as the others follow by their distance from it, in stages each of which is
+        about as large as all before it. None: all at once.
     path
         File; None keeps it in the cache under its content key.
     memory
         Bytes that the process may take at its peak, or text such as ``"8GB"``; None: as many as are useful. The
-        operator itself is written as it is computed, and takes none.
+        operator itself is written as it is computed, and takes none. With ``dask``: of each worker's process.
     progress
         True shows a bar on a terminal; a function is called with columns done and in all.
+    ready
+        Called with the Green's function of each stage but the last, while the next is computed.
+    painted
+        Asked some times a second for surface nodes that are to come next; None: as planned.
+    dask
+        Address of a scheduler of dask.distributed, such as ``"tcp://10.0.0.1:8786"``, or a client of it: its workers
+        solve the columns, this process writes the store, of the same key and the same bits, all at once. Workers may
+        join and die meanwhile. Needs ``palpate[cluster]``, of the same version everywhere.
 
     Raises
     ------
     BodyError
-        A body that its supports leave free to move, a touch node that is not on the surface, or a bound of memory that
-        cannot be kept.
+        A body that its supports leave free to move, a touch node that is not on the surface, or more memory than there
+        is, or than is allowed.
+    StoreError
+        Files that have no room on the disk, with what would fit.
+    ClusterError
+        A cluster that cannot be reached, has no workers or other versions, or fails; or one that is to compute a region
+        ``first``.
 
     Warns
     -----
@@ -68,31 +89,69 @@ def precompute(
         Touches may be wrong by more than 1 %.
 
     """
-    if not isinstance(body, Body):
-        raise BodyError(f"precompute takes a palpate.Body, got {brief_repr(body)}")
-    body.require_supported()
-    problem = problem_arrays(body, touch)
-    key = _native.GreenCore.content_key(problem, precision)
-    if path is None:
-        target = cache_directory() / f"{key[:32]}.palpate"
-        target.parent.mkdir(parents=True, exist_ok=True)
+    if dask is not None and not (first is None and ready is None and painted is None):
+        raise ClusterError("a cluster computes all columns at once: leave out first, ready and painted")
+    job = Job.of(body, precision, touch, first, path)
+    stored = job.stored()
+    if stored is not None:
+        return _told(stored)
+    if dask is None:
+        discarded = _here(job, memory, progress, first is not None, ready, painted)
     else:
-        target = Path(path)
-        require_writable(target, StoreError)
-    remove_leftovers(target)
-    if target.exists():
-        with contextlib.suppress(StoreError):
-            return _told(GreensFunction(_native.GreenCore.load(target, key), body))
-    allowed = None if memory is None else allowed_memory(memory)
-    with progress_reporter("precomputing", progress) as report:
-        _, discarded = _native.GreenCore.precompute_to(
-            problem, precision, CHOSEN, json.dumps(description(body)), report, target, allowed
-        )
+        # Of memory the workers see to their own; the files have to have room here.
+        job.allowed(None)
+        with connected(dask) as client, progress_reporter("precomputing", progress) as report:
+            discarded = precompute_on(client, job.problem, precision, memory, job.description, job.target, report)
     if discarded:
         warnings.warn(
-            f"{target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
+            f"{job.target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
         )
-    return _told(GreensFunction(_native.GreenCore.load(target, key), body))
+    return _told(job.load())
+
+
+def _here(
+    job: Job,
+    memory: int | str | None,
+    progress: bool | Callable[[int, int], None],
+    staged: bool,
+    ready: Callable[[GreensFunction], None] | None,
+    painted: Callable[[], Sequence[int] | None] | None,
+) -> bool:
+    """Compute in this process; whether a partial file of something else was thrown away."""
+    allowed = job.allowed(memory)
+    growth = (job.first, *_watchers(job, ready, painted)) if staged or painted is not None else None
+    with progress_reporter("precomputing", progress) as report:
+        _, discarded = _native.GreenCore.precompute_to(
+            job.problem,
+            job.precision,
+            CHOSEN,
+            job.description,
+            report,
+            job.target,
+            allowed,
+            growth,
+            report and report.phase,
+        )
+    return discarded
+
+
+def _watchers(
+    job: Job, ready: Callable[[GreensFunction], None] | None, painted: Callable[[], Sequence[int] | None] | None
+) -> tuple[Callable[[], list[int] | None], Callable[[int], None]]:
+    """Make what the native module calls: for ranks of the next nodes, and with the store of a stage."""
+    surface = job.body.mesh.surface_nodes
+
+    def asked() -> list[int] | None:
+        nodes = None if painted is None else painted()
+        if nodes is None:
+            return None
+        return np.searchsorted(surface, surface_region(job.body, np.asarray(nodes), "painted")).tolist()
+
+    def written(_nodes: int) -> None:
+        if ready is not None:
+            ready(job.load_growing())
+
+    return asked, written
 
 
 def _told(green: GreensFunction) -> GreensFunction:

@@ -1,4 +1,4 @@
-"""Straight 10-node tetrahedra bent onto a surface."""
+"""Tetrahedra whose edges get a middle on a surface: curved ones of 10 nodes, or eight small ones for each."""
 
 from __future__ import annotations
 
@@ -7,13 +7,28 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate import _native
-from palpate.mesh.elements import unique_edges
+from palpate.mesh.elements import EDGES, unique_edges
 from palpate.mesh.tetmesh import TetMesh
 
 # A curved element's least determinant in parts of its largest, in which straight ones have 1.
 LEAST_DETERMINANT = 0.2
 # Farthest that a mid-side node is moved, in parts of its edge; by less than this part of the mean edge it stays.
 MOST_BULGE, LEAST_BULGE = 0.2, 1e-3
+# An eighth of an element keeps this part of the shape that it has in the straight one, unless it is as good as this (a
+# regular tetrahedron has 1, one of a cube cut into six 0.7).
+KEPT_SHAPE, GOOD_SHAPE = 0.7, 0.5
+
+# By the nodes of a 10-node element: the eighths at its corners; the diagonals of the octahedron between them, counted
+# from its first middle; and the octahedron cut along each.
+AT_CORNERS = np.array([[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3]])
+DIAGONALS = np.array([[0, 5], [1, 3], [2, 4]])
+INSIDE = np.array(
+    [
+        [[4, 9, 5, 6], [4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5]],
+        [[5, 7, 4, 8], [5, 7, 8, 9], [5, 7, 9, 6], [5, 7, 6, 4]],
+        [[6, 8, 4, 5], [6, 8, 5, 9], [6, 8, 9, 7], [6, 8, 7, 4]],
+    ]
+)
 
 
 def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
@@ -27,6 +42,51 @@ def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh
         Points (p, 3), m, onto the shape.
 
     """
+
+    def folded(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+        low, high = _native.determinant_ranges(nodes, tets.astype(np.uint32)).reshape(-1, 2).T
+        return low < LEAST_DETERMINANT * high
+
+    nodes, tets = _bent(mesh, project, folded)
+    return TetMesh(nodes, tets, mesh.regions, mesh.region_names)
+
+
+def refine(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
+    """Eight 4-node tetrahedra for each of a mesh, new surface nodes on a shape, or as near as flattens no element.
+
+    A tetrahedron is cut at the middles of its edges; the octahedron that is left inside is cut along its shortest
+    diagonal (Bey 1995; Zhang 1995): however often that is done, angles do not go to zero.
+
+    Parameters
+    ----------
+    mesh
+        4-node tetrahedra.
+    project
+        Points (p, 3), m, onto the shape.
+
+    """
+
+    def flattened(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+        parts = _eighths(nodes, tets).reshape(-1, 4)
+        straight = nodes.copy()
+        straight[tets[:, 4:]] = nodes[tets[:, EDGES]].mean(axis=2)
+        bent, before = (_shapes(points, parts).reshape(-1, 8) for points in (nodes, straight))
+        return (bent < np.minimum(GOOD_SHAPE, KEPT_SHAPE * before)).any(axis=1)
+
+    nodes, tets = _bent(mesh, project, flattened)
+    parts = _eighths(nodes, tets).reshape(-1, 4)
+    return TetMesh(nodes, parts, np.repeat(mesh.regions, 8), mesh.region_names)
+
+
+def _bent(
+    mesh: TetMesh,
+    project: Callable[[np.ndarray], np.ndarray],
+    is_bad: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (n, 3), m, and elements (m, 10) with middles of surface edges moved as far as leaves no element bad.
+
+    ``is_bad`` gets nodes and elements and returns a mask of the elements.
+    """
     edges, of_element = unique_edges(mesh.tets)
     straight = mesh.nodes[edges].mean(axis=1)
     ends = np.sort(mesh.surface_triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
@@ -37,11 +97,30 @@ def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh
     size = np.maximum(np.linalg.norm(bulge[outside], axis=1), np.finfo(float).tiny)
     bulge[outside] *= np.minimum(1, MOST_BULGE * lengths / size)[:, None]
     tets = np.hstack([mesh.tets, len(mesh.nodes) + of_element])
+    # Only these can be bad.
+    moved = np.flatnonzero(bulge.any(axis=1)[of_element].any(axis=1))
     least = LEAST_BULGE * lengths.mean()
     while True:
         nodes = np.vstack([mesh.nodes, straight + bulge])
-        low, high = _native.determinant_ranges(nodes, tets.astype(np.uint32)).reshape(-1, 2).T
-        bad = np.unique(of_element[low < LEAST_DETERMINANT * high])
+        bad = np.unique(of_element[moved[is_bad(nodes, tets[moved])]])
         if not bulge[bad].any():
-            return TetMesh(nodes, tets, mesh.regions, mesh.region_names)
+            return nodes, tets
         bulge[bad] = np.where(np.linalg.norm(bulge[bad], axis=1) > least, 0.7, 0.0)[:, None] * bulge[bad]
+
+
+def _eighths(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Parts (m, 8, 4) of elements (m, 10), oriented as these."""
+    middles = nodes[tets[:, 4:]]
+    diagonals = np.stack([np.linalg.norm(middles[:, i] - middles[:, j], axis=1) for i, j in DIAGONALS], axis=1)
+    inside = INSIDE[diagonals.argmin(axis=1)]
+    rows = np.arange(len(tets))[:, None, None]
+    return np.concatenate([tets[:, AT_CORNERS], tets[rows, inside]], axis=1)
+
+
+def _shapes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Mean ratios (m,): 1 for a regular tetrahedron, 0 for a flat one, negative where inverted (Liu and Joe 1994)."""
+    corners = nodes[tets]
+    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+    volumes = np.einsum("ij,ij->i", np.cross(a, b), c) / 6
+    edges = corners[:, EDGES[:, 0]] - corners[:, EDGES[:, 1]]
+    return np.sign(volumes) * 12 * np.cbrt(9 * volumes**2) / np.einsum("eij,eij->e", edges, edges)

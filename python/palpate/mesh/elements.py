@@ -81,14 +81,24 @@ def boundary_faces(tets: np.ndarray) -> np.ndarray:
 
     """
     of_element = FACES[tets.shape[1]]
-    faces = tets[:, of_element].reshape(-1, of_element.shape[1])
+    return tets[:, of_element].reshape(-1, of_element.shape[1])[_alone(tets)]
+
+
+def face_owners(tets: np.ndarray) -> np.ndarray:
+    """Element (k,) that each of :func:`boundary_faces` belongs to."""
+    return _alone(tets) // 4
+
+
+def _alone(tets: np.ndarray) -> np.ndarray:
+    """Ranks, among the faces of all elements, of those of one element only."""
+    corners = tets[:, FACES[tets.shape[1]][:, :3]].reshape(-1, 3)
     _, first, inverse, counts = np.unique(
-        _face_keys(faces[:, :3]), return_index=True, return_inverse=True, return_counts=True
+        _face_keys(corners), return_index=True, return_inverse=True, return_counts=True
     )
     if counts.max() > 2:
         face = int(np.flatnonzero(counts[inverse.ravel()] > 2)[0])
         raise MeshError(f"a face of tetrahedron {face // 4} is shared by more than two tetrahedra")
-    return faces[np.sort(first[counts == 1])]
+    return np.sort(first[counts == 1])
 
 
 def face_parts(tets: np.ndarray) -> np.ndarray:

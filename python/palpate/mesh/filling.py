@@ -18,8 +18,8 @@ from palpate import _native
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import failure_of, run_limited
 from palpate.mesh.crossings import first_crossing
-from palpate.mesh.curve import curve
-from palpate.mesh.fit import Fit
+from palpate.mesh.curve import curve, refine
+from palpate.mesh.fit import GOOD_LOSS, Fit
 from palpate.mesh.tetmesh import TetMesh
 
 if TYPE_CHECKING:
@@ -34,6 +34,14 @@ PARTS = {"linear": 15.0, "quadratic": 7.5}
 # Where that is too coarse for the shape, elements become smaller by up to this factor, in so many attempts: all of them
 # where more than this share of the volume is lost, for such a mesh does not tell where.
 FINEST, ATTEMPTS, LOST = 4.0, 5, 0.05
+# Attempts at a size that is given.
+ATTEMPTS_GIVEN = 2
+
+# NETGEN takes about 0.25 ms for each tetrahedron, more than the columns of a region of touch. Beyond so many it makes
+# them twice as large, and each is cut into eight (`refine`). Measured on the liver: so many lie in a cube as wide as
+# the size asked for. Cutting twice was tried: where a body is thin NETGEN's elements are then smaller than asked for,
+# and 64 times as many are half again too many.
+MOST_BY_NETGEN, IN_CUBE = 30_000, 3.5
 
 # Seconds for NETGEN to prove that a surface that intersects itself can be filled: mostly it hangs, or crashes.
 PATIENCE = 30.0
@@ -86,21 +94,25 @@ class Filling:
 
         """
         size = self.extent / PARTS[self.element] if self.size is None else self.size
-        least = size / FINEST if self.size is None else size
+        halvings = self._halvings(size)
         found: tuple[TetMesh, Fit] | None = None
         points, local = np.empty((0, 3)), np.empty(0)
         patience = self.time_limit if self._crossing is None else min(self.time_limit, PATIENCE)
         deadline = time.monotonic() + patience
-        for _ in range(ATTEMPTS):
-            made = self._tetrahedra(size, points, local, deadline)
+        for _ in range(ATTEMPTS if self.size is None else ATTEMPTS_GIVEN):
+            # Where a size is given, parts that NETGEN's larger elements miss are got back by smaller ones there.
+            least = size / 2**halvings if self.size is not None else self.extent / PARTS[self.element] / FINEST
+            made = self._tetrahedra((size, halvings), points, local, deadline)
             fit = Fit.of(made, self.shape) if isinstance(made, TetMesh) else None
             if fit is not None and (found is None or abs(fit.loss) < abs(found[1].loss)):
                 found = made, fit
             late = time.monotonic() > deadline
             if late or size <= least or (fit is not None and fit.is_good(size)):
                 break
-            if fit is None or abs(fit.loss) > LOST:
-                size, points, local = max(size / 2, least), np.empty((0, 3)), np.empty(0)
+            if fit is None or abs(fit.loss) > (GOOD_LOSS if halvings else LOST):
+                points, local = np.empty((0, 3)), np.empty(0)
+                # Elements that are to be cut may have been too large for the shape.
+                size, halvings = (size, halvings - 1) if halvings else (max(size / 2, least), self._halvings(size / 2))
                 continue
             before = np.full(len(fit.points), size) if len(local) == 0 else local
             points, local = fit.points, fit.sizes(before, least)
@@ -110,6 +122,10 @@ class Filling:
             raise MeshError(f"{self.name}: {self._reason(size, made)}")
         self._tell(*found, size)
         return found[0]
+
+    def _halvings(self, size: float) -> int:
+        """How often elements are halved after NETGEN."""
+        return int(self.shape.volume * IN_CUBE / size**3 > MOST_BY_NETGEN)
 
     def _tell(self, mesh: TetMesh, fit: Fit, size: float) -> None:
         """Warn of what the mesh loses, or refuse it."""
@@ -142,24 +158,30 @@ class Filling:
         place = ", ".join(f"{x:.4g}" for x in point)
         return f"the surface intersects itself near ({place}) m; {REPAIR_HINT}"
 
-    def _tetrahedra(self, size: float, points: np.ndarray, local: np.ndarray, deadline: float) -> TetMesh | str:
-        """Elements of a size, smaller at points; or how the mesher failed."""
+    def _tetrahedra(
+        self, sizes: tuple[float, int], points: np.ndarray, local: np.ndarray, deadline: float
+    ) -> TetMesh | str:
+        """Elements of a size, smaller at points, halved so often after NETGEN; or how the mesher failed."""
+        size, halvings = sizes
         origin, extent = self.shape.vertices.min(axis=0), self.extent
         smaller = local < size
         # In a unit box, for NETGEN's tolerances are absolute.
+        unit = extent / 2**halvings
         job = {
             "vertices": (self.shape.vertices - origin) / extent,
             "faces": self.shape.faces,
-            "size": size / extent,
+            "size": size / unit,
             "balls": np.reshape(
-                [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.refine], (-1, 5)
+                [[*((np.array(c) - origin) / extent), r / extent, h / unit] for c, r, h in self.refine], (-1, 5)
             ),
-            "points": np.column_stack([(points[smaller] - origin) / extent, local[smaller] / extent]),
+            "points": np.column_stack([(points[smaller] - origin) / extent, local[smaller] / unit]),
         }
         made = self._run(job, deadline)
         if isinstance(made, str):
             return made
         mesh = TetMesh(made[0] * extent + origin, made[1])
+        for _ in range(halvings):
+            mesh = refine(mesh, self._projected)
         return curve(mesh, self._projected) if self.element == "quadratic" else mesh
 
     def _run(self, job: dict[str, np.ndarray | float], deadline: float) -> tuple[np.ndarray, np.ndarray] | str:

@@ -1,6 +1,6 @@
 """Scenes: what to touch and with what, as read from a file."""
 
-from palpate.scene.build import BuiltBody, BuiltScene, unsolved_body
+from palpate.scene.build import BuiltBody, BuiltScene, mesh_of_body, unsolved_body
 from palpate.scene.dynamics import BodyMotion, DynamicsTable, StrikeTable
 from palpate.scene.model_scenes import MODES, TOOLS, YOUNGS_MODULUS, model_scene
 from palpate.scene.scene import Scene
@@ -19,6 +19,7 @@ __all__ = [
     "Scene",
     "StrikeTable",
     "ToolTable",
+    "mesh_of_body",
     "model_scene",
     "unsolved_body",
 ]

@@ -13,10 +13,11 @@ import numpy as np
 from palpate import models
 from palpate.body import Body, parse
 from palpate.errors import Error, SceneError
-from palpate.green import GreensFunction, precompute, require_precise
+from palpate.green import BackgroundPrecompute, GreensFunction, precompute, require_precise
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.tetrahedralize import tetrahedralize_with
+from palpate.progress import progress_reporter
 from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
 from palpate.scene.loads import together
@@ -92,14 +93,33 @@ class BuiltScene:
         return cls(scene, (BuiltBody(body, green, motion, table.title, table.position, table.orientation),))
 
 
-def build(scene: SceneTables, progress: Progress, modes_progress: Progress | None) -> BuiltScene:
-    """See :meth:`palpate.Scene.build`."""
-    builders = [_Builder(scene, rank) for rank in range(len(scene.bodies))]
+def build(
+    scene: SceneTables,
+    progress: Progress,
+    modes_progress: Progress | None,
+    growing: dict[int, BackgroundPrecompute] | None = None,
+) -> BuiltScene:
+    """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
+    builders = [_Builder(scene, rank, growing) for rank in range(len(scene.bodies))]
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
-def unsolved_body(scene: SceneTables, rank: int = 0) -> Body:
+def mesh_of_body(scene: SceneTables, rank: int = 0) -> TetMesh:
+    """Mesh of a body of a scene, read or made from its surface.
+
+    Raises
+    ------
+    Error
+        A file that cannot be read or filled.
+
+    """
+    return _Builder(scene, rank).mesh()
+
+
+def unsolved_body(scene: SceneTables, rank: int = 0, mesh: TetMesh | None = None) -> Body:
     """Mesh of a body of a scene with its materials, supports and loads, before anything is computed of it.
+
+    ``mesh`` is that of :func:`mesh_of_body`, where it is known.
 
     Raises
     ------
@@ -107,14 +127,14 @@ def unsolved_body(scene: SceneTables, rank: int = 0) -> Body:
         A mesh that cannot be read or made, a region or supports that hold nothing.
 
     """
-    return _Builder(scene, rank).body()
+    return _Builder(scene, rank).body(mesh)
 
 
 class _Builder:
     """Builds one body of a scene."""
 
-    def __init__(self, scene: SceneTables, rank: int):
-        self._scene, self._rank = scene, rank
+    def __init__(self, scene: SceneTables, rank: int, growing: dict[int, BackgroundPrecompute] | None = None):
+        self._scene, self._rank, self._growing = scene, rank, growing
         self._table: BodyTable = scene.bodies[rank]
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
@@ -123,7 +143,7 @@ class _Builder:
         if table.store is not None:
             return BuiltBody(None, GreensFunction.load(self._scene.folder / table.store), None, *place)
         body = self.body()
-        green = precompute(body, precision=table.precision, progress=progress)
+        green = self._green(body, progress)
         dynamics, where = self._own("dynamics")
         if dynamics is None:
             return BuiltBody(body, green, None, *place)
@@ -132,6 +152,16 @@ class _Builder:
             motion = dynamics.build(body, self._scene.device.max_stiffness, report)
         return BuiltBody(body, green, motion, *place)
 
+    def _green(self, body: Body, progress: Progress) -> GreensFunction:
+        area, where = self._own("touch")
+        with self._blaming(where):
+            asked = {"precision": self._table.precision, **area.areas(self._file_mesh)}
+            if self._growing is None or area.first is None:
+                return precompute(body, **asked, progress=progress)
+            background = self._growing[self._rank] = BackgroundPrecompute(body, **asked)
+            with progress_reporter("precomputing what is touched first", progress) as report:
+                return background.wait(report)
+
     def _own(self, key: str) -> tuple[Any, list[str | int]]:
         """Table of the body, or that of the whole scene; and its place in the file."""
         own = getattr(self._table, key)
@@ -139,13 +169,15 @@ class _Builder:
             return own, ["body", self._rank, key]
         return getattr(self._scene, key), [key]
 
-    def body(self) -> Body:
-        table, mesh = self._table, self._mesh()
+    def body(self, mesh: TetMesh | None = None) -> Body:
+        table, mesh = self._table, self.mesh() if mesh is None else mesh
         if table.element == "linear" and mesh.is_quadratic:
             source = table.mesh or table.title
             raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
         if table.adds_middles:
             mesh = mesh.to_quadratic()
+        # With the regions of the file, which those of the scene replace.
+        self._file_mesh = mesh
         base: MaterialTable = self._own("material")[0]
         regions, where = self._own("region")
         labels, of_file = _file_regions(mesh, len(regions))
@@ -178,7 +210,7 @@ class _Builder:
             table = next(key for key in reversed(place) if isinstance(key, str))
             raise SceneError(f"{located(path, text, place)}: {table}: {error}") from None
 
-    def _mesh(self) -> TetMesh:
+    def mesh(self) -> TetMesh:
         table = self._table
         if table.model is not None:
             return models.load(table.model, paper=table.paper)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from palpate.units import brief_repr
 
 # What pydantic adds to the place of a mistake in a value that may be of several kinds.
-UNION_MEMBERS = {"str", "int", "list[int]", "bool"}
+UNION_MEMBERS = {"str", "int", "list[int]", "bool", "[place]", "[text]", "[nodes]"}
 # pydantic's words for kinds of values, as people say them.
 WORDS = {
     "boolean": "true or false",

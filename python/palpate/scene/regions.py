@@ -37,11 +37,8 @@ class MaterialTable(Table):
         return Material(self.youngs_modulus, self.poissons_ratio, self.density)
 
 
-class RegionTable(Table):
-    """A material for part of the body: a region of the mesh file by number or name, or what lies in a shape.
-
-    What it does not say of its material is that of ``[material]``. Later tables override earlier ones.
-    """
+class PlaceTable(Table):
+    """A part of the body: a region of the mesh file by number or name, or what lies in a shape."""
 
     mesh_region: Annotated[int | str | None, _REGION] = None
     shape: Literal["sphere", "box", "cylinder", "half-space"] | None = None
@@ -53,12 +50,9 @@ class RegionTable(Table):
     end: Point | None = None
     point: Point | None = None
     normal: Direction | None = None
-    youngs_modulus: Pressure | None = None
-    poissons_ratio: PoissonsRatio | None = None
-    density: Density | None = None
 
     @model_validator(mode="after")
-    def _one_place(self) -> RegionTable:
+    def _one_place(self) -> PlaceTable:
         if (self.shape is None) == (self.mesh_region is None):
             raise ValueError("give either a shape or a mesh_region")
         needed = () if self.shape is None else SHAPES[self.shape][1]
@@ -103,6 +97,17 @@ class RegionTable(Table):
             known = [*map(str, sorted(set(mesh.regions.tolist()))), *mesh.region_names]
             raise MeshError(f"the mesh has no region {self.mesh_region}; it has {', '.join(known)}")
         return members
+
+
+class RegionTable(PlaceTable):
+    """A material for part of the body.
+
+    What it does not say of its material is that of ``[material]``. Later tables override earlier ones.
+    """
+
+    youngs_modulus: Pressure | None = None
+    poissons_ratio: PoissonsRatio | None = None
+    density: Density | None = None
 
     def material(self, base: MaterialTable) -> Material:
         """Material, completed from that of the body."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,22 +10,19 @@ from typing import Any
 from pydantic import ValidationError
 
 from palpate.errors import SceneError
-from palpate.input_file import require_file
+from palpate.green import BackgroundPrecompute
+from palpate.input_file import read_toml
 from palpate.scene.build import BuiltScene, build
 from palpate.scene.mistakes import explain, located
 from palpate.scene.tables import BodyTable, SceneTables
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 class Scene(SceneTables):
     """What to touch, and with what.
 
     A file has ``[[body]]`` and ``[[tool]]`` tables, or a single ``[body]`` and ``[tool]``. The tables ``supports``,
-    ``material``, ``region``, ``loads`` and ``dynamics`` of the scene are those of every body that has none of its own.
+    ``touch``, ``material``, ``region``, ``loads`` and ``dynamics`` of the scene are those of every body that has none
+    of its own.
     """
 
     def __init__(self, /, **tables: Any):
@@ -46,20 +42,28 @@ class Scene(SceneTables):
 
         """
         path = Path(path)
-        require_file(path, SceneError)
-        text = path.read_text(errors="replace")
+        text, tables = read_toml(path, SceneError)
         try:
-            scene = cls(**tomllib.loads(text))
-        except tomllib.TOMLDecodeError as error:
-            raise SceneError(f"{path}: {error}") from None
+            scene = cls(**tables)
         except SceneError as error:
             if not isinstance(error.__cause__, ValidationError):
                 raise
             raise SceneError(explain(path, text, error.__cause__, cls)) from None
-        scene._source = (path, text)
-        for rank in range(len(scene.bodies)):
-            scene._check_tables(rank)
+        scene.stand_in(path, text)
         return scene
+
+    def stand_in(self, path: Path, text: str) -> None:
+        """Take a file for that of this scene: its folder is where paths start, its lines are where mistakes stand.
+
+        Raises
+        ------
+        SceneError
+            A body whose tables do not go together.
+
+        """
+        self._source = (path, text)
+        for rank in range(len(self.bodies)):
+            self._check_tables(rank)
 
     def start_paths_in(self, folder: str | os.PathLike[str]) -> None:
         """Let the paths of a scene made by a program start in a folder."""
@@ -74,13 +78,14 @@ class Scene(SceneTables):
             place = ["body", rank, "supports"] if body.supports is not None else shared
             of_which = f" for body '{body.title}'" if len(self.bodies) > 1 else ""
             raise SceneError(f"{located(path, text, place)}: the key 'supports.fixed' is missing{of_which}")
-        own = {"material", "region", "loads", "dynamics", "supports"}
+        own = {"material", "region", "loads", "dynamics", "supports", "touch"}
         given = body.model_fields_set & own
         if len(self.bodies) == 1:
             given |= self.model_fields_set & own
         if body.store is not None and given:
             raise SceneError(
-                f"{path}: a store carries its own material, supports and loads, and cannot move: leave those tables out"
+                f"{path}: a store carries its own material, supports and loads, and where it may be touched, and "
+                "cannot move: leave those tables out"
             )
 
     @classmethod
@@ -104,3 +109,24 @@ class Scene(SceneTables):
 
         """
         return build(self, progress, modes_progress)
+
+    def build_first(
+        self, progress: bool | Callable[[int, int], None] = True
+    ) -> tuple[BuiltScene, dict[int, BackgroundPrecompute]]:
+        """Build what is touched first, and go on with the rest in processes beside this one, by rank of the body.
+
+        Bodies without ``touch.first``, and those whose store is there, are built as a whole.
+
+        Raises
+        ------
+        Error
+            As of :meth:`build`.
+
+        """
+        growing: dict[int, BackgroundPrecompute] = {}
+        try:
+            return build(self, progress, None, growing), growing
+        except BaseException:
+            for background in growing.values():
+                background.close()
+            raise

@@ -16,6 +16,7 @@ from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Length, Number, Point, Pressure, Radius, Table, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
+from palpate.scene.touch import TouchTable
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
@@ -56,8 +57,8 @@ class BodyTable(Table):
     fix the middles between them.
 
     ``position`` (m) and ``orientation`` (unit quaternion w x y z) place the body's own frame in the scene; predicates
-    and shapes speak of the body's own frame. ``material``, ``supports``, ``region``, ``loads`` and ``dynamics`` of the
-    body come before those of the whole scene.
+    and shapes speak of the body's own frame. ``material``, ``supports``, ``touch``, ``region``, ``loads`` and
+    ``dynamics`` of the body come before those of the whole scene.
     """
 
     name: str | None = None
@@ -73,6 +74,7 @@ class BodyTable(Table):
     position: Point = (0.0, 0.0, 0.0)
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
     supports: SupportsTable | None = None
+    touch: TouchTable | None = None
     material: MaterialTable | None = None
     region: list[RegionTable] | None = None
     loads: list[LoadTable] | None = None
@@ -152,6 +154,7 @@ class SceneTables(Table):
 
     bodies: list[BodyTable] = Field(alias="body", min_length=1, max_length=MOST_BODIES)
     supports: SupportsTable = SupportsTable()
+    touch: TouchTable = TouchTable()
     material: MaterialTable = MaterialTable()
     region: list[RegionTable] = Field(default_factory=list)
     loads: list[LoadTable] = Field(default_factory=list)

@@ -106,6 +106,22 @@ class Changing:
         scene = self.scene.model_copy(update={"bodies": tables})
         self._exchange(scene, tuple(bodies), list(range(len(bodies))), list(range(len(self.scene.tools))))
 
+    def take_store(self, body: int, green: GreensFunction) -> None:
+        """Go on with another store of a body, in which more of the same surface may be touched.
+
+        Contacts go on; those whose nodes may not be touched any more are let go.
+
+        Raises
+        ------
+        Error
+            No such body, a store of another surface, or a loop that is being recorded.
+
+        """
+        bodies = list(self.bodies)
+        bodies[body] = replace(bodies[self._body(body)], green=green)
+        ranks: tuple[list[Rank], list[Rank]] = list(range(len(bodies))), list(range(len(self.scene.tools)))
+        self._exchange(self.scene, tuple(bodies), *ranks, exchanged=body)
+
     def add_tool(self, device: str | Device = "simulated", **table: Any) -> int:
         """Add a tool, given as in a ``[tool]`` table, moved by a device of a kind or of the program; returns its rank.
 
@@ -196,16 +212,22 @@ class Changing:
         return self._devices[tool]
 
     def _exchange(
-        self, scene: SceneTables, bodies: tuple[BuiltBody, ...], body_ranks: list[Rank], tool_ranks: list[Rank]
+        self,
+        scene: SceneTables,
+        bodies: tuple[BuiltBody, ...],
+        body_ranks: list[Rank],
+        tool_ranks: list[Rank],
+        exchanged: int | None = None,
     ) -> None:
-        """Give the core bodies and tools, of which some were at these ranks before."""
+        """Give the core bodies and tools, of which some were at these ranks before; one of them has another store."""
         local = any(tool.contact == "local" for tool in scene.tools)
         new_bodies = [
             body_arguments(body, local) for body, rank in zip(bodies, body_ranks, strict=True) if rank is None
         ]
         new_tools = [tool_arguments(scene, tool) for tool, rank in enumerate(tool_ranks) if rank is None]
         places = [(tuple(body.position), tuple(body.orientation)) for body in bodies]
-        _native.change(self._core, (body_ranks, new_bodies, places), (tool_ranks, new_tools))
+        other = None if exchanged is None else (exchanged, body_arguments(bodies[exchanged], local))
+        _native.change(self._core, (body_ranks, new_bodies, places), (tool_ranks, new_tools), other)
         self.scene, self.bodies = scene, bodies
         tools = scene.tools
         self._scales = [1.0 if rank is None else self._scales[rank] for rank in body_ranks]

@@ -19,10 +19,10 @@ from palpate.errors import ViewerError
 from palpate.units import to_float
 from palpate.vectors import three_numbers
 
-VERSION = 9
+VERSION = 10
 # Longest name in a client's message.
 LONGEST_WORD = 40
-DTYPES = {"f4": np.dtype("<f4"), "u4": np.dtype("<u4"), "u1": np.dtype("u1")}
+DTYPES = {kind: np.dtype(f"<{kind}") for kind in ("f4", "u4", "u1", "i1", "i2")}
 
 
 def encode(header: Mapping[str, Any], arrays: Mapping[str, tuple[str, np.ndarray]]) -> bytes:

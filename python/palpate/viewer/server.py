@@ -10,7 +10,7 @@ import json
 import secrets
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,11 +22,14 @@ from websockets.http11 import Request, Response
 
 from palpate import __version__
 from palpate.errors import Error, SimulationError, ViewerError
+from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
 from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
+from palpate.viewer.computing import Computing
 from palpate.viewer.pages import headers, host_is_ours, load_pages
+from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.session import Session, Wants, choices
 from palpate.viewer.surface_map import SurfaceMap
 
@@ -52,6 +55,7 @@ class Client:
     connection: ServerConnection
     shown: Session | None = None
     wants: Wants = field(default_factory=Wants)
+    poses: PoseCoder = field(default_factory=PoseCoder)
     sent: int = 0
     log_seen: tuple[int, int] = (0, 0)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
@@ -83,6 +87,8 @@ class ViewerServer:
         Folder of the recordings that the page begins.
     maps
         What a palpation has left of each body.
+    growing
+        What is computed of bodies beside the loop, by their rank.
 
     Raises
     ------
@@ -102,6 +108,7 @@ class ViewerServer:
         record: Path | None = None,
         recordings: Path = Path(),
         maps: Sequence[SurfaceMap | None] | None = None,
+        growing: Mapping[int, BackgroundPrecompute] | None = None,
     ):
         self.host, self.port = host, port
         self.token = secrets.token_urlsafe(24)
@@ -110,6 +117,8 @@ class ViewerServer:
         self._session = built if isinstance(built, Session) else self._make_session(built)
         if record is not None:
             self._session.simulation.record(record)
+        self._computing = Computing(growing)
+        self._computing.begin()
         self._session.start()
         self._worker = Worker()
         self._models, self._scene_of = list(models), scene_of
@@ -184,6 +193,7 @@ class ViewerServer:
 
     def _close_session(self) -> dict[str, Any] | None:
         self._worker.close()
+        self._computing.close()
         ended = self._session.recorder.stop()
         self._session.close()
         return ended
@@ -228,6 +238,7 @@ class ViewerServer:
         role = "control" if self._controller is client else "watch"
         models = choices(self._models)
         await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
+        await client.send(await self._worker.call(self._computing.message, self._session))
 
     async def _welcome(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
@@ -258,6 +269,8 @@ class ViewerServer:
             message = messages.parse(text)
             if message["type"] == "ack":
                 if message.get("frame") == client.sent:
+                    if message.get("whole") is True:
+                        client.poses.forget()
                     client.may_send.set()
             elif message["type"] == "cutaway":
                 client.wants = replace(client.wants, cutaway=message.get("on") is True)
@@ -280,6 +293,8 @@ class ViewerServer:
             await self._choose(message.get("name"))
         elif message["type"] == "shape":
             await self._reshape(message)
+        elif message["type"] == "paint":
+            await self._worker.call(self._computing.paint, self._session, message)
         elif message["type"] == "record":
             await self._tell_end(await self._worker.call(self._session.record, message))
         else:
@@ -296,13 +311,14 @@ class ViewerServer:
                 session = self._session
                 if client.shown is not session:
                     client.shown, client.log_seen = session, (0, 0)
+                    client.poses.forget()
                     await client.connection.send(await self._worker.call(session.scene_message))
                     client.may_send.set()
                     continue
                 client.sent += 1
                 try:
                     message, client.log_seen = await self._worker.call(
-                        session.frame_message, client.sent, client.log_seen, client.wants
+                        session.frame_message, client.sent, client.log_seen, client.wants, client.poses
                     )
                 except SimulationError:
                     # Another model has taken the place of this one meanwhile.
@@ -329,6 +345,16 @@ class ViewerServer:
             if controller is None or time.monotonic() - controller.heard > LOST_AFTER:
                 await self._worker.call(self._session.release)
             await self._tell_end(await self._worker.call(self._session.recorder.stop_failed))
+            await self._tell_computed()
+
+    async def _tell_computed(self) -> None:
+        """Give the loop what has become ready, and tell of it."""
+        try:
+            told = await self._worker.call(self._computing.step, self._session)
+        except Error as error:
+            told = {"type": "error", "text": str(error)}
+        if told is not None:
+            await self._tell_all(told)
 
     async def _tell_end(self, ended: dict[str, Any] | None) -> None:
         """Tell of a recording that has ended."""

@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import ViewerError
+from palpate.green import GreensFunction
 from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
+from palpate.viewer.log_rows import Tail, thinned
 from palpate.viewer.messages import by_body, encode, index, number, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
+from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.recorder import SessionRecorder
 from palpate.viewer.shown_body import ShownBody, titled
 from palpate.viewer.surface_map import SurfaceMap, maps_or_none
@@ -26,8 +29,6 @@ from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices,
 LARGEST_RADIUS = 0.12
 # Tool targets farther than this many body sizes from the body are refused.
 REACH = 10.0
-# Rows of the 1 kHz log kept for slow clients.
-LOG_KEPT = 4000
 # A frame younger than this serves all clients, s.
 FRAME_AGE = 0.008
 
@@ -89,7 +90,7 @@ class Session:
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
         moving = next((body for body, one in enumerate(built.bodies) if one.motion is not None), None)
         self._moving = None if moving is None else MovingBody(self.simulation, self._extent(moving), moving)
-        self._log, self._history = _Tail(3), _Tail(HISTORY_COLUMNS)
+        self._log, self._history = Tail(3), Tail(HISTORY_COLUMNS)
         self._body_time = 0.0
         self._frame: Frame | None = None
         self._frame_time = 0.0
@@ -102,7 +103,7 @@ class Session:
         built, scene = self.built.bodies[body], self.built.scene
         material = scene.bodies[body].material or scene.material
         ratio = None if built.body is None else material.poissons_ratio
-        return ShownBody(built, Fields(self.simulation, self._extent(body), body, self.maps[body]), ratio)
+        return ShownBody.of(built, Fields(self.simulation, self._extent(body), body, self.maps[body]), ratio)
 
     def start(self) -> None:
         """Start the loop."""
@@ -214,6 +215,11 @@ class Session:
         if self._moving is not None and other._moving is not None:
             self._moving.set_time_scale(other._moving.time_scale)
 
+    def take_store(self, body: int, green: GreensFunction) -> None:
+        """Go on with a store of the same body of which more may be touched."""
+        self.simulation.take_store(body, green)
+        self.built = replace(self.built, bodies=self.simulation.bodies)
+
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
         scene = self.built.scene
@@ -247,13 +253,17 @@ class Session:
             "max_contact_radius": self._max_radii[tool],
         }
 
-    def frame_message(self, number: int, log_seen: tuple[int, int], wants: Wants) -> tuple[bytes, tuple[int, int]]:
-        """Binary message of the latest tick, and up to where it carries log and history."""
+    def frame_message(
+        self, number: int, log_seen: tuple[int, int], wants: Wants, coder: PoseCoder
+    ) -> tuple[bytes, tuple[int, int]]:
+        """Binary message of the latest tick for the client of a coder, and up to where it carries log and history."""
         frame = self._latest()
         poses = [self._pose(frame, body) for body in range(len(self._bodies))]
         pairs = list(zip(self._bodies, poses, strict=True))
-        pictures = [body.fields.picture(wants.field, pose, wants.cutaway, wants.full_scale) for body, pose in pairs]
+        pictures = [body.picture(wants.field, pose, wants.cutaway, wants.full_scale) for body, pose in pairs]
         strains = [body.fields.largest_strain(pose) for body, pose in pairs]
+        drawn = zip(pictures, self._bodies, strict=True)
+        coded = coder.code(number, [(picture.displacements, picture.scalar, body.extent) for picture, body in drawn])
         log, moved = self._log.since(log_seen[0]), self._history.since(log_seen[1])
         header = {
             "type": "frame",
@@ -265,15 +275,23 @@ class Session:
             "realtime": all(frame.statistics["realtime"]),
             "strain": max(strains),
             "bodies": [{"strain": strain} for strain in strains],
-            "motion": None if self._moving is None else self._moving.frame_header(),
+            "motion": self._motion_header(),
             "fields": [picture.header for picture in pictures],
             "interior": [picture.interior for picture in pictures],
+            "poses": coded.headers,
             "recording": self.recorder.header(),
             "replay": self._replay_header(),
         }
-        arrays = by_body([{"displacements": ("f4", p.displacements), "scalar": ("u1", p.scalar)} for p in pictures])
-        rows = {"log": ("f4", _thin(log, self.log_sent, 2)), "history": ("f4", _thin(moved, self.log_sent))}
-        return encode(header, {**arrays, **rows}), (self._log.end, self._history.end)
+        rows = {"log": ("f4", thinned(log, self.log_sent, 2)), "history": ("f4", thinned(moved, self.log_sent))}
+        return encode(header, {**by_body(coded.arrays), **rows}), (self._log.end, self._history.end)
+
+    def _motion_header(self) -> dict[str, Any] | None:
+        """Part of a frame message that tells of the motion; the watched node as the vertex that is drawn for it."""
+        moving = self._moving
+        if moving is None:
+            return None
+        told = moving.frame_header()
+        return {**told, "watched": self._bodies[moving.index].drawn_row(told["watched"])}
 
     def _replay_scene(self) -> dict[str, Any] | None:
         """Part of the scene message that tells of a replay."""
@@ -449,33 +467,6 @@ class Session:
         if self._moving is None:
             raise ViewerError(f"{what}: this body does not move")
         return self._moving
-
-
-class _Tail:
-    """The last rows of a growing table; clients say how many they have seen."""
-
-    def __init__(self, columns: int):
-        self._rows = np.zeros((0, columns))
-        self.end = 0
-
-    def append(self, rows: np.ndarray) -> None:
-        self._rows = np.vstack([self._rows, rows])[-LOG_KEPT:]
-        self.end += len(rows)
-
-    def clear(self) -> None:
-        self._rows = self._rows[:0]
-
-    def since(self, seen: int) -> np.ndarray:
-        return self._rows[max(len(self._rows) - max(self.end - seen, 0), 0) :]
-
-
-def _thin(rows: np.ndarray, most: int, peaks: int | None = None) -> np.ndarray:
-    """Rows that a frame may carry, evenly; of the column ``peaks`` the largest value of each group is kept."""
-    stride = -(-len(rows) // most) or 1
-    thin = rows[::stride].copy()
-    if peaks is not None and stride > 1 and len(rows):
-        thin[:, peaks] = np.maximum.reduceat(rows[:, peaks], np.arange(0, len(rows), stride))
-    return thin
 
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:

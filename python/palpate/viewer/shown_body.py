@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from palpate.body import Body
 from palpate.mesh.elements import drawing_tets
 from palpate.scene import BuiltBody
-from palpate.viewer.fields import Fields
+from palpate.viewer.drawn_surface import DrawnSurface, drawn_surface
+from palpate.viewer.fields import Fields, Picture
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,8 @@ class ShownBody:
         The body, its Green's function, its place.
     fields
         What may be drawn in colours.
+    drawn
+        The surface that the page draws.
     poissons_ratio
         None for several materials or a bare store.
 
@@ -30,7 +33,32 @@ class ShownBody:
 
     built: BuiltBody
     fields: Fields
+    drawn: DrawnSurface
     poissons_ratio: float | None = None
+
+    @classmethod
+    def of(cls, built: BuiltBody, fields: Fields, poissons_ratio: float | None) -> ShownBody:
+        """Find what is drawn of a body."""
+        of_element = np.zeros(0, dtype=np.int64) if built.body is None else regions_of(built.body)[1]
+        return cls(built, fields, drawn_surface(built, of_element), poissons_ratio)
+
+    @property
+    def extent(self) -> float:
+        """Longest side of the body, m."""
+        return float(self.built.green.extents.max())
+
+    def picture(self, name: str, displacements: np.ndarray, cutaway: bool, full_scale: float | None) -> Picture:
+        """Field of a pose at the vertices that are drawn, or at all nodes where the body is cut open."""
+        whole = self.drawn.is_whole
+        picture = self.fields.picture(name, displacements, cutaway and whole, full_scale)
+        if whole:
+            return picture
+        rows = self.drawn.nodes
+        return replace(picture, displacements=picture.displacements[rows], scalar=picture.scalar[rows])
+
+    def drawn_row(self, node: int) -> int:
+        """Vertex that stands for a surface node by its row."""
+        return node if self.drawn.owners is None else int(self.drawn.owners[node])
 
     def header(self, youngs_modulus: float | None) -> dict[str, Any]:
         """Entry of the scene message; the modulus, Pa, is None where it cannot be changed."""
@@ -42,6 +70,7 @@ class ShownBody:
             "tets": 0 if body is None else len(body.mesh.tets),
             "surface_nodes": len(green.surface_nodes),
             "triangles": len(green.surface_triangles),
+            "drawn": None if self.drawn.is_whole else self._drawn_header(),
             "youngs_modulus": youngs_modulus,
             "poissons_ratio": self.poissons_ratio,
             "position": list(self.built.position),
@@ -50,26 +79,45 @@ class ShownBody:
             "regions": [] if body is None else regions_of(body)[0],
         }
 
+    def _drawn_header(self) -> dict[str, Any]:
+        return {"triangles": len(self.drawn.triangles), "deviation": self.drawn.deviation}
+
     def arrays(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Arrays of the scene message, in the body's frame."""
-        green, body = self.built.green, self.built.body
-        if body is None:
-            nodes, tets = np.zeros((int(green.surface_nodes.max()) + 1, 3)), np.zeros((0, 4))
-            regions = np.zeros(0)
-            nodes[green.surface_nodes] = green.surface_positions
-            fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)
-        else:
-            nodes, tets, fixed = body.mesh.nodes, drawing_tets(body.mesh.tets), green.fixed_nodes
-            regions = np.repeat(regions_of(body)[1], len(tets) // len(body.mesh.tets))
+        """Arrays of the scene message, in the body's frame.
+
+        Of a body that is drawn by fewer triangles the nodes are those that are drawn, and it has no inside.
+        """
+        drawn, green = self.drawn, self.built.green
+        nodes, tets, regions, surface, fixed = self._mesh() if drawn.is_whole else self._outside()
         return {
             "nodes": ("f4", nodes),
             "tets": ("u4", tets),
             "tet_regions": ("u4", regions),
-            "surface_triangles": ("u4", green.surface_triangles),
-            "surface_nodes": ("u4", green.surface_nodes),
+            "surface_triangles": ("u4", surface[drawn.triangles]),
+            "triangle_regions": ("u4", drawn.regions),
+            "surface_nodes": ("u4", surface),
             "fixed_nodes": ("u4", fixed),
-            "free": ("f4", green.free_displacements),
+            "free": ("f4", green.free_displacements[drawn.nodes]),
+            "owners": ("u4", np.zeros(0) if drawn.owners is None else drawn.owners),
         }
+
+    def _mesh(self) -> tuple[np.ndarray, ...]:
+        """Nodes, tetrahedra, their regions, surface nodes and supported nodes, of a body that is drawn as it is."""
+        green, body = self.built.green, self.built.body
+        if body is None:
+            nodes = np.zeros((int(green.surface_nodes.max()) + 1, 3))
+            nodes[green.surface_nodes] = green.surface_positions
+            fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)
+            return nodes, np.zeros((0, 4)), np.zeros(0), green.surface_nodes, fixed
+        tets = drawing_tets(body.mesh.tets)
+        regions = np.repeat(regions_of(body)[1], len(tets) // len(body.mesh.tets))
+        return body.mesh.nodes, tets, regions, green.surface_nodes, green.fixed_nodes
+
+    def _outside(self) -> tuple[np.ndarray, ...]:
+        """Return the same of the vertices that are drawn, without an inside."""
+        green, rows = self.built.green, self.drawn.nodes
+        fixed = np.flatnonzero(np.isin(green.surface_nodes[rows], green.fixed_nodes))
+        return green.surface_positions[rows], np.zeros((0, 4)), np.zeros(0), np.arange(len(rows)), fixed
 
 
 def regions_of(body: Body) -> tuple[list[dict[str, Any]], np.ndarray]:

@@ -16,7 +16,9 @@ from palpate.validation.bench.record import run_session
 
 ROOT = Path(__file__).parents[3]
 # The nodule is the largest; its store is shared with the tests of its forces.
-EXAMPLES = sorted(path for path in (ROOT / "examples").glob("*.toml") if path.stem != "exam")  # not a scene
+EXAMPLES = sorted(
+    path for path in (ROOT / "examples").glob("*.toml") if path.stem not in ("exam", "study")
+)  # no scenes
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import bent, box_mesh
+from viewer_client import frame_of
 
 import palpate
 from palpate.fields import SurfaceStrain
@@ -124,8 +125,7 @@ def test_viewer_is_sent_flat_triangles_and_tets(built):
         assert arrays["0/tets"].shape == (8 * len(mesh.tets), 4)
         assert np.array_equal(np.unique(arrays["0/tets"]), np.arange(len(mesh.nodes)))
         assert np.array_equal(arrays["0/surface_triangles"], mesh.surface_triangles)
-        message, _ = session.frame_message(1, (0, 0), Wants(cutaway=True))
-        header, arrays = decode(message)
+        header, arrays = frame_of(session, Wants(cutaway=True))
         assert arrays["0/displacements"].shape == (len(mesh.nodes), 3)
         assert header["strain"] <= 1e-12
     finally:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from palpated import HEIGHT, TOP, block_body, scene_of
+from viewer_client import frame_of
 
 import palpate
 from palpate.palpation import compare, stiffness_map
@@ -28,7 +29,7 @@ def palpated(tmp_path_factory):
 def picture(session: Session, **wants):
     session.start()
     try:
-        return messages.decode(session.frame_message(1, (0, 0), Wants(**wants))[0])
+        return frame_of(session, Wants(**wants))
     finally:
         session.close()
 

@@ -100,12 +100,13 @@ def test_fields_are_those_of_the_recovery(built):
                 field = header["fields"][0]
                 zero, steps = (127.5, 127.5) if field["signed"] else (0.0, 255.0)
                 assert field["max"] == pytest.approx(np.abs(values).max(), rel=1e-3)
-                assert np.abs(zero + steps * values / field["max"] - arrays["0/scalar"]).max() < 0.7
+                # Half a step of colour, and what displacements told in steps do to a strain.
+                assert np.abs(zero + steps * values / field["max"] - arrays["0/scalar"]).max() < 1.3
             await client.say(type="cutaway", on=True)
             header, arrays = await client.frame_where(lambda h: h["interior"][0])
             assert len(arrays["0/scalar"]) == scene["bodies"][0]["nodes"]
             on_surface = arrays["0/scalar"][built.bodies[0].green.surface_nodes].astype(float)
-            assert np.abs(127.5 + 127.5 * values / header["fields"][0]["max"] - on_surface).max() < 0.7
+            assert np.abs(127.5 + 127.5 * values / header["fields"][0]["max"] - on_surface).max() < 1.3
             await client.say(type="field", name=5)
             assert "name" in (await client.receive("error"))[0]["text"]
 

@@ -1,6 +1,7 @@
 // One key for each thing that a mouse hand may want at once.
 
 import type { Control } from "../control";
+import type { Painting } from "../painting";
 import type { Viewport } from "../scene/viewport";
 
 /** Keys and what they do, in the order in which the help tells of them. */
@@ -17,12 +18,17 @@ export const KEYS: readonly (readonly [key: string, what: string])[] = [
   ["x", "cut open"],
   ["p", "plots"],
   ["v", "look from the front again"],
+  ["b", "paint with a brush what is to be computed next"],
+  ["l", "paint it with a lasso"],
+  ["[ ]", "a smaller brush, a larger one"],
+  ["u", "undo the last stroke"],
+  ["Enter", "compute what is painted"],
   ["m", "in an exam: the nodule is where the tool touches"],
   ["0", "in an exam: there is none"],
   ["?", "this help"],
 ];
 
-export function listenToKeys(control: Control, viewport: Viewport, toggleHelp: () => void): void {
+export function listenToKeys(control: Control, painting: Painting, viewport: Viewport, toggleHelp: () => void): void {
   const actions: Record<string, () => void> = {
     r: () => control.reset(),
     v: () => viewport.reframe(),
@@ -35,16 +41,23 @@ export function listenToKeys(control: Control, viewport: Viewport, toggleHelp: (
     g: () => control.toggleGrab(),
     k: () => control.toggleStrike(),
     n: () => control.togglePin(),
+    b: () => painting.choose("brush"),
+    l: () => painting.choose("lasso"),
+    "[": () => painting.changeBrush(-1),
+    "]": () => painting.changeBrush(1),
+    u: () => painting.undo(),
+    Enter: () => painting.compute(),
     m: () => control.answer(true),
     "0": () => control.answer(false),
     "?": toggleHelp,
     Escape: () => {
       control.release();
       control.showMode(0);
+      painting.putAway();
     },
   };
   window.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || takesKeys(event.target)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || takesKeys(event.target, event.key)) return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     // Over the help only the key that ends it.
     if (document.querySelector("dialog[open]") && key !== "?") return;
@@ -56,7 +69,9 @@ export function listenToKeys(control: Control, viewport: Viewport, toggleHelp: (
 }
 
 /** Lists choose by letters, and what is typed into a field is text. */
-function takesKeys(target: EventTarget | null): boolean {
+function takesKeys(target: EventTarget | null, key: string): boolean {
   if (target instanceof HTMLInputElement) return target.type === "text";
+  // A button that has the focus is pressed by Enter.
+  if (target instanceof HTMLButtonElement && key === "Enter") return true;
   return target instanceof HTMLSelectElement;
 }

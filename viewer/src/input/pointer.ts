@@ -9,8 +9,10 @@ import type { Stage } from "../scene/stage";
 import type { Viewport } from "../scene/viewport";
 import { drivenTool, inControl } from "../store";
 import type { State, Store } from "../store";
+import type { Place } from "../window_regions";
+import { byCamera } from "./hand_over";
 import { GrabGesture, PressGesture, orientationOn } from "./press_geometry";
-import type { CameraAxes, Gesture, HeldTool, Place, Purpose, Sight } from "./press_geometry";
+import type { CameraAxes, Gesture, HeldTool, Purpose, Sight } from "./press_geometry";
 
 /** So often the tool is told where to go while it moves; a mouse may report four times as often. */
 const SEND_INTERVAL_MS = 4;
@@ -218,13 +220,10 @@ export class Pointer {
     return grab || wantsGrab(event) ? "grab" : "crosshair";
   }
 
-  /** Two fingers are for the camera: it is told of the first one, which it never saw, before it sees the second. */
-  private handOver({ down, place: [clientX, clientY] }: Drag): void {
+  private handOver({ down, place }: Drag): void {
     this.control.letGo(false);
     this.handedOver = true;
-    const { pointerId, pointerType } = down;
-    const again = { pointerId, pointerType, clientX, clientY, isPrimary: true, bubbles: true, button: 0 };
-    this.viewport.canvas.dispatchEvent(new PointerEvent("pointerdown", again));
+    byCamera(this.viewport.canvas, down, place);
     this.handedOver = false;
   }
 

@@ -4,7 +4,8 @@ import { describe, expect, it } from "vitest";
 import { originAt, toolShape } from "../scene/tool_shape";
 import type { SurfaceSpot } from "../scene/tool_shape";
 import { GENTLE_DEPTH, GrabGesture, PEN_DEPTH, PressGesture, approach, orientationOn, outline } from "./press_geometry";
-import type { CameraAxes, HeldTool, Place, Sight } from "./press_geometry";
+import type { CameraAxes, HeldTool, Sight } from "./press_geometry";
+import type { Place } from "../window_regions";
 
 const SIZE = 0.2;
 const RADIUS = 0.01;

@@ -6,6 +6,7 @@ import * as THREE from "three";
 import { originAt } from "../scene/tool_shape";
 import type { SurfaceSpot, ToolShape } from "../scene/tool_shape";
 import type { Posture } from "../store";
+import type { Place } from "../window_regions";
 
 /** Depth, over the tool's radius, that a button held down leads to; of a pen, at full pressure; and of a notch of the wheel. */
 export const GENTLE_DEPTH = 0.4;
@@ -35,9 +36,6 @@ export interface CameraAxes {
   /** Away from the viewer. */
   forward: THREE.Vector3;
 }
-
-/** A place of the window, in pixels. */
-export type Place = readonly [x: number, y: number];
 
 /** A tool in the hand. */
 export interface HeldTool {

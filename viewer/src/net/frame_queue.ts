@@ -1,19 +1,19 @@
 // Frames between their arrival and the picture: each is acknowledged once it was taken in and shown.
 
-import type { FrameData } from "./protocol";
+import type { PosedFrame } from "./protocol";
 
 export class FrameQueue {
-  private pending: FrameData[] = [];
+  private pending: PosedFrame[] = [];
   private taken: number[] = [];
 
   constructor(private readonly acknowledge: (frame: number) => void) {}
 
-  push(frame: FrameData): void {
+  push(frame: PosedFrame): void {
     this.pending.push(frame);
   }
 
   /** What has arrived since the last call, oldest first. The server still counts on an answer to each. */
-  take(): FrameData[] {
+  take(): PosedFrame[] {
     const frames = this.pending.splice(0);
     this.taken.push(...frames.map((frame) => frame.header.frame));
     return frames;

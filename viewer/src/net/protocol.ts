@@ -1,12 +1,14 @@
-// Messages of the websocket, version 8. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 10. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
+import type { ComputedMessage, PaintMessage } from "./computed_messages";
+import type { CodedArrays, PoseArrays, PoseMessage } from "./poses";
 import type { RecordedMessage, RecordingStatus, ReplayFrame, ReplayScene, SessionCommand } from "./session_messages";
 
-export const PROTOCOL_VERSION = 9;
+export const PROTOCOL_VERSION = 10;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -53,6 +55,8 @@ export interface BodyMessage {
   tets: number;
   surface_nodes: number;
   triangles: number;
+  /** Where fewer triangles are drawn than there are: how many, and about how far the surface lies from them at rest, m. */
+  drawn: { triangles: number; deviation: number } | null;
   /** null where it cannot be changed. */
   youngs_modulus: number | null;
   poissons_ratio: number | null;
@@ -112,17 +116,24 @@ export interface MotionScene {
   strike: { point: Vec3; impulse: Vec3 } | null;
 }
 
-/** Geometry of one body, in its frame. */
+/**
+ * Geometry of one body, in its frame. Where fewer triangles are drawn than the surface has, nodes are the vertices that are
+ * drawn, each a node of the surface, and it has no tetrahedra.
+ */
 export interface BodyArrays {
   nodes: Float32Array;
   tets: Uint32Array;
   /** Of each tetrahedron, among the body's regions. */
   tet_regions: Uint32Array;
   surface_triangles: Uint32Array;
+  /** Of each triangle, the region behind it among the body's. */
+  triangle_regions: Uint32Array;
   surface_nodes: Uint32Array;
   fixed_nodes: Uint32Array;
   /** Displacements of the surface under the body's own loads, a row for each surface node. */
   free: Float32Array;
+  /** For each node of the whole surface the vertex that is drawn in its place; empty where all are drawn. */
+  owners: Uint32Array;
 }
 
 /** Surface of a tool from a file, in its frame; empty for the other shapes. */
@@ -214,6 +225,8 @@ export interface FrameMessage {
   /** For each body, what its colours show and whether all of its nodes are sent. */
   fields: FieldMessage[];
   interior: boolean[];
+  /** How the pose of each body is coded. */
+  poses: PoseMessage[];
   recording: RecordingStatus | null;
   /** With the settings of the tick. */
   replay: (ReplayFrame & { settings: SettingsMessage }) | null;
@@ -221,11 +234,6 @@ export interface FrameMessage {
   loudness?: number;
 }
 
-/** Of one body; a row of displacements and scalar is a surface node, or any node if the inside is shown. */
-export interface PoseArrays {
-  displacements: Float32Array;
-  scalar: Uint8Array;
-}
 
 export interface SceneData {
   header: SceneMessage;
@@ -233,9 +241,18 @@ export interface SceneData {
   tools: ToolArrays[];
 }
 
-export interface FrameData {
+export interface FrameData extends FrameRows {
+  header: FrameMessage;
+  bodies: CodedArrays[];
+}
+
+/** A frame whose poses are decoded. */
+export interface PosedFrame extends FrameRows {
   header: FrameMessage;
   bodies: PoseArrays[];
+}
+
+interface FrameRows {
   /** Rows of time, force of the first tool, computing time in us. */
   log: Float32Array;
   /** Body time, displacement of the watched node, kinetic, strain and total energy in J, work on the body since the start. */
@@ -282,6 +299,7 @@ export type TextMessage =
   | StatusMessage
   | RecordedMessage
   | ExamMessage
+  | ComputedMessage
   | { type: "error"; text: string };
 
 export type ClientMessage =
@@ -303,21 +321,24 @@ export type ClientMessage =
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string; max?: number }
   | { type: "answer"; found: boolean }
-  | { type: "ack"; frame: number }
+  | { type: "ack"; frame: number; whole?: true }
+  | PaintMessage
   | SessionCommand;
 
-const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "error"];
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "computed", "error"];
 const BODY_ARRAYS = {
   nodes: Float32Array,
   tets: Uint32Array,
   tet_regions: Uint32Array,
   surface_triangles: Uint32Array,
+  triangle_regions: Uint32Array,
   surface_nodes: Uint32Array,
   fixed_nodes: Uint32Array,
   free: Float32Array,
+  owners: Uint32Array,
 };
 const TOOL_ARRAYS = { vertices: Float32Array, triangles: Uint32Array };
-const POSE_ARRAYS = { displacements: Float32Array, scalar: Uint8Array };
+const CODED_ARRAYS = { moved: Uint8Array, colored: Uint8Array, scalar: Uint8Array };
 
 interface ArrayEntry {
   name: string;
@@ -326,9 +347,15 @@ interface ArrayEntry {
   offset: number;
 }
 
-type AnyArray = Float32Array | Uint32Array | Uint8Array;
-type ArrayKind = Float32ArrayConstructor | Uint32ArrayConstructor | Uint8ArrayConstructor;
-const KINDS: Record<string, ArrayKind> = { f4: Float32Array, u4: Uint32Array, u1: Uint8Array };
+type AnyArray = Float32Array | Uint32Array | Uint8Array | Int8Array | Int16Array;
+type ArrayKind = new (buffer: ArrayBuffer, offset: number, length: number) => AnyArray;
+const KINDS: Record<string, ArrayKind & { BYTES_PER_ELEMENT: number }> = {
+  f4: Float32Array,
+  u4: Uint32Array,
+  u1: Uint8Array,
+  i1: Int8Array,
+  i2: Int16Array,
+};
 
 /** Reads a text message; throws on anything else. */
 export function decodeText(text: string): TextMessage {
@@ -358,7 +385,7 @@ export function decodeBinary(buffer: ArrayBuffer): SceneData | FrameData {
   }
   return {
     header: header as unknown as FrameMessage,
-    bodies: bodies.map((_, i) => group(arrays, `${i}/`, POSE_ARRAYS)),
+    bodies: bodies.map((_, i) => ({ ...group(arrays, `${i}/`, CODED_ARRAYS), steps: stepsOf(arrays, `${i}/steps`) })),
     ...group(arrays, "", { log: Float32Array, history: Float32Array }),
   };
 }
@@ -385,6 +412,13 @@ function viewArray(buffer: ArrayBuffer, start: number, { name, dtype, shape, off
   const end = start + offset + count * kind.BYTES_PER_ELEMENT;
   if (!whole || end > buffer.byteLength) throw new Error(`array '${name}' goes beyond its message`);
   return new kind(buffer, start + offset, count);
+}
+
+/** Steps of a pose, which come in as few bytes as they need. */
+function stepsOf(arrays: Map<string, AnyArray>, name: string): Int8Array | Int16Array {
+  const array = arrays.get(name);
+  if (!(array instanceof Int8Array || array instanceof Int16Array)) throw new Error(`a message without the array '${name}'`);
+  return array;
 }
 
 /** Arrays whose names have a prefix, each of the kind that it must have. */

@@ -2,16 +2,17 @@
 
 import * as THREE from "three";
 
-import type { BodyArrays, BodyMessage, PoseArrays, Vec3 } from "../net/protocol";
+import type { PoseArrays } from "../net/poses";
+import type { BodyArrays, BodyMessage, Vec3 } from "../net/protocol";
 import type { Layer, Theme } from "../store";
 import { ColorMap } from "./color_map";
-import { faceOwners } from "./face_owners";
 import { FIELD, REGION, tissueColor } from "./field_material";
 import type { FieldUniforms, TISSUE } from "./field_material";
 import { createGroundShadow } from "./ground_shadow";
 import { firstEntry } from "./ray_surface";
 import { regionTexture } from "./region_texture";
 import { SectionView } from "./section_view";
+import type { SeenSurface } from "./seen_vertices";
 import { SolidView } from "./solid_view";
 import { SupportsView } from "./supports_view";
 import { Surface } from "./surface";
@@ -98,6 +99,7 @@ export class BodyView {
       regionColors: { value: regionTexture([tissue]) },
       coloring: { value: FIELD },
       gaps: { value: false },
+      marked: { value: false },
     };
     const [w, x, y, z] = header.orientation;
     this.placed.position.set(...header.position);
@@ -106,7 +108,7 @@ export class BodyView {
     this.surface = new Surface(arrays);
     this.restInScene = transformed(this.surface.rest, this.placed.matrix);
     this.bounds.setFromArray(this.restInScene);
-    this.solid = new SolidView(this.surface, tissue, size, this.uniforms, regionsOfTriangles(header, arrays));
+    this.solid = new SolidView(this.surface, tissue, size, this.uniforms, arrays.triangle_regions);
     this.bothSides = new THREE.Mesh(this.solid.mesh.geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
     this.bothSides.matrixWorld.copy(this.placed.matrix);
     this.wireframe = new WireframeView(this.surface);
@@ -141,6 +143,35 @@ export class BodyView {
     regionColors.value.dispose();
     regionColors.value = regionTexture(coloring.length > 0 ? coloring : [tissueColor(this.header.name)]);
     shown.value = REGION;
+  }
+
+  /** Colours what cannot be touched yet: what each node of the whole surface is (see painting.ts); null where all can. */
+  mark(states: Uint8Array | null): void {
+    this.uniforms.marked.value = states !== null;
+    if (states) this.solid.showMarks(this.largestOfVertices(states));
+  }
+
+  /** Nodes of the whole surface that vertices stand for, ascending. */
+  nodesOf(vertices: ReadonlySet<number>): Uint32Array {
+    const { owners } = this.arrays;
+    if (owners.length === 0) return Uint32Array.from(vertices).sort();
+    const nodes: number[] = [];
+    owners.forEach((vertex, node) => {
+      if (vertices.has(vertex)) nodes.push(node);
+    });
+    return Uint32Array.from(nodes);
+  }
+
+  /** The surface as it is drawn, in the scene. */
+  seenSurface(): SeenSurface {
+    const { surface, placed } = this;
+    const normals = new THREE.BufferAttribute(surface.shownNormals.slice(), 3);
+    return {
+      positions: transformed(surface.shown, placed.matrix),
+      normals: new Float32Array(normals.applyNormalMatrix(new THREE.Matrix3().setFromMatrix4(placed.matrix)).array),
+      triangles: surface.triangles,
+      removed: (vertex) => this.removesAt(surface.rest[3 * vertex]!, surface.rest[3 * vertex + 1]!, surface.rest[3 * vertex + 2]!),
+    };
   }
 
   /** Draws displacements times a scale from the next pose on. */
@@ -242,9 +273,22 @@ export class BodyView {
   /** Whether a point of a triangle of the surface is cut away. */
   private removes(triangle: number, weights: Vec3): boolean {
     if (!this.cutShown) return false;
-    const [x, y, z] = this.surface.at(this.surface.rest, { corners: this.surface.cornersOf(triangle), weights });
+    return this.removesAt(...this.surface.at(this.surface.rest, { corners: this.surface.cornersOf(triangle), weights }));
+  }
+
+  /** Whether a point at rest is cut away. */
+  private removesAt(x: number, y: number, z: number): boolean {
     const { normal, offset } = this.plane;
-    return normal.x * x + normal.y * y + normal.z * z > offset;
+    return this.cutShown && normal.x * x + normal.y * y + normal.z * z > offset;
+  }
+
+  /** For each vertex the largest value of the nodes that it stands for. */
+  private largestOfVertices(values: Uint8Array): Uint8Array {
+    const { owners } = this.arrays;
+    if (owners.length === 0) return values;
+    const largest = new Uint8Array(this.surface.count);
+    owners.forEach((vertex, node) => (largest[vertex] = Math.max(largest[vertex]!, values[node]!)));
+    return largest;
   }
 
   /** Values of all nodes, at those of the surface. */
@@ -282,17 +326,12 @@ export class BodyView {
   }
 }
 
-/** The region behind each triangle of the surface. */
-function regionsOfTriangles({ regions }: BodyMessage, arrays: BodyArrays): (triangle: number) => number {
-  if (regions.length < 2) return () => 0;
-  const owners = faceOwners(arrays);
-  return (triangle) => arrays.tet_regions[owners[triangle]!]!;
-}
-
 function transformed(points: Float32Array, matrix: THREE.Matrix4): Float32Array {
   return new Float32Array(new THREE.BufferAttribute(points.slice(), 3).applyMatrix4(matrix).array);
 }
 
 function same(a: Float32Array | Uint8Array, b: Float32Array | Uint8Array): boolean {
-  return a.length === b.length && a.every((value, i) => value === b[i]);
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
 }

@@ -13,6 +13,8 @@ export interface FieldUniforms {
   colorMap: { value: THREE.DataTexture };
   regionColors: { value: THREE.DataTexture };
   coloring: { value: typeof TISSUE | typeof FIELD | typeof REGION };
+  /** Whether some of the surface cannot be touched yet. */
+  marked: { value: boolean };
   /** Whether a value of 0 stands for none: a triangle with such a corner shows the tissue. */
   gaps: { value: boolean };
 }
@@ -42,21 +44,31 @@ export function tissueColor(name: string): THREE.Color {
   return new THREE.Color(found ? found[1] : SILICONE);
 }
 
+/** Of what cannot be touched yet: still to come, asked for, painted. The panel's legend has the same (style.css). */
+export const MARK_COLORS = { later: 0x70757d, waiting: 0xe69f00, painted: 0x56b4e9 } as const;
+
+function glsl(color: number): string {
+  return `vec3(${new THREE.Color(color).toArray().map((part) => part.toFixed(4)).join()})`;
+}
+
 /**
- * Attributes: value of the field, brightness of the tissue, rank of the region, place at rest. The place is linear over a
- * triangle, so the edge of what is drawn is that of the plane.
+ * Attributes: value of the field, brightness of the tissue, rank of the region, place at rest, and as 1 in one of three
+ * places what cannot be touched yet, in the order of the colours above. The place is linear over a triangle, so the edge of
+ * what is drawn is that of the plane.
  */
 const VERTEX_HEAD = /* glsl */ `
 attribute float scalar;
 attribute float shade;
 attribute float region;
 attribute vec3 rest;
+attribute vec3 mark;
 uniform vec4 cutPlane;
 varying float vField;
 varying float vKnown;
 varying float vShade;
 varying float vRegion;
 varying float vBeyond;
+varying vec3 vMark;
 `;
 const VERTEX_BEGIN = /* glsl */ `
 vec3 transformed = vec3(position);
@@ -65,6 +77,7 @@ vKnown = step(0.5 / 255.0, scalar);
 vShade = shade;
 vRegion = region;
 vBeyond = dot(rest, cutPlane.xyz) - cutPlane.w;
+vMark = mark;
 `;
 
 const FRAGMENT_HEAD = /* glsl */ `
@@ -72,6 +85,8 @@ uniform sampler2D colorMap;
 uniform sampler2D regionColors;
 uniform int coloring;
 uniform bool gaps;
+uniform bool marked;
+varying vec3 vMark;
 varying float vField;
 varying float vKnown;
 varying float vShade;
@@ -89,6 +104,11 @@ else if (coloring == ${FIELD}) {
   diffuseColor.rgb = texture2D(colorMap, vec2(part, 0.5)).rgb;
 }
 else diffuseColor.rgb = texelFetch(regionColors, ivec2(int(vRegion + 0.5), 0), 0).rgb;
+if (marked) {
+  if (vMark.z > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.painted)}, 0.85);
+  else if (vMark.y > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.waiting)}, 0.8);
+  else if (vMark.x > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.later)}, 0.85);
+}
 `;
 
 export function createFieldMaterial(

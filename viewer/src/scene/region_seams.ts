@@ -8,12 +8,12 @@ export interface Seams {
 }
 
 /** The first vertices are the rows themselves. */
-export function splitAtSeams(triangles: Uint32Array, regionOf: (triangle: number) => number, count: number): Seams {
+export function splitAtSeams(triangles: Uint32Array, regionOf: Uint32Array, count: number): Seams {
   const rows = Array.from({ length: count }, (_, row) => row);
   const regions: number[] = new Array<number>(count).fill(-1);
   const others = new Map<string, number>();
   const corners = triangles.map((row, corner) => {
-    const region = regionOf(Math.floor(corner / 3));
+    const region = regionOf[Math.floor(corner / 3)]!;
     if (regions[row]! < 0) regions[row] = region;
     if (regions[row] === region) return row;
     const key = `${row} ${region}`;

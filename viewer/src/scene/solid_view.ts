@@ -9,6 +9,9 @@ import { splitAtSeams } from "./region_seams";
 import type { Seams } from "./region_seams";
 import type { Surface } from "./surface";
 
+/** Three marks, and one byte that rounds a vertex up to four. */
+const MARK_SIZE = 4;
+
 export class SolidView {
   /** Its triangles are those of the surface, in their order. */
   readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshPhysicalMaterial>;
@@ -16,6 +19,7 @@ export class SolidView {
   private readonly scalar: THREE.BufferAttribute;
   private readonly position: THREE.BufferAttribute;
   private readonly normal: THREE.BufferAttribute;
+  private readonly mark: THREE.BufferAttribute;
   private readonly cutPlane: CutUniform = noCut();
 
   constructor(
@@ -23,22 +27,24 @@ export class SolidView {
     color: THREE.Color,
     size: number,
     uniforms: FieldUniforms,
-    regionOf: (triangle: number) => number,
+    regions: Uint32Array,
   ) {
     const geometry = new THREE.BufferGeometry();
-    this.seams = splitAtSeams(surface.triangles, regionOf, surface.count);
-    const { rows, regions, triangles } = this.seams;
+    this.seams = splitAtSeams(surface.triangles, regions, surface.count);
+    const { rows, regions: ofRows, triangles } = this.seams;
     const dynamic = (array: THREE.TypedArray, itemSize: number, normalized = false) =>
       new THREE.BufferAttribute(array, itemSize, normalized).setUsage(THREE.DynamicDrawUsage);
     const rest = gathered(surface.rest, rows, 3);
     this.scalar = dynamic(new Uint8Array(rows.length), 1, true);
     this.position = dynamic(rest.slice(), 3);
     this.normal = dynamic(gathered(surface.shownNormals, rows, 3), 3);
+    this.mark = dynamic(new Uint8Array(MARK_SIZE * rows.length), MARK_SIZE, true);
     geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
     geometry.setAttribute("position", this.position);
     geometry.setAttribute("normal", this.normal);
     geometry.setAttribute("scalar", this.scalar);
-    geometry.setAttribute("region", new THREE.BufferAttribute(regions, 1));
+    geometry.setAttribute("mark", this.mark);
+    geometry.setAttribute("region", new THREE.BufferAttribute(ofRows, 1));
     geometry.setAttribute("rest", new THREE.BufferAttribute(rest, 3));
     geometry.setAttribute("shade", new THREE.BufferAttribute(mottle(rest, size), 1));
     geometry.computeBoundingSphere();
@@ -69,6 +75,16 @@ export class SolidView {
     gather(surface.shown, seams.rows, 3, this.position.array as Float32Array);
     gather(surface.shownNormals, seams.rows, 3, this.normal.array as Float32Array);
     for (const attribute of [this.scalar, this.position, this.normal]) attribute.needsUpdate = true;
+  }
+
+  /** Colours vertices by what they are: 0 as it is, else the rank of a colour of marks, from 1. */
+  showMarks(marks: Uint8Array): void {
+    const into = this.mark.array as Uint8Array;
+    into.fill(0);
+    this.seams.rows.forEach((row, vertex) => {
+      if (marks[row]! > 0) into[MARK_SIZE * vertex + marks[row]! - 1] = 255;
+    });
+    this.mark.needsUpdate = true;
   }
 
   /** Leaves out what lies beyond a plane at rest; all is drawn without one. */

@@ -2,15 +2,17 @@
 
 import * as THREE from "three";
 
-import type { FrameData, FrameMessage, SceneData } from "../net/protocol";
+import type { PosedFrame, FrameMessage, SceneData } from "../net/protocol";
 import { grouped } from "../regions";
-import type { Store, Theme } from "../store";
+import { isGrowing, touchStates } from "../painting";
+import type { Store, Stroke, Theme } from "../store";
 import { contactsOf } from "../tool_contacts";
 import { BodyView } from "./body_view";
 import type { Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
 import { ExamPlaces } from "./exam_places";
 import { FIELD, TISSUE } from "./field_material";
+import { SeenVertices } from "./seen_vertices";
 import { toolShape } from "./tool_shape";
 import type { ToolShape } from "./tool_shape";
 import { ToolView } from "./tool_view";
@@ -23,6 +25,7 @@ export class Stage {
   readonly bounds = new THREE.Box3();
   private tools: ToolView[] = [];
   private readonly examPlaces = new ExamPlaces();
+  private stroke: Stroke | null = null;
   private watched: { view: WatchedView; body: number } | null = null;
 
   constructor(readonly viewport: Viewport, private readonly store: Store) {
@@ -34,6 +37,7 @@ export class Stage {
       this.show();
     });
     store.subscribe(["coloring", "layers"], () => this.color());
+    store.subscribe(["computed", "strokes", "asked", "exam"], () => this.mark());
     store.subscribe(["theme"], ({ theme }) => this.setTheme(theme));
     store.subscribe(["cut"], () => this.cut());
     // Drawn with the next frame.
@@ -58,6 +62,7 @@ export class Stage {
     for (const { group } of [...this.bodies, ...this.tools]) this.viewport.scene.add(group);
     for (const body of this.bodies) body.exaggerate(this.store.get().shownScale);
     this.color();
+    this.mark();
     this.setTheme(this.store.get().theme);
     const moving = header.motion && this.bodies[header.motion.body];
     if (header.motion && moving) {
@@ -74,7 +79,7 @@ export class Stage {
   }
 
   /** Moves to a frame and tells whether the picture changes: bodies at rest are not drawn again and again. */
-  update({ header, bodies }: FrameData): boolean {
+  update({ header, bodies }: PosedFrame): boolean {
     const { motion } = header;
     let changed = false;
     this.bodies.forEach((body, i) => {
@@ -103,6 +108,30 @@ export class Stage {
     const hits = this.bodies.map((body) => body.pick(raycaster)).filter((hit) => hit !== null);
     hits.sort((a, b) => a.distance - b.distance);
     return hits[0]?.pick ?? null;
+  }
+
+  /** The vertices of all bodies that are seen from here. */
+  seenVertices(): SeenVertices {
+    const { camera, canvas } = this.viewport;
+    camera.updateMatrixWorld();
+    const matrix = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    const eye = { position: camera.position.toArray(), matrix: matrix.elements, left, top, width, height };
+    return new SeenVertices(this.bodies.map((body) => body.seenSurface()), eye);
+  }
+
+  /** Shows a stroke while it is drawn; null when there is none. */
+  markStroke(stroke: Stroke | null): void {
+    this.stroke = stroke;
+    this.mark();
+  }
+
+  /** What of the bodies can be touched, and what is painted. */
+  private mark(): void {
+    const state = this.store.get();
+    const shown = this.stroke ? { ...state, strokes: [...state.strokes, this.stroke] } : state;
+    this.bodies.forEach((body, i) => body.mark(isGrowing(state) ? touchStates(shown, i) : null));
+    this.viewport.invalidate();
   }
 
   private updateTools(frame: FrameMessage): boolean {

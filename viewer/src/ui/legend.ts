@@ -35,6 +35,13 @@ export class Legend {
       this.told = "";
       if (key === "Enter" || key === "Escape") this.max.blur();
     };
+    store.subscribe(["scene", "body"], ({ scene, body }) => {
+      const { triangles = 0, drawn = null } = scene?.bodies[body] ?? {};
+      byId("legend-drawn").hidden = !drawn;
+      if (!drawn) return;
+      const [few, all] = [drawn.triangles, triangles].map((count) => count.toLocaleString("en"));
+      setText(byId("legend-drawn"), `Drawn by ${few} of ${all} triangles; felt on all.`);
+    });
     store.subscribe(["sizes", "body"], ({ sizes, body }) => {
       const sides = sizes[body];
       byId("legend-size").hidden = !sides;

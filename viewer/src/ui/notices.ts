@@ -6,6 +6,7 @@ import type { StatusMessage } from "../net/protocol";
 import { inControl } from "../store";
 import type { Store } from "../store";
 import { byId, setText } from "./dom";
+import { duration } from "./numbers";
 
 const CONNECTION_WORDS: Record<ConnectionState, string> = {
   connecting: "Connecting",
@@ -79,9 +80,4 @@ function noticeBanner(text: string, dismiss: () => void): HTMLElement {
   close.onclick = dismiss;
   notice.append(words, close);
   return notice;
-}
-
-function duration(seconds: number): string {
-  if (seconds < 90) return `about ${Math.max(1, Math.round(seconds))} s`;
-  return `about ${Math.round(seconds / 60)} min`;
 }

@@ -21,6 +21,12 @@ export function bytes(value: number): string {
   return `${(value / 1e3).toFixed(value >= 9950 ? 0 : 1)} kB`;
 }
 
+/** How long something will still take. */
+export function duration(seconds: number): string {
+  if (seconds < 90) return `about ${Math.max(1, Math.round(seconds))} s`;
+  return `about ${Math.round(seconds / 60)} min`;
+}
+
 /** A frequency, with its unit. */
 export function hertz(value: number): string {
   return `${value >= 999.5 ? value.toFixed(0) : value.toPrecision(3)} Hz`;

@@ -1,7 +1,7 @@
 // The buttons: what is shown, how the pointer touches, and what is done at once.
 
 import type { Control } from "../control";
-import { NO_INSIDE, hasInside } from "../control";
+import { NO_INSIDE, hasInside, whyWhole } from "../control";
 import type { Viewport } from "../scene/viewport";
 import { CUT_SHARE, inControl } from "../store";
 import type { Axis, Layer, Store } from "../store";
@@ -63,7 +63,7 @@ export class Panel {
       // A finger sees no hints: pressed all the same, the button says why.
       const able = scene !== null && hasInside(scene);
       byId("show-cutaway").setAttribute("aria-disabled", String(!able));
-      byId("show-cutaway").title = able ? "Cut open (x)" : NO_INSIDE;
+      byId("show-cutaway").title = able ? "Cut open (x)" : whyWhole(scene);
       const whole = able ? scene.bodies.filter(({ tets }) => tets === 0) : [];
       byId("cut-whole").hidden = whole.length === 0;
       byId("cut-whole").title = NO_INSIDE;

@@ -11,6 +11,8 @@ export class Statistics {
   /** Frames that were drawn. */
   frames = 0;
   framesPerSecond = 0;
+  /** What the page itself took for all frames so far: to read their poses, and to move what is drawn; ms. */
+  readonly tookMs = { read: 0, move: 0 };
   private readonly compute = cells("stat-compute");
   private readonly wakeup = cells("stat-wakeup");
   private shownMs = 0;
@@ -21,6 +23,14 @@ export class Statistics {
     store.subscribe(["frame"], ({ frame }) => {
       if (frame) this.show(frame);
     });
+  }
+
+  /** Does a part of the work on a frame, and adds what it took. */
+  timed<Result>(part: "read" | "move", work: () => Result): Result {
+    const startMs = performance.now();
+    const result = work();
+    this.tookMs[part] += performance.now() - startMs;
+    return result;
   }
 
   private show(frame: FrameMessage): void {

@@ -24,5 +24,5 @@ pub use hollows::Hollows;
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
 pub use refusal::Refusal;
-pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance};
+pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, known_fans};
 pub use touchable::TouchPatch;

@@ -15,6 +15,7 @@ use super::closest::SurfacePoint;
 use super::quadrature::PatchGeometry;
 use super::refusal::Refusal;
 use crate::element::{Face, Tri3, Tri6};
+use crate::green::GreensFunction;
 use crate::mesh::{Faces, Surface};
 use crate::{Error, Result};
 
@@ -167,27 +168,43 @@ fn weights_on<F: Face<N>, const N: usize>(
 }
 
 impl PatchGeometry {
-    /// Refuses a contact radius under which some contact would cover more nodes than a tick can weigh. A radius within one
-    /// that passed before passes at once.
+    /// Refuses a contact radius under which some contact would cover more nodes than a tick can weigh. Contacts lie where
+    /// `green` may be touched; a radius within one that passed before passes at once.
     ///
     /// # Errors
     /// The radius and the limit.
-    pub fn check_radius(&self, surface: &Surface, radius: f64) -> Result<()> {
+    pub fn check_radius(&self, green: &GreensFunction, radius: f64) -> Result<()> {
         if radius <= f64::from_bits(self.verified_radius.load(Ordering::Relaxed)) {
             return Ok(());
         }
-        let (mut scratch, mut patch) = (PatchScratch::new(surface), Patch::default());
-        for triangle in 0..surface.triangles.len() as u32 {
+        let surface = &green.surface;
+        let memory = || (PatchScratch::new(surface), Patch::default());
+        let fits = |(scratch, patch): &mut (PatchScratch, Patch), triangle: u32| {
             let corners = surface.corners(triangle);
             let position: DVec3 = (corners[0] + corners[1] + corners[2]) / 3.0;
             let normal = surface.normals[triangle as usize];
             let centre = SurfacePoint { position, triangle, barycentric: [1.0 / 3.0; 3], normal, signed_distance: 0.0 };
-            if patch_weights(surface, self, &centre, radius, &mut scratch, &mut patch).is_err() {
-                return Err(Error::Invalid(format!(
-                    "a contact radius of {radius} m covers too many surface nodes, the limit is {MAX_PATCH_NODES}: \
-                     choose a smaller radius or a coarser mesh"
-                )));
-            }
+            patch_weights(surface, self, &centre, radius, scratch, patch).is_ok()
+        };
+        let may_be_touched = |triangle: &u32| {
+            surface.triangles[*triangle as usize].iter().any(|&node| green.touchable(node as usize).is_some())
+        };
+        let count = surface.triangles.len() as u32;
+        #[cfg(feature = "offline")]
+        let all_fit = {
+            use rayon::prelude::*;
+            (0..count).into_par_iter().filter(may_be_touched).map_init(memory, fits).all(|fits| fits)
+        };
+        #[cfg(not(feature = "offline"))]
+        let all_fit = {
+            let mut memory = memory();
+            (0..count).filter(may_be_touched).all(|triangle| fits(&mut memory, triangle))
+        };
+        if !all_fit {
+            return Err(Error::Invalid(format!(
+                "a contact radius of {radius} m covers too many surface nodes, the limit is {MAX_PATCH_NODES}: \
+                 choose a smaller radius or a coarser mesh"
+            )));
         }
         // Positive numbers are ordered as their bits are.
         self.verified_radius.fetch_max(radius.to_bits(), Ordering::Relaxed);

@@ -36,6 +36,8 @@ use crate::tensor::{outer, symmetric};
 const HALF_SPACE: f64 = 0.766_544;
 /// `b` over the mean spacing of nodes around: at 2 the ripple of a sliding contact is 1 %, at 3 it is 0.03 %.
 const SPACINGS: f64 = 3.0;
+/// The least `b` over that spacing, where a patch is shortened because it would reach outside of what may be touched.
+const LEAST_SPACINGS: f64 = 2.0;
 /// Contact radius that `C_reg` is extrapolated to, over the tool's radius.
 const CONTACT: f64 = 0.5;
 /// A Hertzian contact of radius `a` has the second moment of `phi` for `b^2 = 8/5 a^2`.
@@ -175,16 +177,20 @@ impl Default for AtFan {
 struct Probe<'a> {
     body: CompliantBody<'a>,
     centre: SurfacePoint,
+    /// Radius down to which a patch may be shortened: such a one may be touched as a whole.
+    least: f64,
     scratch: &'a mut PatchScratch,
     patch: &'a mut Patch,
 }
 
 impl Probe<'_> {
-    /// `W^T Psi W`, and the radius: `wide`, or less where a patch takes no more nodes.
+    /// `W^T Psi W`, and the radius: `wide`, or less where a patch takes no more nodes, or reaches outside of what may be
+    /// touched.
     fn whole(&mut self, mut wide: f64) -> (DMat3, f64) {
         let CompliantBody { green, geometry, .. } = self.body;
         while patch_weights(&green.surface, geometry, &self.centre, wide, self.scratch, self.patch)
             == Err(Refusal::TooManyNodes)
+            || (wide > self.least && !lies_inside(green, self.patch))
         {
             wide *= SHORTER;
         }
@@ -202,9 +208,10 @@ fn at_fan(
     scratch: &mut PatchScratch,
     patch: &mut Patch,
 ) -> AtFan {
-    let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), scratch, patch };
-    let least = (SAME_MOMENT * reference_area(radius)).sqrt();
-    let (whole, width) = probe.whole((SPACINGS * body.smooth.spacing_around(fan)).max(least));
+    let spacing = body.smooth.spacing_around(fan);
+    let least = LEAST_SPACINGS * spacing;
+    let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), least, scratch, patch };
+    let (whole, width) = probe.whole((SPACINGS * spacing).max((SAME_MOMENT * reference_area(radius)).sqrt()));
     let (mut regular, mut widening) = (whole - half_space(body.moduli, fan, width), 0.0);
     let unit = 1.0 / (body.moduli.plane_strain(fan.node) * radius);
     if !body.moduli.homogeneous {
@@ -249,6 +256,32 @@ fn met_in_motion(probe: &mut Probe<'_>, fan: &Fan, (regular, wide): (DMat3, f64)
         }
         wide *= WIDENED;
     }
+}
+
+/// Whether all nodes of a patch may be touched.
+fn lies_inside(green: &GreensFunction, patch: &Patch) -> bool {
+    patch.iter().all(|(node, _)| green.touchable(node).is_some())
+}
+
+/// The fans at which the regular compliance is known: the nodes around them, as far as the least patch reaches, may all be
+/// touched. What is left of a patch that is cut off by the end of the touch region is smaller and beside its middle: its
+/// compliance is not that of the patch.
+pub fn known_fans(green: &GreensFunction, geometry: &PatchGeometry, smooth: &SmoothSurface) -> Vec<bool> {
+    if green.touch.len() == green.surface_count() {
+        return vec![true; smooth.fans().len()];
+    }
+    let (mut scratch, mut patch) = (PatchScratch::new(&green.surface), Patch::default());
+    let mut known = |fan: &Fan| {
+        if green.touchable(fan.node as usize).is_none() {
+            return false;
+        }
+        let (centre, mut wide) = (centre_of(&green.surface, fan), LEAST_SPACINGS * smooth.spacing_around(fan));
+        while patch_weights(&green.surface, geometry, &centre, wide, &mut scratch, &mut patch).is_err() {
+            wide *= SHORTER;
+        }
+        lies_inside(green, &patch)
+    };
+    smooth.fans().iter().map(&mut known).collect()
 }
 
 /// The node of a fan, as a point of its triangle.

@@ -11,7 +11,7 @@ use crate::Result;
 use crate::files::{unwritten, write_whole};
 
 /// Version of what is computed and of the file's layout; part of the key.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const FORMAT: &str = "palpate-contact";
 
 impl RegularCompliance {

@@ -62,6 +62,14 @@ impl TouchPatch {
         }
     }
 
+    /// Finds the columns of the same nodes in another store of the same surface: whether all of them have some.
+    pub fn find_columns(&mut self, green: &GreensFunction) -> bool {
+        let nodes = self.patch.nodes().iter().zip(&mut self.columns);
+        nodes
+            .map(|(&node, column)| green.touchable(node as usize).map(|found| *column = found))
+            .all(|found| found.is_some())
+    }
+
     /// Nodes and weights.
     pub fn patch(&self) -> &Patch {
         &self.patch

@@ -8,6 +8,7 @@ pub const FORMAT_VERSION: u32 = 4;
 
 /// Hex BLAKE3 hash of element, precision, format version and sections of bytes, each with its length.
 #[cfg(feature = "offline")]
+#[derive(Clone)]
 pub struct ContentKey(blake3::Hasher);
 
 #[cfg(feature = "offline")]

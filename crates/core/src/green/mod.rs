@@ -35,4 +35,7 @@ pub use key::FORMAT_VERSION;
 pub use places::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]
-pub use precompute::{Found, Plan, Problem, Progress, Target, Wanted, plan, precompute, precompute_to};
+pub use precompute::{
+    ColumnStore, Columns, Found, Growth, Listener, Measurement, Parts, Phase, Plan, Problem, Progress, Target, Wanted,
+    Working, checksum, plan, precompute, precompute_to, products,
+};

@@ -47,6 +47,16 @@ impl GreensFunction {
     }
 }
 
+/// Key and touchable nodes of the store at `path`; `None` where there is none of this version. Only its head is read: what
+/// it says is not verified.
+#[cfg(feature = "offline")]
+pub fn touch_of_store(path: &Path) -> Option<(String, Vec<u32>)> {
+    let reader = Reader::open(path).ok()?;
+    let metadata = reader.tensors.metadata().clone().unwrap_or_default();
+    check_metadata(path, &metadata, None).ok()?;
+    Some((metadata.get("key")?.clone(), reader.numbers("touch").ok()?))
+}
+
 /// Holds operators of up to `resident_bytes` as a whole.
 fn load_within(path: &Path, expected_key: Option<&str>, resident_bytes: usize) -> Result<GreensFunction> {
     let reader = Reader::open(path)?;

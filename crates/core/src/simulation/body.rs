@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::input::Placement;
 use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
-use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery, barycentric};
+use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery, barycentric, known_fans};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
 use crate::mesh::Surface;
@@ -103,7 +103,9 @@ impl BodyModel {
         if !moduli.youngs.iter().zip(&moduli.poissons).all(valid) {
             return Err(Error::Invalid("elastic constants at the surface are out of range".into()));
         }
-        let smooth = SmoothSurface::new(&self.loaded, |node| self.green.touchable(node as usize).is_some());
+        let smooth = SmoothSurface::new(&self.loaded);
+        let known = known_fans(&self.green, &self.geometry, &smooth);
+        let smooth = smooth.touchable_at(known);
         self.preparing(|prepared| prepared.local = Some(LocalSurface { smooth, moduli }))
     }
 
@@ -208,7 +210,7 @@ impl PreparedBody {
         if !(radius >= 0.0 && radius.is_finite()) {
             return Err(Error::Invalid(format!("the contact radius must not be negative, got {radius} m")));
         }
-        self.geometry.check_radius(&self.green.surface, radius)
+        self.geometry.check_radius(&self.green, radius)
     }
 }
 

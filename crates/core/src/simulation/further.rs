@@ -81,7 +81,7 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
             let Some(found) = foot_at(at, &foot) else { continue };
             (foot, depth) = found;
         }
-        let touchable = scratch.local.weigh(body, &own.smooth, &foot).touchable >= 0.5;
+        let touchable = !scratch.local.weigh(body, &own.smooth, &foot).is_outside();
         let near = depth > -NEAR * radius && depth < DEEPEST * radius;
         if touchable && near && is_another(state, (tool, body), &foot, radius) {
             let local = LocalContact {

@@ -1,6 +1,7 @@
 //! What goes on when bodies and tools come into a running simulation or go out of it.
 
 use super::contacts::Mode;
+use super::model::Model;
 use super::state::State;
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 
@@ -23,7 +24,10 @@ impl State {
     /// Takes over what goes on from the state of the model before: motions and strain of bodies that stay, what tools that stay
     /// remember, and the contacts between these. Contacts keep their slots, so that all that is kept by slot stays right. By
     /// exchanges alone: nothing is allocated or freed.
-    pub fn take_over(&mut self, before: &mut State, kept: &Kept) {
+    ///
+    /// A body that stays may have another store of the same surface in `model`, this state's own: contacts whose nodes may be
+    /// touched there go on.
+    pub fn take_over(&mut self, before: &mut State, kept: &Kept, model: &Model) {
         for (body, old) in self.bodies.iter_mut().zip(&kept.bodies) {
             if let Some(old) = old.and_then(|old| before.bodies.get_mut(old)) {
                 std::mem::swap(body, old);
@@ -44,8 +48,12 @@ impl State {
             let body = Kept::new_rank(&kept.bodies, contact.body);
             if let (Some(tool), Some(body), true) = (tool, body, contact.mode != Mode::Free) {
                 (contact.tool, contact.body) = (tool, body);
+                let patch = &mut before.contacts.patches[slot];
+                if !patch.find_columns(&model.bodies[body].green) {
+                    continue;
+                }
                 self.contacts.put(slot, contact);
-                std::mem::swap(&mut self.contacts.patches[slot], &mut before.contacts.patches[slot]);
+                std::mem::swap(&mut self.contacts.patches[slot], patch);
             }
         }
         std::mem::swap(&mut self.compliance, &mut before.compliance);

@@ -47,7 +47,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         let places = &places[..count];
         let law_of_contact = places.first().map(|&slot| state.contacts.slots[slot].law);
         let law = law_of(law_now(tool_model.law, law_of_contact, said.grab));
-        state.tools[tool].refused[body] = None;
+        let was_refused = state.tools[tool].refused[body].take();
         if !said.active || input.controls.reset || !said.pose.is_finite() {
             state.tools[tool].entry[body] = Entry::default();
             places.iter().for_each(|&slot| state.contacts.clear(slot));
@@ -80,6 +80,8 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
                     limit::begin(model, state, slot, input.controls.strain_limit[body]);
                 }
             }
+            // It is still as deep as where it was refused, or where it has gone since.
+            Ok(None) if state.tools[tool].entry[body].reached > 0.0 => state.tools[tool].refused[body] = was_refused,
             Ok(None) => {}
             Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
         }

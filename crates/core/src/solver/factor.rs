@@ -4,7 +4,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::Perm;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -12,13 +12,13 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::multifrontal::operations;
 use super::ordering::nested_dissection;
 use crate::fem::{Supports, SymmetricCsc};
 use crate::{Error, Result};
 
 /// Order and structure of a factor, before any number is computed.
 pub struct Symbolic {
-    lower: SparseColMat<usize, f64>,
     structure: SymbolicCholesky<usize>,
 }
 
@@ -34,7 +34,10 @@ impl Symbolic {
     /// # Errors
     /// Not enough memory.
     pub fn new(stiffness: &SymmetricCsc, supports: &Supports) -> Result<Self> {
-        let lower = free_lower_triangle(stiffness, supports);
+        Self::of_lower(&free_lower_triangle(stiffness, supports), stiffness, supports)
+    }
+
+    fn of_lower(lower: &SparseColMat<usize, f64>, stiffness: &SymmetricCsc, supports: &Supports) -> Result<Self> {
         let order = dof_order(stiffness, supports);
         let mut inverse = vec![0usize; order.len()];
         for (new, &old) in order.iter().enumerate() {
@@ -52,7 +55,7 @@ impl Symbolic {
             },
         )
         .map_err(|e| Error::Singular(format!("symbolic factorisation failed ({e:?})")))?;
-        Ok(Self { lower, structure })
+        Ok(Self { structure })
     }
 
     /// The supernodes, in permuted positions.
@@ -74,44 +77,31 @@ impl Symbolic {
         }
     }
 
-    /// Entries of the matrix's lower triangle.
-    pub fn matrix_entries(&self) -> usize {
-        self.lower.compute_nnz()
-    }
-
-    /// Operations of [`Symbolic::factorise`]: a column with `c` numbers below its diagonal takes `(c + 1)^2`.
+    /// Operations of a factorisation.
     ///
     /// # Errors
     /// Never: the structure is made supernodal.
     pub fn flops(&self) -> Result<f64> {
         let supernodes = self.supernodes()?;
-        let column = |rows: usize| (rows as f64).powi(2);
-        let of = |s: usize| {
-            let size = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
-            let below = supernodes.supernode(s).pattern().len();
-            (1..=size).map(|k| column(below + k)).sum::<f64>()
-        };
-        Ok((0..supernodes.n_supernodes()).map(of).sum())
+        Ok((0..supernodes.n_supernodes()).map(|s| operations(supernodes, s)).sum())
     }
+}
 
-    /// Bytes that [`Symbolic::factorise`] needs beside the factor.
-    pub fn scratch_bytes(&self, par: Par) -> usize {
-        self.structure.factorize_numeric_llt_scratch::<f64>(par, Default::default()).unaligned_bytes_required()
-    }
-
-    /// The numbers.
+impl Factor {
+    /// Orders and factorises the free part of `stiffness`.
     ///
     /// # Errors
     /// A pivot that is not positive: a part of the body is not held by any support.
-    pub fn factorise(self, par: Par) -> Result<Factor> {
+    pub fn new(stiffness: &SymmetricCsc, supports: &Supports, par: Par) -> Result<Self> {
         let failed = |what: &str| Error::Singular(format!("{what}; is every part of the body held by a support?"));
-        let symbolic = self.structure;
+        let lower = free_lower_triangle(stiffness, supports);
+        let symbolic = Symbolic::of_lower(&lower, stiffness, supports)?.structure;
         let mut values = vec![0.0; symbolic.len_val()];
         let mut memory = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(par, Default::default()));
         symbolic
             .factorize_numeric_llt(
                 &mut values,
-                self.lower.as_ref(),
+                lower.as_ref(),
                 Side::Lower,
                 LltRegularization::default(),
                 par,
@@ -122,17 +112,7 @@ impl Symbolic {
         if !values.iter().all(|v| v.is_finite()) {
             return Err(failed("the factor is not finite"));
         }
-        Ok(Factor { symbolic, values })
-    }
-}
-
-impl Factor {
-    /// Orders and factorises the free part of `stiffness`.
-    ///
-    /// # Errors
-    /// A pivot that is not positive: a part of the body is not held by any support.
-    pub fn new(stiffness: &SymmetricCsc, supports: &Supports, par: Par) -> Result<Self> {
-        Symbolic::new(stiffness, supports)?.factorise(par)
+        Ok(Self { symbolic, values })
     }
 
     /// Number of free dofs.
@@ -148,17 +128,6 @@ impl Factor {
             Par::Seq,
             MemStack::new(memory),
         );
-    }
-
-    /// The factor's supernodes, in permuted positions.
-    ///
-    /// # Errors
-    /// Never: the factor is made supernodal.
-    pub fn supernodal(&self) -> Result<SupernodalLltRef<'_, usize, f64>> {
-        match self.symbolic.raw() {
-            SymbolicCholeskyRaw::Supernodal(symbolic) => Ok(SupernodalLltRef::new(symbolic, &self.values)),
-            SymbolicCholeskyRaw::Simplicial(_) => Err(Error::Singular("the factor has no supernodes".into())),
-        }
     }
 
     /// Scratch for [`Factor::solve_in_place`] with `columns` right-hand sides.

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import importlib.util
 import json
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import numpy as np
 from palpate.errors import ViewerError
 from palpate.scene import model_scene
 from palpate.validation.bench import servo
+from palpate.validation.bench.chromium import browser_page
 from palpate.validation.bench.loop_ticks import LoopTimes, Times, by_kind, played, running, script
 from palpate.viewer import messages
 from palpate.viewer.server import ViewerServer
@@ -25,8 +25,6 @@ CELLS, CONTACTS, LAW = servo.PLATES[0], 1, "local"
 PLACES, PLAYS = 40, 25
 # How long the page is watched, s, and how long it may take to show itself.
 PAGE_SECONDS, PAGE_LIMIT = 4.0, 60.0
-# A graphics processor is not asked for: what is measured must not depend on a screen being there.
-CHROMIUM_FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 @dataclass(frozen=True)
@@ -98,24 +96,18 @@ async def _served(server: ViewerServer) -> float:
 
 async def _drawn(server: ViewerServer) -> float | None:
     """Frames a second that Chromium draws; None without it, without Playwright, or if it shows none."""
-    executable = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if executable is None or importlib.util.find_spec("playwright") is None:
+    if importlib.util.find_spec("playwright") is None:
         return None
     from playwright.async_api import Error as BrowserError
-    from playwright.async_api import async_playwright
 
     with contextlib.suppress(BrowserError, asyncio.TimeoutError):
-        async with async_playwright() as driver:
-            browser = await driver.chromium.launch(executable_path=executable, args=list(CHROMIUM_FLAGS))
-            try:
-                page = await browser.new_page(viewport={"width": 1280, "height": 720})
-                await page.goto(server.address)
-                await asyncio.wait_for(_frames_beyond(page, 3), PAGE_LIMIT)
-                first, begun = await _frames(page), time.monotonic()
-                await asyncio.sleep(PAGE_SECONDS)
-                return (await _frames(page) - first) / (time.monotonic() - begun)
-            finally:
-                await browser.close()
+        async with browser_page(server.address) as page:
+            if page is None:
+                return None
+            await asyncio.wait_for(_frames_beyond(page, 3), PAGE_LIMIT)
+            first, begun = await _frames(page), time.monotonic()
+            await asyncio.sleep(PAGE_SECONDS)
+            return (await _frames(page) - first) / (time.monotonic() - begun)
     return None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.errors import Error
-from palpate.validation.verify import bending, curved, exactness, felt, half_space, palpation, vibration
+from palpate.validation.verify import bending, curved, exactness, felt, half_space, palpation, surface, vibration
 from palpate.validation.verify.check import Benchmark
 from palpate.validation.verify.contact import balance, beside, energy, friction, groove, pressing, shapes, sliding
 
@@ -15,6 +15,7 @@ BENCHMARKS = {
         Benchmark("patch", "Patch test, irregular elements", exactness.patch_test),
         Benchmark("rigid", "Rigid motions", exactness.rigid_motions),
         Benchmark("convergence", "Orders of convergence, smooth displacement", exactness.convergence, slow=True),
+        Benchmark("surface", "All of a surface in stages, 5k tetrahedra", surface.full_surface),
         Benchmark("cantilever", "Cantilever, length 10 depths", bending.cantilever),
         Benchmark("cook", "Cook's membrane, plane strain", bending.cook),
         Benchmark("le10", "NAFEMS LE10, thick elliptic plate", curved.thick_plate),

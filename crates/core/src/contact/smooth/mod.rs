@@ -31,7 +31,7 @@ const MARGIN: f64 = 1.2;
 /// Fans of a surface, and which of them each triangle meets.
 pub struct SmoothSurface {
     pub(super) fans: Vec<Fan>,
-    /// Whether the node of each fan may be touched.
+    /// Whether each fan may be touched.
     pub(super) touchable: Vec<bool>,
     /// For each triangle the fans of its corners, and for each fan those that share a triangle with it.
     pub(super) of_corners: Vec<[u32; 3]>,
@@ -44,10 +44,10 @@ pub struct SmoothSurface {
 }
 
 impl SmoothSurface {
-    /// Fits the surface; `touchable` tells of each node whether it may be touched.
-    pub fn new(surface: &Surface, touchable: impl Fn(u32) -> bool) -> Self {
+    /// Fits the surface, all of which may be touched.
+    pub fn new(surface: &Surface) -> Self {
         let Fans { fans, of_corners, neighbours, creases } = Fans::new(surface);
-        let touchable = fans.iter().map(|fan| touchable(fan.node)).collect();
+        let touchable = vec![true; fans.len()];
         let walked = of_corners.clone();
         let (ranges, met, arch) = (Vec::new(), Vec::new(), Arch::new());
         let mut smooth = Self { fans, touchable, of_corners, neighbours, creases, ranges, met, arch };
@@ -62,6 +62,11 @@ impl SmoothSurface {
             smooth.meet(&mut walk, t);
         }
         smooth
+    }
+
+    /// The same surface of which only some fans may be touched.
+    pub fn touchable_at(self, touchable: Vec<bool>) -> Self {
+        Self { touchable, ..self }
     }
 
     /// The fans.
@@ -217,7 +222,7 @@ pub(crate) mod tests {
     #[test]
     fn the_distance_of_a_ball_is_that_of_the_ball_and_its_derivatives_are_exact() {
         let surface = ball(16);
-        let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
         let (mut worst, mut near) = (0.0f64, near(&smooth));
         let drawn = DrawnSurface { surface: &surface, query: &query };
         for p in points(1.2) {
@@ -242,7 +247,7 @@ pub(crate) mod tests {
     #[test]
     fn weights_sum_to_one_and_their_gradients_are_exact() {
         let surface = ball(16);
-        let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
         let drawn = DrawnSurface { surface: &surface, query: &query };
         let heights: Vec<_> = smooth.fans().iter().map(|fan| [fan.position.z]).collect();
         let mut weights = FanWeights::new(near(&smooth));
@@ -265,7 +270,7 @@ pub(crate) mod tests {
     #[test]
     fn a_cube_has_three_fans_a_corner_and_is_flat_between_its_creases() {
         let surface = cube();
-        let (smooth, query) = (SmoothSurface::new(&surface, |_| true), SurfaceQuery::new(&surface).expect("triangles"));
+        let (smooth, query) = (SmoothSurface::new(&surface), SurfaceQuery::new(&surface).expect("triangles"));
         assert_eq!(smooth.fans().len(), 24);
         let (drawn, mut near) = (DrawnSurface { surface: &surface, query: &query }, near(&smooth));
         let mut foot = |p| smooth.foot_anywhere(drawn, p, &mut near).expect("a foot");

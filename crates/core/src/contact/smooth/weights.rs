@@ -46,6 +46,11 @@ impl<const N: usize> Blended<N> {
 }
 
 impl FanWeights {
+    /// Whether most of what was weighed may not be touched.
+    pub fn is_outside(&self) -> bool {
+        self.touchable < 0.5
+    }
+
     /// With memory for any triangle of some surfaces.
     pub fn new(near: Neighbourhood) -> Self {
         Self {

@@ -1,22 +1,22 @@
 //! The operators of a body and their accuracy, in the number format that is asked for or that the body needs.
 
-use faer::Par;
-
 use super::free_response::{FreeResponse, free_response};
+use super::inverse::Inverse;
 use super::layout::Layout;
 use super::number::Number;
-use super::operators::operators;
+use super::phase::{Listener, Phase};
 use super::plan::{Bounds, Prepared, Route};
 use super::probe::{Probe, Squares};
 use super::problem::Problem;
 use super::sweep::Sweep;
 use super::system::System;
 use super::tree::Tree;
-use crate::Result;
 use crate::fem::SymmetricCsc;
 use crate::green::accuracy::Accuracy;
 use crate::green::precision::Precision;
-use crate::solver::{Factor, condition, require_regular};
+use crate::solver::multifrontal::Schedule;
+use crate::solver::{Symbolic, condition, require_regular};
+use crate::{Error, Result};
 
 /// The number format asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ pub struct Made {
     pub accuracy: Accuracy,
 }
 
-/// Factorises, measures and chooses; `go_on` is asked between the steps.
+/// Factorises, measures and chooses; `phase` is told of the steps, `go_on` asked now and then.
 ///
 /// # Errors
 /// A singular stiffness, a bound of memory that cannot be kept, or an interruption.
@@ -72,33 +72,33 @@ pub fn made(
     wanted: Wanted,
     memory: Option<usize>,
     in_memory: bool,
-    go_on: &dyn Fn() -> Result<()>,
+    phase: Listener<'_>,
+    go_on: &(dyn Fn() -> Result<()> + Sync),
 ) -> Result<Made> {
-    let prepared = Prepared::new(problem)?;
-    let bounds = Bounds { memory, in_memory, choosing: wanted.named().is_none() };
+    let prepared = Prepared::new(problem, phase)?;
+    let bounds = Bounds { memory, in_memory };
     let mut routes = match wanted {
         Wanted::Named(precision) => vec![(precision, prepared.route(precision, bounds)?)],
         Wanted::Within(_) => fitting(&prepared, bounds)?,
     };
     go_on()?;
-    let Prepared { stiffness, symbolic, layout, tree } = prepared;
-    let factor = symbolic.factorise(Par::rayon(0))?;
-    let softness = condition(&factor, &stiffness, &problem.supports);
-    require_regular(&softness, &problem.mesh.nodes)?;
-    go_on()?;
-    let response = free_response(&stiffness, &factor, &problem.supports, &problem.loads, &layout.row_dofs)?;
+    let double = prepared.route(Precision::F32, bounds);
+    let Prepared { stiffness, symbolic, layout, tree, schedule } = prepared;
     let system = System { stiffness: &stiffness, supports: &problem.supports, layout: &layout };
-    let probe = Probe::new(problem, &system, &factor, &softness);
-    // One residual may be small by chance: not below what the columns' residuals were beside the columns.
-    let loads = response.error.max(probe.factor_error * response.size);
-    let measuring = Measuring { system: &system, probe: &probe, factor: &factor, loads };
+    let (symbolic, schedule, tree) = (&symbolic, &schedule, &tree);
+    let making =
+        Making { problem, system: &system, symbolic, schedule, tree, double: double.as_ref().err(), phase, go_on };
     let candidates: Vec<Precision> = routes.iter().map(|(precision, _)| *precision).collect();
-    let Measured { sweeps, accuracy, precision } = match wanted {
-        Wanted::Named(precision) => measuring.named(tree, precision)?,
-        Wanted::Within(bound) => measuring.chosen(tree, bound, &candidates)?,
+    let Measured { sweeps, response, accuracy, precision } = match wanted {
+        Wanted::Named(precision) => making.named(precision)?,
+        Wanted::Within(bound) => making.chosen(bound, &candidates)?,
     };
     let at = routes.iter().position(|(of, _)| *of == precision).unwrap_or(0);
-    let (_, route) = routes.swap_remove(at);
+    let route = match (double, &sweeps) {
+        // Sixteen bits of a body that needs double precision.
+        (Ok(route), Sweeps::Double(_)) if precision == Precision::F16 => route,
+        _ => routes.swap_remove(at).1,
+    };
     Ok(Made { stiffness, layout, route, sweeps, response, precision, accuracy })
 }
 
@@ -122,6 +122,7 @@ fn fitting(prepared: &Prepared, bounds: Bounds) -> Result<Vec<(Precision, Route)
 /// A format with what it achieves.
 struct Measured {
     sweeps: Sweeps,
+    response: FreeResponse,
     accuracy: Accuracy,
     precision: Precision,
 }
@@ -129,68 +130,110 @@ struct Measured {
 /// Sweeps with what they compute on the probed patches, and the error of that.
 struct Swept<C> {
     sweep: Sweep<C>,
+    response: FreeResponse,
     squares: Squares,
     computed: f64,
-}
-
-/// What accuracies are measured with.
-struct Measuring<'a> {
-    system: &'a System<'a>,
-    probe: &'a Probe,
-    factor: &'a Factor,
     loads: f64,
+    /// Nothing gives where it may be touched.
+    rigid: bool,
 }
 
-impl Measuring<'_> {
-    fn swept<C: Number>(&self, tree: Tree) -> Result<Swept<C>> {
-        let operators = operators::<C>(&tree, self.factor.supernodal()?);
-        let sweep = Sweep { tree, operators };
-        let squares = self.probe.squares(self.system, &sweep);
-        let computed = self.probe.computed_error(&squares);
-        Ok(Swept { sweep, squares, computed })
+impl<C> Swept<C> {
+    fn accuracy(&self, precision: Precision) -> Accuracy {
+        self.squares.typical(self.computed, self.loads, precision)
     }
 
-    fn single(&self, tree: Tree) -> Result<Measured> {
-        let Swept { sweep, squares, computed } = self.swept(tree)?;
-        let accuracy = squares.typical(computed, self.loads, Precision::F16);
-        Ok(Measured { sweeps: Sweeps::Single(sweep), accuracy, precision: Precision::F16 })
+    fn measured(self, precision: Precision, sweeps: fn(Sweep<C>) -> Sweeps) -> Measured {
+        let accuracy = self.accuracy(precision);
+        Measured { sweeps: sweeps(self.sweep), response: self.response, accuracy, precision }
     }
+}
 
-    fn named(&self, tree: Tree, precision: Precision) -> Result<Measured> {
-        if precision == Precision::F16 {
-            return self.single(tree);
+/// What sweeps are made of.
+struct Making<'a> {
+    problem: &'a Problem,
+    system: &'a System<'a>,
+    symbolic: &'a Symbolic,
+    schedule: &'a Schedule,
+    tree: &'a Tree,
+    /// Why the memory does not allow operators in double precision, if it does not.
+    double: Option<&'a Error>,
+    phase: Listener<'a>,
+    go_on: &'a (dyn Fn() -> Result<()> + Sync),
+}
+
+impl Making<'_> {
+    /// Factorises and measures; `None` where numbers of this kind have too few digits for the body.
+    fn swept<C: Number>(&self) -> Result<Option<Swept<C>>> {
+        let (problem, system) = (self.problem, self.system);
+        let (stiffness, supports) = (system.stiffness, system.supports);
+        (self.phase)(Phase::Factor);
+        let positions = self.symbolic.positions();
+        let inverse = Inverse::<C>::new(self.symbolic, self.schedule, &positions, stiffness, supports, self.go_on)?;
+        if !inverse.is_finite() {
+            return Ok(None);
         }
-        let Swept { sweep, squares, computed } = self.swept(tree)?;
-        let accuracy = squares.typical(computed, self.loads, precision);
-        Ok(Measured { sweeps: Sweeps::Double(sweep), accuracy, precision })
+        (self.phase)(Phase::Accuracy);
+        let mut scratch = inverse.scratch();
+        let softness = condition(&mut |x| inverse.solve(&mut scratch, x), stiffness, supports);
+        drop(scratch);
+        require_regular(&softness, &problem.mesh.nodes)?;
+        (self.go_on)()?;
+        let response = free_response(stiffness, &inverse, supports, &problem.loads, &system.layout.row_dofs)?;
+        let (Some(response), Some(probe)) = (response, Probe::new(problem, &inverse, &softness)) else {
+            return Ok(None);
+        };
+        (self.go_on)()?;
+        let sweep = inverse.cut(self.tree.clone())?;
+        let squares = probe.squares(system, &sweep);
+        let computed = probe.computed_error(&squares);
+        // One residual may be small by chance: not below what the columns' residuals were beside the columns.
+        let loads = response.error.max(probe.factor_error * response.size);
+        Ok(Some(Swept { sweep, response, squares, computed, loads, rigid: probe.is_empty() }))
+    }
+
+    /// Sweeps in single precision, which may not be enough for the body.
+    fn single(&self) -> Result<Option<Swept<f32>>> {
+        match self.swept() {
+            // Double precision decides whether the body is supported.
+            Err(Error::Singular(_)) => Ok(None),
+            found => found,
+        }
+    }
+
+    fn double(&self) -> Result<Swept<f64>> {
+        let what = "rounding would spoil every digit: parts of the body differ too much in stiffness; bring materials \
+                    closer together, or fix more of the body";
+        if let Some(Error::Memory(reason)) = self.double {
+            return Err(Error::Memory(format!("this body needs double precision: {reason}")));
+        }
+        self.swept()?.ok_or_else(|| Error::Singular(what.into()))
+    }
+
+    fn named(&self, precision: Precision) -> Result<Measured> {
+        if precision == Precision::F16
+            && let Some(single) = self.single()?
+        {
+            return Ok(single.measured(precision, Sweeps::Single));
+        }
+        Ok(self.double()?.measured(precision, Sweeps::Double))
     }
 
     /// The first of the candidates, the cheapest first, within the bound; else the last.
-    fn chosen(&self, mut tree: Tree, bound: f64, candidates: &[Precision]) -> Result<Measured> {
+    fn chosen(&self, bound: f64, candidates: &[Precision]) -> Result<Measured> {
         let within = |accuracy: Accuracy| accuracy.touch.max(accuracy.stamp) <= bound;
-        let &[.., best] = candidates else { return self.named(tree, Precision::F64) };
-        if self.probe.is_empty() && candidates.contains(&Precision::F32) {
-            // Nothing gives where it may be touched: nothing to measure a format by.
-            return self.named(tree, Precision::F32);
+        if candidates.contains(&Precision::F16)
+            && let Some(single) = self.single()?
+            && (candidates.len() == 1 || within(single.accuracy(Precision::F16)) && !single.rigid)
+        {
+            return Ok(single.measured(Precision::F16, Sweeps::Single));
         }
-        if best == Precision::F16 {
-            return self.single(tree);
-        }
-        let mut double = self.swept::<f64>(tree)?;
-        // Sixteen bits are computed in single precision: worth trying only where their rounding alone is within.
-        if candidates[0] == Precision::F16 && within(double.squares.typical(0.0, 0.0, Precision::F16)) {
-            let single = self.single(double.sweep.tree)?;
-            if within(single.accuracy) {
-                return Ok(single);
-            }
-            let Sweeps::Single(Sweep { tree: same, .. }) = single.sweeps else { return Ok(single) };
-            tree = same;
-            double = self.swept(tree)?;
-        }
-        let accuracy_of = |precision| double.squares.typical(double.computed, self.loads, precision);
-        let precision = candidates.iter().copied().filter(|&p| p != Precision::F16);
-        let precision = precision.into_iter().find(|&p| within(accuracy_of(p))).unwrap_or(best);
-        let accuracy = accuracy_of(precision);
-        Ok(Measured { sweeps: Sweeps::Double(double.sweep), accuracy, precision })
+        let double = self.double()?;
+        let mut others = candidates.iter().copied().filter(|&p| p != Precision::F16 || candidates.len() == 1);
+        // Where nothing gives there is nothing to measure a format by.
+        let fits = |&precision: &Precision| double.rigid || within(double.accuracy(precision));
+        let best = candidates.last().copied().unwrap_or(Precision::F64);
+        let precision = others.find(fits).unwrap_or(best);
+        Ok(double.measured(precision, Sweeps::Double))
     }
 }

@@ -3,10 +3,12 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::arrangement::Arrangement;
 use super::block::Block;
 use super::layout::Layout;
 use super::number::Number;
 use super::panels::Panels;
+use super::runs::runs;
 use super::tasks::in_tasks;
 use crate::Result;
 
@@ -14,7 +16,9 @@ use crate::Result;
 pub struct Mirror<'a, T> {
     /// Rows and columns.
     pub layout: &'a Layout,
-    /// Blocks of columns.
+    /// How they are kept.
+    pub arrangement: &'a Arrangement,
+    /// Blocks of columns that are ready: the first ones.
     pub blocks: &'a [Block],
     /// Their panels.
     pub panels: &'a Panels<T>,
@@ -24,6 +28,9 @@ pub struct Mirror<'a, T> {
 pub fn numbers(layout: &Layout, width: usize) -> usize {
     (2 * width + 1) * layout.rows()
 }
+
+/// Rows of a panel that are read at a time, at most.
+const ROWS_AT_ONCE: usize = 256;
 
 impl<T: Number> Mirror<'_, T> {
     /// Hands every column to `take`, as its place in the order and its rows in the order of the store, from up
@@ -42,8 +49,8 @@ impl<T: Number> Mirror<'_, T> {
                 }
                 self.lines(block, &mut lines, &mut panel)?;
                 for (k, line) in lines.chunks_exact(self.layout.rows()).enumerate() {
-                    for (value, &place) in column.iter_mut().zip(&self.layout.place_of_stored) {
-                        *value = line[place as usize];
+                    for (value, &rank) in column.iter_mut().zip(&self.arrangement.rank_of_stored) {
+                        *value = line[rank as usize];
                     }
                     take(self.blocks[block].first + k, &column)?;
                 }
@@ -51,31 +58,59 @@ impl<T: Number> Mirror<'_, T> {
         })
     }
 
-    /// The columns of a block with all their rows in solving order.
+    /// The columns of a block with all their rows by rank.
     fn lines(&self, index: usize, lines: &mut Vec<T>, panel: &mut Vec<T>) -> Result<()> {
         let (block, length) = (&self.blocks[index], self.layout.rows());
+        let ranks = self.layout.ranks(block);
         lines.resize(block.width * length, T::default());
+        // Of the ranks below each column's own, how many are solved so far: no panel after them has their rows.
+        let mut solved = vec![0; block.width];
         for (earlier_index, earlier) in self.blocks[..index].iter().enumerate() {
-            // Rows of this block in the earlier one's panel are columns of this block: contiguous pieces of lines.
-            panel.resize(block.width * earlier.width, T::default());
-            self.panels.get(earlier_index, (block.first - earlier.first) * earlier.width, panel)?;
-            let other_kind = (earlier.first < self.layout.supported) != (block.first < self.layout.supported);
-            for (line, piece) in lines.chunks_exact_mut(length).zip(panel.chunks_exact(earlier.width)) {
-                let target = &mut line[earlier.first..earlier.first + earlier.width];
-                if other_kind {
-                    target.iter_mut().zip(piece).for_each(|(value, &solved)| *value = -solved);
-                } else {
-                    target.copy_from_slice(piece);
+            let theirs = self.layout.ranks(earlier);
+            let below = ranks.iter().map(|&rank| theirs.partition_point(|&other| other < rank));
+            solved.iter_mut().zip(below).for_each(|(solved, below)| *solved += below);
+            self.rows(earlier_index, &solved, ranks, panel)?;
+            let other_kind = self.layout.moves_supports(earlier) != self.layout.moves_supports(block);
+            let runs = runs(theirs.iter().copied());
+            for (line, mut piece) in lines.chunks_exact_mut(length).zip(panel.chunks_exact(earlier.width)) {
+                for run in &runs {
+                    let (part, rest) = piece.split_at(run.len());
+                    let target = &mut line[run.clone()];
+                    if other_kind {
+                        target.iter_mut().zip(part).for_each(|(value, &solved)| *value = -solved);
+                    } else {
+                        target.copy_from_slice(part);
+                    }
+                    piece = rest;
                 }
             }
         }
         panel.resize(block.len(), T::default());
         self.panels.get(index, 0, panel)?;
-        transpose_into(panel, block.width, lines, length, block.first);
-        for k in 0..block.width {
-            for earlier in 0..k {
-                lines[k * length + block.first + earlier] = panel[k * block.width + earlier];
+        let mut row = 0;
+        for run in self.layout.panel_rows(block) {
+            let part = &panel[row * block.width..(row + run.len()) * block.width];
+            transpose_into(part, block.width, lines, length, run.start);
+            row += run.len();
+        }
+        for (k, line) in lines.chunks_exact_mut(length).enumerate() {
+            for (&rank, &value) in ranks[..k].iter().zip(&panel[k * block.width..]) {
+                line[rank as usize] = value;
             }
+        }
+        Ok(())
+    }
+
+    /// Rows `ranks` of an earlier panel, which are columns of a later block: contiguous pieces of lines. `solved` says how
+    /// many of the ranks below each are columns up to and with those of that panel.
+    fn rows(&self, earlier: usize, solved: &[usize], ranks: &[u32], panel: &mut Vec<T>) -> Result<()> {
+        let width = self.blocks[earlier].width;
+        panel.resize(ranks.len() * width, T::default());
+        let rows = ranks.iter().zip(solved).map(|(&rank, solved)| (width + rank as usize - solved) as u32);
+        let mut rest = &mut panel[..];
+        for run in runs(rows) {
+            let part = rest.split_off_mut(..run.len() * width).unwrap_or_default();
+            self.panels.get(earlier, run.start * width, part)?;
         }
         Ok(())
     }
@@ -85,7 +120,7 @@ impl<T: Number> Mirror<'_, T> {
     /// # Errors
     /// That of reading a panel.
     pub fn diagonal(&self) -> Result<Vec<T>> {
-        let mut diagonal = Vec::with_capacity(self.layout.columns);
+        let mut diagonal = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {
             let mut square = vec![T::default(); block.width * block.width];
             self.panels.get(index, 0, &mut square)?;
@@ -94,17 +129,28 @@ impl<T: Number> Mirror<'_, T> {
         Ok(diagonal)
     }
 
-    /// Calls `see(row, column, value)` for all rows that have no column, row and column as places in the order.
+    /// Calls `see(rank, place of the column, value)` for all rows whose columns are not ready, or that have none.
     ///
     /// # Errors
     /// That of reading a panel.
     pub fn rows_without_column(&self, see: &mut dyn FnMut(usize, usize, T)) -> Result<()> {
-        let mut row = Vec::new();
+        let ready: usize = self.blocks.iter().map(|block| block.width).sum();
+        let waits = |rank: &u32| self.layout.place_of_rank(*rank as usize).is_none_or(|place| place >= ready);
+        let mut values = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {
-            row.resize(block.width, T::default());
-            for place in self.layout.columns..self.layout.rows() {
-                self.panels.get(index, (place - block.first) * block.width, &mut row)?;
-                row.iter().enumerate().for_each(|(k, &value)| see(place, block.first + k, value));
+            let mut row = 0;
+            for run in self.layout.panel_rows(block) {
+                for waiting in runs((run.start as u32..run.end as u32).filter(waits)) {
+                    for rank in waiting.clone().step_by(ROWS_AT_ONCE) {
+                        let count = ROWS_AT_ONCE.min(waiting.end - rank);
+                        values.resize(count * block.width, T::default());
+                        self.panels.get(index, (row + rank - run.start) * block.width, &mut values)?;
+                        for (rank, values) in (rank..).zip(values.chunks_exact(block.width)) {
+                            values.iter().enumerate().for_each(|(k, &value)| see(rank, block.first + k, value));
+                        }
+                    }
+                }
+                row += run.len();
             }
         }
         Ok(())

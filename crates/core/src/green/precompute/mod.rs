@@ -1,10 +1,17 @@
 //! Computing a Green's function: offline, with all threads.
 //!
 //! A [`Problem`] is ordered and counted ([`plan`]), factorised ([`crate::solver`]), cut down to a tree of small operators,
-//! and swept block of columns by block; the finished panels are then mirrored into the store.
+//! and swept block of columns by block ([`Columns`]); the finished panels are then mirrored into the store
+//! ([`ColumnStore`]). Both may be in one process, or the columns in several. The columns are solved in stages ([`Growth`]).
 
+mod arrangement;
 mod block;
+mod column_store;
+mod columns;
+mod finish;
 mod free_response;
+mod growth;
+mod inverse;
 mod layout;
 mod made;
 mod mirror;
@@ -12,18 +19,29 @@ mod number;
 mod operators;
 mod panels;
 mod partial;
+mod phase;
 mod plan;
 mod probe;
 mod problem;
+mod rate;
 mod run;
+mod runs;
 mod scales;
+mod solving;
 mod spatial_order;
+mod stages;
 mod sweep;
 mod system;
 mod tasks;
 mod tree;
 
+pub use column_store::{ColumnStore, Found, Target, checksum};
+pub use columns::{Columns, Measurement, Parts, Working};
+pub use growth::Growth;
 pub use made::Wanted;
+pub use phase::{Listener, Phase};
 pub use plan::Plan;
 pub use problem::Problem;
-pub use run::{Found, Progress, Target, plan, precompute, precompute_to};
+pub use rate::products;
+pub use run::{plan, precompute, precompute_to};
+pub use tasks::Progress;

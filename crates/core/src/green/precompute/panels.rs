@@ -4,7 +4,7 @@
 //! without a column last; the numbers of a row are contiguous. Everything earlier is the mirror
 //! of an earlier panel.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use super::number::Number;
 use super::partial::Partial;
@@ -15,21 +15,13 @@ pub enum Panels<T> {
     /// In memory.
     Memory(Vec<OnceLock<Vec<T>>>),
     /// In a file beside the store to be.
-    File(Partial),
+    File(Arc<Partial>),
 }
 
 impl<T: Number> Panels<T> {
     /// Room for some blocks in memory.
     pub fn in_memory(blocks: usize) -> Self {
         Panels::Memory((0..blocks).map(|_| OnceLock::new()).collect())
-    }
-
-    /// Whether a block is there.
-    pub fn has(&self, block: usize) -> bool {
-        match self {
-            Panels::Memory(panels) => panels[block].get().is_some(),
-            Panels::File(partial) => partial.has(block),
-        }
     }
 
     /// Keeps the panel of a block.

@@ -5,6 +5,8 @@ use rayon::current_num_threads;
 use super::block::Block;
 use super::layout::Layout;
 use super::mirror;
+use super::operators::operator_numbers;
+use super::phase::{Listener, Phase};
 use super::probe;
 use super::problem::Problem;
 use super::sweep::{loaded, scratch_numbers};
@@ -13,6 +15,7 @@ use super::tree::Tree;
 use crate::fem::SymmetricCsc;
 use crate::green::precision::Precision;
 use crate::solver::Symbolic;
+use crate::solver::multifrontal::Schedule;
 use crate::{Error, Result};
 
 /// Columns of a block, best first: enough for the matrix products, few enough for the cache and to share among tasks.
@@ -63,6 +66,8 @@ pub struct Prepared {
     pub layout: Layout,
     /// The tree.
     pub tree: Tree,
+    /// Order of the factorisation.
+    pub schedule: Schedule,
 }
 
 /// Blocks of columns, and how they are solved.
@@ -84,8 +89,6 @@ pub struct Bounds {
     pub memory: Option<usize>,
     /// The operator itself is to be held, too.
     pub in_memory: bool,
-    /// The format is one of several that are measured first, in double precision.
-    pub choosing: bool,
 }
 
 impl Prepared {
@@ -93,12 +96,15 @@ impl Prepared {
     ///
     /// # Errors
     /// Not enough memory.
-    pub fn new(problem: &Problem) -> Result<Self> {
+    pub fn new(problem: &Problem, phase: Listener<'_>) -> Result<Self> {
+        phase(Phase::Assembly);
         let stiffness = crate::fem::stiffness(&problem.mesh, &problem.materials);
+        phase(Phase::Ordering);
         let symbolic = Symbolic::new(&stiffness, &problem.supports)?;
         let layout = Layout::new(problem, &stiffness, &symbolic);
         let tree = Tree::new(symbolic.supernodes()?, &layout.wanted);
-        Ok(Self { stiffness, symbolic, layout, tree })
+        let schedule = Schedule::new(symbolic.supernodes()?);
+        Ok(Self { stiffness, symbolic, layout, tree, schedule })
     }
 
     /// Chooses blocks and tasks so that the peak stays within the bounds.
@@ -116,7 +122,7 @@ impl Prepared {
     /// # Errors
     /// Never: the structure is made supernodal.
     pub fn plan(&self, problem: &Problem, precision: Precision, route: &Route) -> Result<Plan> {
-        let Self { stiffness, symbolic, layout, tree } = self;
+        let Self { stiffness, symbolic, layout, tree, .. } = self;
         let system = System { stiffness, supports: &problem.supports, layout };
         Ok(Plan {
             precision,
@@ -151,10 +157,10 @@ fn sweep_flops(system: &System<'_>, tree: &Tree, block: &Block) -> f64 {
 struct Sizes {
     /// Matrix and structure, held throughout.
     matrix: usize,
-    /// Beside it during the factorisation, and while the operators are made from the factor and probed.
+    /// Beside it during the factorisation, and while the columns are probed by the whole of the factor.
     factorising: usize,
-    making: usize,
-    /// The operators.
+    probing: usize,
+    /// The operators that the columns need.
     operators: usize,
     /// The operator and its panels, if they are held.
     result: usize,
@@ -165,24 +171,28 @@ struct Sizes {
 
 impl Sizes {
     fn new(prepared: &Prepared, precision: Precision, bounds: Bounds) -> Result<Self> {
-        let Prepared { stiffness, symbolic, layout, tree } = prepared;
+        let Prepared { stiffness, symbolic, layout, tree, schedule } = prepared;
         let supernodes = symbolic.supernodes()?;
         let (stored, computed) = (precision.panel_bytes(), precision.computed_bytes());
-        let measured = if bounds.choosing { Precision::F64.computed_bytes() } else { computed };
-        let factor = 8 * supernodes.len_val();
-        let lower = 16 * symbolic.matrix_entries();
-        let dofs = stiffness.dimension;
+        let (dofs, threads) = (stiffness.dimension, current_num_threads());
         let structure = 8 * supernodes.row_idx().len() + 64 * dofs + 4 * tree.boundaries.len();
+        let sizes = |s: usize| {
+            let size = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
+            (size, supernodes.supernode(s).pattern().len())
+        };
+        let kept = |s: usize| computed * operator_numbers(sizes(s).0, sizes(s).1);
+        let fronts = schedule.peak_bytes(supernodes, threads, &kept);
+        let whole: usize = (0..supernodes.n_supernodes()).map(kept).sum();
+        // The loads of some columns, the columns, residual and correction; and the same in the sweep, with its entries.
+        let columns = probe::SOLVED * dofs * (4 * 8 + 16 + computed);
+        let patch = computed * scratch_numbers(tree, probe::WIDTH);
         let numbers: usize = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).sum();
-        let largest = tree.nodes.iter().map(|n| n.size() * (n.size() + n.boundary_size())).max().unwrap_or(0);
-        // Three columns at a time by the factor, with residual and correction; then those of a patch by sweeps.
-        let probing = (3 * 8 * largest).max(measured * scratch_numbers(tree, probe::WIDTH)).max(9 * 8 * dofs);
         let panels: usize = layout.blocks(WIDTHS[0]).iter().map(Block::len).sum();
         let held = stored * panels + precision.bytes() * layout.columns * layout.rows();
         Ok(Self {
             matrix: 12 * stiffness.values.len() + structure + OVERHEAD_BYTES,
-            factorising: factor + lower + symbolic.scratch_bytes(faer::Par::rayon(0)),
-            making: factor + measured * numbers + probing,
+            factorising: fronts + 4 * (threads + 1) * dofs,
+            probing: whole + columns.max(patch),
             operators: computed * numbers,
             result: if bounds.in_memory { held } else { 0 },
             stored,
@@ -195,7 +205,7 @@ impl Sizes {
         let panel = self.stored * width * layout.rows();
         let solving = self.operators + tasks * (self.computed * scratch_numbers(tree, width) + panel);
         let mirroring = tasks * self.stored * mirror::numbers(layout, width);
-        self.matrix + self.result + self.factorising.max(self.making).max(solving).max(mirroring)
+        self.matrix + self.result + self.factorising.max(self.probing).max(solving).max(mirroring)
     }
 
     /// Width, tasks and peak: as many tasks as there are threads, as wide as possible, within the bound.

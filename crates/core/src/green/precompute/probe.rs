@@ -1,28 +1,30 @@
 //! The error of the columns of a body, measured on a few of them before the others are computed.
 //!
-//! The three columns of some nodes are solved by the factor and corrected by their residuals: `x + K^-1 (f - K x)`, which
-//! leaves what rounding the entries of `K` itself does. Beside them stand the columns that the sweeps give, and with the
+//! The three columns of some nodes are solved and corrected by their residuals until these are small, which leaves what
+//! rounding the entries of `K` itself does. Beside them stand the columns that the sweeps give, and with the
 //! patches around those nodes typical contacts are solved: their errors by the same estimate as an answer's
 //! ([`crate::green::accuracy`]).
 
 use faer::linalg::solvers::{DenseSolveCore, Solve};
-use faer::{Mat, MatMut, Side};
+use faer::{Mat, Side};
 use glam::{DMat3, DVec3};
 
-use super::free_response::subtract_product;
+use super::inverse::Inverse;
 use super::number::Number;
 use super::problem::Problem;
-use super::sweep::{Scratch, Source, Sweep, loaded, readers};
+use super::sweep::{Scratch, Source, Sweep, loaded};
 use super::system::System;
 use crate::green::accuracy::{Accuracy, Pressed, ROUNDING_MARGIN, rounding_noise, unknown_errors};
 use crate::green::precision::Precision;
-use crate::solver::{Condition, Factor};
+use crate::solver::Condition;
 
 /// Patches that are probed, and nodes of each: some per cent of the columns of a body of 600 touchable nodes.
 const PATCHES: usize = 3;
 const NODES: usize = 8;
 /// Columns of a patch.
 pub const WIDTH: usize = 3 * NODES;
+/// Columns that are solved by the whole of the factor.
+pub const SOLVED: usize = 3 * PATCHES;
 
 /// A few neighbouring touchable nodes, free along all axes; the first is the one they lie around.
 pub struct Patch {
@@ -35,25 +37,39 @@ pub struct Patch {
 /// What is compared with.
 pub struct Probe {
     patches: Vec<Patch>,
-    /// Error of the factor's own columns: `|w_j| / s_j`.
+    /// Error of the factor's own columns in the energy norm, `|w_j| / s_j`: of sweeps in double precision before they were
+    /// corrected, of others what corrections left, for theirs is told by the entries.
     pub factor_error: f64,
 }
 
 impl Probe {
-    /// Chooses patches, the first where the body is softest beside its own stiffness, the others far from it, and solves.
-    pub fn new(problem: &Problem, system: &System<'_>, factor: &Factor, condition: &Condition) -> Self {
+    /// Chooses patches, the first where the body is softest beside its own stiffness, the others far from it, and solves;
+    /// `None` where corrections do not help.
+    pub fn new<C: Number>(problem: &Problem, inverse: &Inverse<'_, C>, condition: &Condition) -> Option<Self> {
+        let supports = &problem.supports;
+        let rank = |dof: u32| supports.free_rank[dof as usize] as usize;
         let mut probe = Self { patches: Vec::new(), factor_error: 0.0 };
-        for nodes in chosen_patches(problem, condition) {
-            let dofs: Vec<u32> = nodes.into_iter().flat_map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
-            let (exact, error) = exact_columns(system, factor, &dofs);
-            probe.factor_error = probe.factor_error.max(error);
-            probe.patches.push(Patch { dofs, exact });
-        }
-        if probe.patches.is_empty() {
+        let dofs_of =
+            |nodes: Vec<u32>| nodes.into_iter().flat_map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
+        let patches: Vec<Vec<u32>> = chosen_patches(problem, condition).into_iter().map(dofs_of).collect();
+        let Some(first) = patches.first() else {
             // Nothing but supports may be touched: what the condition number allows.
             probe.factor_error = condition.number * f64::EPSILON;
+            return Some(probe);
+        };
+        let (count, each) = (supports.free.len(), first.len().min(3));
+        let mut loads = vec![0.0; each * patches.len() * count];
+        for (k, &dof) in patches.iter().flat_map(|dofs| &dofs[..each]).enumerate() {
+            loads[k * count + rank(dof)] = 1.0;
         }
-        probe
+        let found = inverse.refined(&loads)?;
+        let errors = if size_of::<C>() == size_of::<f64>() { &found.first } else { &found.last };
+        probe.factor_error = errors.iter().fold(0.0, |most: f64, &error| most.max(error));
+        for (dofs, columns) in patches.into_iter().zip(found.columns.chunks_exact(each * count)) {
+            let exact = dofs.iter().map(|&dof| [0, 1, 2].map(|k| columns[k * count + rank(dof)])).collect();
+            probe.patches.push(Patch { dofs, exact });
+        }
+        Some(probe)
     }
 
     /// Whether there is no patch: only supports may be touched.
@@ -135,43 +151,13 @@ fn chosen_patches(problem: &Problem, condition: &Condition) -> Vec<Vec<u32>> {
     centres.into_iter().map(around).collect()
 }
 
-/// Rows `dofs` of the columns of the first three, corrected; and the largest `|w_j| / s_j` before that.
-fn exact_columns(system: &System<'_>, factor: &Factor, dofs: &[u32]) -> (Vec<[f64; 3]>, f64) {
-    let (stiffness, supports) = (system.stiffness, system.supports);
-    let count = supports.free.len();
-    let rank = |dof: u32| supports.free_rank[dof as usize] as usize;
-    let mut memory = factor.solve_scratch(3);
-    let mut solve =
-        |x: &mut [f64]| factor.solve_in_place(MatMut::from_column_major_slice_mut(x, count, 3), &mut memory);
-    let mut columns = vec![0.0; 3 * count];
-    for (k, &dof) in dofs[..3].iter().enumerate() {
-        columns[k * count + rank(dof)] = 1.0;
-    }
-    let mut residual = columns.clone();
-    solve(&mut columns);
-    for (x, r) in columns.chunks_exact(count).zip(residual.chunks_exact_mut(count)) {
-        subtract_product(stiffness, supports, x, r);
-    }
-    let mut correction = residual.clone();
-    solve(&mut correction);
-    let mut error = 0.0f64;
-    for (k, &dof) in dofs[..3].iter().enumerate() {
-        let part = k * count..(k + 1) * count;
-        let energy: f64 = residual[part.clone()].iter().zip(&correction[part]).map(|(r, e)| r * e).sum();
-        error = error.max((energy.abs() / columns[k * count + rank(dof)]).sqrt());
-    }
-    columns.iter_mut().zip(&correction).for_each(|(x, e)| *x += e);
-    let row = |&dof: &u32| [0, 1, 2].map(|k| columns[k * count + rank(dof)]);
-    (dofs.iter().map(row).collect(), error)
-}
-
 /// The patch's rows of its columns, as the sweeps compute them; the mean of both halves.
 fn swept<C: Number>(system: &System<'_>, sweep: &Sweep<C>, scratch: &mut Scratch<C>, dofs: &[u32]) -> Mat<f64> {
     let (tree, width) = (&sweep.tree, dofs.len());
     let rows: Vec<u32> = dofs.iter().filter_map(|&dof| system.layout.kept(tree, system.supports, dof)).collect();
     let source = |(column, &row): (usize, &u32)| Source { row, column: column as u32, value: 1.0 };
     let sources: Vec<Source> = rows.iter().enumerate().map(source).collect();
-    sweep.solve(scratch, &sources, &loaded(tree, width, &sources), &readers(tree, width, None));
+    sweep.solve(scratch, &sources, &loaded(tree, width, &sources), &vec![width; tree.nodes.len()]);
     let value = |i: usize, j: usize| scratch.row(rows[i], width)[j].to_f64();
     Mat::from_fn(width, width, |i, j| 0.5 * (value(i, j) + value(j, i)))
 }

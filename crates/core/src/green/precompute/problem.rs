@@ -27,7 +27,16 @@ pub struct Problem {
 impl Problem {
     /// Content key of the Green's function with this precision (`None`: chosen by the body): mesh, materials, supports,
     /// loads, touch region.
+    ///
+    /// In which order the columns were computed is no part of it, nor is how many were computed together: both follow from
+    /// what was asked for first and from the memory there was, and change the last bits only, below the accuracy that the
+    /// store states. A store of hours would otherwise be refused where another place was to be touched first.
     pub fn key(&self, precision: Option<Precision>) -> String {
+        self.key_of_touch(precision).of(&self.touch)
+    }
+
+    /// The keys of this problem for any touch region.
+    pub fn key_of_touch(&self, precision: Option<Precision>) -> KeyOfTouch {
         let mut key = ContentKey::new(self.mesh.tets.element_name(), precision);
         key.section(bytemuck::cast_slice(&self.mesh.nodes));
         key.section(bytemuck::cast_slice(self.mesh.tets.as_flattened()));
@@ -37,11 +46,7 @@ impl Problem {
         }
         key.section(bytemuck::cast_slice(&self.supports.fixed));
         key.section(bytemuck::cast_slice(&self.surface_nodes));
-        key.section(bytemuck::cast_slice(&self.touch));
-        if !self.loads.is_empty() {
-            key.section(bytemuck::cast_slice(&self.loads));
-        }
-        key.finish()
+        KeyOfTouch { before: key, loads: self.loads.clone() }
     }
 
     /// The surface in its own numbering.
@@ -69,5 +74,23 @@ impl Problem {
         }
         let first = self.materials.first()?.youngs_modulus;
         self.materials.iter().all(|m| m.youngs_modulus == first).then_some(first)
+    }
+}
+
+/// What the key of a problem is made of, but for its touch region.
+pub struct KeyOfTouch {
+    before: ContentKey,
+    loads: Vec<f64>,
+}
+
+impl KeyOfTouch {
+    /// The key with these touchable nodes, ascending ranks among the surface nodes.
+    pub fn of(&self, touch: &[u32]) -> String {
+        let mut key = self.before.clone();
+        key.section(bytemuck::cast_slice(touch));
+        if !self.loads.is_empty() {
+            key.section(bytemuck::cast_slice(&self.loads));
+        }
+        key.finish()
     }
 }

@@ -13,7 +13,6 @@
 //! with are the entries near their bound, and those have 15 bits here and 11 there (nodal forces under 20 neighbouring
 //! nodes: 1e-2 of the largest with halves).
 
-use super::layout::Layout;
 use super::mirror::Mirror;
 use super::number::Number;
 use crate::Result;
@@ -24,18 +23,23 @@ use crate::fem::SymmetricCsc;
 /// # Errors
 /// That of reading a panel.
 pub fn magnitudes<T: Number>(mirror: &Mirror<'_, T>, stiffness: &SymmetricCsc) -> Result<Vec<f64>> {
-    let Layout { row_dofs, order, columns, supported, place_of_stored, .. } = mirror.layout;
+    let Mirror { layout, arrangement, .. } = mirror;
     let mut of_place: Vec<f64> = mirror.diagonal()?.into_iter().map(Number::to_f64).collect();
-    for (square, &row) in of_place.iter_mut().zip(&order[..*supported]) {
-        *square = stiffness.diagonal(row_dofs[row as usize]);
+    for (place, square) in of_place.iter_mut().enumerate() {
+        if layout.is_support(place) {
+            *square = stiffness.diagonal(layout.dof(place));
+        }
+        *square = square.sqrt();
     }
-    of_place.iter_mut().for_each(|square| *square = square.sqrt());
-    let mut largest = vec![0.0f64; order.len() - columns];
-    mirror.rows_without_column(&mut |row, column, value| {
-        largest[row - columns] = largest[row - columns].max(value.to_f64().abs() / of_place[column]);
+    let mut of_rank = vec![0.0f64; layout.rows()];
+    mirror.rows_without_column(&mut |rank, place, value| {
+        of_rank[rank] = of_rank[rank].max(value.to_f64().abs() / of_place[place]);
     })?;
-    of_place.extend(largest.into_iter().map(|value| if value > 0.0 { value } else { 1.0 }));
-    Ok(place_of_stored.iter().map(|&place| of_place[place as usize]).collect())
+    of_rank.iter_mut().filter(|value| **value == 0.0).for_each(|value| *value = 1.0);
+    for (place, &value) in of_place.iter().enumerate() {
+        of_rank[layout.rank(place)] = value;
+    }
+    Ok(arrangement.rank_of_stored.iter().map(|&rank| of_rank[rank as usize]).collect())
 }
 
 /// `q` of a column from its entries, the inverse scales being given.

@@ -40,16 +40,6 @@ pub fn loaded(tree: &Tree, width: usize, sources: &[Source]) -> Vec<Range<usize>
     starts.into_iter().zip(ends).map(|(start, end)| if start < end { start..end } else { 0..0 }).collect()
 }
 
-/// For each node how many of the block's columns, the first ones, read something in its subtree. `rows` are the
-/// ascending kept rows of the columns if each reads only rows from its own on; with `None` all read everything.
-pub fn readers(tree: &Tree, width: usize, rows: Option<&[u32]>) -> Vec<usize> {
-    let of = |node: &Node| match rows {
-        Some(rows) if node.last_wanted != NONE => rows.partition_point(|&row| row <= node.last_wanted),
-        _ => width,
-    };
-    tree.nodes.iter().map(of).collect()
-}
-
 /// Memory of one task.
 pub struct Scratch<C> {
     /// Loads and then displacements, kept rows by columns.
@@ -95,7 +85,8 @@ pub struct Sweep<C> {
 
 impl<C: Number> Sweep<C> {
     /// Solves for the columns of a block: `scratch.x` is then right at the rows and columns that are read, and undefined
-    /// elsewhere. `loaded` and `readers` are those of the functions of that name.
+    /// elsewhere. `loaded` is that of the function of that name; `readers` says for each node how many columns, the first
+    /// ones, read something in its subtree.
     pub fn solve(&self, scratch: &mut Scratch<C>, sources: &[Source], loaded: &[Range<usize>], readers: &[usize]) {
         let stride = scratch.stride;
         for (node, columns) in self.tree.nodes.iter().zip(loaded).filter(|(_, columns)| !columns.is_empty()) {
@@ -123,7 +114,7 @@ impl<C: Number> Sweep<C> {
         }
         let loads = part(&scratch.x, node, columns, scratch.stride);
         let product = MatMut::from_row_major_slice_mut(&mut scratch.moved[..boundary * width], boundary, width);
-        matmul(product, Accum::Replace, self.operators[k].g(node), loads, C::from_f64(1.0), Par::Seq);
+        matmul(product, Accum::Replace, self.operators[k].g(), loads, C::from_f64(1.0), Par::Seq);
         for (&row, part) in self.tree.boundary(node).iter().zip(scratch.moved.chunks_exact(width)) {
             let values = &mut scratch.x[row as usize * scratch.stride..][columns.clone()];
             values.iter_mut().zip(part).for_each(|(value, &part)| *value -= part);
@@ -137,7 +128,7 @@ impl<C: Number> Sweep<C> {
             let local = &mut scratch.local[..node.size() * columns.len()];
             let local = MatMut::from_row_major_slice_mut(local, node.size(), columns.len());
             let loads = part(&scratch.x, node, columns, stride);
-            matmul(local, Accum::Replace, self.operators[k].m(node), loads, C::from_f64(1.0), Par::Seq);
+            matmul(local, Accum::Replace, self.operators[k].m(), loads, C::from_f64(1.0), Par::Seq);
         }
         let boundary = self.tree.boundary(node);
         for (&row, copy) in boundary.iter().zip(scratch.moved.chunks_exact_mut(readers)) {
@@ -151,7 +142,7 @@ impl<C: Number> Sweep<C> {
             let gathered = MatRef::from_row_major_slice(gathered, boundary.len(), readers);
             // Not from_row_major_slice_with_stride_mut: faer 0.24 exchanges its strides.
             let own = MatMut::from_column_major_slice_with_stride_mut(x, readers, node.size(), stride).transpose_mut();
-            let follow = self.operators[k].g(node).transpose();
+            let follow = self.operators[k].g().transpose();
             matmul(own, Accum::Replace, follow, gathered, C::from_f64(-1.0), Par::Seq);
         }
         if !columns.is_empty() {

@@ -3,8 +3,8 @@
 use super::block::Block;
 use super::layout::Layout;
 use super::number::Number;
-use super::sweep::{Scratch, Sweep, loaded, readers};
-use super::tree::{NONE, Tree};
+use super::sweep::{Scratch, Sweep, loaded};
+use super::tree::Tree;
 use crate::fem::{Supports, SymmetricCsc};
 
 /// What every block reads.
@@ -32,8 +32,8 @@ impl System<'_> {
         sweep.solve(scratch, &sources, &loaded(tree, block.width, &sources), &self.readers(tree, block));
         panel.clear();
         let mut sums = vec![0.0; block.width];
-        for place in block.first..self.layout.rows() {
-            let dof = self.layout.dof(place);
+        for rank in self.layout.panel_rows(block).into_iter().flatten() {
+            let dof = self.layout.row_dofs[self.layout.row_of_rank[rank] as usize];
             if let Some(kept) = self.layout.kept(tree, self.supports, dof) {
                 panel.extend(scratch.row(kept, block.width).iter().map(|value| T::from_f64(value.to_f64())));
             } else {
@@ -52,10 +52,9 @@ impl System<'_> {
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += stiffness * value.to_f64());
                 continue;
             }
-            let place = self.layout.place_of_dof[other as usize];
-            let column = (place as usize).wrapping_sub(block.first);
-            if place != NONE && column < block.width {
-                sums[column] += stiffness;
+            let column = self.layout.place_of_dof(other).and_then(|place| place.checked_sub(block.first));
+            if let Some(sum) = column.and_then(|column| sums.get_mut(column)) {
+                *sum += stiffness;
             }
         }
     }
@@ -63,11 +62,11 @@ impl System<'_> {
     /// How many columns of a block read something at each node. A moved support is felt everywhere, and read by the
     /// reactions of all others; a force is read from its own row on.
     pub fn readers(&self, tree: &Tree, block: &Block) -> Vec<usize> {
-        if block.first < self.layout.supported {
-            return readers(tree, block.width, None);
+        if self.layout.moves_supports(block) {
+            return vec![block.width; tree.nodes.len()];
         }
         let dofs = (block.first..block.first + block.width).map(|place| self.layout.dof(place));
         let rows: Vec<u32> = dofs.filter_map(|dof| self.layout.kept(tree, self.supports, dof)).collect();
-        readers(tree, block.width, Some(&rows))
+        tree.reading.readers(self.layout.stage_of(block.first), &rows)
     }
 }

@@ -4,6 +4,9 @@ use std::sync::Mutex;
 
 use crate::{Error, Result};
 
+/// Told `(columns done, columns in all)` from any thread; `false` stops the computation.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) -> bool + Sync);
+
 /// Runs `work` in some tasks at once, to the first error.
 pub fn in_tasks(tasks: usize, work: &(dyn Fn() -> Result<()> + Sync)) -> Result<()> {
     let outcome = Mutex::new(Ok(()));
@@ -24,4 +27,9 @@ pub fn in_tasks(tasks: usize, work: &(dyn Fn() -> Result<()> + Sync)) -> Result<
 /// A poisoned or missing result of a task.
 pub fn task_failed() -> Error {
     Error::Invalid("a task of the precomputation failed unexpectedly".into())
+}
+
+/// Tells what is done, and stops where that is wanted.
+pub fn go_on(progress: Progress<'_>, done: usize, columns: usize) -> Result<()> {
+    if progress(done, columns) { Ok(()) } else { Err(Error::Interrupted) }
 }

@@ -1,6 +1,7 @@
 //! The elimination tree, cut down to what the columns of `Psi` need.
 //!
-//! Write the factor of a supernode `k` with the rows below it, its boundary `b`, as `L_kk` and `L_bk`. With
+//! Write the factor of a node `k`, a block of columns of a supernode, with the rows below it, its boundary `b`, as `L_kk` and
+//! `L_bk`. With
 //!
 //! ```text
 //! G_k = L_bk L_kk^-1,      M_k = L_kk^-T L_kk^-1
@@ -13,7 +14,7 @@
 //! down:  x_k = M_k f_k - G_k^T x_b        from the root to the leaves
 //! ```
 //!
-//! `M_k` is the compliance of the supernode with its boundary clamped, `-G_k^T` how it follows its boundary. Only rows
+//! `M_k` is the compliance of the node with its boundary clamped, `-G_k^T` how it follows its boundary. Only rows
 //! are kept that somebody loads or reads, or that a kept row below has in its boundary: for all others `f_k` is zero
 //! and nobody asks for `x_k`.
 
@@ -21,21 +22,28 @@ use std::ops::Range;
 
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
+use crate::solver::block_columns::cuts;
+
 /// No parent, no row, no column.
 pub const NONE: u32 = u32::MAX;
 
 /// What is asked of the solution at one permuted position.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// It has a column of its own: it is read by its own column and those before it.
-    pub column: bool,
-    /// It is read by every column.
-    pub always: bool,
+    /// Stage of its column, or [`NONE`]: it is read by its own column and those of its stage before it.
+    pub stage: u32,
+    /// It is read by every column of the stages before this one; [`NONE`]: of all.
+    pub before: u32,
     /// It is loaded and read by the columns of moved supports, which read everything.
     pub supports: bool,
 }
 
-/// The kept rows of a supernode.
+impl Wanted {
+    /// Nobody asks.
+    pub const NOTHING: Self = Self { stage: NONE, before: 0, supports: false };
+}
+
+/// The kept rows of a block of columns of a supernode.
 #[derive(Clone, Debug)]
 pub struct Node {
     /// Them.
@@ -44,10 +52,12 @@ pub struct Node {
     pub boundary: Range<usize>,
     /// Node of the first boundary row, or [`NONE`].
     pub parent: u32,
+    /// Its positions, kept or not.
+    pub positions: Range<usize>,
+    /// Its number among the blocks of all supernodes.
+    pub block: usize,
     /// The supernode.
-    pub supernode: usize,
-    /// Last row in its subtree that has a column, or [`NONE`] if some row there is read by every column.
-    pub last_wanted: u32,
+    supernode: usize,
 }
 
 impl Node {
@@ -63,6 +73,7 @@ impl Node {
 }
 
 /// The nodes, children before parents, and the kept rows in their order.
+#[derive(Clone)]
 pub struct Tree {
     /// All nodes.
     pub nodes: Vec<Node>,
@@ -72,6 +83,49 @@ pub struct Tree {
     pub row_of_position: Vec<u32>,
     /// For each kept row its node.
     pub node_of_row: Vec<u32>,
+    /// What is read where, stage by stage.
+    pub reading: Reading,
+}
+
+/// Which columns of a block read something at which nodes: a sweep down leaves out all others. Column `j` of a stage reads
+/// the rows of its stage from its own on, for the earlier ones are the mirror of earlier columns, and all rows of later
+/// stages. Rows of earlier stages are never read.
+///
+/// For each stage and node the last row in its subtree that has a column in that stage, or [`NONE`] if some row there is
+/// read by every column of the stage.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reading(Vec<Vec<u32>>);
+
+impl Reading {
+    /// Of a tree, and what is wanted of each permuted position.
+    pub fn new(tree: &Tree, wanted: &[Wanted]) -> Self {
+        let stages = wanted.iter().map(|w| w.stage).filter(|&stage| stage != NONE).max().map_or(1, |last| last + 1);
+        Self((0..stages).map(|stage| last_read(tree, wanted, stage)).collect())
+    }
+
+    /// For each node how many of a block's columns, the first ones, read something in its subtree; `rows` are the
+    /// ascending kept rows of the columns, `stage` is theirs.
+    pub fn readers(&self, stage: usize, rows: &[u32]) -> Vec<usize> {
+        let of = |&last: &u32| if last == NONE { rows.len() } else { rows.partition_point(|&row| row <= last) };
+        self.0.get(stage).map_or(Vec::new(), |lasts| lasts.iter().map(of).collect())
+    }
+}
+
+fn last_read(tree: &Tree, wanted: &[Wanted], stage: u32) -> Vec<u32> {
+    // One higher here, so that 0 means nothing read and NONE stays the highest.
+    let mut last = vec![0u32; tree.nodes.len()];
+    for (position, &row) in tree.row_of_position.iter().enumerate().filter(|(_, row)| **row != NONE) {
+        let of_node = &mut last[tree.node_of_row[row as usize] as usize];
+        if wanted[position].before > stage {
+            *of_node = NONE;
+        } else if wanted[position].stage == stage {
+            *of_node = (*of_node).max(row + 1);
+        }
+    }
+    for (k, node) in tree.nodes.iter().enumerate().filter(|(_, node)| node.parent != NONE) {
+        last[node.parent as usize] = last[node.parent as usize].max(last[k]);
+    }
+    last.into_iter().map(|row| if row == NONE { NONE } else { row.saturating_sub(1) }).collect()
 }
 
 impl Tree {
@@ -83,21 +137,27 @@ impl Tree {
             boundaries: Vec::new(),
             row_of_position: vec![NONE; wanted.len()],
             node_of_row: Vec::new(),
+            reading: Reading::default(),
         };
-        for supernode in 0..supernodes.n_supernodes() {
+        for (block, (supernode, positions)) in blocks(supernodes).enumerate() {
             let first = tree.node_of_row.len();
-            let range = supernodes.supernode_begin()[supernode]..supernodes.supernode_end()[supernode];
-            for position in range.filter(|&p| needed[p]) {
+            for position in positions.clone().filter(|&p| needed[p]) {
                 tree.row_of_position[position] = tree.node_of_row.len() as u32;
                 tree.node_of_row.push(tree.nodes.len() as u32);
             }
             let rows = first..tree.node_of_row.len();
             if !rows.is_empty() {
-                tree.nodes.push(Node { rows, boundary: 0..0, parent: NONE, supernode, last_wanted: 0 });
+                tree.nodes.push(Node { rows, boundary: 0..0, parent: NONE, positions, block, supernode });
             }
         }
-        tree.link(supernodes, wanted);
+        tree.link(supernodes);
+        tree.reading = Reading::new(&tree, wanted);
         tree
+    }
+
+    /// Whether the row of a permuted position is kept.
+    pub fn keeps(&self, position: usize) -> bool {
+        self.row_of_position[position] != NONE
     }
 
     /// Number of kept rows.
@@ -110,45 +170,44 @@ impl Tree {
         &self.boundaries[node.boundary.clone()]
     }
 
-    /// Boundaries, parents and last wanted rows, once every row has its number.
-    fn link(&mut self, supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) {
+    /// Boundaries and parents, once every row has its number.
+    fn link(&mut self, supernodes: &SymbolicSupernodalCholesky<usize>) {
         for node in &mut self.nodes {
             let start = self.boundaries.len();
-            let pattern = supernodes.supernode(node.supernode).pattern();
-            self.boundaries.extend(pattern.iter().map(|&position| self.row_of_position[position]));
+            let below = boundary_positions(supernodes, node.supernode, node.positions.end);
+            self.boundaries.extend(below.map(|position| self.row_of_position[position]));
             node.boundary = start..self.boundaries.len();
             if let Some(&row) = self.boundaries.get(start) {
                 node.parent = self.node_of_row[row as usize];
             }
         }
-        // `last_wanted` is kept one higher here, so that 0 means nothing wanted and NONE stays the highest.
-        for (position, &row) in self.row_of_position.iter().enumerate().filter(|(_, row)| **row != NONE) {
-            let node = &mut self.nodes[self.node_of_row[row as usize] as usize];
-            if wanted[position].always {
-                node.last_wanted = NONE;
-            } else if wanted[position].column {
-                node.last_wanted = node.last_wanted.max(row + 1);
-            }
-        }
-        for k in 0..self.nodes.len() {
-            let (parent, last) = (self.nodes[k].parent, self.nodes[k].last_wanted);
-            if parent != NONE {
-                let parent = &mut self.nodes[parent as usize];
-                parent.last_wanted = parent.last_wanted.max(last);
-            }
-            if last != NONE {
-                self.nodes[k].last_wanted = last.saturating_sub(1);
-            }
-        }
     }
 }
 
-/// Positions that are wanted, or read by a needed supernode below.
+/// Supernode and positions of every block of columns.
+fn blocks(supernodes: &SymbolicSupernodalCholesky<usize>) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+    (0..supernodes.n_supernodes()).flat_map(|s| {
+        let begin = supernodes.supernode_begin()[s];
+        let columns = cuts(supernodes.supernode_end()[s] - begin);
+        columns.map(move |(first, width)| (s, begin + first..begin + first + width))
+    })
+}
+
+/// Positions below a block that ends at `end`: the rest of its supernode, and what that has below.
+fn boundary_positions(
+    supernodes: &SymbolicSupernodalCholesky<usize>,
+    supernode: usize,
+    end: usize,
+) -> impl Iterator<Item = usize> + '_ {
+    (end..supernodes.supernode_end()[supernode]).chain(supernodes.supernode(supernode).pattern().iter().copied())
+}
+
+/// Positions that are wanted, or read by a needed block below.
 fn needed_rows(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) -> Vec<bool> {
-    let mut needed: Vec<bool> = wanted.iter().map(|w| w.column || w.always || w.supports).collect();
-    for s in 0..supernodes.n_supernodes() {
-        if needed[supernodes.supernode_begin()[s]..supernodes.supernode_end()[s]].contains(&true) {
-            for &row in supernodes.supernode(s).pattern() {
+    let mut needed: Vec<bool> = wanted.iter().map(|w| w.stage != NONE || w.before == NONE || w.supports).collect();
+    for (supernode, positions) in blocks(supernodes) {
+        if needed[positions.clone()].contains(&true) {
+            for row in boundary_positions(supernodes, supernode, positions.end) {
                 needed[row] = true;
             }
         }

@@ -10,10 +10,10 @@
 use glam::{DMat3, DVec3};
 
 use crate::contact::local::cells::Resolution;
-use crate::contact::patch_weights;
 use crate::contact::regular::WIDTH;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;
+use crate::contact::{Refusal, patch_weights};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
@@ -26,7 +26,7 @@ use crate::simulation::solve::handover::{
     Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join,
 };
 use crate::simulation::solve::local_scratch::{LocalScratch, local_body};
-use crate::simulation::state::State;
+use crate::simulation::state::{Entry, State};
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
 use crate::tensor::outer;
@@ -99,7 +99,8 @@ enum Outcome {
 /// Forces of the contacts of a body under the local law. Where the foot of one has jumped, or none was found, they are found once
 /// more, with what takes its place. Where that finds nothing either they stay as they were a tick ago.
 pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, body: usize, controls: &Controls) {
-    for last in [false, true] {
+    let mut last = false;
+    loop {
         let mut slots = [0; MAX_CONTACTS];
         let mut count = 0;
         for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law == LawKind::Local) {
@@ -112,7 +113,8 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         }
         match settle(model, state, &mut memory, slots, body, controls) {
             Outcome::Settled => {}
-            Outcome::LetGo => return,
+            // The others go on without it.
+            Outcome::LetGo => continue,
             Outcome::Lost if last => {
                 return slots.iter().for_each(|&slot| {
                     let contact = &mut state.contacts.slots[slot];
@@ -121,6 +123,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
             }
             Outcome::Lost => {
                 hold_lost(state, &memory.local.steps[..count], slots);
+                last = true;
                 continue;
             }
         }
@@ -130,6 +133,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
             take_up(model, state, memory.local, slots, body);
             return;
         }
+        last = true;
     }
 }
 
@@ -270,6 +274,12 @@ fn meet(
                 local.responses[a] = answer;
             }
             None => {
+                if local.weights[a].is_outside() {
+                    let [node, ..] = model.bodies[body].loaded.triangles[local.responses[a].foot.triangle as usize];
+                    state.tools[tool].refused[body] = Some(Refusal::NotTouchable(node));
+                    // Where it comes in again its force begins at zero, however deep it is.
+                    state.tools[tool].entry[body] = Entry { depth: f64::INFINITY, reached: f64::INFINITY };
+                }
                 state.contacts.clear(slot);
                 return false;
             }

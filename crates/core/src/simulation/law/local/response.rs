@@ -78,9 +78,11 @@ pub fn evaluate(
     cells: Cells<'_>,
 ) -> Option<LocalResponse> {
     let Guess { place, force, .. } = guess;
+    // Not known before a foot is found.
+    weights.touchable = 1.0;
     let Met { foot, reference } = meet(body, tool, contact, guess, &mut weights.near)?;
     body.smooth.weigh(&foot, weights);
-    if weights.touchable < 0.5 {
+    if weights.is_outside() {
         return None;
     }
     let fields = weights.blend(body.fields);

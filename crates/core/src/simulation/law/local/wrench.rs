@@ -162,7 +162,7 @@ mod tests {
         fn new() -> Self {
             let surface = ball(24);
             let query = SurfaceQuery::new(&surface).expect("triangles");
-            let smooth = SmoothSurface::new(&surface, |_| true);
+            let smooth = SmoothSurface::new(&surface);
             let modulus = |z: f64| 1e4 * (1.0 + 0.25 * z) / (1.0 - 0.45 * 0.45);
             let fields = smooth.fans().iter().map(|fan| {
                 let mut fields = FanFields::default();

@@ -1,0 +1,348 @@
+//! A store that gathers blocks of columns, in any order and from anybody, and is written once all are there.
+//!
+//! The panels lie in `<path>.partial` beside the store to be, each written to its own place. A block is told from a damaged
+//! one by its checksum, so a computation goes on at whatever blocks are missing.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::arrangement::Arrangement;
+use super::block::Block;
+use super::columns::{Measurement, Parts};
+use super::finish::Finished;
+use super::layout::{Layout, Stage};
+use super::made::Wanted;
+use super::number::Number;
+use super::panels::Panels;
+use super::partial::Partial;
+use super::phase::Listener;
+use super::problem::{KeyOfTouch, Problem};
+use super::tasks::{Progress, task_failed};
+use crate::green::entries::Entries;
+use crate::green::function::GreensFunction;
+use crate::green::key::FORMAT_VERSION;
+use crate::green::numbers::Numbers;
+use crate::green::precision::Precision;
+use crate::green::store::touch_of_store;
+use crate::green::store_writer::StoreWriter;
+use crate::{Error, Result};
+
+/// Where the operator is to be written, and what of.
+pub struct Target<'a> {
+    /// The store.
+    pub path: &'a Path,
+    /// Number format asked for.
+    pub precision: Wanted,
+    /// Bytes that may be taken; `None`: any.
+    pub memory: Option<usize>,
+    /// What the file was made from, in JSON, for people.
+    pub description: &'a str,
+    /// Told of each phase as it begins.
+    pub phase: Listener<'a>,
+}
+
+/// What was found where a store was to be written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Columns that an interrupted computation had finished.
+    pub resumed: usize,
+    /// It had left something that does not belong to this computation, which was thrown away.
+    pub discarded: bool,
+}
+
+/// Blocks of columns on their way into a store.
+pub struct ColumnStore {
+    path: PathBuf,
+    parts: Arc<Parts>,
+    blocks: Vec<Block>,
+    /// Columns of a block.
+    width: usize,
+    partial: Arc<Partial>,
+    /// Everything but the numbers and what may be touched.
+    green: GreensFunction,
+    key: KeyOfTouch,
+    /// What was there.
+    pub found: Found,
+}
+
+/// A stage with blocks that are not there.
+pub struct Unfinished {
+    /// Its first column, and the one behind its last.
+    pub first: usize,
+    pub end: usize,
+    /// The blocks that are not there, ascending.
+    pub blocks: Vec<usize>,
+}
+
+impl ColumnStore {
+    /// Begins a store, or goes on where a computation of the same thing stopped. Blocks that it finished of columns in
+    /// another order are not used.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn open(problem: &Problem, parts: Arc<Parts>, measurement: &Measurement, target: &Target<'_>) -> Result<Self> {
+        let mut store = Self::begin(problem, parts, measurement, target)?;
+        let parts = Arc::clone(&store.parts);
+        store.arrange(parts)?;
+        store.found.resumed = store.done();
+        Ok(store)
+    }
+
+    /// Begins a store whose columns are in stages of nodes, or goes on in the order in which a computation of the same
+    /// thing has begun, and then with what is left of the stages. [`Self::parts`] has the order.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn open_in_stages(
+        problem: &Problem,
+        parts: &Parts,
+        stages: &[Vec<u32>],
+        measurement: &Measurement,
+        target: &Target<'_>,
+    ) -> Result<Self> {
+        let arranged = Arc::new(parts.arranged(0, stages));
+        let mut store = Self::begin(problem, arranged, measurement, target)?;
+        let begun = store.partial.begun();
+        let layout = &store.parts.layout;
+        let row = |place: usize| layout.row(place) as u32;
+        let blocks = layout.blocks(measurement.width);
+        let same = |(block, rows): (&Block, &Vec<u32>)| {
+            rows.len() == block.width && rows.iter().zip(block.first..).all(|(&begun, place)| row(place) == begun)
+        };
+        let parts = if begun.len() <= blocks.len() && blocks.iter().zip(&begun).all(same) {
+            Arc::clone(&store.parts)
+        } else {
+            let kept = begun.iter().map(Vec::len).sum();
+            Arc::new(store.parts.adopting(&begun).arranged(kept, stages))
+        };
+        store.arrange(parts)?;
+        store.found.resumed = store.done();
+        Ok(store)
+    }
+
+    /// Opens the partial file, without any blocks.
+    fn begin(problem: &Problem, parts: Arc<Parts>, measurement: &Measurement, target: &Target<'_>) -> Result<Self> {
+        let mut green = geometry(problem, &parts.layout, measurement, target.precision)?;
+        target.description.clone_into(&mut green.description);
+        let (kind, width) = (measurement.precision.panel_bytes(), measurement.width);
+        let header = format!(
+            "{{\"format\":\"palpate-partial\",\"version\":{FORMAT_VERSION},\"key\":\"{}\",\"bytes\":{kind},\"width\":{width}}}\n",
+            green.key
+        );
+        let (partial, discarded) = Partial::open(&partial_path(target.path), &header, &parts.layout, kind)
+            .map_err(|error| of_target(target.path, error))?;
+        let key = problem.key_of_touch(target.precision.named());
+        let found = Found { resumed: 0, discarded };
+        let (path, partial) = (target.path.to_owned(), Arc::new(partial));
+        Ok(Self { path, parts, blocks: Vec::new(), width, partial, green, key, found })
+    }
+
+    /// Goes on with the columns in the order of other parts of the same problem; blocks that are the same stay.
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn arrange(&mut self, parts: Arc<Parts>) -> Result<()> {
+        self.blocks = parts.layout.blocks(self.width);
+        self.parts = parts;
+        let partial = Arc::get_mut(&mut self.partial).ok_or_else(task_failed)?;
+        partial.arrange(&self.parts.layout, &self.blocks).map_err(|error| of_target(&self.path, error))
+    }
+
+    /// Rows and columns in their order.
+    pub fn parts(&self) -> &Arc<Parts> {
+        &self.parts
+    }
+
+    /// The blocks.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Numbers of the blocks that are not there.
+    pub fn missing(&self) -> Vec<usize> {
+        (0..self.blocks.len()).filter(|&k| !self.partial.has(k)).collect()
+    }
+
+    /// The first stage with a block that is not there.
+    pub fn first_unfinished(&self) -> Option<Unfinished> {
+        let missing = self.missing();
+        let stage = self.parts.layout.stage_of(self.blocks[*missing.first()?].first);
+        let Stage { supports, forces } = self.parts.layout.stages()[stage].clone();
+        let blocks = missing.into_iter().take_while(|&block| self.blocks[block].first < forces.end).collect();
+        Some(Unfinished { first: supports.start, end: forces.end, blocks })
+    }
+
+    /// How many blocks there are up to the last one that is there.
+    pub fn begun_blocks(&self) -> usize {
+        (0..self.blocks.len()).rev().find(|&block| self.partial.has(block)).map_or(0, |last| last + 1)
+    }
+
+    /// Columns of these blocks.
+    pub fn begun(&self) -> usize {
+        self.blocks[..self.begun_blocks()].iter().map(|block| block.width).sum()
+    }
+
+    /// Columns in all.
+    pub fn columns(&self) -> usize {
+        self.parts.layout.columns
+    }
+
+    /// Columns that are there.
+    pub fn done(&self) -> usize {
+        self.blocks.iter().enumerate().filter(|(k, _)| self.partial.has(*k)).map(|(_, block)| block.width).sum()
+    }
+
+    /// Keeps the panel of a block; from any thread.
+    ///
+    /// # Errors
+    /// A panel of another size, or the operating system's.
+    pub fn put(&self, block: usize, panel: &[u8]) -> Result<()> {
+        let bytes = self.blocks.get(block).map(|b| b.len() * self.green.precision().panel_bytes());
+        if bytes != Some(panel.len()) {
+            return Err(Error::Invalid(format!("block {block} of columns does not have {} bytes", panel.len())));
+        }
+        self.partial.put(block, panel).map_err(|error| of_target(&self.path, error))
+    }
+
+    /// Keeps the panel of a block that has come from elsewhere, with the checksum it was sent with; `false`: it is not the
+    /// panel that was summed.
+    ///
+    /// # Errors
+    /// A panel of another size, or the operating system's.
+    pub fn receive(&self, block: usize, panel: &[u8], sum: &[u8]) -> Result<bool> {
+        if checksum(panel) != sum {
+            return Ok(false);
+        }
+        self.put(block, panel).map(|()| true)
+    }
+
+    /// Writes the store from its blocks, `tasks` of them at a time, and removes the partial file.
+    ///
+    /// # Errors
+    /// A block that is missing, the operating system's, or an interruption.
+    pub fn finish(&mut self, tasks: usize, progress: Progress<'_>) -> Result<()> {
+        self.write(self.columns(), tasks, progress)?;
+        self.discard();
+        Ok(())
+    }
+
+    /// Writes a store of the first `columns` alone, which are all the columns of some nodes: it is complete, and has the key
+    /// of the problem in which only these may be touched. Where there is one of as many nodes of the same body it stays.
+    ///
+    /// # Errors
+    /// A block that is missing, the operating system's, or an interruption.
+    pub fn write(&mut self, columns: usize, tasks: usize, progress: Progress<'_>) -> Result<()> {
+        let arrangement = Arrangement::new(&self.green.surface.positions, &self.parts.layout, columns);
+        let as_large =
+            |(key, touch): (String, Vec<u32>)| touch.len() >= arrangement.touch.len() && key == self.key.of(&touch);
+        if columns < self.columns() && touch_of_store(&self.path).is_some_and(as_large) {
+            return Ok(());
+        }
+        let written = match self.green.precision() {
+            Precision::F64 => self.write_as::<f64>(&arrangement, columns, tasks, progress),
+            Precision::F16 | Precision::F32 => self.write_as::<f32>(&arrangement, columns, tasks, progress),
+        };
+        written.map_err(|error| of_target(&self.path, error))
+    }
+
+    /// Removes the partial file.
+    pub fn discard(&self) {
+        drop(std::fs::remove_file(partial_path(&self.path)));
+    }
+
+    fn write_as<T: Number>(
+        &mut self,
+        arrangement: &Arrangement,
+        columns: usize,
+        tasks: usize,
+        progress: Progress<'_>,
+    ) -> Result<()> {
+        let count = self.blocks.partition_point(|block| block.first < columns);
+        if let Some(block) = self.missing().into_iter().find(|&block| block < count) {
+            return Err(Error::Invalid(format!("block {block} of columns is missing")));
+        }
+        let (precision, done, all) = (self.green.precision(), self.done(), self.columns());
+        let panels = Panels::<T>::File(Arc::clone(&self.partial));
+        let finished =
+            Finished { parts: &self.parts, arrangement, blocks: &self.blocks[..count], panels: &panels, tasks };
+        let magnitude = finished.magnitudes()?;
+        self.green.touch.clone_from(&arrangement.touch);
+        self.green.key = self.key.of(&arrangement.touch);
+        self.green.entries = without_numbers(arrangement, &self.green.row_is_fixed, magnitude.clone(), precision);
+        let writer = StoreWriter::create(&self.path, &self.green)?;
+        finished.columns(precision, &magnitude, &|column, bytes| {
+            if !progress(done, all) {
+                return Err(Error::Interrupted);
+            }
+            writer.put(column, bytes)
+        })?;
+        writer.finish()
+    }
+}
+
+/// Checksum of a panel (BLAKE3).
+pub fn checksum(panel: &[u8]) -> [u8; 32] {
+    *blake3::hash(panel).as_bytes()
+}
+
+/// The user knows the file asked for, not the one beside it.
+fn of_target(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Io { source, .. } => Error::Io { path: path.to_owned(), source },
+        other => other,
+    }
+}
+
+/// Everything but the numbers.
+pub fn geometry(
+    problem: &Problem,
+    layout: &Layout,
+    measurement: &Measurement,
+    wanted: Wanted,
+) -> Result<GreensFunction> {
+    let supports = &problem.supports;
+    let row_of_dof: HashMap<u32, u32> =
+        layout.row_dofs.iter().enumerate().map(|(row, &dof)| (dof, row as u32)).collect();
+    let row_is_fixed: Vec<bool> = layout.row_dofs.iter().map(|&d| supports.is_fixed(d)).collect();
+    let surface = problem.surface()?;
+    Ok(GreensFunction {
+        surface_nodes: problem.surface_nodes.clone(),
+        touch: problem.touch.clone(),
+        fixed_dofs: supports.fixed.clone(),
+        fixed_rows: supports.fixed.iter().map(|d| row_of_dof[d]).collect(),
+        rows: layout.row_dofs.len(),
+        entries: without_numbers(
+            &Arrangement::new(&surface.positions, layout, layout.columns),
+            &row_is_fixed,
+            Vec::new(),
+            measurement.precision,
+        ),
+        surface,
+        row_is_fixed,
+        loads: problem.loads.clone(),
+        free_response: measurement.response.clone(),
+        accuracy: measurement.accuracy,
+        key: problem.key(wanted.named()),
+        youngs_modulus: problem.common_youngs_modulus(),
+        description: String::new(),
+        path: None,
+    })
+}
+
+/// Places, format and bounds of entries that are still to be computed.
+fn without_numbers(
+    arrangement: &Arrangement,
+    row_is_fixed: &[bool],
+    magnitude: Vec<f64>,
+    precision: Precision,
+) -> Entries {
+    Entries::new(arrangement.places.clone(), row_is_fixed, magnitude, Numbers::zeros(precision, 0), None)
+}
+
+/// Where unfinished work on a store is kept.
+fn partial_path(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(".partial");
+    path.with_file_name(name)
+}

@@ -1,0 +1,131 @@
+//! A store that grows: some nodes are computed first, and can be touched while the others follow.
+//!
+//! At the end of each stage the nodes that are ready are written as a store of their own and renamed over the one before:
+//! whatever reads that path finds a complete store. What people ask for meanwhile becomes the next stage, and the others
+//! are put into stages around it anew; finished blocks stay.
+
+use std::sync::{Mutex, PoisonError};
+
+use glam::DVec3;
+
+use super::column_store::ColumnStore;
+use super::columns::Columns;
+use super::problem::Problem;
+use super::solving::{Work, solve};
+use super::stages::{by_distance, growing, stages};
+use super::tasks::Progress;
+use crate::Error;
+use crate::Result;
+use std::sync::Arc;
+
+/// In which order a store grows, and who is told.
+pub struct Growth<'a> {
+    /// Nodes that are computed first, ranks among the surface nodes; empty for all at once.
+    pub first: &'a [u32],
+    /// Asked between blocks, from any task, for nodes that are to be ready next.
+    pub next: &'a (dyn Fn() -> Option<Vec<u32>> + Sync),
+    /// Told how many nodes may be touched by the store that has been written.
+    pub ready: &'a (dyn Fn(usize) + Sync),
+}
+
+impl Growth<'_> {
+    /// All columns at once.
+    pub const NONE: Growth<'static> = Growth { first: &[], next: &|| None, ready: &|_| {} };
+
+    /// Touchable nodes by stages.
+    pub fn stages(&self, problem: &Problem) -> Vec<Vec<u32>> {
+        stages(&positions(problem), &problem.touch, self.first)
+    }
+
+    /// Solves what is missing, and writes the store of every stage but the last.
+    ///
+    /// # Errors
+    /// An interruption, or the operating system's.
+    pub fn grow(
+        &self,
+        problem: &Problem,
+        columns: &mut Columns,
+        store: &mut ColumnStore,
+        progress: Progress<'_>,
+    ) -> Result<()> {
+        let mut written = 0;
+        while let Some(stage) = store.first_unfinished() {
+            // What an interrupted computation has finished before.
+            written = self.write(written, stage.first, columns, store, progress)?;
+            let painted = self.solve(&stage.blocks, columns, store, progress)?;
+            if painted.is_empty() {
+                written = self.write(written, stage.end, columns, store, progress)?;
+                continue;
+            }
+            let parts = &columns.parts;
+            let kept = store.begun();
+            let waiting = parts.layout.waiting_nodes(kept);
+            let stages = around(&positions(problem), &waiting, &painted, problem.touch.len() - waiting.len());
+            store.arrange(Arc::new(parts.arranged(kept, &stages)))?;
+            columns.arrange(Arc::clone(store.parts()));
+        }
+        Ok(())
+    }
+
+    /// Writes the store of the first `end` columns if they are more than those written, not all, and whole nodes; how many
+    /// are written then.
+    fn write(
+        &self,
+        written: usize,
+        end: usize,
+        columns: &Columns,
+        store: &mut ColumnStore,
+        progress: Progress<'_>,
+    ) -> Result<usize> {
+        let layout = &columns.parts.layout;
+        if end <= written || end == layout.columns || !layout.is_whole(end) {
+            return Ok(written);
+        }
+        store.write(end, columns.tasks, progress)?;
+        (self.ready)(end / 3);
+        Ok(end)
+    }
+
+    /// Solves blocks of a stage, until nodes are asked for that wait in another: these.
+    fn solve(
+        &self,
+        blocks: &[usize],
+        columns: &Columns,
+        store: &ColumnStore,
+        progress: Progress<'_>,
+    ) -> Result<Vec<u32>> {
+        let (layout, begun) = (&columns.parts.layout, store.begun_blocks());
+        let painted = Mutex::new(Vec::new());
+        let lock = || painted.lock().unwrap_or_else(PoisonError::into_inner);
+        let begin = |block: usize| {
+            if let Some(nodes) = (self.next)() {
+                let waiting = layout.waiting_nodes(store.begun());
+                lock().extend(nodes.into_iter().filter(|node| waiting.binary_search(node).is_ok()));
+            }
+            // Blocks before one that is finished stay where they are.
+            lock().is_empty() || block < begun
+        };
+        solve(
+            columns,
+            store.blocks(),
+            (blocks, store.done()),
+            Work { begin: &begin, put: &|k, p| store.put(k, p) },
+            progress,
+        )?;
+        let painted = painted.into_inner().map_err(|_| Error::Interrupted)?;
+        Ok(painted)
+    }
+}
+
+/// Rest positions of the surface nodes, m.
+fn positions(problem: &Problem) -> Vec<DVec3> {
+    problem.surface_nodes.iter().map(|&n| problem.mesh.nodes[n as usize]).collect()
+}
+
+/// Stages of the nodes that wait: the painted ones, then the others by their distance from them; `ready` are done.
+fn around(positions: &[DVec3], waiting: &[u32], painted: &[u32], ready: usize) -> Vec<Vec<u32>> {
+    let (painted, mut others): (Vec<u32>, Vec<u32>) = waiting.iter().partition(|node| painted.contains(node));
+    by_distance(positions, &mut others, &painted);
+    let before = ready + painted.len();
+    std::iter::once(painted).chain(growing(others, before)).collect()
+}

@@ -1,0 +1,25 @@
+//! The allocator of the C library during a precomputation.
+#![allow(unsafe_code)] // libc
+
+use std::sync::Once;
+
+/// Smallest block that is taken from the system and given back to it by itself, bytes.
+#[cfg(target_env = "gnu")]
+const MAPPED: libc::c_int = 4 << 20;
+
+/// Gives large blocks back to the system as soon as they are freed.
+///
+/// glibc raises the size from which it does so to that of the largest block ever freed, up to 32 MB. Fronts of a
+/// factorisation then lie between what is kept of it, and what they leave is neither used nor given back. Peaks beside what
+/// was planned, and seconds: 62k tetrahedra of which a second factor is made 1.50, 10.0 s; with this size 1.15, 10 to 11 s;
+/// with 1 MB 1.11, 11.2 s, and with one factor of 216k tetrahedra 40 % more time for the system's part.
+pub fn return_large_blocks() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // SAFETY: mallopt only sets a parameter of the allocator.
+        #[cfg(target_env = "gnu")]
+        unsafe {
+            libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED);
+        }
+    });
+}

@@ -1,0 +1,222 @@
+//! A precomputation in pieces: columns by some processes, the store by one.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use palpate_core::green::accuracy::Accuracy;
+use palpate_core::green::{
+    ColumnStore as Store, Columns, Measurement, Parts, Precision, Problem, Target, Wanted, Working, checksum,
+};
+use palpate_core::{Error, Result};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyTuple};
+
+use crate::errors::to_python;
+use crate::green::{named, problem};
+use crate::watched::run_watched;
+
+/// What a store needs to know of a factor: format, columns of a block, accuracy, free response (rows).
+type Measured<'py> = (&'static str, usize, [f64; 4], Bound<'py, PyArray1<f64>>);
+type GivenMeasured<'py> = (String, usize, [f64; 4], PyReadonlyArray1<'py, f64>);
+
+/// A factored problem: any block of its columns, from any thread.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct ColumnJob {
+    columns: Columns,
+    working: Mutex<Memories>,
+    returned: Condvar,
+}
+
+/// Memory of the tasks, each for blocks of up to some width.
+struct Memories {
+    free: Vec<(usize, Working)>,
+    /// How many more may be made.
+    allowed: usize,
+}
+
+impl ColumnJob {
+    fn memories(&self) -> MutexGuard<'_, Memories> {
+        self.working.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Memory for a block, once as few others are being solved as the bound of memory allows.
+    fn take(&self, width: usize) -> Working {
+        let mut memories = self.memories();
+        loop {
+            if let Some((room, working)) = memories.free.pop() {
+                return if room >= width { working } else { self.columns.working(width) };
+            }
+            if memories.allowed > 0 {
+                memories.allowed -= 1;
+                return self.columns.working(width);
+            }
+            memories = self.returned.wait(memories).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn solved(&self, block: usize, width: usize) -> Result<(Vec<u8>, [u8; 32])> {
+        let blocks = self.columns.parts.layout.blocks(width);
+        let missing = || Error::Invalid(format!("there is no block {block} of {width} columns"));
+        let mut working = self.take(width);
+        let panel = blocks.get(block).ok_or_else(missing).and_then(|block| {
+            let panel = self.columns.solve(block, &mut working)?;
+            Ok((panel.to_vec(), checksum(panel)))
+        });
+        self.memories().free.push((width, working));
+        self.returned.notify_one();
+        panel
+    }
+}
+
+#[pymethods]
+impl ColumnJob {
+    /// Factorises a problem on some threads, within `memory` bytes; without a name the format is the cheapest whose typical
+    /// contacts are right to `within`.
+    #[new]
+    #[pyo3(signature = (arguments, precision_name, within, threads, memory=None))]
+    fn new(
+        py: Python<'_>,
+        arguments: &Bound<'_, PyTuple>,
+        precision_name: Option<&str>,
+        within: f64,
+        threads: usize,
+        memory: Option<usize>,
+    ) -> PyResult<Self> {
+        let problem = problem(arguments)?;
+        let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
+        let factored = || Columns::new(&problem, wanted, memory, false, &|_| {}, &|| Ok(()));
+        let columns = py.detach(|| pool.install(factored)).map_err(|e| to_python(py, e))?;
+        let working = Mutex::new(Memories { free: Vec::new(), allowed: columns.tasks });
+        Ok(Self { columns, working, returned: Condvar::new() })
+    }
+
+    /// What the store needs to know.
+    #[getter]
+    fn measured<'py>(&self, py: Python<'py>) -> Measured<'py> {
+        let Measurement { precision, accuracy, response, width } = &self.columns.measurement;
+        (precision.name(), *width, accuracy.to_array(), response.clone().into_pyarray(py))
+    }
+
+    /// Hash of the order of rows and columns.
+    #[getter]
+    fn order<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.columns.parts.order())
+    }
+
+    /// The panel of a block of columns, `width` of which are a block, and its checksum.
+    fn solve<'py>(
+        &self,
+        py: Python<'py>,
+        block: usize,
+        width: usize,
+    ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+        let (panel, sum) = py.detach(|| self.solved(block, width)).map_err(|e| to_python(py, e))?;
+        Ok((PyBytes::new(py, &panel), PyBytes::new(py, &sum)))
+    }
+}
+
+/// Rows and columns of a problem, without a factor.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct ColumnLayout {
+    problem: Problem,
+    parts: Arc<Parts>,
+}
+
+#[pymethods]
+impl ColumnLayout {
+    /// Assembles and orders.
+    #[new]
+    fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let problem = problem(arguments)?;
+        let parts = py.detach(|| Parts::new(&problem)).map_err(|e| to_python(py, e))?;
+        Ok(Self { problem, parts: Arc::new(parts) })
+    }
+
+    /// Hash of the order of rows and columns.
+    #[getter]
+    fn order<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.parts.order())
+    }
+}
+
+/// Blocks of columns on their way into a store.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct ColumnStore {
+    store: Mutex<Store>,
+}
+
+impl ColumnStore {
+    fn store(&self) -> MutexGuard<'_, Store> {
+        self.store.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl ColumnStore {
+    /// Begins the store at `path`, or goes on with it; `precision_name` as asked for, `measured` by a [`ColumnJob`].
+    #[new]
+    #[pyo3(signature = (layout, precision_name, within, measured, path, description))]
+    fn new(
+        py: Python<'_>,
+        layout: &ColumnLayout,
+        precision_name: Option<&str>,
+        within: f64,
+        measured: GivenMeasured<'_>,
+        path: PathBuf,
+        description: &str,
+    ) -> PyResult<Self> {
+        let (name, width, accuracy, response) = measured;
+        let unusable = || to_python(py, Error::Invalid(format!("unusable blocks of {width} columns in '{name}'")));
+        let precision = Precision::parse(&name).filter(|_| width > 0).ok_or_else(unusable)?;
+        let accuracy = Accuracy::from_slice(&accuracy).ok_or_else(unusable)?;
+        let measurement = Measurement { precision, accuracy, response: response.as_array().to_vec(), width };
+        let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
+        let target = Target { path: &path, precision: wanted, memory: None, description, phase: &|_| {} };
+        let open = || Store::open(&layout.problem, Arc::clone(&layout.parts), &measurement, &target);
+        let store = py.detach(open).map_err(|e| to_python(py, e))?;
+        Ok(Self { store: Mutex::new(store) })
+    }
+
+    /// Numbers of the blocks that are not there.
+    fn missing(&self) -> Vec<usize> {
+        self.store().missing()
+    }
+
+    /// Columns in all.
+    #[getter]
+    fn columns(&self) -> usize {
+        self.store().columns()
+    }
+
+    /// Columns that are there.
+    #[getter]
+    fn done(&self) -> usize {
+        self.store().done()
+    }
+
+    /// Whether something that belongs to another computation was thrown away.
+    #[getter]
+    fn discarded(&self) -> bool {
+        self.store().found.discarded
+    }
+
+    /// Keeps the panel of a block; whether it fits its checksum.
+    fn put(&self, py: Python<'_>, block: usize, panel: &[u8], sum: &[u8]) -> PyResult<bool> {
+        py.detach(|| self.store().receive(block, panel, sum)).map_err(|e| to_python(py, e))
+    }
+
+    /// Writes the store, by all threads; `progress` as everywhere.
+    #[pyo3(signature = (progress=None))]
+    fn finish(&self, py: Python<'_>, progress: Option<Py<PyAny>>) -> PyResult<()> {
+        let total = self.columns();
+        run_watched(py, total, progress.as_ref(), |note| self.store().finish(rayon::current_num_threads(), note))
+    }
+
+    /// Removes what is there.
+    fn discard(&self) {
+        self.store().discard();
+    }
+}

@@ -1,0 +1,66 @@
+"""The command that runs a study."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.app import app
+from palpate.cli.bodies import Dask
+
+if TYPE_CHECKING:
+    from palpate.study import StudyResult
+
+
+@app.command()
+def study(
+    file: Annotated[Path, typer.Argument(help="Study file (.toml): a scene with presses and a grid of values.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; default: <name>-study.")] = None,
+    dask: Dask = None,
+) -> None:
+    """Solve many bodies or materials, press each of them, and write one table.
+
+    Ctrl-C keeps what is finished in the folder; the same command goes on from there. A study that has grown computes
+    only what is new.
+
+    Example: palpate study study.toml
+
+    Example: palpate study patients.toml --out patients --dask tcp://10.0.0.1:8786
+    """
+    from palpate.cli.bodies import cluster
+    from palpate.study import Study
+
+    read = Study.read(file)
+    folder = out if out is not None else Path(f"{file.stem}-study")
+    with cluster(dask) as workers:
+        try:
+            result = read.run(folder, dask=workers)
+        except KeyboardInterrupt:
+            told = f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on"
+            print(told, file=sys.stderr)
+            raise typer.Exit(130) from None
+    _tell(result, folder)
+
+
+def _tell(result: StudyResult, folder: Path) -> None:
+    """Write the results, and say what was found and what could not be."""
+    import numpy as np
+
+    cases = len(np.unique(result.columns["case"]))
+    known = f", {result.resumed} of them known before" if result.resumed else ""
+    print(f"{cases} bodies{known}; varied: {', '.join(result.varied) or 'nothing'}")
+    stiffness = result.columns.get("stiffness_N_per_m", np.empty(0))
+    if np.isfinite(stiffness).any():
+        low, high = np.nanmin(stiffness), np.nanmax(stiffness)
+        error = np.nanmax(result.columns["error"])
+        print(f"stiffness from {low:.4g} to {high:.4g} N/m, errors of solving up to {error:.1g}")
+    for note in result.notes:
+        print(f"palpate: note: {note}", file=sys.stderr)
+    print(f"wrote {folder}: {', '.join(path.name for path in result.save(folder))}")
+    for number, problem in result.problems.items():
+        print(f"palpate: error: case {number}: {problem}", file=sys.stderr)
+    if result.problems:
+        raise typer.Exit(2)

@@ -1,0 +1,226 @@
+"""Workers of dask.distributed: connecting to them, and what may be wrong with them."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, TypeVar
+
+from palpate import _native
+from palpate.errors import ClusterError
+from palpate.units import brief_repr
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+# For the scheduler to answer, and for a first worker to join it, s.
+PATIENCE = 5.0
+# Between looks for workers that have come or gone, s.
+LOOK = 1.0
+
+Item = TypeVar("Item")
+
+
+@contextlib.contextmanager
+def connected(dask: str | Client) -> Iterator[Client]:
+    """Client of the scheduler at an address, such as ``"tcp://10.0.0.1:8786"``; a client of one's own stays open.
+
+    Raises
+    ------
+    ClusterError
+        dask.distributed is not installed, no scheduler answers, or no worker with this version of Palpate is there.
+
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise ClusterError("a cluster needs dask.distributed: pip install 'palpate[cluster]'") from None
+    if isinstance(dask, distributed.Client):
+        _require_workers(dask)
+        yield dask
+        return
+    if not isinstance(dask, str):
+        raise ClusterError(f"dask takes the address of a scheduler, or a distributed.Client; got {brief_repr(dask)}")
+    with _quiet():
+        try:
+            client = distributed.Client(dask, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError, TimeoutError):
+            raise ClusterError(
+                f"no scheduler answers at {dask}: 'dask scheduler' starts one and prints its address"
+            ) from None
+    try:
+        _require_workers(client)
+        yield client
+    finally:
+        with _quiet():
+            client.close()
+
+
+def dashboard(client: Client) -> str | None:
+    """Address of the scheduler's page, where it has one (it needs bokeh)."""
+    return client.dashboard_link if "dashboard" in client.scheduler_info().get("services", {}) else None
+
+
+def threads_of_workers(client: Client) -> dict[str, int]:
+    """Threads of every worker that is there now, by address."""
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    return {address: int(worker["nthreads"]) for address, worker in workers.items()}
+
+
+def use_threads_of_worker() -> None:
+    """Have computations of this worker use as many threads as it has; to be called before the first of them."""
+    from distributed import get_worker
+
+    os.environ.setdefault("RAYON_NUM_THREADS", str(get_worker().state.nthreads))
+
+
+def submit(client: Client, function: Callable, *arguments: object, address: str | None = None) -> Future:
+    """Task that is meant for the worker at an address, and goes to any other if that one is gone."""
+    workers = None if address is None else [address]
+    with warnings.catch_warnings():
+        # The scheduler keeps what a task needs, to give it to workers that join or replace others.
+        warnings.filterwarnings("ignore", "Sending large graph")
+        return client.submit(function, *arguments, workers=workers, allow_other_workers=address is not None, pure=False)
+
+
+def spread(client: Client, waiting: list[Item], start: Callable[[Item, str], Future]) -> Iterator[tuple[Item, Future]]:
+    """Have items worked on, from the last of the list on; yield each with its task once that has ended.
+
+    ``start`` makes the task of an item for the worker at an address. Every worker is kept in work and one task ahead;
+    the rest waits here, for whoever joins. What a worker that dies has not finished goes to others. Items may be added
+    while this goes on. Tasks that are left when the caller stops are cancelled.
+
+    Raises
+    ------
+    ClusterError
+        The scheduler is lost.
+
+    """
+    running: dict[Future, tuple[Item, str]] = {}
+    alone = False
+    try:
+        while waiting or running:
+            threads = threads_of_workers(client)
+            if not threads and not alone:
+                print("palpate: no worker is left; waiting for one (Ctrl-C keeps what is finished)", file=sys.stderr)
+            alone = not threads
+            meant = Counter(address for _, address in running.values())
+            while waiting and threads:
+                address = min(threads, key=lambda address: (meant[address] + 1) / threads[address])
+                if meant[address] > threads[address]:
+                    break
+                item = waiting.pop()
+                running[start(item, address)] = item, address
+                meant[address] += 1
+            for future in wait_for_some(client, list(running)):
+                item, _ = running.pop(future)
+                if future.status == "cancelled":
+                    require_scheduler(client)
+                    waiting.append(item)
+                else:
+                    yield item, future
+    finally:
+        client.cancel(list(running))
+
+
+def wait_for_some(client: Client, futures: list[Future]) -> list[Future]:
+    """Those that have ended, as soon as one has, or none after a while; with none given, wait for a worker to come.
+
+    Raises
+    ------
+    ClusterError
+        The scheduler is lost.
+
+    """
+    from distributed import CancelledError, wait
+
+    try:
+        if futures:
+            with client.as_current():
+                wait(futures, timeout=LOOK, return_when="FIRST_COMPLETED")
+        else:
+            client.wait_for_workers(1, timeout=LOOK)
+    except (TimeoutError, CancelledError):
+        require_scheduler(client)
+    return [future for future in futures if future.done()]
+
+
+def require_scheduler(client: Client) -> None:
+    """Refuse a scheduler that is gone.
+
+    Raises
+    ------
+    ClusterError
+        It is.
+
+    """
+    if client.status != "running":
+        raise ClusterError("the scheduler is lost; what was finished is kept, and the same command goes on from there")
+
+
+def failure(future: Future) -> Exception:
+    """Say why a task failed, as an error of Palpate where that can be."""
+    from distributed.scheduler import KilledWorker
+
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return ClusterError(
+            "a task has brought down several workers in turn, probably for want of memory: give them more, or fewer "
+            "threads, or --memory"
+        )
+    if isinstance(error, ImportError):
+        return ClusterError(f"a worker cannot load Palpate {_native.__version__}: {error}")
+    return error if isinstance(error, Exception) else ClusterError(f"a task failed: {error}")
+
+
+def _require_workers(client: Client) -> None:
+    """Refuse a cluster of nobody, and one of another version."""
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        raise ClusterError(
+            f"the scheduler at {client.scheduler.address} has no worker: 'dask worker {client.scheduler.address}' "
+            "starts one"
+        ) from None
+
+    # Defined here, so that it travels by value: a worker without Palpate can still run it.
+    def version() -> str | None:
+        try:
+            from palpate import _native
+        except ImportError:
+            return None
+        return _native.__version__
+
+    for address, found in client.run(version).items():
+        require_version(found, address)
+
+
+def require_version(found: str | None, address: str) -> None:
+    """Refuse another version: its blocks may be of other columns.
+
+    Raises
+    ------
+    ClusterError
+        It is not that of this process.
+
+    """
+    if found != _native.__version__:
+        told = "no Palpate" if found is None else f"Palpate {found}"
+        raise ClusterError(f"the worker at {address} has {told}, not {_native.__version__}: install the same version")
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library's own account of a failed connection from the terminal: the error says it in a line."""
+    logger = logging.getLogger("distributed")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)

@@ -1,0 +1,230 @@
+"""A precomputation in a process of its own, while the region that was computed first is touched."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from palpate.body import Body, SurfaceRegion, surface_region
+from palpate.errors import BodyError, StoreError
+from palpate.green.bounds import CHOSEN
+from palpate.green.function import GreensFunction
+from palpate.green.job import Job
+
+# The child gives way to everything else once a force loop runs.
+NICEST = 19
+
+
+class BackgroundPrecompute:
+    """Green's function that grows in its file.
+
+    The process ends with the program that started it, however that ends; what it has finished is found again.
+
+    Parameters
+    ----------
+    body, precision, touch, first
+        As of :func:`palpate.precompute`.
+    path
+        The store; None keeps it in the cache.
+
+    Attributes
+    ----------
+    body
+        What is computed.
+    done, columns
+        Columns that are computed, and in all.
+    error
+        Why it has ended before all are; None while it has not.
+
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        *,
+        first: SurfaceRegion,
+        touch: SurfaceRegion | None = None,
+        precision: str | None = None,
+        path: str | os.PathLike[str] | None = None,
+    ):
+        self.body = body
+        self._job = job = Job.of(body, precision, touch, first, path)
+        self.done, self.columns = 0, 3 * len(job.region)
+        self.error: str | None = None
+        self._fresh: GreensFunction | None = None
+        self._complete = job.stored()
+        self._news = threading.Condition()
+        self._painted, self._touchable = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._began: tuple[float, int] | None = None
+        self._child: subprocess.Popen[bytes] | None = None
+        if self._complete is not None:
+            self.done = self.columns
+            return
+        with contextlib.suppress(StoreError, OSError):
+            # What an interrupted computation had ready can be touched while this one begins.
+            self._fresh = GreensFunction.load(job.target, body=body)
+            self._touchable = self._fresh.touchable_nodes
+        memory = job.allowed(None)
+        self._child = child = subprocess.Popen(
+            [sys.executable, "-m", "palpate.green.child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first")
+        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first)
+        assert child.stdin is not None and child.stdout is not None
+        self._input = child.stdin
+        pickle.dump(dict(zip(names, values, strict=True)), self._input)
+        self._input.flush()
+        self._listener = threading.Thread(
+            target=self._listen, args=(child.stdout,), name="palpate-columns", daemon=True
+        )
+        self._listener.start()
+
+    def _listen(self, lines: Iterable[bytes]) -> None:
+        for line in lines:
+            message = json.loads(line)
+            if "done" in message:
+                self._note(message["done"], message["columns"])
+            elif "error" in message:
+                self._end(message["error"])
+            else:
+                self._load(bool(message.get("finished")))
+        self._end("the process that computes the columns has ended")
+
+    def _note(self, done: int, columns: int) -> None:
+        with self._news:
+            # What was there already does not count for the time that is left.
+            if self._began is None and done < columns:
+                self._began = (time.monotonic(), done)
+            self.done, self.columns = done, columns
+            self._news.notify_all()
+
+    def _load(self, finished: bool) -> None:
+        try:
+            green = self._job.load() if finished else self._job.load_growing()
+        except (StoreError, OSError) as error:
+            self._end(str(error))
+            return
+        # What tools needed to know of the stage before is kept under its name, and of no more use.
+        for contact in self._job.target.parent.glob(f"{self._job.target.stem}.*.contact.palpate"):
+            contact.unlink(missing_ok=True)
+        with self._news:
+            self._fresh, self._touchable = green, green.touchable_nodes
+            if finished:
+                self._complete, self.done = green, self.columns
+            self._news.notify_all()
+
+    def _end(self, reason: str) -> None:
+        with self._news:
+            if self._complete is None:
+                self.error = self.error or reason
+            self._news.notify_all()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all columns are computed."""
+        return self._complete is not None
+
+    @property
+    def waiting(self) -> int:
+        """How many nodes that were asked for next are not ready."""
+        with self._news:
+            return len(np.setdiff1d(self._painted, self._touchable))
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Until all is computed, by the columns so far, s; None while that is not known."""
+        with self._news:
+            if self._began is None or self.error is not None or self._complete is not None:
+                return None
+            since, had = self._began
+            done = self.done - had
+            return (time.monotonic() - since) * (self.columns - self.done) / done if done > 0 else None
+
+    def wait(self, progress: Callable[[int, int], None] | None = None) -> GreensFunction:
+        """Wait for the region that is computed first; what it gives may be touched there.
+
+        Raises
+        ------
+        BodyError
+            The computation has failed.
+
+        """
+        while True:
+            with self._news:
+                fresh = self._complete or self._fresh
+                if fresh is not None:
+                    self._fresh = None
+                    return fresh
+                if self.error is not None:
+                    raise BodyError(self.error)
+                self._news.wait(0.1)
+                done, columns = self.done, self.columns
+            if progress is not None:
+                progress(done, columns)
+
+    def take(self) -> GreensFunction | None:
+        """Green's function that has become ready since it was last asked for; None for none."""
+        with self._news:
+            fresh, self._fresh = self._fresh, None
+            return fresh
+
+    def paint(self, nodes: Sequence[int] | np.ndarray) -> None:
+        """Let surface nodes be the next stage.
+
+        Raises
+        ------
+        BodyError
+            A node that is not on the surface.
+
+        """
+        surface = self.body.mesh.surface_nodes
+        wanted = np.intersect1d(surface_region(self.body, np.asarray(nodes), "painted"), self._job.region)
+        if self.is_complete or self.error is not None or not len(wanted):
+            return
+        line = json.dumps(np.searchsorted(surface, wanted).tolist()) + "\n"
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            self._input.write(line.encode())
+            self._input.flush()
+            with self._news:
+                self._painted = np.union1d(self._painted, wanted)
+
+    def give_way(self) -> None:
+        """Leave a processor to a force loop that begins, and compute on the others at the lowest priority."""
+        if self._child is None or not hasattr(os, "sched_setaffinity"):
+            return
+        ours = sorted(os.sched_getaffinity(0))
+        with contextlib.suppress(OSError):
+            for thread in map(int, os.listdir(f"/proc/{self._child.pid}/task")):
+                with contextlib.suppress(OSError):  # one that has ended
+                    os.sched_setaffinity(thread, ours[1:] or ours)
+                    os.setpriority(os.PRIO_PROCESS, thread, NICEST)
+
+    def close(self) -> None:
+        """End the process; what it has finished stays in the partial file."""
+        if self._child is None:
+            return
+        with contextlib.suppress(OSError):
+            self._input.close()
+        try:
+            self._child.wait(2.0)
+        except subprocess.TimeoutExpired:
+            self._child.kill()
+            self._child.wait()
+        self._listener.join()
+        assert self._child.stdout is not None
+        self._child.stdout.close()
+
+    def __enter__(self) -> BackgroundPrecompute:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()

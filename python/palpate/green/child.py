@@ -1,0 +1,71 @@
+"""The process that computes columns beside a running force loop: ``python -m palpate.green.child``.
+
+It is given the problem as a pickle on its standard input, then a line of JSON for every region that is to come next,
+and writes a line of JSON on its standard output for whatever has happened. Where its input ends the program that
+started it is gone: it ends at once, and what is finished stays in the partial file.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import sys
+import threading
+from typing import Any, BinaryIO
+
+from palpate import _native
+from palpate.errors import Error
+
+
+class _Painted:
+    """What is to come next, read on a thread of its own."""
+
+    def __init__(self, stream: BinaryIO):
+        self._stream, self._lock = stream, threading.Lock()
+        self._nodes: list[int] = []
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        for line in self._stream:
+            with self._lock:
+                self._nodes += json.loads(line)
+        # Not sys.exit: threads of the computation would be waited for.
+        os._exit(0)
+
+    def take(self) -> list[int] | None:
+        """Nodes that have come since, as ranks among the surface nodes; None for none."""
+        with self._lock:
+            nodes, self._nodes = self._nodes, []
+        return nodes or None
+
+
+def main() -> None:
+    """Compute what standard input asks for."""
+    arguments = pickle.load(sys.stdin.buffer)
+    painted, told = _Painted(sys.stdin.buffer), None
+
+    def say(**message: Any) -> None:
+        sys.stdout.write(json.dumps(message) + "\n")
+        sys.stdout.flush()
+
+    def progress(done: int, columns: int) -> None:
+        nonlocal told
+        if told != (done, columns):
+            told = (done, columns)
+            say(done=done, columns=columns)
+
+    growth = (arguments.pop("first"), painted.take, lambda nodes: say(ready=nodes))
+    try:
+        _native.GreenCore.precompute_to(**arguments, progress=progress, growth=growth)
+        say(finished=True)
+    except Error as error:
+        say(error=str(error))
+    except OSError as error:
+        say(error=f"{arguments['path']}: {error.strerror or error}")
+    # The reading thread holds the lock of standard input, with which the interpreter cannot end.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

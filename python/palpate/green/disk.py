@@ -1,0 +1,94 @@
+"""Room on the disk for a store and for what an interrupted computation keeps beside it."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from palpate.errors import StoreError
+
+# Bytes of a number in the store, and in the finished blocks beside it.
+STORED = {"f16": 2, "f32": 4, "f64": 8}
+KEPT = {"f16": 4, "f32": 4, "f64": 8}
+
+
+@dataclass(frozen=True)
+class DiskUse:
+    """Bytes that a precomputation takes on the disk.
+
+    Attributes
+    ----------
+    store
+        The finished store.
+    partial
+        Finished blocks beside it, until it is finished. Of two entries that mirror each other one is kept.
+    before
+        The store of the stage before the last, which is replaced by rename.
+
+    """
+
+    store: int
+    partial: int
+    before: int
+
+    @property
+    def peak(self) -> int:
+        """All of it at once: while the last store is written."""
+        return self.store + self.partial + self.before
+
+    @classmethod
+    def of(cls, columns: int, rows: int, precision: str, in_stages: bool) -> DiskUse:
+        """Count for an operator of so many columns and rows."""
+        store = STORED[precision] * columns * rows
+        partial = KEPT[precision] * (columns * rows - columns * (columns - 1) // 2)
+        # Each stage but the last is written; the last is about as large as all before it.
+        return cls(store, partial, store // 2 if in_stages else 0)
+
+
+def require_room(target: Path, columns: int, rows: int, precision: str, in_stages: bool) -> None:
+    """Refuse a precomputation whose files have no room beside ``target``, and say what would.
+
+    Raises
+    ------
+    StoreError
+        With the numbers.
+
+    """
+    free = free_bytes(target)
+    needed = DiskUse.of(columns, rows, precision, in_stages)
+    if needed.peak <= free:
+        return
+    raise StoreError(
+        f"{target}: the store in {precision} takes {_gb(needed.store)} and its unfinished columns "
+        f"{_gb(needed.partial)} beside it, {_gb(needed.peak)} in all, but {_gb(free)} are free there: "
+        f"{_what_fits(columns, rows, precision, in_stages, free)}"
+    )
+
+
+def free_bytes(target: Path) -> int:
+    """Bytes free for ``target``: those of its file system, and what an unfinished computation of it holds already."""
+    partial = target.with_name(f"{target.name}.partial")
+    held = partial.stat().st_blocks * 512 if partial.exists() else 0
+    return shutil.disk_usage(target.absolute().parent).free + held
+
+
+def _what_fits(columns: int, rows: int, precision: str, in_stages: bool, free: int) -> str:
+    others = [
+        f"'{other}' takes {_gb(smaller.peak)}"
+        for other in STORED
+        if STORED[other] < STORED[precision] and (smaller := DiskUse.of(columns, rows, other, in_stages)).peak <= free
+    ]
+    low, high = 0, columns // 3
+    while low < high:
+        middle = (low + high + 1) // 2
+        if DiskUse.of(3 * middle, rows, precision, in_stages).peak <= free:
+            low = middle
+        else:
+            high = middle - 1
+    region = [f"a touch region of up to {low} of the {columns // 3} nodes fits"] if low else []
+    return ", ".join([*region, *others, "or name a file on a larger disk"])
+
+
+def _gb(size: int) -> str:
+    return f"{size / 1e9:.3g} GB"

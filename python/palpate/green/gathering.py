@@ -1,0 +1,110 @@
+"""A precomputation by the workers of a cluster: blocks of columns come from them, the store is written here."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate import _native
+from palpate.cluster import failure, require_scheduler, spread, submit, threads_of_workers, wait_for_some
+from palpate.errors import ClusterError
+from palpate.green import worker
+from palpate.green.bounds import CHOSEN
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+# A block that was damaged on its way is asked for again, so often.
+MOST_DAMAGED = 3
+
+Report = Callable[[int, int], None] | None
+
+
+def precompute_on(
+    client: Client,
+    problem: worker.Arrays,
+    precision: str | None,
+    memory: int | str | None,
+    description: str,
+    target: Path,
+    report: Report,
+) -> bool:
+    """Write the Green's function of a problem to ``target``; whether a partial file of something else was thrown away.
+
+    Every worker factorises the problem once. Finished blocks stand in ``<target>.partial``, and are kept whatever
+    happens to the cluster: the same call, here or without a cluster, goes on from them.
+
+    Raises
+    ------
+    ClusterError
+        Workers that fail, or a scheduler that is lost.
+
+    """
+    job = worker.Job(_native.GreenCore.content_key(problem, precision), _native.__version__, precision, memory)
+    held = submit(client, worker.received, problem)
+    try:
+        workers = threads_of_workers(client)
+        measuring = [submit(client, worker.measure, held, job, address=address) for address in workers]
+        # Assembled and ordered here, too, while the workers factorise.
+        layout = _native.ColumnLayout(problem)
+        measured, order = _first(client, measuring)
+        # Nobody needs to measure again for a worker that dies.
+        client.cancel(measuring)
+        if order != layout.order:
+            raise ClusterError("the workers order the columns otherwise: give them the same build of Palpate")
+        store = _native.ColumnStore(layout, precision, CHOSEN, measured, target, description)
+        _, width, *_ = measured
+        _gather(client, (held, job, order), width, store, report)
+        store.finish(report)
+        return store.discarded
+    finally:
+        _release(client, job.key)
+
+
+def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], bytes]:
+    """Wait for the first task that ends; its result."""
+    while True:
+        for future in wait_for_some(client, futures):
+            if future.status != "finished":
+                raise failure(future)
+            return future.result()
+
+
+def _gather(
+    client: Client,
+    task: tuple[Future, worker.Job, bytes],
+    width: int,
+    store: _native.ColumnStore,
+    report: Report,
+) -> None:
+    """Have the missing blocks solved, and keep them."""
+
+    def tell() -> None:
+        if report is not None:
+            report(store.done, store.columns)
+
+    tell()
+    damaged: Counter[int] = Counter()
+    waiting = store.missing()[::-1]
+    for block, future in spread(
+        client, waiting, lambda block, address: submit(client, worker.solve, *task, block, width, address=address)
+    ):
+        if future.status != "finished":
+            raise failure(future)
+        if not store.put(block, *future.result()):
+            damaged[block] += 1
+            if damaged[block] == MOST_DAMAGED:
+                raise ClusterError(f"block {block} of columns was damaged on its way {MOST_DAMAGED} times")
+            waiting.append(block)
+        tell()
+
+
+def _release(client: Client, key: str) -> None:
+    """Have the workers let their factors go; those that do not hear it do so after a while."""
+    try:
+        require_scheduler(client)
+        client.run(worker.release, key, on_error="ignore")
+    except (ClusterError, OSError):
+        return

@@ -1,0 +1,129 @@
+"""What a precomputation is of and where it goes, and that there is room for it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate import _native
+from palpate.body import Body, SurfaceRegion, description, problem_arrays, surface_region
+from palpate.cache import cache_directory
+from palpate.errors import BodyError, StoreError
+from palpate.green.disk import require_room
+from palpate.green.function import GreensFunction
+from palpate.green.memory import allowed_memory, available_memory
+from palpate.input_file import require_writable
+from palpate.leftovers import remove_leftovers
+from palpate.units import brief_repr
+
+
+@dataclass(frozen=True)
+class Job:
+    """A precomputation that may begin.
+
+    Attributes
+    ----------
+    body
+        What it is of.
+    region
+        Surface nodes that may be touched, ascending.
+    problem
+        As the native module takes it.
+    first
+        Nodes that are computed first, as ranks among the surface nodes; empty for all at once.
+    key
+        Of the finished store.
+    target
+        Its file.
+    precision
+        As asked for; None lets the body choose.
+
+    """
+
+    body: Body
+    region: np.ndarray
+    problem: tuple[np.ndarray, ...]
+    first: np.ndarray
+    key: str
+    target: Path
+    precision: str | None
+
+    @classmethod
+    def of(
+        cls,
+        body: Body,
+        precision: str | None,
+        touch: SurfaceRegion | None,
+        first: SurfaceRegion | None,
+        path: str | os.PathLike[str] | None,
+    ) -> Job:
+        """Check everything that can be checked before a number is computed.
+
+        Raises
+        ------
+        Error
+            See :func:`palpate.precompute`.
+
+        """
+        if not isinstance(body, Body):
+            raise BodyError(f"precompute takes a palpate.Body, got {brief_repr(body)}")
+        body.require_supported()
+        region = surface_region(body, touch, "touch")
+        nodes = np.empty(0, np.int64) if first is None else np.intersect1d(surface_region(body, first, "first"), region)
+        if first is not None and not len(nodes):
+            raise BodyError("first: none of its nodes may be touched, for they lie outside of touch")
+        problem = problem_arrays(body, region)
+        key = _native.GreenCore.content_key(problem, precision)
+        if path is None:
+            target = cache_directory() / f"{key[:32]}.palpate"
+            target.parent.mkdir(parents=True, exist_ok=True)
+        else:
+            target = Path(path)
+            require_writable(target, StoreError)
+        remove_leftovers(target)
+        first_ranks = np.searchsorted(body.mesh.surface_nodes, nodes).astype(np.uint32)
+        return cls(body, region, problem, first_ranks, key, target, precision)
+
+    @property
+    def rows(self) -> int:
+        """Rows of the operator: dofs of the surface, and supported ones inside."""
+        inside = ~np.isin(self.body.fixed_dofs // 3, self.body.mesh.surface_nodes)
+        return 3 * len(self.body.mesh.surface_nodes) + int(inside.sum())
+
+    @property
+    def description(self) -> str:
+        """What the file says it was made from, in JSON."""
+        return json.dumps(description(self.body))
+
+    def stored(self) -> GreensFunction | None:
+        """Give what is in the file, if that matches."""
+        if self.target.exists():
+            with contextlib.suppress(StoreError):
+                return self.load()
+        return None
+
+    def load(self) -> GreensFunction:
+        """Read the finished store."""
+        return GreensFunction(_native.GreenCore.load(self.target, self.key), self.body)
+
+    def load_growing(self) -> GreensFunction:
+        """Read what is ready of a store that grows: another key for each stage."""
+        return GreensFunction(_native.GreenCore.load(self.target), self.body)
+
+    def allowed(self, memory: int | str | None) -> int | None:
+        """Bytes of memory that may be taken, once the files have room.
+
+        Raises
+        ------
+        Error
+            They have not, or nothing is left of the memory.
+
+        """
+        in_stages = 0 < len(self.first) < len(self.region)
+        require_room(self.target, 3 * len(self.region), self.rows, self.precision or "f16", in_stages)
+        return available_memory() if memory is None else allowed_memory(memory)

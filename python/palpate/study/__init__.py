@@ -1,0 +1,6 @@
+"""Studies: many bodies or materials, the same presses, one table."""
+
+from palpate.study.result import StudyResult
+from palpate.study.study import Study
+
+__all__ = ["Study", "StudyResult"]

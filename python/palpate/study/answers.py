@@ -1,0 +1,232 @@
+"""What the bodies of a study answer: those that share an operator together."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import _native
+from palpate.body import Body, description, problem_arrays
+from palpate.cluster import require_version, use_threads_of_worker
+from palpate.errors import Error, PalpateWarning
+from palpate.green import GreensFunction
+from palpate.mesh import TetMesh
+from palpate.scene import mesh_of_body, unsolved_body
+from palpate.scene.default_radius import PART_OF_BODY, default_contact_radius
+from palpate.scene.regions import MaterialTable
+from palpate.study.tables import PressTable, StudyScene
+
+# Of a store with a handful of columns nothing is gained by fewer bits.
+PRECISION = "f64"
+# Of the operator, where the modulus only scales forces, Pa.
+REFERENCE_MODULUS = 10e3
+# Meshes kept for the next body of this process.
+MESHES_KEPT = 3
+# Files that a mesh is split into, by the ending of the one that is named.
+PARTS = {".node": (".ele", ".face", ".edge"), ".ele": (".node", ".face", ".edge")}
+# Patches are weighed on curved faces: farther out than their flat triangles.
+MARGIN = 1.1
+
+# Keys of a body that decide its mesh.
+MESH_KEYS = {"mesh", "model", "paper", "unit", "max_element_size", "element", "refine"}
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What one body answers.
+
+    Attributes
+    ----------
+    rows
+        A row of the table for each press.
+    notes
+        What there was to warn of.
+    problem
+        Why there are no rows; empty if there are.
+
+    """
+
+    rows: list[dict[str, Any]]
+    notes: list[str]
+    problem: str = ""
+
+
+def files_of(scene: StudyScene) -> list[Path]:
+    """Files that the mesh of a body is read from; none of a built-in model."""
+    mesh = scene.bodies[0].mesh
+    if mesh is None:
+        return []
+    file = scene.folder / mesh
+    parts = [file.with_suffix(ending) for ending in PARTS.get(file.suffix.lower(), ())]
+    return [file, *(part for part in parts if part.is_file())]
+
+
+def mesh_key(scene: StudyScene, read: Callable[[Path], bytes] = Path.read_bytes) -> str:
+    """Hash of everything that decides the mesh of a body."""
+    tables = scene.bodies[0].model_dump(mode="json", include=MESH_KEYS - {"mesh"})
+    key = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
+    for file in files_of(scene):
+        key.update(file.suffix.encode() + hashlib.sha256(read(file)).digest())
+    return key.hexdigest()
+
+
+def operator_key(scene: StudyScene) -> str:
+    """Hash of everything that decides the operator of a body and the presses, but for a modulus that scales forces."""
+    tables = scene.model_dump(mode="json", include={"bodies", "supports", "material", "region", "loads", "presses"})
+    body = tables["bodies"][0]
+    for name in ("mesh", "name", "position", "orientation"):
+        body.pop(name)
+    if scales_with_modulus(scene):
+        (body["material"] or tables["material"]).pop("youngs_modulus")
+    content = json.dumps([_native.__version__, mesh_key(scene), tables], sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def case_key(scene: StudyScene) -> str:
+    """Hash of everything that decides what a body answers."""
+    return hashlib.sha256(f"{operator_key(scene)} {youngs_modulus(scene)!r}".encode()).hexdigest()
+
+
+def youngs_modulus(scene: StudyScene) -> float:
+    """Young's modulus of a body, but for its regions."""
+    return (scene.bodies[0].material or scene.material).youngs_modulus
+
+
+def scales_with_modulus(scene: StudyScene) -> bool:
+    """Whether Young's modulus is the same everywhere, and nothing but touches loads the body."""
+    body = scene.bodies[0]
+    loads = scene.loads if body.loads is None else body.loads
+    regions = scene.region if body.region is None else body.region
+    return not loads and all(region.youngs_modulus is None for region in regions)
+
+
+def answers(scenes: Sequence[StudyScene]) -> list[Answers]:
+    """Answers of bodies that share an operator: it is computed once, if its store says that the modulus only scales."""
+    known: GreensFunction | None = None
+    found = []
+    for scene in scenes:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", PalpateWarning)
+            try:
+                if known is None or known.youngs_modulus is None:
+                    known = _operator(scene)
+                factor = 1.0 if known.youngs_modulus is None else youngs_modulus(scene) / known.youngs_modulus
+                rows, problem = [_row(known, factor, press) for press in scene.presses], ""
+            except (Error, OSError) as error:
+                rows, problem = [], str(error)
+        notes = [str(warning.message) for warning in caught if issubclass(warning.category, PalpateWarning)]
+        found.append(Answers(rows, list(dict.fromkeys(notes)), problem))
+    return found
+
+
+def answers_elsewhere(version: str, scenes: Sequence[StudyScene], files: Sequence[tuple[str, bytes]]) -> list[Answers]:
+    """Answers on a worker, which has the contents of the files and not the files."""
+    from distributed import get_worker
+
+    require_version(version, get_worker().address)
+    use_threads_of_worker()
+    with tempfile.TemporaryDirectory(prefix="palpate-study-") as folder:
+        for name, content in files:
+            (Path(folder) / name).write_bytes(content)
+        moved = []
+        for scene in scenes:
+            path, text = scene.source
+            body = scene.bodies[0]
+            name = None if body.mesh is None else Path(body.mesh).name
+            here = scene.model_copy(update={"bodies": [body.model_copy(update={"mesh": name})]})
+            here.stand_in(Path(folder) / path.name, text)
+            moved.append(here)
+        home = str(scenes[0].source[0].parent)
+        return [Answers(a.rows, a.notes, a.problem.replace(folder, home)) for a in answers(moved)]
+
+
+_meshes: dict[str, TetMesh] = {}
+
+
+def _mesh(scene: StudyScene) -> TetMesh:
+    """Mesh of a body, from those that this process has made lately."""
+    key = mesh_key(scene)
+    mesh = _meshes.pop(key, None)
+    if mesh is None:
+        mesh = mesh_of_body(scene)
+    _meshes[key] = mesh
+    while len(_meshes) > MESHES_KEPT:
+        del _meshes[next(iter(_meshes))]
+    return mesh
+
+
+def _operator(scene: StudyScene) -> GreensFunction:
+    """Green's function of the nodes that the presses are about.
+
+    Where the modulus only scales forces it is that of a reference, so that what a body answers does not depend on which
+    others are computed with it.
+    """
+    if scales_with_modulus(scene):
+        scene = _of_reference_modulus(scene)
+    body = unsolved_body(scene, mesh=_mesh(scene))
+    body.require_supported()
+    problem = problem_arrays(body, _touched_nodes(body, scene.presses))
+    precision = scene.bodies[0].precision or PRECISION
+    core = _native.GreenCore.precompute(problem, precision, json.dumps(description(body)), None)
+    return GreensFunction(core, body)
+
+
+def _of_reference_modulus(scene: StudyScene) -> StudyScene:
+    body = scene.bodies[0]
+    if body.material is None:
+        return scene.model_copy(update={"material": _with_reference(scene.material)})
+    return scene.model_copy(update={"bodies": [body.model_copy(update={"material": _with_reference(body.material)})]})
+
+
+def _with_reference(material: MaterialTable) -> MaterialTable:
+    return material.model_copy(update={"youngs_modulus": REFERENCE_MODULUS})
+
+
+def _touched_nodes(body: Body, presses: Sequence[PressTable]) -> np.ndarray:
+    """Nodes of all surface faces that a patch reaches."""
+    mesh = body.mesh
+    corners = np.searchsorted(mesh.surface_nodes, mesh.surface_triangles).astype(np.uint32)
+    search = _native.SurfaceSearch(mesh.nodes[mesh.surface_nodes], corners)
+    faces = mesh.nodes[mesh.surface_faces]
+    centres = faces.mean(axis=1)
+    sizes = np.linalg.norm(faces - centres[:, None], axis=2).max(axis=1)
+    touched = np.zeros(len(faces), dtype=bool)
+    for press in presses:
+        radius = PART_OF_BODY * float(np.ptp(mesh.nodes, axis=0).max()) if press.radius is None else press.radius
+        landed = search.closest(np.array([press.point]))
+        touched |= np.linalg.norm(centres - landed, axis=1) <= MARGIN * (sizes + radius)
+    return np.unique(mesh.surface_faces[touched])
+
+
+def _row(green: GreensFunction, factor: float, press: PressTable) -> dict[str, Any]:
+    """Row of a press; forces are ``factor`` times those of the operator."""
+    body = green.body
+    assert body is not None
+    radius = default_contact_radius(green) if press.radius is None else press.radius
+    answer = green.touch(press.point, press.displacement, radius)
+    force = factor * answer.force
+    moved = np.array([0.0 if component is None else component for component in press.displacement])
+    loaded = bool(body.load_vector().any())
+    return {
+        "press": press.name or "",
+        "nodes": len(body.mesh.nodes),
+        "tetrahedra": len(body.mesh.tets),
+        "volume_m3": float(body.mesh.volume),
+        "radius_m": float(radius),
+        **{f"point_{axis}_m": float(x) for axis, x in zip("xyz", answer.point, strict=True)},
+        "distance_m": float(answer.distance),
+        **{f"force_{axis}_N": float(f) for axis, f in zip("xyz", force, strict=True)},
+        "force_N": float(np.linalg.norm(force)),
+        # What pushes back for each metre; not of a body that its own loads have moved before.
+        "stiffness_N_per_m": float("nan") if loaded else float(force @ moved / (moved @ moved)),
+        "largest_displacement_m": float(np.linalg.norm(answer.displacements, axis=1).max()),
+        "error": float(answer.error),
+    }

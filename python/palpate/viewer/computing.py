@@ -1,0 +1,113 @@
+"""Columns that are computed while a session runs: what is ready goes into its loop, and the page is told."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import ViewerError
+from palpate.green import BackgroundPrecompute
+from palpate.viewer.messages import index, whole
+from palpate.viewer.session import Session
+
+# Characters of a painted mask, in a message of the size that a client may send.
+LONGEST_MASK = 3000
+# Seconds that are left are told anew when they differ by this part.
+TOLD_AGAIN = 0.05
+
+
+class Computing:
+    """What is computed of the bodies of a session, by their rank."""
+
+    def __init__(self, growing: Mapping[int, BackgroundPrecompute] | None = None):
+        self._growing = dict(growing or {})
+        self._told: dict[str, Any] | None = None
+
+    def begin(self) -> None:
+        """Leave the processor to the loop, which begins."""
+        for background in self._growing.values():
+            background.give_way()
+
+    def step(self, session: Session) -> dict[str, Any] | None:
+        """Give the loop what has become ready; the message for all pages, if there is something new to tell."""
+        for body, background in self._growing.items():
+            if session.simulation.recording is None:  # a recording is of one scene: the store waits
+                green = background.take()
+                if green is not None:
+                    session.take_store(body, green)
+        message = self.message(session)
+        if self._told is not None and _is_same(message, self._told):
+            return None
+        self._told = message
+        return message
+
+    def message(self, session: Session) -> dict[str, Any]:
+        """Message with what can be touched by now."""
+        return {"type": "computed", "bodies": [self._entry(session, body) for body in range(len(session.built.bodies))]}
+
+    def _entry(self, session: Session, body: int) -> dict[str, Any]:
+        green, background = session.built.bodies[body].green, self._growing.get(body)
+        ready = np.isin(green.surface_nodes, green.touchable_nodes)
+        columns = 3 * len(green.touchable_nodes)
+        return {
+            "ready": None if ready.all() else mask_text(ready),
+            "done": columns if background is None else background.done,
+            "columns": columns if background is None else background.columns,
+            "left_s": None if background is None else background.seconds_left,
+            "waiting": 0 if background is None else background.waiting,
+            "stopped": None if background is None else background.error,
+        }
+
+    def paint(self, session: Session, message: Mapping[str, Any]) -> None:
+        """Let nodes of a message be computed next.
+
+        Raises
+        ------
+        ViewerError
+            Nothing is computed of that body, or nodes that it does not have.
+
+        """
+        body = index(message, "body", len(session.built.bodies))
+        background, surface = self._growing.get(body), session.built.bodies[body].green.surface_nodes
+        if background is None or background.is_complete:
+            raise ViewerError("paint: all of this body that may be touched is computed")
+        first = whole(message, "first", 0, len(surface) - 1)
+        ranks = first + np.flatnonzero(_mask(message.get("nodes")))
+        if first % 8 or not len(ranks) or ranks.max() >= len(surface):
+            raise ViewerError("paint: nodes must be a mask of surface nodes")
+        background.paint(surface[ranks])
+
+    def close(self) -> None:
+        """End what is computed; it goes on from there another time."""
+        for background in self._growing.values():
+            background.close()
+
+
+def mask_text(mask: np.ndarray) -> str:
+    """Bits of a mask in base64, the lowest of each byte first."""
+    return base64.b64encode(np.packbits(mask, bitorder="little").tobytes()).decode()
+
+
+def _mask(text: Any) -> np.ndarray:
+    if not isinstance(text, str) or len(text) > LONGEST_MASK:
+        raise ViewerError("paint: nodes must be a mask in base64")
+    try:
+        data = base64.b64decode(text, validate=True)
+    except (binascii.Error, ValueError):
+        raise ViewerError("paint: nodes must be a mask in base64") from None
+    return np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little").astype(bool)
+
+
+def _is_same(message: Mapping[str, Any], told: Mapping[str, Any]) -> bool:
+    """Whether nothing differs but a little time."""
+    for now, before in zip(message["bodies"], told["bodies"], strict=True):
+        left, said = now["left_s"], before["left_s"]
+        if {**now, "left_s": None} != {**before, "left_s": None} or (left is None) != (said is None):
+            return False
+        if left is not None and abs(left - said) > TOLD_AGAIN * said + 1.0:
+            return False
+    return True

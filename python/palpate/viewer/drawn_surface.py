@@ -1,0 +1,113 @@
+"""The surface that a page draws of a body: all of it, or fewer triangles where there are more than a page takes.
+
+Vertices that are drawn are surface nodes, in place: displacements and fields are exact there, and what is left out is
+only the nodes between. What is felt knows nothing of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate import _native
+from palpate.mesh.elements import face_owners
+from palpate.scene import BuiltBody
+
+# Triangles of one body that a page draws at most: docs/benchmarks.md.
+MOST_TRIANGLES = 60_000
+# Sheets that face away from each other are apart: a normal counts as so many mean distances between drawn vertices.
+APART = 4.0
+
+
+@dataclass(frozen=True)
+class DrawnSurface:
+    """What is drawn of a surface of s nodes.
+
+    Attributes
+    ----------
+    nodes
+        Rows (v,) of the surface nodes that are drawn, ascending.
+    triangles
+        Corners (k, 3) among them.
+    regions
+        Rank of the region behind each triangle (k,).
+    owners
+        The drawn vertex that stands for each surface node (s,); None where all are drawn.
+    deviation
+        How far the surface lies from the drawn triangles at rest, about, m.
+
+    """
+
+    nodes: np.ndarray
+    triangles: np.ndarray
+    regions: np.ndarray
+    owners: np.ndarray | None = None
+    deviation: float = 0.0
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of the surface is drawn."""
+        return self.owners is None
+
+
+def drawn_surface(built: BuiltBody, of_element: np.ndarray, most: int | None = None) -> DrawnSurface:
+    """Surface of a body, or at most about so many triangles of it, as many as a page takes where that is not told.
+
+    ``of_element`` tells the region of each element.
+    """
+    green, most = built.green, MOST_TRIANGLES if most is None else most
+    triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
+    regions = _regions(built, of_element, len(triangles))
+    if len(triangles) <= most:
+        return DrawnSurface(np.arange(len(green.surface_nodes)), triangles, regions)
+    positions = green.surface_positions
+    parts, deviation = [], 0.0
+    seams = _on_seams(triangles, regions, len(positions))
+    for region in np.unique(regions):
+        corners = triangles[regions == region].astype(np.uint32)
+        fewer, off = _native.simplified(positions, corners.ravel(), seams, int(most * len(corners) / len(triangles)))
+        parts.append((fewer.reshape(-1, 3), np.full(len(fewer) // 3, region)))
+        deviation = max(deviation, off)
+    corners = np.vstack([corners for corners, _ in parts])
+    nodes, ranks = np.unique(corners, return_inverse=True)
+    owners = _owners(positions, _normals(positions, triangles), nodes)
+    return DrawnSurface(nodes, ranks.reshape(-1, 3), np.concatenate([r for _, r in parts]), owners, deviation)
+
+
+def _regions(built: BuiltBody, of_element: np.ndarray, count: int) -> np.ndarray:
+    """Rank of the region behind each triangle of the surface (k,)."""
+    if built.body is None or not of_element.any():
+        return np.zeros(count, dtype=np.int64)
+    owners = face_owners(built.body.mesh.tets)
+    # A face with mid-side nodes is drawn as several triangles.
+    return of_element[np.repeat(owners, count // len(owners))]
+
+
+def _on_seams(triangles: np.ndarray, regions: np.ndarray, count: int) -> np.ndarray:
+    """Whether each node (s,) is a corner of triangles of several regions."""
+    low, high = np.full(count, regions.max() + 1), np.full(count, -1)
+    for corner in triangles.T:
+        np.minimum.at(low, corner, regions)
+        np.maximum.at(high, corner, regions)
+    return low < high
+
+
+def _normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return unit normals (s, 3) at the nodes."""
+    a, b, c = (positions[triangles[:, k]] for k in range(3))
+    normals, areas = np.zeros_like(positions), np.cross(b - a, c - a)
+    for corner in triangles.T:
+        for axis in range(3):
+            normals[:, axis] += np.bincount(corner, areas[:, axis], len(positions))
+    return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+
+
+def _owners(positions: np.ndarray, normals: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Drawn vertex (s,) that is nearest to each node on its own side of the body."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(positions[nodes])
+    spacing = float(np.median(tree.query(positions[nodes], k=2)[0][:, 1]))
+    sided = np.hstack([positions, APART * spacing * normals])
+    return cKDTree(sided[nodes]).query(sided)[1]

@@ -1,0 +1,171 @@
+"""Work by a Dask cluster: the same bits and numbers as one machine, whoever dies or joins meanwhile."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import refused, run
+from conftest import box_mesh
+from dask_cluster import local_cluster
+
+import palpate
+from palpate import cluster as clusters
+from palpate.cluster import connected
+from palpate.green import worker
+from palpate.study import Study
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def workers():
+    with local_cluster(2) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def body():
+    mesh = box_mesh(cells=(16, 10, 10))
+    return palpate.Body(mesh, material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(body, tmp_path_factory):
+    return palpate.precompute(body, path=tmp_path_factory.mktemp("one") / "a.palpate").path.read_bytes()
+
+
+def test_one_worker_killed_half_way_leaves_the_bits_of_one_machine(workers, body, undisturbed, tmp_path):
+    seen, killed = [], []
+
+    def kill_one(done, total):
+        seen.append(done)
+        if done >= total // 2 and not killed:
+            killed.append(next(iter(pids.values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+    with connected(workers.scheduler_address) as client:
+        pids = client.run(os.getpid)
+        assert len(pids) == 2
+        green = palpate.precompute(body, path=tmp_path / "a.palpate", dask=client, progress=kill_one)
+        assert killed
+        # Another takes the place of the one that died; nobody holds a factor any more.
+        client.wait_for_workers(2, timeout=120)
+        assert set(client.run(held_factors).values()) == {0}
+        assert killed[0] not in client.run(os.getpid).values()
+    assert green.path.read_bytes() == undisturbed
+    assert os.listdir(tmp_path) == ["a.palpate"]
+    assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == 3 * len(body.mesh.surface_nodes)
+
+
+def held_factors():
+    return len(worker._factors.held)
+
+
+def test_what_a_cluster_began_is_finished_by_one_machine(workers, body, undisturbed, tmp_path):
+    path, total = tmp_path / "a.palpate", 3 * len(body.mesh.surface_nodes)
+    begun = []
+
+    def stop_at(part):
+        def stop(done, _total):
+            begun.append(done)
+            if done >= part * total:
+                raise KeyboardInterrupt
+
+        return stop
+
+    for part in (0.3, 0.6):
+        with pytest.raises(KeyboardInterrupt):
+            palpate.precompute(body, path=path, dask=workers.scheduler_address, progress=stop_at(part))
+        assert os.listdir(tmp_path) == ["a.palpate.partial"]
+        assert begun[-1] < total
+    assert [done for done in begun if done == 0] == [0]
+    palpate.precompute(body, path=path, progress=lambda done, _: begun.append(done))
+    assert begun[-1] == total
+    assert path.read_bytes() == undisturbed
+    assert os.listdir(tmp_path) == ["a.palpate"]
+
+
+def test_eight_bodies_on_two_workers_answer_what_they_answer_one_by_one(workers, tmp_path):
+    box_mesh(cells=(6, 4, 4)).write(tmp_path / "box.vtu")
+    (tmp_path / "study.toml").write_text(
+        """
+[body]
+mesh = "box.vtu"
+[supports]
+fixed = "z < min + 1mm"
+[[region]]
+shape = "box"
+low = [0, 0, "20mm"]
+high = ["80mm", "50mm", "40mm"]
+[[press]]
+point = ["40mm", "25mm", "50mm"]
+displacement = [0, "1mm", "-2mm"]
+[grid]
+region.youngs_modulus = ["5kPa", "10kPa", "20kPa", "40kPa"]
+material.poissons_ratio = [0.3, 0.45]
+"""
+    )
+    study = Study.read(tmp_path / "study.toml")
+    alone, seen = study.run(tmp_path / "alone", progress=False), []
+    told = run("study", "study.toml", "--dask", workers.scheduler_address, "--out", "by-two", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "8 bodies" in told.stdout
+    assert (tmp_path / "by-two" / "study.csv").read_bytes() == written(alone, tmp_path)
+    spread = study.run(tmp_path / "spread", dask=workers.scheduler_address, progress=lambda *at: seen.append(at))
+    assert spread == alone and seen[-1] == (8, 8)
+    assert len(np.unique(alone.columns["force_N"])) == 8
+
+
+def written(result, folder):
+    return result.save(folder)[0].read_bytes()
+
+
+def test_mistakes_of_a_cluster_are_told_in_a_line(workers, body, tmp_path, monkeypatch):
+    def refuses(dask, match, **options):
+        with pytest.raises(palpate.Error, match=match) as error:
+            palpate.precompute(body, path=tmp_path / "a.palpate", dask=dask, **options)
+        assert "\n" not in str(error.value)
+        assert not os.listdir(tmp_path)
+
+    monkeypatch.setattr(clusters, "PATIENCE", 0.5)
+    refuses("tcp://127.0.0.1:1", "no scheduler answers at tcp://127.0.0.1:1")
+    refuses("nonsense", "no scheduler answers at nonsense")
+    refuses(8786, "address of a scheduler")
+    refuses(workers.scheduler_address, "already in use", memory="1MB")
+    with local_cluster(0) as nobody:
+        refuses(nobody.scheduler_address, "has no worker: 'dask worker tcp://")
+    with monkeypatch.context() as other:
+        other.setattr(clusters, "_native", types.SimpleNamespace(__version__="0.0.1"))
+        refuses(workers.scheduler_address, r"worker at tcp://\S+ has Palpate \S+, not 0\.0\.1")
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "distributed", None)
+        refuses(workers.scheduler_address, r"pip install 'palpate\[cluster\]'")
+
+
+def test_a_worker_of_another_version_that_joins_is_refused(monkeypatch):
+    monkeypatch.setattr(worker, "_address", lambda: "tcp://10.0.0.7:1234")
+    job = worker.Job("key", "0.0.1", "f32", None)
+    with pytest.raises(palpate.ClusterError, match=r"the worker at tcp://10\.0\.0\.7:1234 has Palpate"):
+        worker.measure((), job)
+
+
+def test_command_line(workers, tmp_path):
+    mesh = box_mesh(cells=(8, 5, 5))
+    mesh.write(tmp_path / "box.vtu")
+    command = ["precompute", "box.vtu", "--fix", "x < 1mm", "-E", "10kPa", "--nu", "0.4", "-o", "a.palpate", "--dask"]
+    told = run(*command, workers.scheduler_address, cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert f"{workers.scheduler_address}: 2 workers with 2 threads" in told.stdout
+    body = palpate.Body(
+        palpate.TetMesh.read(tmp_path / "box.vtu"), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-3
+    )
+    assert (
+        palpate.precompute(body, path=tmp_path / "b.palpate").path.read_bytes() == (tmp_path / "a.palpate").read_bytes()
+    )
+    refused(run(*command, "tcp://127.0.0.1:1", cwd=tmp_path), "no scheduler answers at tcp://127.0.0.1:1")

@@ -1,0 +1,9 @@
+// Two fingers are for the camera: it is told of the first one, which it never saw, before it sees the second.
+
+import type { Place } from "../window_regions";
+
+/** Tells the camera's controls of a pointer that went down, at the place where it is now. */
+export function byCamera(canvas: HTMLCanvasElement, { pointerId, pointerType }: PointerEvent, [clientX, clientY]: Place): void {
+  const again = { pointerId, pointerType, clientX, clientY, isPrimary: true, bubbles: true, button: 0 };
+  canvas.dispatchEvent(new PointerEvent("pointerdown", again));
+}

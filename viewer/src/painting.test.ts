@@ -1,0 +1,86 @@
+import { describe, expect, it } from "vitest";
+
+import { maskOfNodes, nodesOfMask } from "./net/computed_messages";
+import type { ClientMessage, SceneMessage } from "./net/protocol";
+import { LATER, PAINTED, Painting, READY, WAITING, countStates, isGrowing, touchStates } from "./painting";
+import { Store } from "./store";
+
+const COUNT = 20_000;
+
+function growing() {
+  const store = new Store();
+  const sent: ClientMessage[] = [];
+  const painting = new Painting(store, (message) => sent.push(message));
+  const ready = maskOfNodes([0, 1, 2, 17_000], COUNT);
+  store.update({
+    role: "control",
+    connection: "open",
+    scene: { bodies: [{ surface_nodes: COUNT }, { surface_nodes: 8 }] } as unknown as SceneMessage,
+    computed: {
+      type: "computed",
+      bodies: [
+        { ready, done: 12, columns: 60_000, left_s: 30, waiting: 0, stopped: null },
+        { ready: null, done: 24, columns: 24, left_s: 0, waiting: 0, stopped: null },
+      ],
+    },
+  });
+  return { store, sent, painting };
+}
+
+describe("painting", () => {
+  it("marks what is neither ready nor asked for, and takes it back", () => {
+    const { store, painting } = growing();
+    painting.add([Uint32Array.of(1, 5, 6), Uint32Array.of(3)]);
+    painting.add([Uint32Array.of(6, 7), new Uint32Array(0)]);
+    const states = touchStates(store.get(), 0)!;
+    expect([states[1], states[5], states[7], states[8]]).toEqual([READY, PAINTED, PAINTED, LATER]);
+    expect(touchStates(store.get(), 1)).toBeNull();
+    expect(countStates(store.get())).toEqual([4 + 8, COUNT - 4 - 3, 0, 3]);
+    painting.undo();
+    expect(touchStates(store.get(), 0)![7]).toBe(LATER);
+    painting.clear();
+    expect(store.get().strokes).toEqual([]);
+    // A stroke over what is ready is none.
+    painting.add([Uint32Array.of(0, 2), new Uint32Array(0)]);
+    expect(store.get().strokes).toEqual([]);
+  });
+
+  it("asks for all strokes in messages of bounded length", () => {
+    const { store, sent, painting } = growing();
+    painting.choose("brush");
+    painting.add([Uint32Array.of(5, 16_383), new Uint32Array(0)]);
+    painting.add([Uint32Array.of(5, 16_384, 19_999), new Uint32Array(0)]);
+    painting.compute();
+    expect(sent.map((message) => message.type)).toEqual(["paint", "paint"]);
+    const asked = sent.flatMap((message) => {
+      if (message.type !== "paint") return [];
+      expect(message.first % 8).toBe(0);
+      expect(JSON.stringify(message).length).toBeLessThan(4096);
+      return Array.from(nodesOfMask(message.nodes), (node) => message.first + node);
+    });
+    expect(asked).toEqual([5, 16_383, 16_384, 19_999]);
+    const state = store.get();
+    expect([state.strokes.length, state.paintTool]).toEqual([0, null]);
+    expect(touchStates(state, 0)![16_384]).toBe(WAITING);
+    // What comes is ready, and the rest still waits.
+    const [body, other] = state.computed!.bodies;
+    store.update({ computed: { type: "computed", bodies: [{ ...body!, ready: maskOfNodes([5], COUNT) }, other!] } });
+    expect([5, 16_384].map((node) => touchStates(store.get(), 0)![node])).toEqual([READY, WAITING]);
+  });
+
+  it("is put away where it can do nothing", () => {
+    const { store, sent, painting } = growing();
+    painting.choose("lasso");
+    expect(store.get().paintTool).toBe("lasso");
+    store.update({ role: "watch" });
+    expect(store.get().paintTool).toBeNull();
+    painting.choose("brush");
+    painting.add([Uint32Array.of(9), new Uint32Array(0)]);
+    painting.compute();
+    expect([store.get().paintTool, sent.length]).toEqual([null, 0]);
+    store.update({ role: "control", computed: null });
+    expect(isGrowing(store.get())).toBe(false);
+    painting.choose("brush");
+    expect(store.get().paintTool).toBeNull();
+  });
+});

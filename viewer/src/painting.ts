@@ -1,0 +1,123 @@
+// Parts of a surface that a person paints to be computed next, and what is known of each node.
+
+import { NODES_A_MESSAGE, maskOfNodes, nodesOfMask } from "./net/computed_messages";
+import type { ComputedBody } from "./net/computed_messages";
+import type { ClientMessage } from "./net/protocol";
+import { inControl } from "./store";
+import type { PaintTool, State, Store, Stroke } from "./store";
+
+/** Pixels. */
+export const BRUSH_MIN = 4;
+export const BRUSH_MAX = 120;
+const BRUSH_STEP = 1.25;
+
+/** What a node of the surface is, in the order in which a later one hides an earlier one. */
+export const READY = 0;
+export const LATER = 1;
+export const WAITING = 2;
+export const PAINTED = 3;
+
+/** Whether more of a body can be touched later. A region that was chosen once and is whole is no such body. */
+function grows({ ready, done, columns }: ComputedBody): boolean {
+  return ready !== null && done < columns;
+}
+
+/** Whether more of a scene can be touched later. */
+export function isGrowing({ computed, exam }: Readonly<State>): boolean {
+  return exam === null && (computed?.bodies.some(grows) ?? false);
+}
+
+/** What each surface node of a body is; null where no more can be touched later. */
+export function touchStates({ computed, scene, strokes, asked }: Readonly<State>, body: number): Uint8Array | null {
+  const [told, header] = [computed?.bodies[body], scene?.bodies[body]];
+  if (!told?.ready || !header || !grows(told)) return null;
+  const states = new Uint8Array(header.surface_nodes).fill(LATER);
+  for (const node of asked[body] ?? []) states[node] = WAITING;
+  for (const stroke of strokes) for (const node of stroke[body] ?? []) states[node] = PAINTED;
+  for (const node of nodesOfMask(told.ready)) states[node] = READY;
+  return states;
+}
+
+/** How many surface nodes of all bodies are in each state. */
+export function countStates(state: Readonly<State>): [ready: number, later: number, waiting: number, painted: number] {
+  const counts: [number, number, number, number] = [0, 0, 0, 0];
+  state.scene?.bodies.forEach((header, body) => {
+    const states = touchStates(state, body);
+    if (!states) counts[READY] += header.surface_nodes;
+    else for (const one of states) counts[one as 0 | 1 | 2 | 3] += 1;
+  });
+  return counts;
+}
+
+export class Painting {
+  constructor(private readonly store: Store, private readonly send: (message: ClientMessage) => void) {
+    store.subscribe(["role", "connection", "computed", "exam"], (state) => {
+      if (state.paintTool && !this.able(state)) store.update({ paintTool: null });
+    });
+  }
+
+  /** A tool that is chosen again is put away. */
+  choose(tool: PaintTool): void {
+    const state = this.store.get();
+    if (!this.able(state)) return;
+    this.store.update({ paintTool: state.paintTool === tool ? null : tool });
+  }
+
+  putAway(): void {
+    this.store.update({ paintTool: null });
+  }
+
+  setBrush(radius: number): void {
+    this.store.update({ brushRadius: Math.min(Math.max(radius, BRUSH_MIN), BRUSH_MAX) });
+  }
+
+  /** A step larger, or smaller. */
+  changeBrush(steps: number): void {
+    this.setBrush(this.store.get().brushRadius * BRUSH_STEP ** steps);
+  }
+
+  /** Keeps what of a stroke is not ready and not asked for; one that marks nothing is none. */
+  add(stroke: Stroke): void {
+    const state = this.store.get();
+    const kept = stroke.map((nodes, body) => {
+      const states = touchStates(state, body);
+      return states ? nodes.filter((node) => states[node] === LATER) : new Uint32Array(0);
+    });
+    if (kept.some((nodes) => nodes.length > 0)) this.store.update({ strokes: [...state.strokes, kept] });
+  }
+
+  undo(): void {
+    this.store.update({ strokes: this.store.get().strokes.slice(0, -1) });
+  }
+
+  clear(): void {
+    if (this.store.get().strokes.length > 0) this.store.update({ strokes: [] });
+  }
+
+  /** Asks for all that is painted. */
+  compute(): void {
+    const state = this.store.get();
+    const { strokes, asked, scene } = state;
+    if (!inControl(state) || !scene || strokes.length === 0) return;
+    const wanted = scene.bodies.map((_, body) => new Set(strokes.flatMap((stroke) => Array.from(stroke[body] ?? []))));
+    wanted.forEach((nodes, body) => this.ask(body, nodes, scene.bodies[body]!.surface_nodes));
+    this.store.update({
+      strokes: [],
+      asked: wanted.map((nodes, body) => new Set([...(asked[body] ?? []), ...nodes])),
+      paintTool: null,
+    });
+  }
+
+  /** A message takes so many nodes; one without any is not sent. */
+  private ask(body: number, nodes: ReadonlySet<number>, count: number): void {
+    for (let first = 0; first < count; first += NODES_A_MESSAGE) {
+      const end = Math.min(first + NODES_A_MESSAGE, count);
+      const here = Array.from(nodes).filter((node) => node >= first && node < end).map((node) => node - first);
+      if (here.length > 0) this.send({ type: "paint", body, first, nodes: maskOfNodes(here, end - first) });
+    }
+  }
+
+  private able(state: Readonly<State>): boolean {
+    return inControl(state) && isGrowing(state);
+  }
+}
