@@ -150,6 +150,7 @@ impl GreenCore {
         let precision = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
         let total = 3 * problem.touch.len();
         let phase = |begun: Phase| {
+            crate::allocator::return_free_pages();
             if let Some(phase) = &phase {
                 // What it raises is for nobody: a computation does not end because its name cannot be shown.
                 drop(Python::attach(|py| phase.call1(py, (begun.name(),))));

@@ -9,36 +9,39 @@ use faer::{MatMut, MatRef};
 pub const WIDTH: usize = 256;
 
 /// Consecutive columns, rows from that of the first one's diagonal on.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct BlockColumn<T> {
     /// First column.
     pub first: usize,
     /// Number of columns.
     pub width: usize,
-    /// One column after the other.
+    /// Number of rows.
+    pub height: usize,
+    /// One column after the other; there may be more behind them.
     values: Vec<T>,
 }
 
-impl<T: Copy + Default> BlockColumn<T> {
-    /// Zeros for the rows up to `rows`.
-    pub fn zeros(first: usize, width: usize, rows: usize) -> Self {
-        Self { first, width, values: vec![T::default(); width * (rows - first)] }
+impl<T> BlockColumn<T> {
+    /// With the numbers that stand in `values`.
+    pub fn new(first: usize, width: usize, height: usize, values: Vec<T>) -> Self {
+        debug_assert!(values.len() >= width * height);
+        Self { first, width, height, values }
     }
 
-    /// Number of rows.
-    pub fn height(&self) -> usize {
-        self.values.len().checked_div(self.width).unwrap_or(0)
+    /// Its memory.
+    pub fn into_values(self) -> Vec<T> {
+        self.values
     }
 
     /// All of it.
     pub fn matrix(&self) -> MatRef<'_, T> {
-        MatRef::from_column_major_slice(&self.values, self.height(), self.width)
+        MatRef::from_column_major_slice(&self.values[..self.width * self.height], self.height, self.width)
     }
 
     /// All of it, to be changed.
     pub fn matrix_mut(&mut self) -> MatMut<'_, T> {
-        let height = self.height();
-        MatMut::from_column_major_slice_mut(&mut self.values, height, self.width)
+        let values = &mut self.values[..self.width * self.height];
+        MatMut::from_column_major_slice_mut(values, self.height, self.width)
     }
 
     /// Rows from `from` on, counted as those of the whole matrix.
@@ -48,17 +51,16 @@ impl<T: Copy + Default> BlockColumn<T> {
 
     /// The rows from its diagonal on of one of its columns, counted in the block; row `first` is the slice's first.
     pub fn column_mut(&mut self, column: usize) -> &mut [T] {
-        let height = self.height();
-        &mut self.values[column * height..][..height]
+        &mut self.values[column * self.height..][..self.height]
     }
 
     /// A column, as [`BlockColumn::column_mut`].
     pub fn column(&self, column: usize) -> &[T] {
-        &self.values[column * self.height()..][..self.height()]
+        &self.values[column * self.height..][..self.height]
     }
 }
 
-/// First columns and widths of the blocks of some columns.
+/// First columns and widths of the blocks of some columns: all have `WIDTH` columns but for the last.
 pub fn cuts(columns: usize) -> impl ExactSizeIterator<Item = (usize, usize)> + Clone {
     (0..columns.div_ceil(WIDTH)).map(move |block| (block * WIDTH, WIDTH.min(columns - block * WIDTH)))
 }
@@ -66,9 +68,4 @@ pub fn cuts(columns: usize) -> impl ExactSizeIterator<Item = (usize, usize)> + C
 /// Numbers in a trapezoid of some columns and rows.
 pub fn trapezoid_len(columns: usize, rows: usize) -> usize {
     cuts(columns).map(|(first, width)| width * (rows - first)).sum()
-}
-
-/// A trapezoid whose blocks all have `WIDTH` columns but for the last.
-pub fn trapezoid<T: Copy + Default>(columns: usize, rows: usize) -> Vec<BlockColumn<T>> {
-    cuts(columns).map(|(first, width)| BlockColumn::zeros(first, width, rows)).collect()
 }

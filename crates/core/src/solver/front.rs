@@ -12,6 +12,8 @@
 //! of indefinite sparse symmetric linear equations, ACM TOMS 9, 1983). Every entry is summed by one thread in an order that
 //! does not depend on how many there are.
 
+use std::ops::Range;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::matmul;
@@ -19,7 +21,8 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, Par};
 use rayon::prelude::*;
 
-use super::block_columns::{BlockColumn, WIDTH, trapezoid, trapezoid_len};
+use super::block_columns::{BlockColumn, WIDTH, cuts};
+use super::buffers::{Buffers, buffer_numbers};
 
 /// Rows that a task works on at a time: with [`WIDTH`] columns they stay in the second-level cache.
 const ROWS: usize = 512;
@@ -45,21 +48,110 @@ pub struct Eliminated {
 /// `U_bb`, lower half.
 pub struct Update(Vec<BlockColumn<f64>>);
 
+impl Eliminated {
+    /// Gives its memory to others.
+    pub fn recycle(self, buffers: &Buffers) {
+        self.blocks.into_iter().for_each(|block| buffers.give(block.into_values()));
+    }
+}
+
+/// What a child adds to a front.
+pub struct Addend {
+    update: Update,
+    /// Places of its boundary in the front, ascending.
+    places: Vec<u32>,
+    /// Where they follow each other without a gap, as ranges of their indices.
+    runs: Vec<Range<usize>>,
+}
+
+impl Addend {
+    /// The update of a child, whose boundary has the ascending `places` in the front.
+    pub fn new(update: Update, places: Vec<u32>) -> Self {
+        let mut from = 0;
+        let range = |run: &[u32]| {
+            from += run.len();
+            from - run.len()..from
+        };
+        let runs = places.chunk_by(|a, b| a + 1 == *b).map(range).collect();
+        Self { update, places, runs }
+    }
+
+    /// Its columns from a place in the front on.
+    fn from(&self, place: usize) -> Rest<'_> {
+        let column = self.places.partition_point(|&other| (other as usize) < place);
+        Rest { of: self, column, runs: &self.runs[self.runs.partition_point(|run| run.end <= column)..] }
+    }
+}
+
+/// Columns of an addend that are not added yet.
+struct Rest<'a> {
+    of: &'a Addend,
+    column: usize,
+    runs: &'a [Range<usize>],
+}
+
+impl Rest<'_> {
+    /// Adds to the column of a place, whose rows begin with that of place `first`; all places are asked for in turn.
+    fn add(&mut self, place: usize, first: usize, target: &mut [f64]) {
+        let Addend { update, places, .. } = self.of;
+        if places.get(self.column).is_none_or(|&next| next as usize != place) {
+            return;
+        }
+        let source = &update.0[self.column / WIDTH];
+        let values = &source.column(self.column - source.first)[self.column - source.first..];
+        for run in self.runs {
+            let start = run.start.max(self.column);
+            let target = &mut target[places[start] as usize - first..][..run.end - start];
+            target.iter_mut().zip(&values[start - self.column..]).for_each(|(sum, value)| *sum += value);
+        }
+        self.column += 1;
+        if self.runs.first().is_some_and(|run| run.end <= self.column) {
+            self.runs = &self.runs[1..];
+        }
+    }
+}
+
+/// Blocks of the columns of a supernode, first columns and widths, then those of its boundary.
+fn blocks(size: usize, boundary: usize) -> impl Iterator<Item = (usize, usize)> {
+    cuts(size).chain(cuts(boundary).map(move |(first, width)| (size + first, width)))
+}
+
 /// Numbers of a front, and of its update.
 pub fn front_numbers(size: usize, boundary: usize) -> (usize, usize) {
-    let update = trapezoid_len(boundary, boundary);
-    (trapezoid_len(size, size + boundary) + update, update)
+    let numbers = |from: usize| -> usize {
+        let kept = blocks(size, boundary).filter(|&(first, _)| first >= from);
+        kept.map(|(first, width)| buffer_numbers(width * (size + boundary - first))).sum()
+    };
+    (numbers(0), numbers(size))
 }
 
 impl Front {
-    /// Zeros.
-    pub fn new(size: usize, boundary: usize) -> Self {
-        let mut blocks = trapezoid(size, size + boundary);
-        blocks.extend(trapezoid(boundary, boundary).into_iter().map(|mut block: BlockColumn<f64>| {
-            block.first += size;
-            block
-        }));
-        Self { rows: size + boundary, size, blocks }
+    /// The sum of the updates of the children.
+    pub fn new(size: usize, boundary: usize, children: Vec<Addend>, buffers: &Buffers) -> Self {
+        let rows = size + boundary;
+        let block = |(first, width): (usize, usize)| {
+            BlockColumn::new(first, width, rows - first, buffers.take(width * (rows - first)))
+        };
+        let mut blocks: Vec<BlockColumn<f64>> = blocks(size, boundary).map(block).collect();
+        // Column by column, each cleared and summed while the cache has it.
+        let assemble = |block: &mut BlockColumn<f64>| {
+            let first = block.first;
+            let mut rests: Vec<Rest<'_>> = children.iter().map(|child| child.from(first)).collect();
+            for column in 0..block.width {
+                let target = block.column_mut(column);
+                target.fill(0.0);
+                rests.iter_mut().for_each(|rest| rest.add(first + column, first, target));
+            }
+        };
+        if rows < SHARED {
+            blocks.iter_mut().for_each(assemble);
+        } else {
+            blocks.par_iter_mut().with_max_len(1).for_each(assemble);
+        }
+        for child in children {
+            child.update.0.into_iter().for_each(|block| buffers.give(block.into_values()));
+        }
+        Self { rows, size, blocks }
     }
 
     /// Number of blocks with columns of the supernode.
@@ -72,28 +164,6 @@ impl Front {
         let block = &mut self.blocks[column / WIDTH];
         let first = block.first;
         block.column_mut(column - first)[row - first] += value;
-    }
-
-    /// Adds the update of a child, whose boundary has the ascending `places` here.
-    pub fn assemble(&mut self, update: &Update, places: &[u32]) {
-        let add = |block: &mut BlockColumn<f64>| {
-            let first = block.first;
-            let from = places.partition_point(|&place| (place as usize) < first);
-            let to = places.partition_point(|&place| (place as usize) < first + block.width);
-            for column in from..to {
-                let target = block.column_mut(places[column] as usize - first);
-                let source = &update.0[column / WIDTH];
-                let values = &source.column(column - source.first)[column - source.first..];
-                for (value, &place) in values.iter().zip(&places[column..]) {
-                    target[place as usize - first] += value;
-                }
-            }
-        };
-        if places.len() < SHARED {
-            self.blocks.iter_mut().for_each(add);
-        } else {
-            self.blocks.par_iter_mut().with_max_len(1).for_each(add);
-        }
     }
 
     /// Eliminates the supernode. An error is a pivot that is not positive.

@@ -1,6 +1,7 @@
 //! The sparse Cholesky factor that Green's functions and motion are computed with.
 
 pub mod block_columns;
+mod buffers;
 mod condition;
 mod factor;
 pub mod front;

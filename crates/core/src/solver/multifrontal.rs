@@ -4,7 +4,8 @@
 //! format it needs: the factor as a whole is never held. A left-looking factorisation must hold all of it in double
 //! precision, twice as much as what is kept in single precision.
 //!
-//! Memory beside what is kept: the updates of finished supernodes whose parents wait, and one front. So large fronts come
+//! Memory beside what is kept: the updates of finished supernodes whose parents wait, one front, and what waits to be used
+//! by the next ones, no more than the largest. So large fronts come
 //! one after the other, each shared by the threads; threads have subtrees of their own only where these are small.
 
 use std::sync::Mutex;
@@ -12,7 +13,8 @@ use std::sync::Mutex;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use rayon::prelude::*;
 
-use super::front::{Eliminated, Front, Update, front_numbers};
+use super::buffers::Buffers;
+use super::front::{Addend, Eliminated, Front, Update, front_numbers};
 use crate::{Error, Result};
 
 /// A subtree of less than this part of all operations is shared by the threads, one of less than a sixteenth of that is
@@ -116,7 +118,12 @@ impl Schedule {
             account.peak = account.peak.max(before.max(account.held) + running);
             unit.rest.iter().for_each(|&s| account.eliminate(s as usize));
         }
-        account.peak
+        account.peak + 8 * self.largest_front(structure)
+    }
+
+    /// Numbers of the largest front.
+    fn largest_front(&self, structure: &SymbolicSupernodalCholesky<usize>) -> usize {
+        (0..self.parents.len()).map(|s| numbers(structure, s).0).max().unwrap_or(0)
     }
 
     /// Eliminates everything; `keep` is handed the columns of each supernode, `go_on` asked now and then.
@@ -127,13 +134,14 @@ impl Schedule {
         &self,
         structure: &SymbolicSupernodalCholesky<usize>,
         columns: &dyn Columns,
-        keep: &(dyn Fn(Eliminated) -> Kept + Sync),
+        keep: &(dyn Fn(&Eliminated) -> Kept + Sync),
         go_on: &(dyn Fn() -> Result<()> + Sync),
     ) -> Result<Vec<Kept>> {
         let run = Run {
             schedule: self,
             structure,
             columns,
+            buffers: Buffers::new(self.largest_front(structure)),
             updates: (0..self.parents.len()).map(|_| Mutex::new(None)).collect(),
             kept: (0..self.parents.len()).map(|_| Mutex::new(None)).collect(),
             keep,
@@ -159,9 +167,10 @@ struct Run<'a, Kept> {
     schedule: &'a Schedule,
     structure: &'a SymbolicSupernodalCholesky<usize>,
     columns: &'a dyn Columns,
+    buffers: Buffers,
     updates: Vec<Mutex<Option<Update>>>,
     kept: Vec<Mutex<Option<Kept>>>,
-    keep: &'a (dyn Fn(Eliminated) -> Kept + Sync),
+    keep: &'a (dyn Fn(&Eliminated) -> Kept + Sync),
 }
 
 impl<Kept> Run<'_, Kept> {
@@ -172,7 +181,8 @@ impl<Kept> Run<'_, Kept> {
             if self.schedule.parents[s] != NONE {
                 put(&self.updates[s], update);
             }
-            put(&self.kept[s], (self.keep)(eliminated));
+            put(&self.kept[s], (self.keep)(&eliminated));
+            eliminated.recycle(&self.buffers);
         }
         Ok(())
     }
@@ -184,16 +194,15 @@ impl<Kept> Run<'_, Kept> {
         for (place, position) in positions.clone().chain(boundary.iter().copied()).enumerate() {
             places[position] = place as u32;
         }
-        let mut front = Front::new(positions.len(), boundary.len());
+        let addend = |&child: &u32| {
+            let pattern = self.structure.supernode(child as usize).pattern();
+            let places = pattern.iter().map(|&position| places[position]).collect();
+            take(&self.updates[child as usize]).map(|update| Addend::new(update, places))
+        };
+        let children = self.schedule.children[s].iter().filter_map(addend).collect();
+        let mut front = Front::new(positions.len(), boundary.len(), children, &self.buffers);
         for (column, position) in positions.enumerate() {
             self.columns.each(position, &mut |row, value| front.add(places[row] as usize, column, value));
-        }
-        for &child in &self.schedule.children[s] {
-            if let Some(update) = take(&self.updates[child as usize]) {
-                let pattern = self.structure.supernode(child as usize).pattern();
-                let places: Vec<u32> = pattern.iter().map(|&position| places[position]).collect();
-                front.assemble(&update, &places);
-            }
         }
         front
     }
@@ -225,8 +234,7 @@ struct Account<'a> {
 impl Account<'_> {
     fn eliminate(&mut self, s: usize) {
         let numbers = |s: usize| {
-            let size = self.structure.supernode_end()[s] - self.structure.supernode_begin()[s];
-            let (front, update) = front_numbers(size, self.structure.supernode(s).pattern().len());
+            let (front, update) = numbers(self.structure, s);
             (8 * front, 8 * update)
         };
         let (front, update) = numbers(s);
@@ -238,6 +246,12 @@ impl Account<'_> {
         self.peak = self.peak.max(self.held + front);
         self.held += update;
     }
+}
+
+/// Numbers of the front of a supernode, and of its update.
+fn numbers(structure: &SymbolicSupernodalCholesky<usize>, s: usize) -> (usize, usize) {
+    let size = structure.supernode_end()[s] - structure.supernode_begin()[s];
+    front_numbers(size, structure.supernode(s).pattern().len())
 }
 
 /// The supernode of each one's first boundary row.

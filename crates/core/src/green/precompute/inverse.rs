@@ -3,6 +3,8 @@
 //! The sweeps may be in single precision: each correction `x += S (f - K x)`, the residual in double, reduces the error by
 //! what the sweeps themselves are wrong by. Where that is not enough the operators are of no use for columns either.
 
+use rayon::prelude::*;
+
 use super::number::Number;
 use super::operators::Operator;
 use super::sweep::{Scratch, Source, Sweep, loaded};
@@ -54,7 +56,7 @@ impl<'a, C: Number> Inverse<'a, C> {
     ) -> Result<Self> {
         let supernodes = symbolic.supernodes()?;
         let columns = Permuted::new(positions, stiffness, supports);
-        let keep = |factor: Eliminated| Operator::<C>::all(factor);
+        let keep = |factor: &Eliminated| Operator::<C>::all(factor);
         let operators = schedule.run(supernodes, &columns, &keep, go_on)?.into_iter().flatten().collect();
         let everything = Wanted { supports: true, ..Wanted::NOTHING };
         let tree = Tree::new(supernodes, &vec![everything; positions.len()]);
@@ -92,9 +94,8 @@ impl<'a, C: Number> Inverse<'a, C> {
         let mut found = Refined { columns, first: Vec::new(), last: Vec::new(), size: Vec::new() };
         for _ in 0..MOST {
             let mut residual = loads.to_vec();
-            for (x, r) in found.columns.chunks_exact(rows).zip(residual.chunks_exact_mut(rows)) {
-                subtract_product(self.stiffness, self.supports, x, r);
-            }
+            let columns = found.columns.par_chunks_exact(rows).zip(residual.par_chunks_exact_mut(rows));
+            columns.for_each(|(x, r)| subtract_product(self.stiffness, self.supports, x, r));
             let mut correction = residual.clone();
             self.solve(&mut scratch, &mut correction);
             found.columns.iter_mut().zip(&correction).for_each(|(x, e)| *x += e);
@@ -138,7 +139,7 @@ impl<'a, C: Number> Inverse<'a, C> {
 
     /// Whether all of it are numbers.
     pub fn is_finite(&self) -> bool {
-        self.sweep.operators.iter().all(Operator::is_finite)
+        self.sweep.operators.par_iter().all(Operator::is_finite)
     }
 }
 

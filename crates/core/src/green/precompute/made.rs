@@ -89,10 +89,12 @@ pub fn made(
     let making =
         Making { problem, system: &system, symbolic, schedule, tree, double: double.as_ref().err(), phase, go_on };
     let candidates: Vec<Precision> = routes.iter().map(|(precision, _)| *precision).collect();
-    let Measured { sweeps, response, accuracy, precision } = match wanted {
-        Wanted::Named(precision) => making.named(precision)?,
-        Wanted::Within(bound) => making.chosen(bound, &candidates)?,
-    };
+    // By a thread of the pool: one outside would sleep and be woken for every product that the threads share.
+    let measured = rayon::scope(|_| match wanted {
+        Wanted::Named(precision) => making.named(precision),
+        Wanted::Within(bound) => making.chosen(bound, &candidates),
+    });
+    let Measured { sweeps, response, accuracy, precision } = measured?;
     let at = routes.iter().position(|(of, _)| *of == precision).unwrap_or(0);
     let route = match (double, &sweeps) {
         // Sixteen bits of a body that needs double precision.

@@ -30,9 +30,9 @@ pub fn operator_numbers(size: usize, boundary: usize) -> usize {
 
 impl<C: Number> Operator<C> {
     /// Those of a supernode, one for each block of its columns.
-    pub fn all(factor: Eliminated) -> Vec<Self> {
+    pub fn all(factor: &Eliminated) -> Vec<Self> {
         let shared = factor.rows >= SHARED;
-        factor.blocks.into_iter().map(|block| Self::new(&block, shared)).collect()
+        factor.blocks.iter().map(|block| Self::new(block, shared)).collect()
     }
 
     fn new(block: &BlockColumn<f64>, shared: bool) -> Self {

@@ -8,10 +8,19 @@ use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
 
 use super::number::Number;
 use super::operators::Operator;
 use super::tree::{NONE, Node, Tree};
+
+/// So few columns are solved one block at a time, and read large matrices once: the threads share each.
+const NARROW: usize = 32;
+/// Numbers of a matrix that is shared.
+const SHARED: usize = 1 << 18;
+/// Rows and columns of a shared matrix that a thread takes at a time.
+const ROWS: usize = 1024;
+const COLUMNS: usize = 32;
 
 /// One entry of the right-hand sides.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +114,12 @@ impl<C: Number> Sweep<C> {
         }
     }
 
+    /// Whether the threads share the matrices of a node.
+    fn is_shared(&self, k: usize, width: usize) -> bool {
+        let node = &self.tree.nodes[k];
+        width <= NARROW && node.size() * node.boundary_size() >= SHARED
+    }
+
     /// `f_b -= G f`.
     fn up(&self, k: usize, columns: &Range<usize>, scratch: &mut Scratch<C>) {
         let node = &self.tree.nodes[k];
@@ -113,8 +128,19 @@ impl<C: Number> Sweep<C> {
             return;
         }
         let loads = part(&scratch.x, node, columns, scratch.stride);
-        let product = MatMut::from_row_major_slice_mut(&mut scratch.moved[..boundary * width], boundary, width);
-        matmul(product, Accum::Replace, self.operators[k].g(), loads, C::from_f64(1.0), Par::Seq);
+        let (g, shared) = (self.operators[k].g(), self.is_shared(k, width));
+        let product = |(piece, product): (usize, &mut [C])| {
+            let rows = product.len() / width;
+            let product = MatMut::from_row_major_slice_mut(product, rows, width);
+            matmul(product, Accum::Replace, g.subrows(piece * ROWS, rows), loads, C::from_f64(1.0), Par::Seq);
+        };
+        let moved = &mut scratch.moved[..boundary * width];
+        if shared {
+            moved.par_chunks_mut(ROWS * width).enumerate().for_each(product);
+        } else {
+            let whole = MatMut::from_row_major_slice_mut(moved, boundary, width);
+            matmul(whole, Accum::Replace, g, loads, C::from_f64(1.0), Par::Seq);
+        }
         for (&row, part) in self.tree.boundary(node).iter().zip(scratch.moved.chunks_exact(width)) {
             let values = &mut scratch.x[row as usize * scratch.stride..][columns.clone()];
             values.iter_mut().zip(part).for_each(|(value, &part)| *value -= part);
@@ -140,10 +166,19 @@ impl<C: Number> Sweep<C> {
         } else {
             let gathered = &scratch.moved[..boundary.len() * readers];
             let gathered = MatRef::from_row_major_slice(gathered, boundary.len(), readers);
-            // Not from_row_major_slice_with_stride_mut: faer 0.24 exchanges its strides.
-            let own = MatMut::from_column_major_slice_with_stride_mut(x, readers, node.size(), stride).transpose_mut();
-            let follow = self.operators[k].g().transpose();
-            matmul(own, Accum::Replace, follow, gathered, C::from_f64(-1.0), Par::Seq);
+            let g = self.operators[k].g();
+            let follow = |(piece, x): (usize, &mut [C])| {
+                let rows = x.len() / stride;
+                // Not from_row_major_slice_with_stride_mut: faer 0.24 exchanges its strides.
+                let own = MatMut::from_column_major_slice_with_stride_mut(x, readers, rows, stride).transpose_mut();
+                let follow = g.subcols(piece * COLUMNS, rows).transpose();
+                matmul(own, Accum::Replace, follow, gathered, C::from_f64(-1.0), Par::Seq);
+            };
+            if self.is_shared(k, readers) {
+                x.par_chunks_mut(COLUMNS * stride).enumerate().for_each(follow);
+            } else {
+                follow((0, x));
+            }
         }
         if !columns.is_empty() {
             for (row, part) in x.chunks_exact_mut(stride).zip(scratch.local.chunks_exact(columns.len())) {

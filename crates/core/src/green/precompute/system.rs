@@ -31,6 +31,7 @@ impl System<'_> {
         let sources = self.layout.loads(self.stiffness, self.supports, tree, block);
         sweep.solve(scratch, &sources, &loaded(tree, block.width, &sources), &self.readers(tree, block));
         panel.clear();
+        panel.reserve_exact(block.len());
         let mut sums = vec![0.0; block.width];
         for rank in self.layout.panel_rows(block).into_iter().flatten() {
             let dof = self.layout.row_dofs[self.layout.row_of_rank[rank] as usize];
