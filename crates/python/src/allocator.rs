@@ -1,11 +1,11 @@
-//! The allocator of the C library, told how a precomputation uses memory: in blocks of up to gigabytes, each used whole
-//! and then given back.
+//! The allocator of the C library during a precomputation.
 #![allow(unsafe_code)] // libc
 
 use std::sync::Once;
 
 /// Smallest block that is taken from the system and given back to it by itself, bytes.
-const MAPPED: usize = 4 << 20;
+#[cfg(target_env = "gnu")]
+const MAPPED: libc::c_int = 4 << 20;
 
 /// Gives large blocks back to the system as soon as they are freed.
 ///
@@ -19,7 +19,7 @@ pub fn return_large_blocks() {
         // SAFETY: mallopt only sets a parameter of the allocator.
         #[cfg(target_env = "gnu")]
         unsafe {
-            libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED as libc::c_int);
+            libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED);
         }
     });
 }
@@ -30,56 +30,5 @@ pub fn return_free_pages() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     unsafe {
         libc::malloc_trim(0);
-    }
-}
-
-/// The system's allocator, which asks for huge pages where a block is large.
-///
-/// A block that is given back is cleared by the system page by page when its memory is next used: of 4 kB each, that is a
-/// fault for every 512 numbers of a front.
-#[cfg(target_os = "linux")]
-mod huge_pages {
-    use std::alloc::{GlobalAlloc, Layout, System};
-
-    use super::MAPPED;
-
-    struct HugePages;
-
-    #[global_allocator]
-    static ALLOCATOR: HugePages = HugePages;
-
-    /// Asks for huge pages within a block; where there are none it stays as it is.
-    fn advise(block: *mut u8, size: usize) -> *mut u8 {
-        const PAGE: usize = 2 << 20;
-        if size >= MAPPED && !block.is_null() {
-            let skipped = block.align_offset(PAGE);
-            let length = size.saturating_sub(skipped) / PAGE * PAGE;
-            // SAFETY: the range lies within the block; the advice changes no contents.
-            unsafe { libc::madvise(block.wrapping_add(skipped).cast(), length, libc::MADV_HUGEPAGE) };
-        }
-        block
-    }
-
-    // SAFETY: all that is handed out comes from the system's allocator and goes back to it, with the same layout.
-    unsafe impl GlobalAlloc for HugePages {
-        unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-            // SAFETY: the caller's promise.
-            advise(unsafe { System.alloc(layout) }, layout.size())
-        }
-
-        unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-            // SAFETY: the caller's promise.
-            advise(unsafe { System.alloc_zeroed(layout) }, layout.size())
-        }
-
-        unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-            // SAFETY: the caller's promise.
-            advise(unsafe { System.realloc(block, layout, size) }, size)
-        }
-
-        unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-            // SAFETY: the caller's promise.
-            unsafe { System.dealloc(block, layout) }
-        }
     }
 }

@@ -96,7 +96,7 @@ def test_exponent_and_evenness_see_other_laws():
     along = slide.step * np.arange(2001)
     even = np.tile([0.0, 0.0, 0.1], (2001, 1))
     rough = even * (1 + 0.05 * (np.arange(2001) // 50 % 2))[:, None]  # elements of 5 mm, every other one 5 % harder
-    assert measures.roughness(along[1], even)[0] < 1e-12
+    assert measures.roughness(along[1], even)[0] < 1e-10  # rounding of the fit
     rms, largest = measures.roughness(along[1], rough)
     assert rms > 0.005
     assert largest > 0.02

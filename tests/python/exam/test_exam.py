@@ -266,7 +266,7 @@ def press_place(page, place) -> float:
 
 def gives_nothing_away(received: list[str | bytes]) -> None:
     """Neither place, region nor contrast of a nodule is in what the page received."""
-    kinds, scenes = set(), set()
+    kinds, scenes, computed = set(), set(), set()
     for message in received:
         if isinstance(message, str):
             text = json.loads(message)
@@ -275,6 +275,8 @@ def gives_nothing_away(received: list[str | bytes]) -> None:
                 assert set(text) == {"type", "trial", "trials", "places", "result"} and len(text["places"]) == 3
             elif text["type"] == "settings":
                 assert text["youngs_modulus"] == [None]
+            elif text["type"] == "computed":
+                computed.add(message)
             continue
         header, arrays = messages.decode(message)
         kinds.add(header["type"])
@@ -285,7 +287,9 @@ def gives_nothing_away(received: list[str | bytes]) -> None:
         assert header["fields"][0]["largest"] == 0 and not header["interior"][0] and len(arrays["log"]) == 0
         assert not arrays["0/steps"].any() and not arrays["0/scalar"].any()
     assert kinds >= {"exam", "scene", "frame", "welcome"} and kinds <= {
-        *("exam", "scene", "frame", "welcome", "settings", "status", "error", "role")
+        *("exam", "scene", "frame", "welcome", "settings", "status", "error", "role", "computed")
     }
+    # What may be touched is the same in every trial.
+    assert len(computed) == 1
     # One scene for all trials, to the bit.
     assert len(scenes) == 1

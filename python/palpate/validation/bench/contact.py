@@ -28,6 +28,8 @@ from palpate.validation.verify.solution import green_of
 BLOCK, RADIUS = Block(), 0.01
 DEPTHS = (2.5e-4, 5e-4, 1e-3, 1.5e-3, 2e-3)
 CELLS = (10, 10, 5)
+# Distance from the middle, m, within which nodes may be touched: two spacings beyond the elements that are pressed.
+WITHIN = 0.05
 # Places of an element of the top around the middle of the block, in cells: a node, middles of edges, insides of faces.
 PLACES = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [1 / 3, 2 / 3], [2 / 3, 1 / 3]])
 # The elements that all take, and Palpate's operator with the contact of the others.
@@ -134,7 +136,7 @@ def _places(body: Body) -> np.ndarray:
 
 def _own_rows(body: Body, name: str) -> list[Row]:
     """By the local law, and at the mesh's own points."""
-    green = green_of(body, touch=top_nodes(body, 0.035))
+    green = green_of(body, touch=top_nodes(body, WITHIN))
     places = _places(body)
     nodal = [at_the_meshs_points(green, body.mesh, tools.sphere(RADIUS, tuple(place)), DEPTHS) for place in places]
     local, cost = _local_forces(body, green, places)
