@@ -28,9 +28,9 @@ const NOTICES_MAX = 3;
 const LYING: Posture = { tilt: 90, turn: 0 };
 const UPRIGHT: Posture = { tilt: 0, turn: 0 };
 export const TILT_MAX = 90;
-/** Why a body from a store is not cut open. */
+/** Why a body from a store, or one of very many elements, is not cut open. */
 export const NO_INSIDE =
-  "A store holds the surface of a body only: what is inside is not in the file. Open the scene or the mesh that it was made from to cut it open.";
+  "Only the surface of this body is known: a store holds no inside, and of more than 50,000 nodes none is computed. Open the scene or the mesh that a store was made from to cut it open.";
 
 /** Why a large body is not. */
 const TOO_LARGE_TO_CUT = "A body that is drawn by fewer triangles than its surface has is not cut open.";

@@ -2,7 +2,8 @@
 
 Of a body whose elements are known it is the largest principal strain in magnitude, `max |e_1|, |e_3|`, over the surface
 nodes, with the infinitesimal strain that :class:`palpate.StressRecovery` recovers there. A bare store knows no
-elements: there it is the Green strain in the plane of the surface, :class:`palpate.fields.SurfaceStrain`.
+elements, and those of a body of more than 50,000 nodes cost too much: there it is the Green strain in the plane of the
+surface, :class:`palpate.fields.SurfaceStrain`.
 
 A measure works in two steps, so that many poses of one contact cost little each: a ``sample`` that is an affine
 function of the displacements, and the ``magnitudes`` of a sample.

@@ -17,7 +17,7 @@ from palpate.body import Body
 from palpate.devices import Device
 from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError
-from palpate.fields import ElementStrain, StrainMeasure, SurfaceStress
+from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.input_file import require_writable
 from palpate.scene import BodyMotion, BuiltScene, Scene
@@ -310,10 +310,10 @@ class Simulation(Adjustable, Changing):
             A body from a store, which knows only its surface.
 
         """
-        measure = self.bodies[self._body(body)].green.strain_measure
-        if not isinstance(measure, ElementStrain):
+        green = self.bodies[self._body(body)].green
+        if green.body is None:
             raise SceneError("a body from a store knows only its surface: stress needs its elements")
-        field = measure.recovery.recover(displacements)
+        field = green.stress_recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
         return SurfaceStress(self._scales[body] * field.stress, field.strain)
 

@@ -63,11 +63,12 @@ class ShownBody:
     def header(self, youngs_modulus: float | None) -> dict[str, Any]:
         """Entry of the scene message; the modulus, Pa, is None where it cannot be changed."""
         green, body = self.built.green, self.built.body
+        outer = int(green.surface_nodes.max()) + 1
         return {
             "name": self.built.name,
             "title": titled(self.built.name),
-            "nodes": int(green.surface_nodes.max()) + 1 if body is None else len(body.mesh.nodes),
-            "tets": 0 if body is None else len(body.mesh.tets),
+            "nodes": len(body.mesh.nodes) if body is not None and green.follows_inside else outer,
+            "tets": len(body.mesh.tets) if body is not None and green.follows_inside else 0,
             "surface_nodes": len(green.surface_nodes),
             "triangles": len(green.surface_triangles),
             "drawn": None if self.drawn.is_whole else self._drawn_header(),
@@ -104,7 +105,7 @@ class ShownBody:
     def _mesh(self) -> tuple[np.ndarray, ...]:
         """Nodes, tetrahedra, their regions, surface nodes and supported nodes, of a body that is drawn as it is."""
         green, body = self.built.green, self.built.body
-        if body is None:
+        if body is None or not green.follows_inside:
             nodes = np.zeros((int(green.surface_nodes.max()) + 1, 3))
             nodes[green.surface_nodes] = green.surface_positions
             fixed = np.intersect1d(green.fixed_nodes, green.surface_nodes)

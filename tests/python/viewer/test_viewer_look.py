@@ -274,7 +274,7 @@ def test_a_store_says_why_it_is_not_cut_open(chromium, block_green, cache):
             assert button.get_attribute("aria-disabled") == "true"
             assert "surface" in button.get_attribute("title")
             page.keyboard.press("x")
-            page.get_by_text("A store holds the surface of a body only").wait_for()
+            page.get_by_text("Only the surface of this body is known").wait_for()
             assert button.get_attribute("aria-pressed") == "false" and page.locator("#cut").is_hidden()
             press(page)
             page.mouse.up()
