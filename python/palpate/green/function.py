@@ -132,7 +132,7 @@ class GreensFunction:
 
     @cached_property
     def strain_measure(self) -> StrainMeasure:
-        """Measure of the largest strain of answers: by the elements; of a bare store or a large body, by the surface."""
+        """Measure of the largest strain of answers: by elements; of a bare store or a large body, by the surface."""
         if not self.follows_inside:
             return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
         return ElementStrain(self.stress_recovery)

@@ -11,6 +11,8 @@ import pyvista
 import trimesh
 
 import palpate
+from palpate.fields import SurfaceStrain, interior
+from palpate.green import function
 from palpate.mesh import TetMesh
 from palpate.scene import BuiltScene
 from palpate.validation.verify.grids import lattice, mapped
@@ -139,6 +141,31 @@ def test_what_is_drawn_of_a_touched_body_are_displacements_of_its_nodes(sheet, m
     supported = arrays["0/fixed_nodes"]
     assert (np.abs(arrays["0/nodes"][supported][:, 0]) > 0.0999).all() and len(supported) > 5
     assert not read["0/displacements"][supported].any()
+
+
+def test_of_a_large_body_the_surface_alone_is_followed(sheet, monkeypatch):
+    """Nothing factorises its inner part until somebody asks for stress."""
+    body, small = sheet
+    monkeypatch.setattr(function, "MOST_NODES_INSIDE", len(body.mesh.nodes) - 1)
+    green = palpate.GreensFunction(small._core, body)
+    pushed = 1e-3 * np.outer(np.exp(-((green.surface_positions[:, 0] / 0.03) ** 2)), (0.0, 0.0, -1.0))
+    with monkeypatch.context() as patch:
+        patch.setattr(interior.Interior, "__init__", lambda *_: pytest.fail("the inner part was factorised"))
+        session = Session(BuiltScene.of(palpate.Scene.of_store("sheet.palpate"), body, green))
+        session.start()
+        try:
+            header, arrays = messages.decode(session.scene_message())
+            last, _ = messages.decode(session.frame_message(1, (0, 0), Wants(cutaway=True), PoseCoder())[0])
+            strain = session.simulation.strain_measure.largest(pushed)
+        finally:
+            session.close()
+    told = header["bodies"][0]
+    assert told["tets"] == len(arrays["0/tets"]) == 0 and not last["interior"][0]
+    assert {field["name"] for field in told["fields"]}.isdisjoint({"von_mises", "principal_stress"})
+    faces = np.searchsorted(green.surface_nodes, green.surface_faces)
+    assert strain == SurfaceStrain(green.surface_positions, faces).largest(pushed) > 1e-3
+    exact = palpate.StressRecovery(body).recover(pushed)
+    np.testing.assert_allclose(green.stress_recovery.recover(pushed).stress, exact.stress, rtol=1e-12)
 
 
 def _ranks(green) -> np.ndarray:
