@@ -19,7 +19,7 @@ SIDE = 0.06
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory) -> palpate.Scene:
     folder = tmp_path_factory.mktemp("growing")
-    mesh = box_mesh((10, 10, 7), (SIDE, SIDE, SIDE), jitter=0.0)
+    mesh = box_mesh((16, 16, 12), (SIDE, SIDE, SIDE), jitter=0.0)
     TetMesh(mesh.nodes, mesh.tets).write(folder / "cube.vtu")
     text = """
 body = { mesh = "cube.vtu", unit = "m", precision = "f16" }

@@ -101,8 +101,9 @@ impl<'a, C: Number> Inverse<'a, C> {
             found.columns.iter_mut().zip(&correction).for_each(|(x, e)| *x += e);
             found.size = energies(loads, &found.columns, rows);
             let energies = energies(&residual, &correction, rows);
+            // What is no number stays none, and is not believed.
             found.last =
-                energies.iter().zip(&found.size).map(|(e, size)| if *size > 0.0 { e / size } else { 0.0 }).collect();
+                energies.iter().zip(&found.size).map(|(e, size)| if *size == 0.0 { 0.0 } else { e / size }).collect();
             if found.first.is_empty() {
                 found.first.clone_from(&found.last);
             }
