@@ -125,9 +125,13 @@ pub fn front_numbers(size: usize, boundary: usize) -> (usize, usize) {
     (numbers(0), numbers(size))
 }
 
+/// Tells the entries of a column of the supernode: places of their rows, and values.
+pub type Own<'a> = &'a (dyn Fn(usize, &mut dyn FnMut(usize, f64)) + Sync);
+
 impl Front {
-    /// The sum of the updates of the children.
-    pub fn new(size: usize, boundary: usize, children: Vec<Addend>, buffers: &Buffers) -> Self {
+    /// The sum of the supernode's columns of the matrix, whose rows on and below the diagonal `own` tells by their places,
+    /// and the updates of the children.
+    pub fn new(size: usize, boundary: usize, own: Own<'_>, children: Vec<Addend>, buffers: &Buffers) -> Self {
         let rows = size + boundary;
         let block = |(first, width): (usize, usize)| {
             BlockColumn::new(first, width, rows - first, buffers.take(width * (rows - first)))
@@ -140,6 +144,9 @@ impl Front {
             for column in 0..block.width {
                 let target = block.column_mut(column);
                 target.fill(0.0);
+                if first + column < size {
+                    own(first + column, &mut |row, value| target[row - first] += value);
+                }
                 rests.iter_mut().for_each(|rest| rest.add(first + column, first, target));
             }
         };
@@ -157,13 +164,6 @@ impl Front {
     /// Number of blocks with columns of the supernode.
     fn pivots(&self) -> usize {
         self.size.div_ceil(WIDTH)
-    }
-
-    /// Adds an entry of the matrix in a column of the supernode, on or below its diagonal.
-    pub fn add(&mut self, row: usize, column: usize, value: f64) {
-        let block = &mut self.blocks[column / WIDTH];
-        let first = block.first;
-        block.column_mut(column - first)[row - first] += value;
     }
 
     /// Eliminates the supernode. An error is a pivot that is not positive.

@@ -194,17 +194,17 @@ impl<Kept> Run<'_, Kept> {
         for (place, position) in positions.clone().chain(boundary.iter().copied()).enumerate() {
             places[position] = place as u32;
         }
+        let places = &*places;
         let addend = |&child: &u32| {
             let pattern = self.structure.supernode(child as usize).pattern();
             let places = pattern.iter().map(|&position| places[position]).collect();
             take(&self.updates[child as usize]).map(|update| Addend::new(update, places))
         };
         let children = self.schedule.children[s].iter().filter_map(addend).collect();
-        let mut front = Front::new(positions.len(), boundary.len(), children, &self.buffers);
-        for (column, position) in positions.enumerate() {
-            self.columns.each(position, &mut |row, value| front.add(places[row] as usize, column, value));
-        }
-        front
+        let own = |column: usize, see: &mut dyn FnMut(usize, f64)| {
+            self.columns.each(positions.start + column, &mut |row, value| see(places[row] as usize, value));
+        };
+        Front::new(positions.len(), boundary.len(), &own, children, &self.buffers)
     }
 }
 
