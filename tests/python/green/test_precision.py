@@ -168,6 +168,25 @@ def test_hard_bodies_are_answered_within_their_stated_error(make, precision, tmp
         assert true <= stated or stated > 1
 
 
+@pytest.mark.parametrize("precision", ["f16", "f32"])
+def test_no_answer_of_a_singular_capacitance_matrix_counts_as_exact(precision, tmp_path):
+    """Nodes of a part a hundred million times stiffer move as one: in few bits their compliances are the same."""
+    body = half_stiff(1e8)
+    solver, green = DirectSolver(body), compliance(body, precision, tmp_path)
+    free = np.setdiff1d(body.mesh.surface_nodes, body.fixed_nodes)
+    stiff = free[body.mesh.nodes[free][:, 0] > 0.04]
+    rng = np.random.default_rng(0)
+    beyond = 0
+    for _ in range(100):
+        pushed = rng.choice(stiff, rng.integers(1, 6), replace=False)
+        change = {"displacements": {int(n): 1e-3 * rng.normal(size=3) for n in pushed}, "forces": {}}
+        with without_refusals():
+            stated, true = error_of_change(green, change, solver.change(change))
+        beyond += stated > 1
+        assert true <= stated or stated > 1
+    assert beyond > 50
+
+
 @pytest.mark.parametrize(
     ("make", "precision", "wrong_by"),
     [

@@ -3,7 +3,7 @@
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 
-use crate::green::accuracy::{ROUNDING_MARGIN, rounding_noise, unknown_errors};
+use crate::green::accuracy::{ROUNDING_MARGIN, largest, relative, rounding_noise, unknown_errors};
 use crate::green::{GreensFunction, Precision};
 
 /// What the columns of an answer add up to.
@@ -94,10 +94,25 @@ pub fn relative_error(
     forces: &[f64],
     least_force: f64,
 ) -> f64 {
-    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |m, x| m.max(x.abs()));
     let of = |kind: bool, values: &[f64], least: f64| {
-        let error = largest(&mut errors.iter().zip(is_force).filter(|&(_, &f)| f == kind).map(|(e, _)| *e));
-        if error > 0.0 { error / largest(&mut values.iter().copied()).max(least) } else { 0.0 }
+        let error = largest(errors.iter().zip(is_force).filter(|&(_, &f)| f == kind).map(|(e, _)| *e));
+        relative(error, largest(values.iter().copied().chain([least])))
     };
     of(true, forces, least_force).max(of(false, displacements, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::relative_error;
+
+    #[test]
+    fn an_error_that_is_no_number_is_not_passed_over() {
+        let of = |errors: [f64; 2]| relative_error(&errors, &[true, false], &[0.0, 2.0], &[4.0, 0.0], 0.0);
+        assert_eq!(of([0.4, 0.1]), 0.1);
+        assert_eq!(of([0.0, 0.0]), 0.0);
+        assert_eq!(of([f64::NAN, 0.1]), f64::INFINITY);
+        assert_eq!(of([0.4, f64::NAN]), f64::INFINITY);
+        // An answer that is none, whatever its error.
+        assert_eq!(relative_error(&[0.4, 0.1], &[true, false], &[0.0, f64::NAN], &[4.0, 0.0], 0.0), f64::INFINITY);
+    }
 }

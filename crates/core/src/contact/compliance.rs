@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, SurfaceQuery, TouchPatch, patch_weights};
 use crate::green::GreensFunction;
-use crate::green::accuracy::{Pressed, PressedError};
+use crate::green::accuracy::{Pressed, PressedError, largest, relative};
 use crate::{Error, Result};
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
@@ -68,9 +68,8 @@ pub fn touch(green: &GreensFunction, point: DVec3, displacement: [Option<f64>; 3
 fn relative_error(green: &GreensFunction, error: PressedError, largest_force: f64, displacements: &[f64]) -> f64 {
     let free = (0..displacements.len()).filter(|&row| !green.row_is_fixed[row]);
     let magnitude = free.map(|row| green.magnitude(row)).fold(0.0, f64::max);
-    let moved = displacements.iter().fold(0.0f64, |m, u| m.max(u.abs()));
-    let ratio = |error: f64, of: f64| if error > 0.0 { error / of } else { 0.0 };
-    ratio(error.force, largest_force).max(ratio(magnitude * error.elsewhere, moved))
+    let moved = largest(displacements.iter().copied());
+    relative(error.force, largest_force).max(relative(magnitude * error.elsewhere, moved))
 }
 
 /// A patch as its errors are estimated; supported dofs take no part.

@@ -81,6 +81,17 @@ pub fn unknown_errors(inverse: faer::MatRef<'_, f64>, noise: &[f64], residual: f
     (0..noise.len()).map(of).collect()
 }
 
+/// Largest magnitude; not a number if one of the values is none, where `f64::max` would pass over it.
+pub fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |most: f64, value| if most.is_nan() || value.abs() <= most { most } else { value.abs() })
+}
+
+/// An error relative to a value: zero only of an error that is zero, infinite of one that is no number.
+pub fn relative(error: f64, value: f64) -> f64 {
+    let ratio = if error == 0.0 { 0.0 } else { error / value };
+    if ratio.is_nan() { f64::INFINITY } else { ratio }
+}
+
 /// What is known of a pressed patch, by axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Pressed {

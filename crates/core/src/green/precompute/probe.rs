@@ -14,7 +14,7 @@ use super::number::Number;
 use super::problem::Problem;
 use super::sweep::{Scratch, Source, Sweep, loaded};
 use super::system::System;
-use crate::green::accuracy::{Accuracy, Pressed, ROUNDING_MARGIN, rounding_noise, unknown_errors};
+use crate::green::accuracy::{Accuracy, Pressed, ROUNDING_MARGIN, largest, rounding_noise, unknown_errors};
 use crate::green::precision::Precision;
 use crate::solver::Condition;
 
@@ -204,9 +204,8 @@ fn stamp_error(square: &Mat<f64>, accuracy: Accuracy, precision: Precision) -> f
             })
             .collect();
         let errors = unknown_errors(inverse.as_ref(), &noise, accuracy.residual(size));
-        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |m, x| m.max(x.abs()));
-        let error = largest(&mut errors.iter().zip(&magnitude).map(|(e, s)| e / s));
-        error / largest(&mut magnitude.iter().enumerate().map(|(i, s)| scaled_force[(i, 0)] / s))
+        let error = largest(errors.iter().zip(&magnitude).map(|(e, s)| e / s));
+        error / largest(magnitude.iter().enumerate().map(|(i, s)| scaled_force[(i, 0)] / s))
     };
     (0..3).map(of_axis).map(finite).fold(0.0, f64::max)
 }
