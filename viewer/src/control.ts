@@ -87,7 +87,7 @@ export class Control {
       },
       frame: null,
       answering: false,
-      ...(before?.name === scene.name ? {} : { paintTool: null, strokes: [], asked: [] }),
+      ...(before?.name === scene.name ? {} : { paintTool: null, strokes: [] }),
       postures: scene.tools.map(posture),
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,

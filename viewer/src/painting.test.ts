@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 
 import { maskOfNodes, nodesOfMask } from "./net/computed_messages";
 import type { ClientMessage, SceneMessage } from "./net/protocol";
-import { LATER, PAINTED, Painting, READY, WAITING, countStates, isGrowing, touchStates } from "./painting";
+import { LATER, NEVER, PAINTED, Painting, READY, WAITING, countStates, isGrowing, touchStates } from "./painting";
 import { Store } from "./store";
 
 const COUNT = 20_000;
@@ -19,8 +19,8 @@ function growing() {
     computed: {
       type: "computed",
       bodies: [
-        { ready, done: 12, columns: 60_000, left_s: 30, waiting: 0, stopped: null },
-        { ready: null, done: 24, columns: 24, left_s: 0, waiting: 0, stopped: null },
+        { ready, done: 12, columns: 60_000, left_s: 30, region: null, waiting: null, stopped: null },
+        { ready: null, done: 24, columns: 24, left_s: 0, region: null, waiting: null, stopped: null },
       ],
     },
   });
@@ -35,7 +35,7 @@ describe("painting", () => {
     const states = touchStates(store.get(), 0)!;
     expect([states[1], states[5], states[7], states[8]]).toEqual([READY, PAINTED, PAINTED, LATER]);
     expect(touchStates(store.get(), 1)).toBeNull();
-    expect(countStates(store.get())).toEqual([4 + 8, COUNT - 4 - 3, 0, 3]);
+    expect(countStates(store.get())).toEqual([4 + 8, 0, COUNT - 4 - 3, 0, 3]);
     painting.undo();
     expect(touchStates(store.get(), 0)![7]).toBe(LATER);
     painting.clear();
@@ -61,11 +61,17 @@ describe("painting", () => {
     expect(asked).toEqual([5, 16_383, 16_384, 19_999]);
     const state = store.get();
     expect([state.strokes.length, state.paintTool]).toEqual([0, null]);
-    expect(touchStates(state, 0)![16_384]).toBe(WAITING);
-    // What comes is ready, and the rest still waits.
-    const [body, other] = state.computed!.bodies;
-    store.update({ computed: { type: "computed", bodies: [{ ...body!, ready: maskOfNodes([5], COUNT) }, other!] } });
-    expect([5, 16_384].map((node) => touchStates(store.get(), 0)![node])).toEqual([READY, WAITING]);
+  });
+
+  it("shows what the server has been asked for, and what it never computes", () => {
+    const { store, painting } = growing();
+    const [body, other] = store.get().computed!.bodies;
+    const masks = { region: maskOfNodes([0, 5, 6, 7], COUNT), waiting: maskOfNodes([5, 6], COUNT), ready: maskOfNodes([5], COUNT) };
+    store.update({ computed: { type: "computed", bodies: [{ ...body!, ...masks }, other!] } });
+    painting.add([Uint32Array.of(0, 6, 8), new Uint32Array(0)]);
+    const states = touchStates(store.get(), 0)!;
+    expect([0, 5, 6, 7, 8].map((node) => states[node])).toEqual([PAINTED, READY, WAITING, LATER, NEVER]);
+    expect(countStates(store.get())).toEqual([1 + 8, COUNT - 4, 1, 1, 1]);
   });
 
   it("is put away where it can do nothing", () => {

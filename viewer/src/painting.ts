@@ -11,11 +11,12 @@ export const BRUSH_MIN = 4;
 export const BRUSH_MAX = 120;
 const BRUSH_STEP = 1.25;
 
-/** What a node of the surface is, in the order in which a later one hides an earlier one. */
+/** What a node of the surface is; of the nodes that a vertex stands for the largest is shown. */
 export const READY = 0;
-export const LATER = 1;
-export const WAITING = 2;
-export const PAINTED = 3;
+export const NEVER = 1;
+export const LATER = 2;
+export const WAITING = 3;
+export const PAINTED = 4;
 
 /** Whether more of a body can be touched later. A region that was chosen once and is whole is no such body. */
 function grows({ ready, done, columns }: ComputedBody): boolean {
@@ -28,23 +29,26 @@ export function isGrowing({ computed, exam }: Readonly<State>): boolean {
 }
 
 /** What each surface node of a body is; null where no more can be touched later. */
-export function touchStates({ computed, scene, strokes, asked }: Readonly<State>, body: number): Uint8Array | null {
+export function touchStates({ computed, scene, strokes }: Readonly<State>, body: number): Uint8Array | null {
   const [told, header] = [computed?.bodies[body], scene?.bodies[body]];
   if (!told?.ready || !header || !grows(told)) return null;
-  const states = new Uint8Array(header.surface_nodes).fill(LATER);
-  for (const node of asked[body] ?? []) states[node] = WAITING;
-  for (const stroke of strokes) for (const node of stroke[body] ?? []) states[node] = PAINTED;
+  const states = new Uint8Array(header.surface_nodes).fill(told.region === null ? LATER : NEVER);
+  for (const node of told.region === null ? [] : nodesOfMask(told.region)) states[node] = LATER;
+  for (const node of told.waiting === null ? [] : nodesOfMask(told.waiting)) states[node] = WAITING;
+  for (const stroke of strokes) for (const node of stroke[body] ?? []) if (states[node] === LATER) states[node] = PAINTED;
   for (const node of nodesOfMask(told.ready)) states[node] = READY;
   return states;
 }
 
+type StateCounts = [ready: number, never: number, later: number, waiting: number, painted: number];
+
 /** How many surface nodes of all bodies are in each state. */
-export function countStates(state: Readonly<State>): [ready: number, later: number, waiting: number, painted: number] {
-  const counts: [number, number, number, number] = [0, 0, 0, 0];
+export function countStates(state: Readonly<State>): StateCounts {
+  const counts: StateCounts = [0, 0, 0, 0, 0];
   state.scene?.bodies.forEach((header, body) => {
     const states = touchStates(state, body);
     if (!states) counts[READY] += header.surface_nodes;
-    else for (const one of states) counts[one as 0 | 1 | 2 | 3] += 1;
+    else for (const one of states) counts[one as 0 | 1 | 2 | 3 | 4] += 1;
   });
   return counts;
 }
@@ -97,15 +101,11 @@ export class Painting {
   /** Asks for all that is painted. */
   compute(): void {
     const state = this.store.get();
-    const { strokes, asked, scene } = state;
+    const { strokes, scene } = state;
     if (!inControl(state) || !scene || strokes.length === 0) return;
     const wanted = scene.bodies.map((_, body) => new Set(strokes.flatMap((stroke) => Array.from(stroke[body] ?? []))));
     wanted.forEach((nodes, body) => this.ask(body, nodes, scene.bodies[body]!.surface_nodes));
-    this.store.update({
-      strokes: [],
-      asked: wanted.map((nodes, body) => new Set([...(asked[body] ?? []), ...nodes])),
-      paintTool: null,
-    });
+    this.store.update({ strokes: [], paintTool: null });
   }
 
   /** A message takes so many nodes; one without any is not sent. */

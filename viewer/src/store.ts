@@ -84,9 +84,8 @@ export interface State {
   /** What the pointer paints with; null where it presses. Radius of the brush, pixels. */
   paintTool: PaintTool | null;
   brushRadius: number;
-  /** What is painted and not asked for yet, and which nodes of each body have been asked for by this page. */
+  /** What is painted and not asked for yet. */
   strokes: readonly Stroke[];
-  asked: readonly ReadonlySet<number>[];
 
   /** Whether a press holds on to the surface; whether a click strikes; the impulse of a strike, N s. */
   grab: boolean;
@@ -138,7 +137,6 @@ export function initialState(): State {
     paintTool: null,
     brushRadius: 24,
     strokes: [],
-    asked: [],
     grab: false,
     strike: false,
     impulse: 0,

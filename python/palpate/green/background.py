@@ -101,8 +101,9 @@ class BackgroundPrecompute:
 
     def _note(self, done: int, columns: int) -> None:
         with self._news:
-            # What was there already does not count for the time that is left.
-            if self._began is None and done < columns:
+            # The time left follows from columns that come one after the other: not from the factorisation before the
+            # first of them, nor from what was there already.
+            if self._began is None and done > self.done > 0:
                 self._began = (time.monotonic(), done)
             self.done, self.columns = done, columns
             self._news.notify_all()
@@ -134,10 +135,15 @@ class BackgroundPrecompute:
         return self._complete is not None
 
     @property
-    def waiting(self) -> int:
-        """How many nodes that were asked for next are not ready."""
+    def region(self) -> np.ndarray:
+        """Surface nodes that can be touched once all is computed, ascending."""
+        return self._job.region
+
+    @property
+    def waiting(self) -> np.ndarray:
+        """Nodes that were asked for next and are not ready, ascending."""
         with self._news:
-            return len(np.setdiff1d(self._painted, self._touchable))
+            return np.setdiff1d(self._painted, self._touchable)
 
     @property
     def seconds_left(self) -> float | None:
@@ -201,6 +207,8 @@ class BackgroundPrecompute:
         """Leave a processor to a force loop that begins, and compute on the others at the lowest priority."""
         if self._child is None or not hasattr(os, "sched_setaffinity"):
             return
+        with self._news:
+            self._began = None  # it is slower from now on
         ours = sorted(os.sched_getaffinity(0))
         with contextlib.suppress(OSError):
             for thread in map(int, os.listdir(f"/proc/{self._child.pid}/task")):

@@ -51,14 +51,18 @@ class Computing:
 
     def _entry(self, session: Session, body: int) -> dict[str, Any]:
         green, background = session.built.bodies[body].green, self._growing.get(body)
-        ready = np.isin(green.surface_nodes, green.touchable_nodes)
+        surface = green.surface_nodes
+        ready = np.isin(surface, green.touchable_nodes)
+        region = ready if background is None else np.isin(surface, background.region)
+        waiting = np.isin(surface, [] if background is None else background.waiting)
         columns = 3 * len(green.touchable_nodes)
         return {
             "ready": None if ready.all() else mask_text(ready),
+            "region": None if region.all() else mask_text(region),
+            "waiting": mask_text(waiting) if waiting.any() else None,
             "done": columns if background is None else background.done,
             "columns": columns if background is None else background.columns,
             "left_s": None if background is None else background.seconds_left,
-            "waiting": 0 if background is None else background.waiting,
             "stopped": None if background is None else background.error,
         }
 

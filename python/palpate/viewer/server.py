@@ -295,6 +295,7 @@ class ViewerServer:
             await self._reshape(message)
         elif message["type"] == "paint":
             await self._worker.call(self._computing.paint, self._session, message)
+            await self._tell_computed()
         elif message["type"] == "record":
             await self._tell_end(await self._worker.call(self._session.record, message))
         else:

@@ -59,7 +59,7 @@ def test_the_page_is_told_what_is_ready_and_what_it_paints_comes_next(scene):
             while entry["ready"] is not None:
                 told, _ = await client.receive("computed")
                 entry = told["bodies"][0]
-            assert entry["done"] == entry["columns"] and entry["waiting"] == 0
+            assert entry["done"] == entry["columns"] and entry["waiting"] is None
             # The loop has taken the store: the corner far from what came first can be pressed.
             await client.say(type="press", tool=0, position=[0.01, 0.01, SIDE + 0.02], grab=False)
             await client.frame_where(lambda header: header["tools"][0]["active"])

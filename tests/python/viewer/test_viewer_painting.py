@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import MARKS, PATIENCE, drawn, opened
+from browser import MARKS, PATIENCE, drawn, opened, until
 
 import palpate
 from palpate.scene import BuiltScene
@@ -22,21 +22,26 @@ pytestmark = MARKS
 
 # Middle and radius of what is ready, m.
 READY, REACH = (0.03, 0.0), 0.03
+# What has a smaller x is never computed, m.
+OUTSIDE = -0.07
 
 
 class StandingComputing(Computing):
     """Half of the columns are computed, and no more come; keeps what is painted."""
 
-    def __init__(self, ready: np.ndarray):
+    def __init__(self, ready: np.ndarray, region: np.ndarray):
         super().__init__()
-        self.ready, self.painted = ready, np.zeros(len(ready), dtype=bool)
+        self.ready, self.region, self.painted = ready, region, np.zeros(len(ready), dtype=bool)
 
-    def step(self, session: Any) -> None:
-        return None
+    def step(self, session: Any) -> dict[str, Any]:
+        return self.message(session)
 
     def message(self, session: Any) -> dict[str, Any]:
-        entry = {"ready": mask_text(self.ready), "done": 300, "columns": 600, "left_s": 130.0}
-        return {"type": "computed", "bodies": [{**entry, "waiting": 0, "stopped": None}]}
+        entry = {"ready": mask_text(self.ready), "region": mask_text(self.region), "waiting": mask_text(self.painted)}
+        return {
+            "type": "computed",
+            "bodies": [{**entry, "done": 300, "columns": 600, "left_s": 130.0, "stopped": None}],
+        }
 
     def paint(self, session: Any, message: Any) -> None:
         bits = np.unpackbits(np.frombuffer(base64.b64decode(message["nodes"]), np.uint8), bitorder="little")
@@ -56,7 +61,7 @@ class Served:
     async def _start(self, built: BuiltScene) -> str:
         self.server = ViewerServer(DomeSession(built, self.dome), port=0)
         away = np.linalg.norm(self.dome.places[:, :2] - READY, axis=1)
-        self.computing = self.server._computing = StandingComputing(away < REACH)
+        self.computing = self.server._computing = StandingComputing(away < REACH, self.dome.places[:, 0] > OUTSIDE)
         await self.server.start()
         return self.server.address
 
@@ -103,6 +108,7 @@ def test_what_is_painted_is_asked_for(chromium, served):
     with opened(chromium, served) as page:
         assert page.get_by_test_id("paint-left").inner_text() == "50 % computed, about 2 min left"
         assert count(page, "ready") == computing.ready.sum()
+        assert count(page, "never") == (~computing.region).sum() > 0
         start, end = on_dome(dome, -0.03, -0.05), on_dome(dome, 0.01, -0.05)
         page.keyboard.press("b")
         line(page, place(page, start), place(page, end))
@@ -120,7 +126,7 @@ def test_what_is_painted_is_asked_for(chromium, served):
         both = count(page, "painted")
         page.keyboard.press("Enter")
         end_time = time.monotonic() + 30
-        while computing.painted.sum() < both and time.monotonic() < end_time:
+        while count(page, "waiting") < both and time.monotonic() < end_time:
             time.sleep(0.05)
         assert computing.painted.sum() == both == count(page, "waiting") and count(page, "painted") == 0
         # What was asked for is where the pointer was: the brush's way, and inside of the lasso.
@@ -133,6 +139,10 @@ def test_what_is_painted_is_asked_for(chromium, served):
         assert not computing.painted[~lasso & ~way].any()
         middle = (np.abs(x + 0.01) < 0.02) & (np.abs(y + 0.05) < 1.01 * spacing)
         assert computing.painted[middle].all()
+        # A page that is opened anew knows it, too.
+        page.reload()
+        until(page, lambda state: state["frames"] > 3)
+        assert count(page, "waiting") == both
 
 
 def test_what_is_ready_is_not_painted_and_escape_gives_the_pointer_back(chromium, served):
@@ -143,6 +153,10 @@ def test_what_is_ready_is_not_painted_and_escape_gives_the_pointer_back(chromium
         for _ in range(4):
             page.keyboard.press("[")
         line(page, (x, y), (x + 2, y))
+        drawn(page)
+        assert count(page, "painted") == 0
+        # Nor is what is never computed.
+        line(page, *(place(page, on_dome(dome, -0.09, y)) for y in (-0.02, 0.0)))
         drawn(page)
         assert count(page, "painted") == 0
         page.keyboard.press("Escape")

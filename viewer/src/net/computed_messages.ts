@@ -9,13 +9,15 @@ export interface ComputedMessage {
 export interface ComputedBody {
   /** Surface nodes that can be touched by now, as a mask of nodes (`nodesOfMask`); null for all of them. */
   ready: string | null;
+  /** Those that can be touched once all columns are done, likewise. */
+  region: string | null;
+  /** Painted ones that wait to be computed; null for none. */
+  waiting: string | null;
   /** Columns done, and in all. */
   done: number;
   columns: number;
   /** Until all are done; null while that is not known, or nothing is computed. */
   left_s: number | null;
-  /** Painted nodes that wait to be computed. */
-  waiting: number;
   /** Why nothing is computed any more though columns are missing; else null. */
   stopped: string | null;
 }

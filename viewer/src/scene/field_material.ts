@@ -44,16 +44,16 @@ export function tissueColor(name: string): THREE.Color {
   return new THREE.Color(found ? found[1] : SILICONE);
 }
 
-/** Of what cannot be touched yet: still to come, asked for, painted. The panel's legend has the same (style.css). */
-export const MARK_COLORS = { later: 0x70757d, waiting: 0xe69f00, painted: 0x56b4e9 } as const;
+/** Of what cannot be touched: ever, yet, asked for, painted. The panel's legend has the same (paint.css). */
+export const MARK_COLORS = { never: 0x33363c, later: 0x70757d, waiting: 0xe69f00, painted: 0x56b4e9 } as const;
 
 function glsl(color: number): string {
   return `vec3(${new THREE.Color(color).toArray().map((part) => part.toFixed(4)).join()})`;
 }
 
 /**
- * Attributes: value of the field, brightness of the tissue, rank of the region, place at rest, and as 1 in one of three
- * places what cannot be touched yet, in the order of the colours above. The place is linear over a triangle, so the edge of
+ * Attributes: value of the field, brightness of the tissue, rank of the region, place at rest, and as 1 in one of four
+ * places what cannot be touched, in the order of the colours above. The place is linear over a triangle, so the edge of
  * what is drawn is that of the plane.
  */
 const VERTEX_HEAD = /* glsl */ `
@@ -61,14 +61,14 @@ attribute float scalar;
 attribute float shade;
 attribute float region;
 attribute vec3 rest;
-attribute vec3 mark;
+attribute vec4 mark;
 uniform vec4 cutPlane;
 varying float vField;
 varying float vKnown;
 varying float vShade;
 varying float vRegion;
 varying float vBeyond;
-varying vec3 vMark;
+varying vec4 vMark;
 `;
 const VERTEX_BEGIN = /* glsl */ `
 vec3 transformed = vec3(position);
@@ -86,7 +86,7 @@ uniform sampler2D regionColors;
 uniform int coloring;
 uniform bool gaps;
 uniform bool marked;
-varying vec3 vMark;
+varying vec4 vMark;
 varying float vField;
 varying float vKnown;
 varying float vShade;
@@ -105,9 +105,10 @@ else if (coloring == ${FIELD}) {
 }
 else diffuseColor.rgb = texelFetch(regionColors, ivec2(int(vRegion + 0.5), 0), 0).rgb;
 if (marked) {
-  if (vMark.z > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.painted)}, 0.85);
-  else if (vMark.y > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.waiting)}, 0.8);
-  else if (vMark.x > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.later)}, 0.85);
+  if (vMark.w > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.painted)}, 0.85);
+  else if (vMark.z > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.waiting)}, 0.8);
+  else if (vMark.y > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.later)}, 0.85);
+  else if (vMark.x > 0.5) diffuseColor.rgb = mix(diffuseColor.rgb, ${glsl(MARK_COLORS.never)}, 0.85);
 }
 `;
 

@@ -9,7 +9,7 @@ import { splitAtSeams } from "./region_seams";
 import type { Seams } from "./region_seams";
 import type { Surface } from "./surface";
 
-/** Three marks, and one byte that rounds a vertex up to four. */
+/** One byte for each colour of marks. */
 const MARK_SIZE = 4;
 
 export class SolidView {

@@ -37,7 +37,7 @@ export class Stage {
       this.show();
     });
     store.subscribe(["coloring", "layers"], () => this.color());
-    store.subscribe(["computed", "strokes", "asked", "exam"], () => this.mark());
+    store.subscribe(["computed", "strokes", "exam"], () => this.mark());
     store.subscribe(["theme"], ({ theme }) => this.setTheme(theme));
     store.subscribe(["cut"], () => this.cut());
     // Drawn with the next frame.

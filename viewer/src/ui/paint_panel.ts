@@ -1,6 +1,6 @@
 // Which part of the surface can be touched, and what is painted to be computed next.
 
-import { BRUSH_MAX, BRUSH_MIN, LATER, PAINTED, READY, WAITING, countStates, isGrowing } from "../painting";
+import { BRUSH_MAX, BRUSH_MIN, LATER, NEVER, PAINTED, READY, WAITING, countStates, isGrowing } from "../painting";
 import type { Painting } from "../painting";
 import { inControl } from "../store";
 import type { State, Store } from "../store";
@@ -8,7 +8,7 @@ import { byId, press, setText } from "./dom";
 import { duration } from "./numbers";
 import { Slider } from "./slider";
 
-const STATES = { ready: READY, waiting: WAITING, painted: PAINTED, later: LATER } as const;
+const STATES = { ready: READY, waiting: WAITING, painted: PAINTED, later: LATER, never: NEVER } as const;
 
 export class PaintPanel {
   private readonly brush: Slider;
@@ -35,7 +35,7 @@ export class PaintPanel {
       byId("brush-field").hidden = paintTool !== "brush";
     });
     store.subscribe(["brushRadius"], ({ brushRadius }) => this.brush.show(brushRadius));
-    store.subscribe(["computed", "scene", "strokes", "asked", "exam"], (state) => this.show(state));
+    store.subscribe(["computed", "scene", "strokes", "exam"], (state) => this.show(state));
     store.subscribe(["strokes", "role", "connection"], (state) => {
       const nothing = state.strokes.length === 0 || !inControl(state);
       for (const id of ["undo", "clear", "compute"]) byId<HTMLButtonElement>(`paint-${id}`).disabled = nothing;
