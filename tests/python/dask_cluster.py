@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import os
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import distributed
 
@@ -21,3 +26,25 @@ def local_cluster(workers: int) -> Iterator[distributed.LocalCluster]:
     ) as cluster:
         yield cluster
     assert os.environ.get("RAYON_NUM_THREADS") == before
+
+
+@contextlib.contextmanager
+def programs(folder: Path) -> Iterator[tuple[str, subprocess.Popen]]:
+    """Address and process of ``dask scheduler``, and one ``dask worker``, as a user starts them."""
+    file = folder / "scheduler.json"
+    dask = [sys.executable, "-m", "dask"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    where = ["--scheduler-file", str(file)]
+    scheduler = subprocess.Popen(
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", *where], **quiet
+    )
+    worker = subprocess.Popen([*dask, "worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", *where], **quiet)
+    try:
+        until = time.monotonic() + 60
+        while not file.exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"], scheduler
+    finally:
+        for process in (worker, scheduler):
+            process.kill()
+            process.wait()
