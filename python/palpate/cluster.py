@@ -6,10 +6,11 @@ import contextlib
 import logging
 import os
 import sys
+import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from palpate import _native
 from palpate.errors import ClusterError
@@ -41,8 +42,9 @@ def connected(dask: str | Client) -> Iterator[Client]:
     except ImportError:
         raise ClusterError("a cluster needs dask.distributed: pip install 'palpate[cluster]'") from None
     if isinstance(dask, distributed.Client):
-        _require_workers(dask)
-        yield dask
+        with _lost_is_told():
+            _require_workers(dask)
+            yield dask
         return
     if not isinstance(dask, str):
         raise ClusterError(f"dask takes the address of a scheduler, or a distributed.Client; got {brief_repr(dask)}")
@@ -53,11 +55,11 @@ def connected(dask: str | Client) -> Iterator[Client]:
             raise ClusterError(
                 f"no scheduler answers at {dask}: 'dask scheduler' starts one and prints its address"
             ) from None
-    try:
-        _require_workers(client)
-        yield client
-    finally:
-        with _quiet():
+        try:
+            with _lost_is_told():
+                _require_workers(client)
+                yield client
+        finally:
             client.close()
 
 
@@ -160,7 +162,25 @@ def require_scheduler(client: Client) -> None:
 
     """
     if client.status != "running":
-        raise ClusterError("the scheduler is lost; what was finished is kept, and the same command goes on from there")
+        raise _lost()
+
+
+def result_of(client: Client, future: Future) -> Any:
+    """Take the result of a task that has finished.
+
+    Raises
+    ------
+    ClusterError
+        The scheduler is lost, from which it comes: the library would wait for it for ever.
+
+    """
+    patience = PATIENCE
+    while True:
+        try:
+            return future.result(timeout=patience)
+        except TimeoutError:
+            require_scheduler(client)
+            patience *= 2  # large results take longer
 
 
 def failure(future: Future) -> Exception:
@@ -214,13 +234,38 @@ def require_version(found: str | None, address: str) -> None:
         raise ClusterError(f"the worker at {address} has {told}, not {_native.__version__}: install the same version")
 
 
+def _lost() -> ClusterError:
+    return ClusterError("the scheduler is lost; what was finished is kept, and the same command goes on from there")
+
+
+@contextlib.contextmanager
+def _lost_is_told() -> Iterator[None]:
+    """Have whatever the library raises where the scheduler is lost be told as that."""
+    from distributed import CancelledError
+    from distributed.client import ClosedClientError
+
+    try:
+        yield
+    except (CancelledError, ClosedClientError):
+        raise _lost() from None
+    except OSError as error:
+        # Not one of files, here or in what the caller does meanwhile.
+        modules = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
+        if any(name.startswith("distributed.") for name in modules):
+            raise _lost() from None
+        raise
+
+
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the library's own account of a failed connection from the terminal: the error says it in a line."""
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    # The library gives its client a level of its own.
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)

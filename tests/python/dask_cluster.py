@@ -34,17 +34,28 @@ def programs(folder: Path) -> Iterator[tuple[str, subprocess.Popen]]:
     file = folder / "scheduler.json"
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    where = ["--scheduler-file", str(file)]
-    scheduler = subprocess.Popen(
-        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", *where], **quiet
-    )
-    worker = subprocess.Popen([*dask, "worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", *where], **quiet)
+    command = [
+        *dask,
+        "scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    ]
+    started = [subprocess.Popen(command, **quiet)]
     try:
-        until = time.monotonic() + 60
-        while not file.exists() and time.monotonic() < until:
+        until, address = time.monotonic() + 60, ""
+        while not address and time.monotonic() < until:
             time.sleep(0.05)
-        yield json.loads(file.read_text())["address"], scheduler
+            with contextlib.suppress(OSError, ValueError):  # not written yet, or not all of it
+                address = json.loads(file.read_text())["address"]
+        command = [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        started.append(subprocess.Popen(command, **quiet))
+        yield address, started[0]
     finally:
-        for process in (worker, scheduler):
+        for process in started:
             process.kill()
             process.wait()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate import _native
-from palpate.cluster import failure, require_scheduler, spread, submit, threads_of_workers, wait_for_some
+from palpate.cluster import failure, require_scheduler, result_of, spread, submit, threads_of_workers, wait_for_some
 from palpate.errors import ClusterError
 from palpate.green import worker
 from palpate.green.bounds import CHOSEN
@@ -45,11 +45,12 @@ def precompute_on(
     job = worker.Job(_native.GreenCore.content_key(problem, precision), _native.__version__, precision, memory)
     held = submit(client, worker.received, problem)
     try:
-        workers = threads_of_workers(client)
-        measuring = [submit(client, worker.measure, held, job, address=address) for address in workers]
+        measuring = _measure(client, held, job)
         # Assembled and ordered here, too, while the workers factorise.
         layout = _native.ColumnLayout(problem)
-        measured, order = _first(client, measuring)
+        while (found := _first(client, measuring)) is None:
+            measuring = measuring or _measure(client, held, job)
+        measured, order = found
         # Nobody needs to measure again for a worker that dies.
         client.cancel(measuring)
         if order != layout.order:
@@ -63,13 +64,18 @@ def precompute_on(
         _release(client, job.key)
 
 
-def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], bytes]:
-    """Wait for the first task that ends; its result."""
-    while True:
-        for future in wait_for_some(client, futures):
-            if future.status != "finished":
-                raise failure(future)
-            return future.result()
+def _measure(client: Client, held: Future, job: worker.Job) -> list[Future]:
+    """Have all workers factorise that are there."""
+    return [submit(client, worker.measure, held, job, address=address) for address in threads_of_workers(client)]
+
+
+def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], bytes] | None:
+    """Wait for the first task that ends, and give its result; None if none has for a while."""
+    for future in wait_for_some(client, futures):
+        if future.status != "finished":
+            raise failure(future)
+        return result_of(client, future)
+    return None
 
 
 def _gather(
@@ -93,7 +99,7 @@ def _gather(
     ):
         if future.status != "finished":
             raise failure(future)
-        if not store.put(block, *future.result()):
+        if not store.put(block, *result_of(client, future)):
             damaged[block] += 1
             if damaged[block] == MOST_DAMAGED:
                 raise ClusterError(f"block {block} of columns was damaged on its way {MOST_DAMAGED} times")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate import _native
-from palpate.cluster import connected, failure, spread, submit
+from palpate.cluster import connected, failure, result_of, spread, submit
 from palpate.errors import SceneError
 from palpate.input_file import read_toml, require_file
 from palpate.progress import progress_reporter
@@ -135,7 +135,7 @@ class Study:
                 for ranks, future in solved:
                     if future.status != "finished":
                         raise failure(future)
-                    yield ranks, future.result()
+                    yield ranks, result_of(client, future)
 
 
 class _Finished:
