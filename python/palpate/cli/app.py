@@ -145,7 +145,8 @@ def precompute(
         made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
         body = body_of(made, material, fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
-        planned = palpate.plan(body, precision=precision, touch=region, first=first, path=out, memory=memory)
+        where = {"path": out, "memory": memory, "dask": workers}
+        planned = palpate.plan(body, precision=precision, touch=region, first=first, **where)
         print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
 
         def ready(green: palpate.GreensFunction) -> None:
@@ -154,7 +155,7 @@ def precompute(
         asked = {"precision": precision, "touch": region, "first": first}
         if workers is None:
             asked["ready"] = ready
-        green = palpate.precompute(body, **asked, path=out, memory=memory, dask=workers)
+        green = palpate.precompute(body, **asked, **where)
     print(f"{green.path}: {_green_line(green)}")
     print(_precision_line(green))
 

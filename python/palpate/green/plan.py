@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from palpate import _native
 from palpate.body import Body, SurfaceRegion
 from palpate.green.disk import DiskUse, free_bytes
 from palpate.green.job import Job
 from palpate.green.memory import memory_in_use
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 # Operations of factor and columns a second, over those of a product of matrices: of a million tetrahedra on two cores.
 FACTOR_EFFICIENCY, COLUMN_EFFICIENCY = 0.7, 0.9
@@ -90,8 +94,12 @@ def plan(
     first: SurfaceRegion | None = None,
     path: str | os.PathLike[str] | None = None,
     memory: int | str | None = None,
+    dask: str | Client | None = None,
 ) -> Plan:
     """Count what :func:`palpate.precompute` would do with the same arguments.
+
+    With ``dask`` the memory is that of a worker with as many threads as this process has, and may be more than there is
+    here; nobody is connected to.
 
     Raises
     ------
@@ -104,6 +112,8 @@ def plan(
     job = Job.of(body, precision, touch, first, path)
     used = memory_in_use()
     allowed = job.allowed(memory)
+    if dask is not None and memory is None:
+        allowed = None
     counts = _native.GreenCore.plan(job.problem, precision, allowed)
     disk = DiskUse.of(counts["columns"], counts["rows"], counts["precision"], 0 < len(job.first) < len(job.region))
     # The factor is always computed in double precision, columns of sixteen bits in single.

@@ -111,6 +111,15 @@ def test_plan_counts_and_bounds_memory(block):
         palpate.plan(body, memory="8 apples")
 
 
+def test_a_plan_for_workers_may_need_more_memory_than_there_is_here(block, monkeypatch):
+    here = palpate.plan(block, precision="f32")
+    monkeypatch.setattr("palpate.green.job.available_memory", lambda: 1_000_000)
+    with pytest.raises(palpate.BodyError, match=r"needs at least 0\.\d+ GB of memory"):
+        palpate.plan(block, precision="f32")
+    of_workers = palpate.plan(block, precision="f32", dask="tcp://10.0.0.1:8786")
+    assert (of_workers.block, of_workers.store) == (here.block, here.store)
+
+
 def test_peak_memory_is_the_planned_one(tmp_path):
     program = child_program(
         (26, 20, 20),
