@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +14,7 @@ import numpy as np
 from palpate import _native
 from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.cluster import connected
-from palpate.errors import ClusterError, PrecisionWarning, StoreWarning
+from palpate.errors import ClusterError, PrecisionWarning, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN, WARNED, error_text, remedy
 from palpate.green.function import GreensFunction
 from palpate.green.gathering import precompute_on
@@ -78,7 +80,7 @@ def precompute(
         A body that its supports leave free to move, a touch node that is not on the surface, or more memory than there
         is, or than is allowed.
     StoreError
-        Files that have no room on the disk, with what would fit.
+        Files that have no room on the disk, with what would fit, or have none any more, with what is kept.
     ClusterError
         A cluster that cannot be reached, has no workers or other versions, or fails; or one that is to compute a region
         ``first``.
@@ -100,7 +102,11 @@ def precompute(
     else:
         # Of memory the workers see to their own; the files have to have room here.
         job.allowed(None)
-        with connected(dask) as client, progress_reporter("precomputing", progress) as report:
+        with (
+            connected(dask) as client,
+            progress_reporter("precomputing", progress) as report,
+            _what_is_kept_is_told(job.target),
+        ):
             discarded = precompute_on(client, job.problem, precision, memory, job.description, job.target, report)
     if discarded:
         warnings.warn(
@@ -120,7 +126,7 @@ def _here(
     """Compute in this process; whether a partial file of something else was thrown away."""
     allowed = job.allowed(memory)
     growth = (job.first, *_watchers(job, ready, painted)) if staged or painted is not None else None
-    with progress_reporter("precomputing", progress) as report:
+    with progress_reporter("precomputing", progress) as report, _what_is_kept_is_told(job.target):
         _, discarded = _native.GreenCore.precompute_to(
             job.problem,
             job.precision,
@@ -133,6 +139,21 @@ def _here(
             report and report.phase,
         )
     return discarded
+
+
+@contextlib.contextmanager
+def _what_is_kept_is_told(target: Path) -> Iterator[None]:
+    """Say where a full disk, or another failure of it, has left finished columns."""
+    try:
+        yield
+    except OSError as error:
+        partial = Path(f"{target}.partial")
+        if not partial.exists():
+            raise
+        raise StoreError(
+            f"{error.filename or target}: {error.strerror or error}; finished columns are kept in {partial}: "
+            "once there is room, the same command goes on from there"
+        ) from error
 
 
 def _watchers(

@@ -215,6 +215,35 @@ palpate.precompute(body, path={str(path)!r}, progress=show)
     assert "a.palpate.partial" not in os.listdir(tmp_path)
 
 
+@pytest.mark.parametrize("room", [0.25, 0.8], ids=["for a part of the columns", "for all columns, not for the store"])
+def test_a_full_disk_leaves_what_is_finished(room, undisturbed, tmp_path):
+    """A limit of the size of a file is met as the end of a disk is."""
+    path = tmp_path / "a.palpate"
+    program = child_program(
+        (20, 15, 15),
+        f"""
+import resource
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, ({int(room * len(undisturbed))},) * 2)
+try:
+    palpate.precompute(body, path={str(path)!r})
+except palpate.StoreError as error:
+    print(error)
+""",
+    )
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=280)
+    assert told.returncode == 0, told.stderr
+    assert f"finished columns are kept in {path}.partial: once there is room, the same command goes on" in told.stdout
+    assert os.listdir(tmp_path) == ["a.palpate.partial"]
+    body = palpate.Body(
+        box_mesh(cells=(20, 15, 15)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9
+    )
+    seen = []
+    palpate.precompute(body, path=path, progress=lambda done, total: seen.append(done / total))
+    assert min(part for part in seen if part > 0) > (0.1 if room < 0.5 else 0.999)
+    assert path.read_bytes() == undisturbed
+
+
 def test_partial_of_another_body_is_thrown_away(block, tmp_path):
     path = tmp_path / "a.palpate"
     partial = tmp_path / "a.palpate.partial"

@@ -89,8 +89,8 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
 /// the nodes that are ready from the end of the first on.
 ///
 /// # Errors
-/// A singular stiffness, a bound that cannot be kept, the operating system's (nothing is left behind), or
-/// [`Error::Interrupted`] (the finished blocks are left behind).
+/// A singular stiffness, a bound that cannot be kept (nothing is left behind), the operating system's, or
+/// [`Error::Interrupted`] (the finished blocks are left behind, if there are any).
 pub fn precompute_to(
     problem: &Problem,
     target: &Target<'_>,
@@ -111,8 +111,8 @@ pub fn precompute_to(
     drop(columns);
     (target.phase)(Phase::Store);
     let result = solved.and_then(|()| store.finish(tasks, progress));
-    // What was finished before an interruption is worth keeping; after any other failure it is in the way.
-    if !matches!(result, Err(Error::Interrupted)) || store.done() == 0 {
+    // What was finished before an interruption, or a full disk, is worth keeping; otherwise it is in the way.
+    if !matches!(result, Err(Error::Interrupted | Error::Io { .. })) || store.done() == 0 {
         store.discard();
     }
     result
