@@ -91,7 +91,7 @@ def test_a_block_that_was_damaged_on_its_way_is_asked_for_again(times, body, tmp
             panel, checksum = job.solve(block, width)
             if block == 3 and asked.count(3) <= times:
                 panel = panel[:-1] + bytes([panel[-1] ^ 128])
-            yield block, types.SimpleNamespace(status="finished", result=lambda got=(panel, checksum): got)
+            yield block, types.SimpleNamespace(status="finished", result=lambda timeout, got=(panel, checksum): got)
 
     monkeypatch.setattr(gathering, "spread", spread)
     if times == gathering.MOST_DAMAGED:
