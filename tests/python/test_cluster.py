@@ -8,6 +8,7 @@ import sys
 import types
 from pathlib import Path
 
+import distributed
 import numpy as np
 import pytest
 from command_line import refused, run
@@ -110,6 +111,16 @@ def test_a_scheduler_that_is_killed_loses_nothing(body, undisturbed, tmp_path_fa
             palpate.precompute(body, path=path, dask=address, progress=kill)
     assert os.listdir(tmp_path) == ["a.palpate.partial"]
     assert_finished_here(body, path, undisturbed, begun[-1])
+
+
+def test_a_lost_connection_is_not_taken_for_a_full_disk(workers, body, tmp_path, monkeypatch):
+    def lose(client, *_):
+        (tmp_path / "a.palpate.partial").write_bytes(b"")
+        client.sync(distributed.comm.connect, "tcp://127.0.0.1:1", timeout=0.2)
+
+    monkeypatch.setattr(sys.modules["palpate.green.precompute"], "precompute_on", lose)
+    with pytest.raises(palpate.ClusterError, match="the scheduler is lost; what was finished is kept"):
+        palpate.precompute(body, path=tmp_path / "a.palpate", dask=workers.scheduler_address)
 
 
 def test_eight_bodies_on_two_workers_answer_what_they_answer_one_by_one(workers, tmp_path):

@@ -97,17 +97,15 @@ def precompute(
     stored = job.stored()
     if stored is not None:
         return _told(stored)
-    if dask is None:
-        discarded = _here(job, memory, progress, first is not None, ready, painted)
-    else:
-        # Of memory the workers see to their own; the files have to have room here.
-        job.allowed(None)
-        with (
-            connected(dask) as client,
-            progress_reporter("precomputing", progress) as report,
-            _what_is_kept_is_told(job.target),
-        ):
-            discarded = precompute_on(client, job.problem, precision, memory, job.description, job.target, report)
+    with _what_is_kept_is_told(job.target):
+        if dask is None:
+            discarded = _here(job, memory, progress, first is not None, ready, painted)
+        else:
+            # Of memory the workers see to their own; the files have to have room here.
+            job.allowed(None)
+            # A lost connection, an OSError of the library, is told apart in here.
+            with connected(dask) as client, progress_reporter("precomputing", progress) as report:
+                discarded = precompute_on(client, job.problem, precision, memory, job.description, job.target, report)
     if discarded:
         warnings.warn(
             f"{job.target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
@@ -126,7 +124,7 @@ def _here(
     """Compute in this process; whether a partial file of something else was thrown away."""
     allowed = job.allowed(memory)
     growth = (job.first, *_watchers(job, ready, painted)) if staged or painted is not None else None
-    with progress_reporter("precomputing", progress) as report, _what_is_kept_is_told(job.target):
+    with progress_reporter("precomputing", progress) as report:
         _, discarded = _native.GreenCore.precompute_to(
             job.problem,
             job.precision,
