@@ -32,28 +32,20 @@ def local_cluster(workers: int) -> Iterator[distributed.LocalCluster]:
 def programs(folder: Path) -> Iterator[tuple[str, subprocess.Popen]]:
     """Address and process of ``dask scheduler``, and one ``dask worker``, as a user starts them."""
     file = folder / "scheduler.json"
-    dask = [sys.executable, "-m", "dask"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    command = [
-        *dask,
-        "scheduler",
-        "--host",
-        "127.0.0.1",
-        "--port",
-        "0",
-        "--no-dashboard",
-        "--scheduler-file",
-        str(file),
-    ]
-    started = [subprocess.Popen(command, **quiet)]
+    started: list[subprocess.Popen] = []
+
+    def start(*words: str) -> None:
+        command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
+        started.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+
+    start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
     try:
         until, address = time.monotonic() + 60, ""
         while not address and time.monotonic() < until:
             time.sleep(0.05)
             with contextlib.suppress(OSError, ValueError):  # not written yet, or not all of it
                 address = json.loads(file.read_text())["address"]
-        command = [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-        started.append(subprocess.Popen(command, **quiet))
+        start("worker", address, "--nthreads", "1", "--no-nanny")
         yield address, started[0]
     finally:
         for process in started:

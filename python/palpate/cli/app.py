@@ -145,17 +145,15 @@ def precompute(
         made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
         body = body_of(made, material, fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
-        where = {"path": out, "memory": memory, "dask": workers}
-        planned = palpate.plan(body, precision=precision, touch=region, first=first, **where)
+        asked = {"precision": precision, "touch": region, "first": first}
+        asked |= {"path": out, "memory": memory, "dask": workers}
+        planned = palpate.plan(body, **asked)
         print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
 
         def ready(green: palpate.GreensFunction) -> None:
             print(f"{green.path}: {len(green.touchable_nodes)} nodes can be touched by now")
 
-        asked = {"precision": precision, "touch": region, "first": first}
-        if workers is None:
-            asked["ready"] = ready
-        green = palpate.precompute(body, **asked, **where)
+        green = palpate.precompute(body, **asked, ready=ready if workers is None else None)
     print(f"{green.path}: {_green_line(green)}")
     print(_precision_line(green))
 
