@@ -38,6 +38,12 @@ impl SurfaceQuery {
         Ok(Self { mesh })
     }
 
+    /// Calls `found` for every triangle whose box meets that between two corners.
+    pub fn for_each_within(&self, low: DVec3, high: DVec3, found: impl FnMut(u32)) {
+        let around = parry3d_f64::bounding_volume::Aabb::new(low, high);
+        self.mesh.bvh().intersect_aabb(&around).for_each(found);
+    }
+
     /// The surface point closest to `point`; `None` if `point` is not finite.
     pub fn closest(&self, surface: &Surface, point: DVec3) -> Option<SurfacePoint> {
         if !point.is_finite() {

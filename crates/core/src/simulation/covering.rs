@@ -1,7 +1,8 @@
 //! Memory in which the nodes below a contact are weighed.
 
 use super::model::Model;
-use crate::contact::smooth::Neighbourhood;
+use crate::contact::footprint::FootprintScratch;
+use crate::contact::smooth::{FanWeights, Neighbourhood};
 use crate::contact::{Patch, PatchScratch};
 
 /// Sized once, for all bodies.
@@ -12,13 +13,18 @@ pub struct Covering {
     pub candidate: Patch,
     /// Where a tool comes near.
     pub near: Neighbourhood,
+    /// Where a tool that is no sphere comes near, and the fans there.
+    pub footprint: FootprintScratch,
+    pub weights: FanWeights,
 }
 
 impl Covering {
     /// For a model.
     pub fn new(model: &Model) -> Self {
         let patches = model.bodies.iter().map(|body| PatchScratch::new(&body.green.surface)).collect();
-        Self { patches, candidate: Patch::default(), near: neighbourhood(model) }
+        let near = neighbourhood(model);
+        let (footprint, weights) = (FootprintScratch::default(), FanWeights::new(near.clone()));
+        Self { patches, candidate: Patch::default(), near, footprint, weights }
     }
 }
 

@@ -8,10 +8,10 @@
 //! A place is on the side of the surface that the tool has come from: its normal faces the tool's middle. The far side of a thin
 //! part never does.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::contacts::{Contact, Mode};
-use super::law::{ASKED, LocalContact, place_near};
+use super::law::{ASKED, LocalContact};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::solve::{DEEPEST, add_contact, dent_at};
@@ -48,10 +48,11 @@ pub fn find(model: &Model, state: &mut State, scratch: &mut Scratch, (tool, body
 /// Looks for places from the one in `slot`.
 fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows: &Hollows, slot: usize) {
     let Contact { tool, body, local, .. } = state.contacts.slots[slot];
-    let (fixed, shape, radius) = (&model.bodies[body], &model.tools[tool].shape, model.tools[tool].radius);
+    let (fixed, radius) = (&model.bodies[body], model.tools[tool].radius);
     let Some(own) = &fixed.local else { return };
     // The first place of a tool is known from the tick after it has begun.
-    let before = state.tools[tool].before.map_or(local.tool, |before| fixed.placement.point_to_body(before));
+    let before = state.tools[tool].before.map(|before| fixed.placement.point_to_body(before.position));
+    let before = before.unwrap_or(local.tool);
     let came = 2.0 * local.tool.distance(before);
     for &start in hollows.starts(local.foot.triangle) {
         let lasting = state.contacts.of(tool, body).filter(|&slot| !state.contacts.slots[slot].local.held).count();
@@ -59,16 +60,12 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
             return;
         }
         let fan = &own.smooth.fans()[start as usize];
-        let from = FootPoint {
-            triangle: fan.triangle,
-            position: fan.position,
-            normal: fan.normal,
-            turning: DMat3::ZERO,
-            shift: DMat3::ZERO,
-            ..FootPoint::default()
+        let from = FootPoint { triangle: fan.triangle, ..FootPoint::at(fan.position, fan.normal) };
+        let (drawn, near) = (fixed.drawn(), &mut scratch.covering.near);
+        let mut foot_at = |at: DVec3, from: &FootPoint| {
+            let foot = own.smooth.foot(drawn, at, from, near)?;
+            Some((foot, radius - foot.distance))
         };
-        let (met, near) = ((&own.smooth, fixed.drawn()), &mut scratch.covering.near);
-        let mut foot_at = |at: DVec3, from: &FootPoint| place_near(met, shape, (at, local.orientation), from, near);
         // As if the body were carried along there as it is below the place that is known; then as it is.
         let mut at = local.relative + local.advance;
         let Some((mut foot, mut depth)) = foot_at(at, &from) else { continue };

@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use super::body::BodyModel;
+use super::law::takes_cells;
 use super::tool::{LawKind, ToolModel};
 use super::{MAX_BODIES, MAX_TOOLS};
+use crate::contact::shape::ToolShape;
+use crate::contact::footprint::PressedSurface;
 use crate::contact::{CompliantBody, Hollows, RegularCompliance};
 use crate::{Error, Result};
 
@@ -16,7 +19,9 @@ pub struct Model {
     pub tools: Vec<ToolModel>,
     /// For each tool under the local law and each body what the tool meets beyond the half-space.
     pub(super) regular: Vec<Vec<Option<Arc<RegularCompliance>>>>,
-    /// For the same where the tool may touch at several places.
+    /// For each such tool that is no sphere the surface that it is pressed on.
+    pub(super) pressed: Vec<Vec<Option<Arc<PressedSurface>>>>,
+    /// For each that is one where it may touch at several places.
     pub(super) hollows: Vec<Vec<Hollows>>,
 }
 
@@ -64,12 +69,17 @@ impl Model {
             };
             regular.push(of_tool);
         }
-        let hollows_of = |tool: &ToolModel, body: &BodyModel| match (&body.local, tool.law) {
-            (Some(local), LawKind::Local) => Hollows::new(&local.smooth, tool.shape.bounding_radius()),
+        let hollows_of = |tool: &ToolModel, body: &BodyModel| match (&body.local, &tool.shape, tool.law) {
+            (Some(local), &ToolShape::Sphere { radius }, LawKind::Local) => Hollows::new(&local.smooth, radius),
             _ => Hollows::default(),
         };
         let hollows = tools.iter().map(|tool| bodies.iter().map(|body| hollows_of(tool, body)).collect()).collect();
-        Ok(Self { bodies, tools, regular, hollows })
+        let pressed_of = |(rank, tool): (usize, &ToolModel)| {
+            let of_body = |(regular, body)| pressed_surface(body, tool, regular);
+            regular[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
+        };
+        let pressed = tools.iter().enumerate().map(pressed_of).collect();
+        Ok(Self { bodies, tools, regular, pressed, hollows })
     }
 
     /// What such a tool meets of a body, if some tool here does.
@@ -91,6 +101,19 @@ impl Model {
 /// Whether two tools meet the same regular compliance.
 fn meets_the_same(one: &ToolModel, other: &ToolModel) -> bool {
     other.law == one.law && other.radius == one.radius && other.max_stiffness == one.max_stiffness
+}
+
+fn pressed_surface(
+    body: &BodyModel,
+    tool: &ToolModel,
+    regular: Option<&RegularCompliance>,
+) -> Option<Arc<PressedSurface>> {
+    let (local, regular) = (body.local.as_ref()?, regular?);
+    if !takes_cells(&tool.shape) {
+        return None;
+    }
+    let fine = PressedSurface::pieces(&body.loaded, &body.query, &local.smooth, tool.shape.thickness());
+    Some(Arc::new(PressedSurface { fine, fields: local.smooth.evened(&regular.fields) }))
 }
 
 fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {

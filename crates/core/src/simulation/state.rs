@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::body::BodyModel;
 use super::contacts::Contacts;
+use super::input::Pose;
 use super::law::takes_cells;
 use super::model::Model;
 use super::motion::Motion;
@@ -27,8 +28,10 @@ pub struct Entry {
 pub struct ToolState {
     /// How deep it is in each.
     pub entry: [Entry; MAX_BODIES],
-    /// Where it was a tick ago, m, in the world; none where it was not in the scene.
-    pub(super) before: Option<DVec3>,
+    /// Where it was a tick ago, in the world; none where it was not in the scene.
+    pub(super) before: Option<Pose>,
+    /// Whether it has been in the scene before and left it.
+    pub(super) has_left: bool,
     /// Energy that contacts which fade have lost in this tick, J.
     pub(super) freed: f64,
     /// Why no contact began where the tool reaches the body.

@@ -32,7 +32,8 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
     }
 
     for (tool, said) in state.tools.iter_mut().zip(&input.tools) {
-        tool.before = (said.active && said.pose.is_finite()).then_some(said.pose.position);
+        tool.has_left |= tool.before.is_some() && !said.active;
+        tool.before = (said.active && said.pose.is_finite()).then_some(said.pose);
     }
 
     // 4. The device feels minus what the bodies feel.
@@ -53,8 +54,8 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
             places.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
-        let before = state.tools[tool].before;
-        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), (tool, body), before, input);
+        let known = state.tools[tool];
+        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), (tool, body), &known, input);
         let mut lasts = false;
         for &slot in places {
             if law.update(&approach, &mut state.contacts.slots[slot]) {
@@ -67,7 +68,10 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         }
         if count > 0 {
             if lasts {
-                further::find(model, state, scratch, (tool, body));
+                // A tool that is no sphere touches all places at once.
+                if approach.pressed.is_none() {
+                    further::find(model, state, scratch, (tool, body));
+                }
                 continue;
             }
             if places.iter().any(|&slot| state.contacts.slots[slot].mode == Mode::Free) {

@@ -4,16 +4,12 @@
 //! `d` is how far the tool's tip would reach below the undeformed surface.
 
 pub mod cells;
-mod ellipse;
-mod ellipsoid;
 mod modulus;
 mod place;
 mod sphere;
 mod widening;
 
-pub use ellipse::{EllipseContact, indent_ellipse};
-pub use ellipsoid::{EllipsoidContact, EllipsoidProblem};
 pub use modulus::effective_modulus;
-pub use place::{OsculatingSurface, ToolPose};
+pub use place::{ContactPlane, ToolPose};
 pub use sphere::{SphereContact, indent_sphere};
 pub use widening::{WidenedContact, Widening};

@@ -1,17 +1,14 @@
-//! Where a tool is, and the surface it touches there.
+//! Where a tool is, and the plane on which it is pressed there.
 
 use glam::{DMat3, DQuat, DVec3};
 
-/// A body's surface around a point, of second order.
+/// The plane of a contact.
 #[derive(Clone, Copy, Debug)]
-pub struct OsculatingSurface {
-    /// The point, m.
+pub struct ContactPlane {
+    /// A point of it, m.
     pub origin: DVec3,
     /// Two tangents and the outward normal as columns, right-handed and orthonormal.
     pub axes: DMat3,
-    /// Curvatures `[k_xx, k_xy, k_yy]` along the tangents, 1/m, positive where the surface falls away from its tangent
-    /// plane: its height is `-(k_xx x^2 + 2 k_xy x y + k_yy y^2)/2`.
-    pub curvature: [f64; 3],
 }
 
 /// Where a tool is.
@@ -23,16 +20,10 @@ pub struct ToolPose {
     pub rotation: DQuat,
 }
 
-impl OsculatingSurface {
-    /// Height over the tangent plane, in the frame of the surface.
-    pub(super) fn height(&self, at: DVec3) -> f64 {
-        let [xx, xy, yy] = self.curvature;
-        -0.5 * (xx * at.x * at.x + 2.0 * xy * at.x * at.y + yy * at.y * at.y)
-    }
-
-    /// Slope of the height.
-    pub(super) fn slope(&self, at: DVec3) -> DVec3 {
-        let [xx, xy, yy] = self.curvature;
-        -DVec3::new(xx * at.x + xy * at.y, xy * at.x + yy * at.y, 0.0)
+impl ContactPlane {
+    /// Through a point, with a unit normal.
+    pub fn new(origin: DVec3, normal: DVec3) -> Self {
+        let along = normal.any_orthonormal_vector();
+        Self { origin, axes: DMat3::from_cols(along, normal.cross(along), normal) }
     }
 }

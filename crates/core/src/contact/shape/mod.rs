@@ -182,6 +182,18 @@ impl ToolShape {
         }
     }
 
+    /// Half its width where it is narrowest, m.
+    pub fn thickness(&self) -> f64 {
+        match *self {
+            Self::Sphere { radius } | Self::Capsule { radius, .. } | Self::Punch { radius, .. } => radius,
+            Self::Ellipsoid { semi_axes } => semi_axes.min_element(),
+            Self::Surface(ref surface) => {
+                let widths = DVec3::AXES.map(|axis| (surface.support(axis) - surface.support(-axis)).dot(axis));
+                0.5 * widths.into_iter().fold(f64::INFINITY, f64::min)
+            }
+        }
+    }
+
     /// The direction along which the shape is longest, a unit vector: contacts are mostly longest along it too.
     pub fn long_axis(&self) -> DVec3 {
         match *self {

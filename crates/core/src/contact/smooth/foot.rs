@@ -51,6 +51,11 @@ pub struct FootPoint {
 }
 
 impl FootPoint {
+    /// A point of the surface that does not move with the point it is the foot of.
+    pub fn at(position: DVec3, normal: DVec3) -> Self {
+        Self { position, normal, turning: DMat3::ZERO, shift: DMat3::ZERO, ..Self::default() }
+    }
+
     /// The same point for a place elsewhere, the surface being taken for its plane and the point for fixed in it.
     pub fn held(&self, p: DVec3) -> Self {
         let distance = (p - self.position).dot(self.normal);

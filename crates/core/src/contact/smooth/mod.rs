@@ -74,6 +74,45 @@ impl SmoothSurface {
         &self.fans
     }
 
+    /// Fans of a triangle's corners.
+    pub fn fans_of(&self, triangle: u32) -> [u32; 3] {
+        self.of_corners[triangle as usize]
+    }
+
+    /// Whether a fan may be touched.
+    pub fn is_touchable(&self, fan: u32) -> bool {
+        self.touchable[fan as usize]
+    }
+
+    /// Which edges of a triangle are creases.
+    pub fn creases_of(&self, triangle: u32) -> [bool; 3] {
+        self.creases[triangle as usize]
+    }
+
+    /// For each node of the surface whether a crease ends or passes there.
+    pub fn crease_nodes(&self, surface: &Surface) -> Vec<bool> {
+        let mut nodes = vec![false; surface.positions.len()];
+        for (corners, creases) in surface.triangles.iter().zip(&self.creases) {
+            for k in (0..3).filter(|&k| creases[k]) {
+                nodes[corners[k] as usize] = true;
+                nodes[corners[(k + 1) % 3] as usize] = true;
+            }
+        }
+        nodes
+    }
+
+    /// Fields known at the fans, each blended with those around it as at the fan's own place: interpolated linearly between
+    /// the corners of a triangle they are as even as blended ones.
+    pub fn evened<const N: usize>(&self, fields: &[[f64; N]]) -> Vec<[f64; N]> {
+        let mut weights = FanWeights::new(Neighbourhood::new(std::iter::once(self)));
+        let even = |(rank, fan): (usize, &Fan)| {
+            let foot = FootPoint { triangle: fan.triangle, ..FootPoint::at(fan.position, fan.normal) };
+            self.weigh(&foot, &mut weights);
+            if weights.is_outside() { fields[rank] } else { weights.blend(fields).values }
+        };
+        self.fans.iter().enumerate().map(even).collect()
+    }
+
     /// Mean spacing of the nodes around a fan, m.
     pub(super) fn spacing_around(&self, fan: &Fan) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
@@ -203,7 +242,8 @@ pub(crate) mod tests {
         Surface::new(positions, faces.into()).expect("a closed surface")
     }
 
-    fn cube() -> Surface {
+    /// A cube of side one.
+    pub(crate) fn cube() -> Surface {
         let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
         let faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2]];
         let faces = [&faces[..], &[[2, 4, 6], [1, 3, 5], [3, 7, 5]]].concat();

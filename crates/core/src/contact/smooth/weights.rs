@@ -64,6 +64,40 @@ impl FanWeights {
         }
     }
 
+    /// Begins a set of weights that is summed up by [`FanWeights::add`].
+    pub fn begin(&mut self) {
+        (self.count, self.touchable) = (0, 0.0);
+    }
+
+    /// Adds weight, and its gradient, to a fan: where it stands among the weights, or none where there is no room left.
+    pub fn add(&mut self, fan: u32, weight: f64, gradient: DVec3) -> Option<usize> {
+        let place = match self.fans[..self.count].iter().position(|&known| known == fan) {
+            Some(place) => place,
+            None if self.count == MAX_FANS => return None,
+            None => {
+                let place = self.count;
+                (self.fans[place], self.weights[place], self.gradients[place]) = (fan, 0.0, DVec3::ZERO);
+                self.count += 1;
+                place
+            }
+        };
+        self.weights[place] += weight;
+        self.gradients[place] += gradient;
+        Some(place)
+    }
+
+    /// Scales the weights to a sum of one; returns what they were divided by.
+    pub fn normalise(&mut self) -> f64 {
+        let sum: f64 = self.weights[..self.count].iter().sum();
+        let slope: DVec3 = self.gradients[..self.count].iter().sum();
+        let inverse = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        for (weight, gradient) in self.weights[..self.count].iter_mut().zip(&mut self.gradients) {
+            *weight *= inverse;
+            *gradient = (*gradient - slope * *weight) * inverse;
+        }
+        sum
+    }
+
     /// Rank of each fan and its weight.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.fans[..self.count].iter().zip(&self.weights).map(|(&fan, &weight)| (fan as usize, weight))

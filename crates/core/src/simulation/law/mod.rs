@@ -10,8 +10,7 @@ mod stick;
 
 pub(super) use local::ASKED;
 pub use local::{
-    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, place_near,
-    takes_cells,
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
 };
 pub use stick::series_compliance;
 
@@ -23,8 +22,10 @@ use super::covering::Covering;
 use super::input::Input;
 use super::model::Model;
 use super::motion::Motion;
-use super::state::Entry;
+use super::rotation::rotation_vector;
+use super::state::{Entry, ToolState};
 use super::tool::{LawKind, ToolModel};
+use crate::contact::footprint::PressedSurface;
 use crate::contact::shape::ToolShape;
 use crate::contact::{Refusal, SurfacePoint};
 
@@ -86,8 +87,13 @@ pub struct Approach<'a> {
     pub grab: bool,
     /// Contact radius of a contact that begins now, m.
     pub contact_radius: f64,
-    /// How far the tool has gone since the last tick, m, where it was in the scene then.
+    /// How far the tool has gone since the last tick, m, where it was in the scene then, and turned, rad.
     pub gone: DVec3,
+    pub turned: f64,
+    /// Whether the tool has just come back into the scene.
+    pub returned: bool,
+    /// The body's surface for a tool that is no sphere, under the local law.
+    pub pressed: Option<&'a PressedSurface>,
 }
 
 impl<'a> Approach<'a> {
@@ -96,15 +102,19 @@ impl<'a> Approach<'a> {
         model: &'a Model,
         motion: Option<&'a Motion>,
         (tool, body): (usize, usize),
-        before: Option<DVec3>,
+        known: &ToolState,
         input: &Input,
     ) -> Self {
         let said = &input.tools[tool];
         let position = model.bodies[body].placement.point_to_body(said.pose.position);
         let contact_radius = input.controls.contact_radius[tool];
         let orientation = DQuat::from_mat3(&model.bodies[body].placement.rotation.transpose()) * said.pose.orientation;
-        let gone = position - before.map_or(position, |before| model.bodies[body].placement.point_to_body(before));
-        Self { grab: said.grab, orientation, contact_radius, gone, ..Self::at(model, motion, tool, body, position) }
+        let before = known.before.unwrap_or(said.pose);
+        let gone = position - model.bodies[body].placement.point_to_body(before.position);
+        let turned = rotation_vector(before.orientation, said.pose.orientation).length();
+        let returned = known.before.is_none() && known.has_left;
+        let at = Self::at(model, motion, tool, body, position);
+        Self { grab: said.grab, orientation, contact_radius, gone, turned, returned, ..at }
     }
 
     /// Of a tool at a place of the body's frame.
@@ -120,6 +130,17 @@ impl<'a> Approach<'a> {
             grab: false,
             contact_radius: 0.0,
             gone: DVec3::ZERO,
+            turned: 0.0,
+            returned: false,
+            pressed: model.pressed[tool][body].as_deref(),
+        }
+    }
+
+    /// How far any point of the tool has gone at most, m.
+    pub fn way(&self) -> f64 {
+        match self.tool.shape {
+            ToolShape::Sphere { .. } => self.gone.length(),
+            ref shape => self.gone.length() + 2.0 * shape.bounding_radius() * self.turned,
         }
     }
 

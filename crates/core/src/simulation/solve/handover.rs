@@ -14,7 +14,7 @@ use crate::contact::shape::ToolShape;
 use crate::contact::smooth::FootPoint;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
-use crate::simulation::law::{LocalResponse, depth_below};
+use crate::simulation::law::{LocalResponse, depth_below, takes_cells};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::tool::ToolModel;
@@ -27,11 +27,9 @@ pub const DEEPEST: f64 = 0.4;
 const FADING: f64 = 100.0;
 /// Least part of the half-space that a contact has.
 const LEAST_PART: f64 = 1e-6;
-/// A foot that goes farther in a tick than this many times as far as its tool, and this beyond, over its radius, has jumped. The
-/// foot of a tool that is no sphere goes along it as it turns.
+/// A foot that goes farther in a tick than this many times as far as its tool, and this beyond, over its radius, has jumped.
 const STRETCH: f64 = 4.0;
 const JUMP: f64 = 0.02;
-const JUMP_OF_SHAPES: f64 = 0.25;
 /// The next place is no farther than this, over the tool's radius, and its normal is turned by no more than this cosine.
 const NEXT: f64 = 0.25;
 const SAME_SIDE: f64 = 0.3;
@@ -52,15 +50,11 @@ pub struct Found<'a> {
 /// Whether a foot has come elsewhere than where the tool has gone.
 pub fn has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, place: DVec3) -> bool {
     let (own, tool) = (&contact.local, &model.tools[contact.tool]);
-    if own.held || own.found {
+    if own.held || own.found || takes_cells(&tool.shape) {
         return false;
     }
-    let beyond = match tool.shape {
-        ToolShape::Sphere { .. } => JUMP,
-        _ => JUMP_OF_SHAPES,
-    };
     let gone = place.distance(own.relative);
-    response.foot.position.distance(own.foot.position) > STRETCH * gone + beyond * tool.radius
+    response.foot.position.distance(own.foot.position) > STRETCH * gone + JUMP * tool.radius
         || response.foot.normal.dot(own.foot.normal) < SAME_SIDE
 }
 

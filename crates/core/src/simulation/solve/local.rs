@@ -11,8 +11,6 @@ use glam::{DMat3, DVec3};
 
 use crate::contact::local::cells::Resolution;
 use crate::contact::regular::WIDTH;
-use crate::contact::shape::ToolShape;
-use crate::contact::smooth::FootPoint;
 use crate::contact::{Refusal, patch_weights};
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
@@ -40,8 +38,10 @@ const USUAL_STEPS: usize = 10;
 const LONGEST: f64 = 0.5;
 /// Where the last step is longer than this, over the tool's radius, nothing has been found.
 const LOST: f64 = 2e-3;
-/// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's.
-pub const MOST_CELL_STEPS: usize = 3;
+/// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's; two or three are usual.
+pub const MOST_CELL_STEPS: usize = 6;
+/// A step of such a tool that leaves more of the equation than there was is taken back to this part of it.
+const TAKEN_BACK: f64 = 0.3;
 /// A step of this length, over the tool's radius, is none.
 const SETTLED: f64 = 1e-7;
 /// A force that differs by less than this part from what was expected is found.
@@ -49,9 +49,6 @@ const SAME: f64 = 1e-7;
 /// Both, over those above, where a tool takes pressure cells. They are found to 1e-6 of the depth, and the step that is left, of
 /// 1e-5 of the radius, bounds the error of the force; what it differs from the expected only tells that steps still go to and fro.
 const CELLS_LOOSER: [f64; 2] = [1e2, 1e4];
-/// A tool is taken no deeper into the surface at rest than this, over its radius: farther inside, the closest point is no
-/// longer one. A half-space under a sphere is strained far beyond what is linear there.
-const MOST_DEPTH: f64 = 1.6;
 /// Steps in which the compliance between contacts follows them.
 const FOLLOWED: usize = 3;
 
@@ -150,7 +147,6 @@ fn settle(
     local.turn_to(body);
     local.others[..slots.len()].fill(Others::default());
     follow_motion(model, state, covering, local, slots, body);
-    let mut deepest = [f64::NEG_INFINITY; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
         let contact = &state.contacts.slots[slot];
         // Whatever moves goes on as it did.
@@ -158,20 +154,30 @@ fn settle(
         local.from[a] = contact.local.tool - free_displacement(model, state, body, slot);
         local.responses[a].force = contact.local.force;
         local.responses[a].foot = contact.local.foot;
-        if let ToolShape::Sphere { radius } = model.tools[contact.tool].shape {
-            deepest[a] = (1.0 - MOST_DEPTH) * radius - contact.local.entry;
-        }
     }
     let cells = slots.iter().any(|&slot| takes_pressures(model, state, slot));
     let (most, [looser, looser_force]) = if cells { (MOST_CELL_STEPS, CELLS_LOOSER) } else { (MOST_STEPS, [1.0; 2]) };
+    let tool = &model.tools[state.contacts.slots[slots[0]].tool];
+    let radius = if cells { tool.shape.thickness() } else { tool.radius };
+    let mut least = f64::INFINITY;
+    local.stepped = false;
     for step in 0..most {
         local.taken = step + 1;
         if !meet(model, state, local, slots, body, controls, step) {
             return Outcome::LetGo;
         }
-        let radius = model.tools[state.contacts.slots[slots[0]].tool].radius;
-        let longest = advance(local, system, &deepest, slots.len());
-        if step >= USUAL_STEPS || (!cells && longest > LONGEST * radius) {
+        if cells {
+            let miss = local.miss(slots.len());
+            if miss.is_nan() || miss > least {
+                // The last step, or where it led from.
+                local.take_back(slots.len(), if step + 1 < most { TAKEN_BACK } else { 0.0 });
+                continue;
+            }
+            least = miss;
+            local.keep(slots.len());
+        }
+        let longest = advance(local, system, slots.len());
+        if step >= USUAL_STEPS || longest > LONGEST * radius {
             let share = (LONGEST * radius / longest).min(if step < USUAL_STEPS { 1.0 } else { 0.5 });
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
         }
@@ -259,10 +265,10 @@ fn meet(
     for (a, &slot) in slots.iter().enumerate() {
         let tool = state.contacts.slots[slot].tool;
         let answer = local_body(model, state, tool, body).and_then(|met| {
-            let LocalScratch { places, responses, others, weights, cells, unused, .. } = &mut *local;
+            let LocalScratch { places, responses, others, weights, cells, footprint, unused, .. } = &mut *local;
             let contact = &state.contacts.slots[slot].local;
             let pressures = state.pressures.get_mut(slot).unwrap_or(unused);
-            let cells = Cells { state: pressures, scratch: cells, resolution };
+            let cells = Cells { state: pressures, scratch: cells, footprint, resolution };
             let tool = local_tool(model, controls, tool);
             let guess = Guess { place: places[a], force: responses[a].force, foot: &responses[a].foot };
             evaluate(met, tool, contact, guess, others[a], &mut weights[a], cells)
@@ -296,7 +302,7 @@ fn meet(
 }
 
 /// One step of Newton's method; the longest of all.
-fn advance(local: &mut LocalScratch, system: &mut System, deepest: &[f64; MAX_CONTACTS], count: usize) -> f64 {
+fn advance(local: &mut LocalScratch, system: &mut System, count: usize) -> f64 {
     for a in 0..count {
         let mut residual = local.places[a] - local.from[a];
         for b in 0..count {
@@ -319,18 +325,10 @@ fn advance(local: &mut LocalScratch, system: &mut System, deepest: &[f64; MAX_CO
     for a in 0..count {
         let step = DVec3::from_slice(&system.right[3 * a..3 * a + 3]);
         let step = if step.is_finite() { step } else { DVec3::ZERO };
-        let step = held_out(step, &local.responses[a].foot, deepest[a]);
         local.steps[a] = step;
         longest = longest.max(step.length());
     }
     longest
-}
-
-/// A step that takes a tool no deeper than it is to go: shortened along the normal. Beyond, the force stays what it is there,
-/// however far the device goes on where the body gives no farther, as at a support.
-fn held_out(step: DVec3, foot: &FootPoint, deepest: f64) -> DVec3 {
-    let beyond = deepest - (foot.distance + step.dot(foot.normal));
-    if beyond > 0.0 { step + foot.normal * beyond } else { step }
 }
 
 /// Writes the answers down.
@@ -360,7 +358,7 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
         own.advance = local.places[a] - own.relative;
         own.relative = local.places[a];
         own.turned = own.orientation;
-        own.foot = response.foot;
+        (own.foot, own.sunk) = (response.foot, response.sunk);
         own.friction = response.springs();
         let indentation = &response.indentation;
         (own.torque, own.radius, own.slipping) = (response.torque, indentation.radius, response.friction.slipping);

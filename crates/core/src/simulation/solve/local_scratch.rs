@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
 use crate::simulation::MAX_CONTACTS;
@@ -9,6 +10,7 @@ use crate::simulation::covering::neighbourhood;
 use crate::simulation::law::{LocalBody, LocalResponse, Others};
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
+use crate::tensor::outer;
 
 /// Memory of the method.
 pub struct LocalScratch {
@@ -25,11 +27,16 @@ pub struct LocalScratch {
     pub(super) from: [DVec3; MAX_CONTACTS],
     pub(super) places: [DVec3; MAX_CONTACTS],
     pub(super) steps: [DVec3; MAX_CONTACTS],
+    /// The best places and answers so far, of tools that take cells.
+    best: Vec<(DVec3, LocalResponse)>,
+    /// Whether one is known.
+    pub(super) stepped: bool,
     /// Largest difference of a force from what was expected, over that force.
     pub(super) changed: f64,
     /// Steps that the last body took.
     pub(in crate::simulation) taken: usize,
     pub(super) cells: Box<CellScratch>,
+    pub(super) footprint: FootprintScratch,
     /// For contacts without cells.
     pub(super) unused: PressureState,
 }
@@ -59,6 +66,44 @@ impl LocalScratch {
         }
     }
 
+    /// What is left of the equation for the places, m.
+    pub(super) fn miss(&self, count: usize) -> f64 {
+        let of = |a: usize| {
+            let moved: DVec3 = (0..count).map(|b| self.between[a][b] * self.responses[b].force).sum();
+            (self.places[a] - self.from[a] + moved).length()
+        };
+        (0..count).map(of).fold(0.0, |most: f64, miss| if miss.is_nan() { miss } else { most.max(miss) })
+    }
+
+    /// Remembers places and answers. What the force has changed by since the ones before replaces what it was expected to.
+    pub(super) fn keep(&mut self, count: usize) {
+        for a in 0..count {
+            let (place, before) = self.best[a];
+            let (response, way) = (&mut self.responses[a], self.places[a] - place);
+            let squared = way.length_squared();
+            if self.stepped && squared > 0.0 {
+                let missed = response.force - before.force - response.jacobian * way;
+                response.jacobian += outer(missed, way) * (1.0 / squared);
+            }
+            self.best[a] = (self.places[a], self.responses[a]);
+        }
+        self.stepped = true;
+    }
+
+    /// Goes back to the places that are remembered, but for a part of the way from there.
+    pub(super) fn take_back(&mut self, count: usize, part: f64) {
+        for a in 0..count {
+            let (place, before) = self.best[a];
+            let way = self.places[a] - place;
+            self.places[a] = if part > 0.0 && way.is_finite() { place + way * part } else { place };
+            self.responses[a] = before;
+            self.responses[a].force += before.jacobian * (self.places[a] - place);
+            if part == 0.0 {
+                self.responses[a] = before;
+            }
+        }
+    }
+
     /// For a model.
     pub fn new(model: &Model) -> Self {
         Self {
@@ -71,9 +116,12 @@ impl LocalScratch {
             from: [DVec3::ZERO; MAX_CONTACTS],
             places: [DVec3::ZERO; MAX_CONTACTS],
             steps: [DVec3::ZERO; MAX_CONTACTS],
+            best: vec![(DVec3::ZERO, LocalResponse::default()); MAX_CONTACTS],
+            stepped: false,
             changed: 0.0,
             taken: 0,
             cells: Box::default(),
+            footprint: FootprintScratch::default(),
             unused: PressureState::default(),
         }
     }
@@ -88,6 +136,7 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
         drawn: fixed.drawn(),
         smooth: &local.smooth,
         fields: &regular.fields,
+        pressed: model.pressed[tool][body].as_deref(),
         scale: state.bodies[body].stiffness_scale,
     })
 }

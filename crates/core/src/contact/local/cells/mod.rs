@@ -1,9 +1,10 @@
-//! Any tool on a half-space, without friction: pressures on a grid of cells.
+//! Any tool on a body, without friction: pressures on a grid of cells over the plane of the contact.
 //!
 //! The stored energy is `U = max over f >= 0 of - f.gap - f.G f/2`, where `gap` is how far the tool lies above the body at
-//! the middle of each cell (negative where it overlaps) and `G` the influence of the cells' forces on each other. The
-//! wrench is the gradient of this energy by the tool's pose, to the precision of the solution: at the maximum the forces
-//! may be held constant, and the gap, the cells' places and their influence are differentiated.
+//! the middle of each cell (negative where it overlaps) and `G` the influence of the cells' forces on each other, that of a
+//! half-space. Wrenches are the gradients of this energy by the pose of the tool and by that of the body, to the precision of the
+//! solution: at the maximum the forces may be held constant, and the gap, the cells' places and their influence are
+//! differentiated.
 //!
 //! The gap is measured along the normal, as in Sneddon's and Hertz's solutions. Of a sphere 16 x 16 cells give force and
 //! energy to 0.3 %, 8 x 8 to 1 %, 4 x 4 to 3 %.
@@ -11,17 +12,19 @@
 mod grid;
 mod influence;
 mod pressure;
+mod relief;
 mod wrench;
 
 use glam::{DMat3, DVec3};
 
 use super::super::shape::ToolShape;
-use super::place::{OsculatingSurface, ToolPose};
+use super::place::{ContactPlane, ToolPose};
 use grid::{PosedTool, Rectangle};
 pub use influence::MAX_CELLS;
 use influence::{Grid, Influence};
 use pressure::PressureScratch;
 pub use pressure::{Convergence, MAX_PRODUCTS, TOLERANCE};
+pub use relief::{GridFrame, Heights, LEAST_COSINE, Relief};
 
 /// How many cells a side of the grid has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,8 +56,8 @@ pub struct CellProblem<'a> {
     pub shape: &'a ToolShape,
     /// Where it is.
     pub pose: ToolPose,
-    /// What it touches.
-    pub surface: OsculatingSurface,
+    /// The plane of the contact: no lower than what the tool touches.
+    pub plane: ContactPlane,
     /// `E*`, Pa.
     pub effective_modulus: f64,
     /// How finely.
@@ -83,6 +86,7 @@ impl Default for PressureState {
 pub struct CellScratch {
     influence: Influence,
     solver: PressureScratch,
+    heights: Heights,
     gap: Grid,
     /// Slopes of the tool's height along both axes of the grid.
     slopes: [Grid; 2],
@@ -92,7 +96,14 @@ pub struct CellScratch {
 impl Default for CellScratch {
     fn default() -> Self {
         let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-        Self { influence: Influence::new(), solver: PressureScratch::new(), gap: zero, slopes: [zero; 2], image: zero }
+        Self {
+            influence: Influence::new(),
+            solver: PressureScratch::new(),
+            heights: Heights::new(),
+            gap: zero,
+            slopes: [zero; 2],
+            image: zero,
+        }
     }
 }
 
@@ -114,29 +125,30 @@ pub struct CellContact {
     pub energy: f64,
     /// Area of the cells under pressure, m^2.
     pub area: f64,
-    /// How far the tool's support reaches below the tangent plane, m.
+    /// How far the tool's support reaches below the plane, m.
     pub depth: f64,
-    /// Derivative of the energy with respect to each curvature of the surface, J m. With it and the wrench, the energy's change
-    /// with the whole frame is known: a motion of tool and frame together changes nothing.
-    pub energy_by_curvature: [f64; 3],
+    /// Gradient of the energy by the body's place, N.
+    pub body_force: DVec3,
+    /// Gradient of the energy by a rotation of the body about the plane's origin, N m.
+    pub body_torque: DVec3,
     /// How the solution ended.
     pub convergence: Convergence,
 }
 
 impl CellProblem<'_> {
-    /// Presses the tool into the surface. Nothing touches unless the tool reaches below the tangent plane.
+    /// Presses the tool into a surface. Nothing touches unless the tool reaches below the plane.
     ///
     /// `state` is where the solution starts and what it leaves for the next one; it changes the answer by no more than
     /// [`TOLERANCE`] lets it.
-    pub fn solve(&self, state: &mut PressureState, scratch: &mut CellScratch) -> CellContact {
+    pub fn solve(&self, relief: &impl Relief, state: &mut PressureState, scratch: &mut CellScratch) -> CellContact {
         if state.resolution != self.resolution {
             *state = PressureState { resolution: self.resolution, ..Default::default() };
         }
-        let to_surface = self.surface.axes.transpose();
+        let to_plane = self.plane.axes.transpose();
         let tool = PosedTool {
             shape: self.shape,
-            rotation: to_surface * DMat3::from_quat(self.pose.rotation),
-            tip: to_surface * (self.pose.position - self.surface.origin),
+            rotation: to_plane * DMat3::from_quat(self.pose.rotation),
+            tip: to_plane * (self.pose.position - self.plane.origin),
         };
         let depth = -tool.support(DVec3::NEG_Z).z;
         if !(depth > 0.0 && depth.is_finite()) {
@@ -146,10 +158,15 @@ impl CellProblem<'_> {
         if !(cells.sides[0] > 0.0 && cells.sides[1] > 0.0) {
             return CellContact::default();
         }
+        scratch.heights.clear();
+        relief.fill(&cells.frame(&self.plane, depth), &mut scratch.heights);
+        let overlap = scratch.measure_gaps(&tool, &cells, depth);
+        if overlap == 0.0 {
+            return CellContact::default();
+        }
         scratch.influence.set_aspect(cells.count, cells.sides[1] / cells.sides[0]);
-        scratch.measure_gaps(&tool, &cells, &self.surface, depth);
-        let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.gap, depth, &mut state.q);
-        let contact = scratch.integrate(&tool, &cells, &self.surface, &state.q);
+        let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.gap, overlap, &mut state.q);
+        let contact = scratch.integrate(&tool, &cells, &self.plane, &state.q);
         let punch = scratch.solver.punch(&scratch.influence, cells.count, &state.q, &mut state.punch);
         CellContact { stiffness: cells.force_scale * punch, depth, convergence, ..contact }
     }
@@ -171,6 +188,20 @@ impl Cells {
         let sides = rectangle.sides.map(|[lower, upper]| (upper.coordinate - lower.coordinate) / count as f64);
         let force_scale = std::f64::consts::PI * effective_modulus * (sides[0] * sides[1]).sqrt();
         Self { rectangle, count, sides, force_scale }
+    }
+
+    /// The grid in the axes of the world.
+    fn frame(&self, plane: &ContactPlane, depth: f64) -> GridFrame {
+        let [along, across] = self.rectangle.axes;
+        let [[left, _], [below, _]] = &self.rectangle.sides;
+        GridFrame {
+            origin: plane.origin,
+            axes: DMat3::from_cols(plane.axes * along, plane.axes * across, plane.axes.z_axis),
+            corner: [left.coordinate, below.coordinate],
+            sides: self.sides,
+            count: self.count,
+            lowest: -depth,
+        }
     }
 
     /// Middle of a cell, m.

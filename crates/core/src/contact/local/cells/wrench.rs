@@ -6,7 +6,7 @@ use super::grid::PosedTool;
 use super::influence::Grid;
 use super::pressure::dot;
 use super::{CellContact, CellScratch, Cells};
-use crate::contact::local::OsculatingSurface;
+use crate::contact::local::ContactPlane;
 
 /// Normals flatter than this do not press: the wall of a tool is no contact along the normal.
 const LEAST_NORMAL: f64 = 1e-3;
@@ -23,28 +23,35 @@ struct ByPlace {
 }
 
 impl CellScratch {
-    /// How far the tool lies above the surface in the middle of each cell, where it overlaps; zero elsewhere.
-    pub(super) fn measure_gaps(&mut self, tool: &PosedTool, cells: &Cells, surface: &OsculatingSurface, depth: f64) {
+    /// How far the tool lies above the surface in the middle of each cell, where it overlaps, and zero elsewhere; returns the
+    /// largest overlap, m.
+    pub(super) fn measure_gaps(&mut self, tool: &PosedTool, cells: &Cells, depth: f64) -> f64 {
         let to_tool = tool.rotation.transpose();
         let upwards = to_tool * DVec3::Z;
         let axes = cells.rectangle.axes;
+        let mut overlap = 0.0f64;
         for j in 0..cells.count {
             for i in 0..cells.count {
                 let at = cells.middle(i, j);
                 self.gap[j][i] = 0.0;
                 // From the plane through the tool's lowest point.
                 let origin = to_tool * (at.with_z(-depth) - tool.tip);
-                let height = depth + surface.height(at);
+                let height = depth + self.heights.height[j][i];
+                if height <= 0.0 {
+                    continue;
+                }
                 let Some(entry) = tool.shape.line_entry(origin, upwards, height) else { continue };
                 let normal = tool.rotation * entry.normal;
                 let gap = entry.distance - height;
                 if gap < 0.0 && normal.z < -LEAST_NORMAL {
                     self.gap[j][i] = gap;
+                    overlap = overlap.max(-gap);
                     self.slopes[0][j][i] = -normal.dot(axes[0]) / normal.z;
                     self.slopes[1][j][i] = -normal.dot(axes[1]) / normal.z;
                 }
             }
         }
+        overlap
     }
 
     /// Energy, wrench and what else follows from the solution, whose residual must still be at hand.
@@ -52,7 +59,7 @@ impl CellScratch {
         &mut self,
         tool: &PosedTool,
         cells: &Cells,
-        surface: &OsculatingSurface,
+        plane: &ContactPlane,
         q: &Grid,
     ) -> CellContact {
         let mut contact = CellContact::default();
@@ -66,17 +73,21 @@ impl CellScratch {
                 let (force, gap) = (cells.force_scale * q[j][i], self.gap[j][i]);
                 let slopes = [self.slopes[0][j][i], self.slopes[1][j][i]];
                 let at = cells.middle(i, j);
-                by_place.add(cells, surface, (at, slopes), force, (i, j));
+                let body_slopes = [self.heights.slopes[0][j][i], self.heights.slopes[1][j][i]];
+                let gap_slopes = [slopes[0] - body_slopes[0], slopes[1] - body_slopes[1]];
+                by_place.add(cells, (at, gap_slopes), force, (i, j));
+                (0..2).for_each(|k| by_place.side[k] += force * self.heights.by_side[k][j][i]);
                 // A lift of the tool widens the gap by as much, a shift by the tool's slope times it.
                 let [along, across] = cells.rectangle.axes;
                 let push = force * (DVec3::Z - slopes[0] * along - slopes[1] * across);
-                let height = surface.height(at);
+                let height = self.heights.height[j][i];
                 contact.force += push;
                 contact.torque += (at.with_z(height + gap) - tool.tip).cross(push);
                 contact.normal_force += force;
-                contact.energy_by_curvature[0] -= 0.5 * force * at.x * at.x;
-                contact.energy_by_curvature[1] -= force * at.x * at.y;
-                contact.energy_by_curvature[2] -= 0.5 * force * at.y * at.y;
+                let against = force * (DVec3::Z - body_slopes[0] * along - body_slopes[1] * across);
+                let [u, v, w] = [0, 1, 2].map(|k| self.heights.carrier[k][j][i]);
+                contact.body_force += against;
+                contact.body_torque += (along * u + across * v).with_z(w).cross(against);
                 contact.area += cells.sides[0] * cells.sides[1];
                 work -= force * gap;
                 moment += force * at.with_z(height);
@@ -87,10 +98,11 @@ impl CellScratch {
         self.add_influence(cells, q, elastic, &mut by_place);
         by_place.move_with_tool(tool, cells, &mut contact);
         if contact.normal_force > 0.0 {
-            contact.centre_of_pressure = surface.origin + surface.axes * (moment / contact.normal_force);
+            contact.centre_of_pressure = plane.origin + plane.axes * (moment / contact.normal_force);
         }
-        contact.force = surface.axes * contact.force;
-        contact.torque = surface.axes * contact.torque;
+        for vector in [&mut contact.force, &mut contact.torque, &mut contact.body_force, &mut contact.body_torque] {
+            *vector = plane.axes * *vector;
+        }
         contact
     }
 
@@ -104,18 +116,9 @@ impl CellScratch {
 }
 
 impl ByPlace {
-    /// Adds a cell whose place `at` sees the tool's `slopes`.
-    fn add(
-        &mut self,
-        cells: &Cells,
-        surface: &OsculatingSurface,
-        (at, slopes): (DVec3, [f64; 2]),
-        force: f64,
-        (i, j): (usize, usize),
-    ) {
+    /// Adds a cell at whose place `at` the gap has some slopes.
+    fn add(&mut self, cells: &Cells, (at, gap_slopes): (DVec3, [f64; 2]), force: f64, (i, j): (usize, usize)) {
         let [along, across] = cells.rectangle.axes;
-        let slope = surface.slope(at);
-        let gap_slopes = [slopes[0] - slope.dot(along), slopes[1] - slope.dot(across)];
         let from_middle = [i, j].map(|k| k as f64 + 0.5 - 0.5 * cells.count as f64);
         for k in 0..2 {
             self.shift[k] -= force * gap_slopes[k];

@@ -23,8 +23,10 @@ pub struct LocalContact {
     pub(in crate::simulation) turned: DQuat,
     /// Approach at which it began, m: a tool that appears inside starts from no force.
     pub entry: f64,
-    /// The closest point of the surface at rest.
+    /// The closest point of the surface at rest; of a tool that is no sphere the middle of its footprint.
     pub foot: FootPoint,
+    /// How deep a tool that is no sphere lies below the plane of its footprint, m.
+    pub(in crate::simulation) sunk: f64,
     /// Whether it is a place beside another one of the same tool: it may wait there without a force.
     pub(in crate::simulation) further: bool,
     /// Whether it has just been found, and counts from where it is then.

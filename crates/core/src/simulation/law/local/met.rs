@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::contact::local::effective_modulus;
+use crate::contact::footprint::PressedSurface;
 use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
@@ -14,6 +15,8 @@ pub struct LocalBody<'a> {
     pub smooth: &'a SmoothSurface,
     /// What the tool meets at the fans.
     pub fields: &'a [FanFields],
+    /// The same for a tool that is no sphere.
+    pub pressed: Option<&'a PressedSurface>,
     /// Young's modulus over the Green's function's.
     pub scale: f64,
 }
@@ -39,6 +42,8 @@ pub struct HalfSpace {
     /// `E*`, Pa, and its gradient by the place of the foot's point.
     pub modulus: f64,
     pub slope: DVec3,
+    /// Its derivative by the body's own `E/(1 - nu^2)`.
+    pub by_own: f64,
     /// `k_t / k_n`.
     pub tangential: f64,
 }
@@ -49,9 +54,10 @@ impl HalfSpace {
         let own = body.scale * fields.values[PLANE_STRAIN];
         let whole = effective_modulus(own, 0.0, tool.pad);
         let modulus = part * whole;
-        let slope = fields.slope(PLANE_STRAIN) * (part * body.scale * (whole / own).powi(2));
+        let by_own = part * body.scale * (whole / own).powi(2);
+        let slope = fields.slope(PLANE_STRAIN) * by_own;
         let poisson = fields.values[POISSON];
-        Self { modulus, slope, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
+        Self { modulus, slope, by_own, tangential: 2.0 * (1.0 - poisson) / (2.0 - poisson) }
     }
 }
 

@@ -20,24 +20,22 @@
 mod contact;
 mod friction;
 mod met;
-mod reference;
 mod response;
 mod wrench;
 
 pub(in crate::simulation) use contact::ASKED;
 pub use contact::LocalContact;
 pub use met::{LocalBody, LocalTool};
-pub use reference::depth_below;
 pub use response::{Guess, LocalResponse, Others, evaluate};
 pub use wrench::{Cells, takes_cells};
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
-use self::reference::Reference;
 use super::{Approach, Law};
 use crate::contact::Refusal;
+use crate::contact::footprint::{NearPiece, PosedShape, PressedSurface, margin};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
+use crate::contact::smooth::{FootPoint, Neighbourhood};
 use crate::simulation::body::LocalSurface;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
@@ -60,6 +58,8 @@ pub struct Local;
 /// A tool that comes is followed from where it was in steps no longer than this, over its radius: within one of them it does not
 /// pass the middle of a part that is thicker than its radius.
 const STRIDE: f64 = 0.25;
+/// Most of these steps for a tool that is no sphere.
+const MOST_STRIDES: f64 = 8.0;
 
 /// The foot of a tool that comes to a place over the surface at rest: once the tool touches on its way, the foot is followed, so
 /// that it lies on the side that the tool has come from. And how far the tool reaches below the plane through it, m. `None` where
@@ -97,29 +97,12 @@ fn follow(
     from: &FootPoint,
     near: &mut Neighbourhood,
 ) -> Option<(FootPoint, f64)> {
-    let (body, shape) = (approach.body, &approach.tool.shape);
-    place_near((&local.smooth, body.drawn()), shape, (place, approach.orientation), from, near)
+    let foot = local.smooth.foot(approach.body.drawn(), place, from, near)?;
+    Some((foot, approach.tool.radius - foot.distance))
 }
 
-/// The foot of a tool at a place, followed from one near it, and how far the tool reaches below the plane through it, m.
-pub fn place_near(
-    (smooth, drawn): (&SmoothSurface, DrawnSurface<'_>),
-    shape: &ToolShape,
-    (place, orientation): (DVec3, DQuat),
-    from: &FootPoint,
-    near: &mut Neighbourhood,
-) -> Option<(FootPoint, f64)> {
-    if let ToolShape::Sphere { radius } = *shape {
-        let foot = smooth.foot(drawn, place, from, near)?;
-        return Some((foot, radius - foot.distance));
-    }
-    let pose = (place, DMat3::from_quat(orientation));
-    let (foot, _) = Reference::find((smooth, drawn), shape, pose, from, near)?;
-    Some((foot, depth_below(shape, pose, &foot)))
-}
-
-/// The foot of a tool at a place over the surface at rest, and how far it reaches below the plane through it, m. `None` where it
-/// is too far to reach it.
+/// The foot of a sphere at a place over the surface at rest, and how far it reaches below the plane through it, m. `None` where
+/// it is too far to reach it.
 fn first_foot(
     approach: &Approach<'_>,
     local: &LocalSurface,
@@ -127,21 +110,58 @@ fn first_foot(
     near: &mut Neighbourhood,
 ) -> Option<(FootPoint, f64)> {
     let (body, tool) = (approach.body, approach.tool);
-    let (drawn, rotation) = (body.drawn(), DMat3::from_quat(approach.orientation));
-    let centre = place + rotation * tool.shape.centre();
-    let closest = body.closest(centre)?;
-    if local.smooth.surely_beyond(tool.shape.bounding_radius(), &closest) {
+    let closest = body.closest(place)?;
+    if local.smooth.surely_beyond(tool.radius, &closest) {
         return None;
     }
-    let from = local.smooth.foot_from(drawn, centre, &closest, near);
-    if let ToolShape::Sphere { radius } = tool.shape {
-        return Some((from, radius - from.distance));
+    let foot = local.smooth.foot_from(body.drawn(), place, &closest, near);
+    Some((foot, tool.radius - foot.distance))
+}
+
+/// The footprint of a tool that is no sphere, as a foot, and how deep it is in the pieces below, m. `None` where it is near none.
+///
+/// The contact faces the side that the tool has come from: the first piece that it has been near on its way.
+fn shape_arrival(
+    approach: &Approach<'_>,
+    local: &LocalSurface,
+    pressed: &PressedSurface,
+    place: DVec3,
+    covering: &mut Covering,
+) -> Option<(FootPoint, f64)> {
+    let (body, shape) = (approach.body, &approach.tool.shape);
+    let (drawn, rotation, thickness) = (body.drawn(), DMat3::from_quat(approach.orientation), shape.thickness());
+    let closest = body.closest(place + rotation * shape.centre())?;
+    if closest.signed_distance > shape.bounding_radius() + margin(thickness) + approach.gone.length() {
+        return None;
     }
-    if from.distance > tool.shape.bounding_radius() {
-        return Some((from, 0.0));
+    let Covering { footprint, weights, .. } = covering;
+    let jumped = approach.gone.length() > JUMP * approach.tool.radius;
+    let gone = if jumped { DVec3::ZERO } else { approach.gone };
+    let strides = (gone.length() / (STRIDE * thickness)).ceil().clamp(1.0, MOST_STRIDES);
+    let mut at = PosedShape { shape, place, rotation, facing: DVec3::ZERO, sunk: 0.0 };
+    for left in (0..strides as u32).rev() {
+        at.place = place - gone * (f64::from(left) / strides);
+        footprint.near.gather(&pressed.fine, drawn.query, &at, margin(thickness));
+        if let Some((normal, _)) = footprint.first_met(gone) {
+            at.facing = normal;
+            break;
+        }
     }
-    let (foot, _) = Reference::find((&local.smooth, drawn), &tool.shape, (place, rotation), &from, near)?;
-    Some((foot, depth_below(&tool.shape, (place, rotation), &foot)))
+    if at.facing == DVec3::ZERO {
+        return None;
+    }
+    let at = PosedShape { place, sunk: gone.length(), ..at };
+    footprint.near.gather(&pressed.fine, drawn.query, &at, margin(thickness));
+    let found = footprint.find(&pressed.fine, &local.smooth, at.facing, weights)?;
+    let facing = |near: &&NearPiece| near.normal.dot(found.normal) > 0.0;
+    let deepest = footprint.near.pieces.iter().filter(facing).map(|near| -near.distance).fold(0.0, f64::max);
+    Some((found.foot(place), deepest))
+}
+
+/// How far a tool at `place` reaches below the plane through a foot, m; negative where it does not.
+pub fn depth_below(shape: &ToolShape, (place, rotation): (DVec3, DMat3), foot: &FootPoint) -> f64 {
+    let deepest = place + rotation * shape.support(-(rotation.transpose() * foot.normal));
+    (foot.position - deepest).dot(foot.normal)
 }
 
 impl Law for Local {
@@ -154,19 +174,26 @@ impl Law for Local {
         let (body, met) = (approach.body, approach.position - approach.carried());
         let Some(local) = &body.local else { return Ok(None) };
         covering.near.forget();
-        let Some((foot, depth)) = arrival(approach, local, met, &mut covering.near) else {
+        let arrived = match approach.pressed {
+            Some(pressed) => shape_arrival(approach, local, pressed, met, covering),
+            None => arrival(approach, local, met, &mut covering.near),
+        };
+        let Some((foot, depth)) = arrived else {
             *entry = Entry::default();
             return Ok(None);
         };
         let before = std::mem::replace(&mut entry.reached, depth.max(0.0));
         entry.depth = entry.depth.min(entry.reached);
-        if let (ToolShape::Sphere { .. }, None) = (&approach.tool.shape, approach.motion)
-            && approach.gone != DVec3::ZERO
-        {
-            // A distance changes by no more than the way: where it seems to, the foot a tick ago was another one.
-            entry.depth = entry.depth.max(depth - before - WAY * approach.gone.length());
+        if approach.returned {
+            entry.depth = entry.reached;
         }
-        if depth <= entry.depth {
+        if approach.motion.is_none() && approach.way() > 0.0 {
+            // A distance changes by no more than the way: where it seems to, the foot a tick ago was another one.
+            entry.depth = entry.depth.max(depth - before - WAY * approach.way());
+        }
+        // Pieces do not show where between them a tool first touches: one that has come from outside is tried as soon as it is near.
+        let tried = approach.pressed.is_some() && entry.depth == 0.0;
+        if depth <= entry.depth && !tried {
             return Ok(None);
         }
         let local = LocalContact {

@@ -5,12 +5,12 @@ use glam::{DMat3, DVec3};
 use super::LocalContact;
 use super::friction::{Answer, Friction};
 use super::met::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
-use super::reference::Reference;
-use super::wrench::{Cells, indent_shape};
+use super::wrench::{Cells, indent_shape, posed, sunk};
+use crate::contact::footprint::{PressedSurface, margin};
 use crate::contact::local::{WidenedContact, Widening};
-use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, WIDENING, compliance_of, reference_area};
+use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint, Neighbourhood};
+use crate::contact::smooth::{FanWeights, FootPoint};
 use crate::simulation::rotation::rotation_vector;
 use crate::tensor::outer;
 
@@ -34,6 +34,8 @@ pub struct Others {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LocalResponse {
     pub foot: FootPoint,
+    /// How deep a tool that is no sphere lies below the plane of its footprint, m.
+    pub sunk: f64,
     /// Force on the body, N, and its derivative by the place, N/m.
     pub force: DVec3,
     pub jacobian: DMat3,
@@ -47,13 +49,6 @@ pub struct LocalResponse {
     pub friction: Answer,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
-}
-
-/// Where a tool meets the surface.
-struct Met {
-    foot: FootPoint,
-    /// How its foot follows it; that of a sphere's centre follows the tip.
-    reference: Option<Reference>,
 }
 
 /// Where an answer is asked for, and what is known of it so far.
@@ -77,75 +72,91 @@ pub fn evaluate(
     weights: &mut FanWeights,
     cells: Cells<'_>,
 ) -> Option<LocalResponse> {
-    let Guess { place, force, .. } = guess;
     // Not known before a foot is found.
     weights.touchable = 1.0;
-    let Met { foot, reference } = meet(body, tool, contact, guess, &mut weights.near)?;
+    match body.pressed {
+        Some(pressed) => evaluate_shape((body, pressed), tool, contact, guess, others, weights, cells),
+        None => evaluate_sphere(body, tool, contact, guess, others, weights),
+    }
+}
+
+/// A matrix no larger than a bound. At an edge the normal of a tool's footprint turns faster than its force does.
+fn bounded(matrix: DMat3, most: f64) -> DMat3 {
+    let size = matrix.to_cols_array().iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+    if size > most { matrix * (most / size) } else { matrix }
+}
+
+fn evaluate_sphere(
+    body: LocalBody<'_>,
+    tool: LocalTool<'_>,
+    contact: &LocalContact,
+    guess: Guess<'_>,
+    others: Others,
+    weights: &mut FanWeights,
+) -> Option<LocalResponse> {
+    let foot = match contact.held {
+        true => contact.foot.held(guess.place),
+        false => body.smooth.foot(body.drawn, guess.place, guess.foot, &mut weights.near)?,
+    };
     body.smooth.weigh(&foot, weights);
     if weights.is_outside() {
         return None;
     }
     let fields = weights.blend(body.fields);
     // One that has just been found counts from where it is.
-    let indentation = match &reference {
-        _ if contact.found => Indentation::default(),
-        None => indent(body, tool, contact, &foot, &fields),
-        Some(reference) => indent_shape(body, tool, contact, place, (&foot, reference), (weights, &fields), cells),
-    };
-    let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
-    let (normal, point) = (foot.normal, foot.position);
-    // A matrix is the identity by default.
-    let jacobian = DMat3::ZERO;
-    let mut response =
-        LocalResponse { foot, compliance, normal, point, indentation, jacobian, ..LocalResponse::default() };
-    if indentation.force == 0.0 {
-        return Some(response);
-    }
-    let lever = indentation.lever;
-    let rotation = rotation_vector(contact.turned, contact.orientation);
-    let displacement = place - contact.relative + rotation.cross(lever);
-    let slope = slope(body, force, others, &fields).clamp_length_max(STEEPEST * indentation.force);
-    let (slope, twist) = reference.map_or((slope, DVec3::ZERO), |reference| reference.by_pose(slope));
-    let push = slope - indentation.gradient;
-    let pressing = push.length();
-    response.normal = push / pressing;
-    let stiffness = indentation.tangential * indentation.stiffness;
-    let bound = tool.coefficient * pressing;
-    response.friction = contact.friction.answer(displacement, bound, tool.coefficient, stiffness, response.normal);
-    response.force = response.friction.force - push;
-    let turning = reference.map_or(foot.turning, |reference| reference.turning(&foot));
-    let n = foot.normal;
-    response.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force
-        + response.friction.by_displacement
-        - outer(response.friction.by_pressing, n) * indentation.stiffness;
-    response.torque = -lever.cross(response.friction.force);
-    if reference.is_some() {
-        response.torque += indentation.torque + twist;
-        response.point = place + lever;
-    }
+    let indentation = if contact.found { Indentation::default() } else { indent(body, tool, contact, &foot, &fields) };
+    let mut response = LocalResponse::at(body, foot, &fields, indentation);
+    let slope = slope(body, guess.force, others, &fields).clamp_length_max(STEEPEST * indentation.force);
+    response.push(tool, contact, guess.place, slope);
     Some(response)
 }
 
-fn meet(
-    body: LocalBody<'_>,
+fn evaluate_shape(
+    (body, pressed): (LocalBody<'_>, &PressedSurface),
     tool: LocalTool<'_>,
     contact: &LocalContact,
     guess: Guess<'_>,
-    near: &mut Neighbourhood,
-) -> Option<Met> {
-    if let ToolShape::Sphere { .. } = tool.shape {
-        let foot = match contact.held {
-            true => contact.foot.held(guess.place),
-            false => body.smooth.foot(body.drawn, guess.place, guess.foot, near)?,
-        };
-        return Some(Met { foot, reference: None });
-    }
-    let pose = (guess.place, DMat3::from_quat(contact.orientation));
-    let (foot, reference) = match contact.held {
-        true => Reference::held(tool.shape, pose, &contact.foot)?,
-        false => Reference::find((body.smooth, body.drawn), tool.shape, pose, guess.foot, near)?,
+    others: Others,
+    weights: &mut FanWeights,
+    cells: Cells<'_>,
+) -> Option<LocalResponse> {
+    let Guess { place, force, .. } = guess;
+    let posed = posed(tool.shape, contact, place);
+    let near = margin(tool.shape.thickness());
+    cells.footprint.near.gather(&pressed.fine, body.drawn.query, &posed, near);
+    let found = cells.footprint.find(&pressed.fine, body.smooth, contact.foot.normal, weights);
+    let Some(footprint) = found else {
+        // Away from the body: no force.
+        let compliance = DMat3::ZERO;
+        return Some(LocalResponse { foot: contact.foot, compliance, jacobian: DMat3::ZERO, ..LocalResponse::default() });
     };
-    Some(Met { foot, reference: Some(reference) })
+    if weights.is_outside() {
+        return None;
+    }
+    let fields = weights.blend(&pressed.fields);
+    let half_space = HalfSpace::new(body, tool, &fields, contact.part);
+    // Gradients by the tool's rotation of `E*` and of `f^T C_reg f / 2`.
+    let (mut modulus_turns, mut compliance_turns) = (DVec3::ZERO, DVec3::ZERO);
+    for ((fan, _), turn) in weights.iter().zip(&cells.footprint.by_rotation) {
+        let own = &pressed.fields[fan];
+        modulus_turns += *turn * own[PLANE_STRAIN];
+        compliance_turns += *turn * (0.5 / body.scale * force.dot(compliance_of(own) * force));
+    }
+    modulus_turns *= half_space.by_own;
+    let sunk = sunk(&posed, &footprint);
+    let indentation =
+        indent_shape(&pressed.fine, tool, contact, place, &footprint, (&half_space, modulus_turns), cells);
+    let mut response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
+    response.sunk = sunk;
+    response.point = place + indentation.lever;
+    let whole = slope(body, force, others, &fields);
+    let slope = whole.clamp_length_max(STEEPEST * indentation.force);
+    let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
+    response.push(tool, contact, place, slope);
+    if response.force != DVec3::ZERO {
+        response.torque += indentation.torque + compliance_turns * share;
+    }
+    Some(response)
 }
 
 /// What the change of the body's compliance, and the other contacts, add to the force on the tool, by the place of the foot's
@@ -199,6 +210,41 @@ fn indent(
 }
 
 impl LocalResponse {
+    /// At a foot, before anything is pushed.
+    fn at(body: LocalBody<'_>, foot: FootPoint, fields: &Fields, indentation: Indentation) -> Self {
+        let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
+        let (normal, point) = (foot.normal, foot.position);
+        // A matrix is the identity by default.
+        Self { foot, compliance, normal, point, indentation, jacobian: DMat3::ZERO, ..Self::default() }
+    }
+
+    /// Adds the force that follows from the indentation, inclined by `slope`, and friction.
+    fn push(&mut self, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3, slope: DVec3) {
+        let indentation = self.indentation;
+        let push = slope - indentation.gradient;
+        let pressing = push.length();
+        if indentation.force == 0.0 || pressing == 0.0 {
+            return;
+        }
+        let lever = indentation.lever;
+        let rotation = rotation_vector(contact.turned, contact.orientation);
+        let displacement = place - contact.relative + rotation.cross(lever);
+        self.normal = push / pressing;
+        let stiffness = indentation.tangential * indentation.stiffness;
+        let bound = tool.coefficient * pressing;
+        self.friction = contact.friction.answer(displacement, bound, tool.coefficient, stiffness, self.normal);
+        self.force = self.friction.force - push;
+        let n = self.foot.normal;
+        let turning = match tool.shape {
+            ToolShape::Sphere { .. } => self.foot.turning,
+            shape => bounded(self.foot.turning, 1.0 / shape.thickness()),
+        };
+        self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force
+            + self.friction.by_displacement
+            - outer(self.friction.by_pressing, n) * indentation.stiffness;
+        self.torque = -lever.cross(self.friction.force);
+    }
+
     /// Its springs; without a force none is stretched.
     pub fn springs(&self) -> Friction {
         if self.force == DVec3::ZERO { Friction::default() } else { self.friction.friction }

@@ -1,0 +1,142 @@
+//! Pieces of a surface near a tool, and how far the tool is from each.
+
+use glam::{DMat3, DVec3};
+
+use crate::contact::shape::ToolShape;
+use crate::contact::{SurfaceQuery, Tessellation};
+
+/// Most pieces that are looked at: their memory is there before a tick.
+const MOST_PIECES: usize = 8192;
+/// A piece farther above the middle of the tool than it can be is pushed away by this many times the difference.
+const BEYOND: f64 = 2.0;
+
+/// A tool over a surface.
+#[derive(Clone, Copy)]
+pub struct PosedShape<'a> {
+    /// The tool.
+    pub shape: &'a ToolShape,
+    /// Where its origin is, m.
+    pub place: DVec3,
+    /// Its axes as columns.
+    pub rotation: DMat3,
+    /// Unit normal of the contact as it is known, zero where none is. What lies above the tool's middle along it is measured
+    /// at that height: a tool that has sunk in as a whole still meets the surface that it came through.
+    pub facing: DVec3,
+    /// How deep the tool is in the surface as far as it is known, m.
+    pub sunk: f64,
+}
+
+/// A piece near the tool.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NearPiece {
+    /// Its rank.
+    pub piece: u32,
+    /// Its corners, m.
+    pub corners: [DVec3; 3],
+    /// The middle of these, m.
+    pub middle: DVec3,
+    /// Unit outward normal.
+    pub normal: DVec3,
+    /// Its area, m^2.
+    pub area: f64,
+    /// Farthest corner from the middle, m.
+    pub size: f64,
+    /// Of the middle from the tool, m, negative inside.
+    pub distance: f64,
+    /// Its derivatives by the tool's place, and by its rotation about its origin, m.
+    pub by_pose: [DVec3; 2],
+}
+
+/// The pieces near a tool.
+#[derive(Clone, Debug)]
+pub struct NearPieces {
+    /// In the order of the search.
+    pub pieces: Vec<NearPiece>,
+    /// Middle of the tool, m.
+    pub centre: DVec3,
+    /// Distance from which pieces count, m.
+    pub margin: f64,
+}
+
+impl Default for NearPieces {
+    /// With the memory for any tool.
+    fn default() -> Self {
+        Self { pieces: Vec::with_capacity(MOST_PIECES), centre: DVec3::ZERO, margin: 0.0 }
+    }
+}
+
+impl PosedShape<'_> {
+    /// Middle of the tool, m.
+    pub fn centre(&self) -> DVec3 {
+        self.place + self.rotation * self.shape.centre()
+    }
+
+    /// The tool's point that reaches farthest in a direction, m.
+    pub fn support(&self, direction: DVec3) -> DVec3 {
+        self.place + self.rotation * self.shape.support(self.rotation.transpose() * direction)
+    }
+
+    /// How far above its middle the surface may lie, m.
+    fn headroom(&self, margin: f64) -> f64 {
+        let half = (self.centre() - self.support(-self.facing)).dot(self.facing);
+        (self.sunk - half).max(0.0) + margin
+    }
+
+    /// Distance of a point from the tool, and its derivatives by place and rotation.
+    fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2]) {
+        let arm = centre - self.place;
+        let above = (point - centre).dot(self.facing).max(0.0);
+        let at = point - self.facing * above;
+        let (mut distance, gradient) = self.shape.signed_distance(self.rotation.transpose() * (at - self.place));
+        let gradient = self.rotation * gradient;
+        let mut by_pose = [-gradient, gradient.cross(at - self.place)];
+        // The middle moves with the tool, and what is measured at its height with it.
+        let mut rise = if above > 0.0 { gradient.dot(self.facing) } else { 0.0 };
+        if above > headroom {
+            distance += BEYOND * (above - headroom);
+            rise -= BEYOND;
+        }
+        by_pose[0] += self.facing * rise;
+        by_pose[1] += arm.cross(self.facing) * rise;
+        (distance, by_pose)
+    }
+}
+
+impl NearPieces {
+    /// Finds the pieces that lie no farther from the tool than `margin`, m.
+    pub fn gather(&mut self, fine: &Tessellation, query: &SurfaceQuery, tool: &PosedShape<'_>, margin: f64) {
+        self.pieces.clear();
+        (self.centre, self.margin) = (tool.centre(), margin);
+        let (centre, headroom) = (self.centre, tool.headroom(margin));
+        let reach = |axis: DVec3| tool.support(axis).dot(axis) + margin + (headroom * tool.facing.dot(axis)).max(0.0);
+        let high = DVec3::from_array(DVec3::AXES.map(reach));
+        let low = -DVec3::from_array(DVec3::AXES.map(|axis| reach(-axis)));
+        if !(low.is_finite() && high.is_finite()) {
+            return;
+        }
+        query.for_each_within(low, high, |triangle| {
+            let (ball, radius) = fine.ball(triangle);
+            if tool.distance(ball, centre, headroom).0 > radius + margin {
+                return;
+            }
+            let count = fine.pieces_of_triangle() as u32;
+            for piece in triangle * count..(triangle + 1) * count {
+                let near = measured(fine, tool, piece, (centre, headroom));
+                if near.distance < near.size + margin && self.pieces.len() < MOST_PIECES {
+                    self.pieces.push(near);
+                }
+            }
+        });
+    }
+}
+
+fn measured(fine: &Tessellation, tool: &PosedShape<'_>, piece: u32, (centre, headroom): (DVec3, f64)) -> NearPiece {
+    let corners = fine.corners(piece);
+    let [a, b, c] = corners;
+    let middle = (a + b + c) / 3.0;
+    let across = (b - a).cross(c - a);
+    let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
+    let (distance, by_pose) = tool.distance(middle, centre, headroom);
+    let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
+    NearPiece { piece, corners, middle, normal, area, size, distance, by_pose }
+}
