@@ -22,12 +22,13 @@ mod servo;
 mod settings;
 mod statistics;
 mod strain;
+mod strikes;
 mod subnormals;
 mod timing;
 
 pub use clock::now_ns;
 pub use emulated::{EmulatedTick, Emulation};
-pub use force_loop::ForceLoop;
+pub use force_loop::{ForceLoop, check_period};
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
 pub use offline::{Recording, Script, rerun, run};

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use palpate_core::simulation::{Kept, Model};
+use palpate_core::simulation::{Kept, Model, Strike};
 use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 use rtrb::Consumer;
@@ -125,6 +125,14 @@ impl Servo {
     /// See [`Settings::check`]; the loop then keeps those it has.
     pub fn set(&mut self, settings: Settings) -> Result<()> {
         self.handle.set(settings)
+    }
+
+    /// See [`LoopHandle::strike`].
+    ///
+    /// # Errors
+    /// A body that the model does not have; so many strikes that the loop has not come to them.
+    pub fn strike(&mut self, strike: Strike) -> Result<()> {
+        self.handle.strike(strike)
     }
 
     /// The latest tick; wait-free.
