@@ -12,9 +12,7 @@ use palpate_core::simulation::{Pose, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{self, simulated};
 use palpate_scene::{BodyId, Prepared, ToolId, unit_quaternion};
-use palpate_servo::{
-    ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker, check_period,
-};
+use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker, check_period};
 
 use crate::arguments::{hand_out, shared, take_back};
 use crate::device::{DeviceEnd, brought};

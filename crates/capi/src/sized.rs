@@ -120,7 +120,7 @@ mod tests {
         let mut older = Older { struct_size: 16, first: 7, second: 8.0, behind: 9.0 };
         // SAFETY: 16 bytes are there.
         let read = unsafe { read((&raw const older).cast::<Grown>()) }.expect("an older struct");
-        assert_eq!(read, Grown { first: 7, second: 8.0, ..Grown::default() });
+        assert_eq!(read, Grown { struct_size: 16, first: 7, second: 8.0, added: 3.0 });
         let answer = Grown { first: 4, second: 5.0, added: 6.0, ..Grown::default() };
         // SAFETY: 16 bytes are there.
         unsafe { write(&answer, (&raw mut older).cast::<Grown>()) }.expect("an older struct");

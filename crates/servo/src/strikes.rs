@@ -48,7 +48,8 @@ impl StrikeHandle {
     /// One more strike.
     pub fn push(&mut self, model: &Model, strike: Strike) -> Result<()> {
         check_body(model, strike.body, "strike")?;
-        let full = || format!("{MOST_WAITING} strikes wait already: the loop gives one a tick, and four at once to a body");
+        let full =
+            || format!("{MOST_WAITING} strikes wait already: the loop gives one a tick, and four at once to a body");
         let waiting = Waiting { strike, resets: self.resets };
         self.waiting.push(waiting).map_err(|_| Error::Invalid(full()))
     }

@@ -152,9 +152,16 @@ class Simulation(Adjustable, Changing):
             Processors of ``scene.device`` that this process may not run on.
 
         """
+        self._start(lambda: connect(self._core, self.scene, self._given))
+
+    def start_without_devices(self) -> None:
+        """Start the loop with simulated tools alone, whatever moves them in the scene: a device may have gone."""
+        self._start(dict)
+
+    def _start(self, connected: Callable[[], dict[int, str]]) -> None:
         if not self._running:
             self._arm_strain_limit()
-            self._devices = connect(self._core, self.scene, self._given)
+            self._devices = connected()
             RUNNING.add(self)
             try:
                 start_loop(self._core, self.scene.device)
