@@ -221,6 +221,7 @@ def info(
         return
     if file.suffix == ".toml":
         scene = palpate.Scene.read(file)
+        scene.require_files()
         print(f"{file}: scene of {scene.name}")
         for name, value in scene.model_dump(by_alias=True, exclude_none=True).items():
             _print_entry(name, value)

@@ -22,7 +22,7 @@ from palpate.errors import SceneError, SimulationError
 from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.input_file import require_writable
-from palpate.scene import BodyMotion, BuiltScene, Scene
+from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
@@ -317,7 +317,7 @@ class Simulation(Adjustable, Changing):
     ) -> tuple[Any, tuple[BuiltBody, ...], list[float]]:
         """Read from the loop what belongs to the bodies that it comes with; None where it does not run.
 
-        Another thread may be changing the scene: between its change of the loop and that of the bodies here are moments.
+        Another thread may be changing the scene: between its change of the loop and that of the bodies are moments.
         """
         for _ in range(CHANGE_WAITS):
             answer, bodies, scales = read(), self.bodies, self._scales

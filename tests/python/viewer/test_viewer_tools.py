@@ -141,7 +141,6 @@ def test_a_press_during_a_change_of_tool_goes_on_with_the_new_one(block, block_g
         time.sleep(0.5)
         make(session, *arguments)
 
-
     async def session():
         async with serving(built) as server, page(server) as client:
             await client.receive("scene")
@@ -183,7 +182,10 @@ def test_a_tool_that_cannot_be_taken_leaves_the_one_before(block, block_green, m
     async def session():
         async with serving(built) as server, page(server) as client:
             await client.receive("scene")
-            for name, words in (("punch", "connect it again; the scene shown before goes on"), ("capsule", "report it")):
+            for name, words in (
+                ("punch", "connect it again; the scene shown before goes on"),
+                ("capsule", "report it"),
+            ):
                 await client.say(type="shape", tool=0, name=name)
                 notice, _ = await client.receive("error")
                 assert words in notice["text"] and "\n" not in notice["text"]
