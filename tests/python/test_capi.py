@@ -244,7 +244,7 @@ def test_cmake_finds_it_and_its_static_form_links(prefix, tmp_path):
 
 
 def grown_library(folder: Path) -> Path:
-    """Folder of a library each of whose structs that may grow has one more member at its end, as a later version has."""
+    """Folder of a library whose structs that may grow have one more member at their ends, as a later version has."""
     copy = folder / "grown"
     shutil.copytree(ROOT / "crates/capi", copy / "capi", ignore=shutil.ignore_patterns("tests", "examples"))
     workspace = (ROOT / "Cargo.toml").read_text()
@@ -258,9 +258,8 @@ def grown_library(folder: Path) -> Path:
     for source in (copy / "capi/src").glob("*.rs"):
         text = source.read_text()
         for name in re.findall(r"unsafe impl Sized for (\w+)", text.split("#[cfg(test)]")[0]):
-            text, count = re.subn(
-                rf"(pub struct {name} {{.*?)\n}}", r"\1\n    pub added: [f64; 3],\n}", text, count=1, flags=re.S
-            )
+            whole, added = rf"(pub struct {name} {{.*?)\n}}", r"\1\n    pub added: [f64; 3],\n}"
+            text, count = re.subn(whole, added, text, count=1, flags=re.S)
             filled = "struct_size: size_of::<Self>() as u32,"
             after = text.index(filled, text.index(f"struct {name}"))
             text = text[:after] + text[after:].replace(filled, filled + " added: [7.0; 3],", 1)

@@ -207,7 +207,7 @@ def test_command_line(workers, tmp_path):
 
 
 def test_certificates_of_dasks_own_configuration_are_taken(tmp_path):
-    """A scheduler that asks for certificates: the command has them from the environment, as dask has; without them no."""
+    """A scheduler that asks for certificates: the command has them from the environment, as dask has."""
     box_mesh(cells=(8, 5, 5)).write(tmp_path / "box.vtu")
     command = ["precompute", "box.vtu", "--fix", "x < 1mm", "-E", "10kPa", "--nu", "0.4", "-o", "a.palpate", "--dask"]
     ours, others = tmp_path / "ours", tmp_path / "others"

@@ -83,9 +83,10 @@ class Scene(SceneTables):
         if len(self.bodies) == 1:
             given |= self.model_fields_set & own
         if body.store is not None and given:
+            where = located(path, text, ["body", rank, "store"])
             raise SceneError(
-                f"{located(path, text, ['body', rank, 'store'])}: a store carries its own material, supports and loads, "
-                "and where it may be touched, and cannot move: leave those tables out"
+                f"{where}: a store carries its own material, supports and loads, and where it may be touched, and "
+                "cannot move: leave those tables out"
             )
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The page where there is little room, and what it says of mistakes: nothing overlaps, and no word is lost or stays for ever."""
+"""The page where there is little room, and what it says: nothing overlaps, and no word is lost or stays for ever."""
 
 from __future__ import annotations
 
