@@ -165,8 +165,7 @@ class SimulationCore:
     def set_target(
         self,
         tool: int,
-        position: Vector,
-        orientation: tuple[float, float, float, float],
+        place: tuple[Vector, tuple[float, float, float, float]],
         velocity: Vector,
         active: bool,
         grab: bool,

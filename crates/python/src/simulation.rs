@@ -148,17 +148,16 @@ impl SimulationCore {
         &self,
         py: Python<'_>,
         tool: usize,
-        position: [f64; 3],
-        orientation: [f64; 4],
+        place: ([f64; 3], [f64; 4]),
         velocity: [f64; 3],
         active: bool,
         grab: bool,
     ) {
-        let pose = Pose { position: position.into(), orientation: quaternion(orientation) };
+        let pose = Pose { position: place.0.into(), orientation: quaternion(place.1) };
         let target = Target { pose, velocity: velocity.into(), active, grab };
         let mut parts = self.parts(py);
-        let Some(place) = parts.targets.get_mut(tool) else { return };
-        *place = target;
+        let Some(before) = parts.targets.get_mut(tool) else { return };
+        *before = target;
         if let Some(Some(handle)) = parts.handles.get_mut(tool) {
             handle.set(target);
         }

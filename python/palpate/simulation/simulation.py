@@ -252,19 +252,19 @@ class Simulation(Adjustable, Changing):
         if orientation is not None:
             turned = tuple(orientations_of([orientation], np.array([[place]]))[0, 0].tolist())
         self._keep("_targets", tool, (place, turned))
-        self._core.set_target(tool, place, turned, moving, True, held)
+        self._core.set_target(tool, (place, turned), moving, True, held)
 
     def grab(self, on: bool, tool: int = 0) -> None:
         """Grab the surface near the tool, or let go."""
         target = self._targets[self._tool(tool)]
         self._keep("_grab", tool, bool(on))
-        self._core.set_target(tool, *target, (0.0, 0.0, 0.0), True, bool(on))
+        self._core.set_target(tool, target, (0.0, 0.0, 0.0), True, bool(on))
 
     def remove(self, tool: int = 0) -> None:
         """Take a tool out of the scene until it is moved again."""
         target = self._targets[self._tool(tool)]
         self._keep("_grab", tool, False)
-        self._core.set_target(tool, *target, (0.0, 0.0, 0.0), False, False)
+        self._core.set_target(tool, target, (0.0, 0.0, 0.0), False, False)
 
     def closest(self, points: np.ndarray, body: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Closest points of a body's surface as tools under the local law meet it: smooth between the nodes.
