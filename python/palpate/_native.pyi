@@ -64,6 +64,11 @@ class DirectMotion:
     def at(self, rows: list[int] | None, order: int) -> np.ndarray: ...
     def energies(self) -> tuple[float, float, float, float]: ...
 
+class StoreClaim:
+    @staticmethod
+    def take(path: Path) -> StoreClaim | None: ...
+    def release(self) -> None: ...
+
 class GreenCore:
     surface_nodes: np.ndarray
     surface_positions: np.ndarray
@@ -99,6 +104,7 @@ class GreenCore:
         memory: int | None = None,
         growth: tuple[np.ndarray, Callable[[], list[int] | None], Callable[[int], Any]] | None = None,
         phase: Callable[[str], Any] | None = None,
+        claim: StoreClaim | None = None,
     ) -> tuple[int, bool]: ...
     @staticmethod
     def plan(

@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_core::green::accuracy::Accuracy;
 use palpate_core::green::{
-    ColumnStore as Store, Columns, Measurement, Parts, Precision, Problem, Target, Wanted, Working, checksum,
+    Claim, ColumnStore as Store, Columns, Measurement, Parts, Precision, Problem, Target, Wanted, Working, checksum,
 };
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
@@ -142,6 +142,39 @@ impl ColumnLayout {
     }
 }
 
+/// The right to write a store, until it is released.
+#[pyclass(frozen, module = "palpate._native")]
+pub struct StoreClaim {
+    claim: Arc<Claim>,
+}
+
+#[pymethods]
+impl StoreClaim {
+    /// Claims the store at `path`; `None` while somebody else writes it.
+    #[staticmethod]
+    fn take(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
+        let claim = Claim::take(&path).map_err(|e| to_python(py, e))?;
+        Ok(claim.map(|claim| Self { claim: Arc::new(claim) }))
+    }
+
+    /// Lets others write the store, also where an object that wrote it lives on.
+    fn release(&self) {
+        self.claim.release();
+    }
+}
+
+/// A claim that Python has made, or a new one.
+pub(crate) fn claimed(py: Python<'_>, claim: Option<&StoreClaim>, path: PathBuf) -> PyResult<Arc<Claim>> {
+    if let Some(claim) = claim {
+        return Ok(Arc::clone(&claim.claim));
+    }
+    let busy = || Error::Store {
+        path: path.clone(),
+        reason: "is being computed by another process: wait for it to end".into(),
+    };
+    Claim::take(&path).and_then(|claim| claim.ok_or_else(busy)).map(Arc::new).map_err(|e| to_python(py, e))
+}
+
 /// Blocks of columns on their way into a store.
 #[pyclass(frozen, module = "palpate._native")]
 pub struct ColumnStore {
@@ -158,7 +191,8 @@ impl ColumnStore {
 impl ColumnStore {
     /// Begins the store at `path`, or goes on with it; `precision_name` as asked for, `measured` by a [`ColumnJob`].
     #[new]
-    #[pyo3(signature = (layout, precision_name, within, measured, path, description))]
+    #[pyo3(signature = (layout, precision_name, within, measured, path, description, claim=None))]
+    #[allow(clippy::too_many_arguments)] // one call of one caller
     fn new(
         py: Python<'_>,
         layout: &ColumnLayout,
@@ -167,6 +201,7 @@ impl ColumnStore {
         measured: GivenMeasured<'_>,
         path: PathBuf,
         description: &str,
+        claim: Option<&StoreClaim>,
     ) -> PyResult<Self> {
         let (name, width, accuracy, response) = measured;
         let unusable = || to_python(py, Error::Invalid(format!("unusable blocks of {width} columns in '{name}'")));
@@ -174,8 +209,9 @@ impl ColumnStore {
         let accuracy = Accuracy::from_slice(&accuracy).ok_or_else(unusable)?;
         let measurement = Measurement { precision, accuracy, response: response.as_array().to_vec(), width };
         let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
-        let target = Target { path: &path, precision: wanted, memory: None, description, phase: &|_| {} };
-        let open = || Store::open(&layout.problem, Arc::clone(&layout.parts), &measurement, &target);
+        let claim = claimed(py, claim, path)?;
+        let target = Target { precision: wanted, memory: None, description, phase: &|_| {} };
+        let open = || Store::open(claim, &layout.problem, Arc::clone(&layout.parts), &measurement, &target);
         let store = py.detach(open).map_err(|e| to_python(py, e))?;
         Ok(Self { store: Mutex::new(store) })
     }

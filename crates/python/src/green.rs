@@ -16,6 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::body::{self, indices, materials, vectors};
+use crate::columns::{StoreClaim, claimed};
 use crate::errors::to_python;
 use crate::watched::{run_watched, run_watched_and};
 
@@ -132,7 +133,7 @@ impl GreenCore {
     /// to come next or `None`, and one that is told of each store on the way by its number of touchable nodes.
     /// `phase` is told the name of each phase as it begins.
     #[staticmethod]
-    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None, growth=None, phase=None))]
+    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None, growth=None, phase=None, claim=None))]
     #[allow(clippy::too_many_arguments)] // one call of one caller
     fn precompute_to(
         py: Python<'_>,
@@ -145,6 +146,7 @@ impl GreenCore {
         memory: Option<usize>,
         growth: Option<(PyReadonlyArray1<'_, u32>, Py<PyAny>, Py<PyAny>)>,
         phase: Option<Py<PyAny>>,
+        claim: Option<&StoreClaim>,
     ) -> PyResult<(usize, bool)> {
         let problem = problem(arguments)?;
         let precision = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
@@ -156,7 +158,8 @@ impl GreenCore {
                 drop(Python::attach(|py| phase.call1(py, (begun.name(),))));
             }
         };
-        let target = Target { path: &path, precision, memory, description, phase: &phase };
+        let claim = claimed(py, claim, path)?;
+        let target = Target { precision, memory, description, phase: &phase };
         let (first, next, ready) = match growth {
             Some((first, next, ready)) => (indices(&first), Some(next), Some(ready)),
             None => (Vec::new(), None, None),
@@ -179,7 +182,7 @@ impl GreenCore {
             let ready = |nodes| written.store(nodes, Ordering::Relaxed);
             let growth = Growth { first: &first, next: &next, ready: &ready };
             let mut found = Found::default();
-            precompute_to(&problem, &target, &growth, &mut |f| found = f, note)?;
+            precompute_to(claim, &problem, &target, &growth, &mut |f| found = f, note)?;
             Ok(found)
         })?;
         Ok((found.resumed, found.discarded))

@@ -47,6 +47,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<columns::ColumnJob>()?;
     module.add_class::<columns::ColumnLayout>()?;
     module.add_class::<columns::ColumnStore>()?;
+    module.add_class::<columns::StoreClaim>()?;
     module.add_class::<simulation::SimulationCore>()?;
     module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
     module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
