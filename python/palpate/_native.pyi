@@ -7,6 +7,7 @@ import numpy as np
 
 __version__: str
 
+def end_with_parent(watch_input: bool = True) -> None: ...
 def products(single: bool, count: int) -> float: ...
 def stiffness(
     nodes: np.ndarray, tets: np.ndarray, material: np.ndarray

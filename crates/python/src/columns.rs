@@ -12,6 +12,7 @@ use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
+use crate::allocator::require_scratch_of_products;
 use crate::errors::to_python;
 use crate::green::{named, problem};
 use crate::watched::run_watched;
@@ -87,6 +88,7 @@ impl ColumnJob {
         let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
+        require_scratch_of_products().map_err(|e| to_python(py, e))?;
         let factored = || Columns::new(&problem, wanted, memory, false, &|_| {}, &|| Ok(()));
         let columns = py.detach(|| pool.install(factored)).map_err(|e| to_python(py, e))?;
         let working = Mutex::new(Memories { free: Vec::new(), allowed: columns.tasks });

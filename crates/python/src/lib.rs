@@ -4,6 +4,7 @@
 mod allocator;
 mod body;
 mod changes;
+mod children;
 mod columns;
 mod connection;
 mod devices;
@@ -44,6 +45,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<dynamics::DirectMotion>()?;
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
+    module.add_function(wrap_pyfunction!(children::end_with_parent, module)?)?;
     module.add_class::<columns::ColumnJob>()?;
     module.add_class::<columns::ColumnLayout>()?;
     module.add_class::<columns::ColumnStore>()?;

@@ -77,8 +77,12 @@ class BackgroundPrecompute:
             self._fresh = GreensFunction.load(job.target, body=body)
             self._touchable = self._fresh.touchable_nodes
         memory = job.allowed(None)
+        # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
         self._child = child = subprocess.Popen(
-            [sys.executable, "-m", "palpate.green.child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [sys.executable, "-m", "palpate.green.child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
         )
         names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
         values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)

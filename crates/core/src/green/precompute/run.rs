@@ -71,7 +71,7 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
     drop(columns);
     let finished = Finished { parts: &parts, arrangement: &arrangement, blocks: &blocks, panels: &panels, tasks };
     let magnitude = finished.magnitudes()?;
-    let mut numbers = Numbers::zeros(precision, parts.layout.columns * green.rows);
+    let mut numbers = Numbers::try_zeros(precision, parts.layout.columns * green.rows)?;
     let bytes = green.rows * precision.bytes();
     let places: Vec<Mutex<&mut [u8]>> = numbers.bytes_mut().chunks_mut(bytes).map(Mutex::new).collect();
     finished.columns(precision, &magnitude, &|column, bytes| {
