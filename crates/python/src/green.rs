@@ -65,6 +65,12 @@ fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
     palpate_core::green::Interior::new(&stiffness, &problem.supports, &problem.surface_nodes, &problem.loads)
 }
 
+/// Removes what is kept beside a store of contacts with it.
+#[pyfunction]
+pub(crate) fn forget_contacts(store: PathBuf) {
+    contact::forget_kept(&store);
+}
+
 /// The format of a name, if one is named.
 pub(crate) fn named(py: Python<'_>, name: Option<&str>) -> PyResult<Option<Precision>> {
     name.map(|name| precision(py, name)).transpose()

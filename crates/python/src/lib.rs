@@ -12,6 +12,7 @@ mod drawing;
 mod dynamics;
 mod emulated;
 mod errors;
+mod exchange;
 mod frame;
 mod green;
 mod programmed;
@@ -46,6 +47,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<green::GreenCore>()?;
     module.add_class::<green::Interior>()?;
     module.add_function(wrap_pyfunction!(children::end_with_parent, module)?)?;
+    module.add_function(wrap_pyfunction!(exchange::exchange, module)?)?;
+    module.add_function(wrap_pyfunction!(green::forget_contacts, module)?)?;
     module.add_class::<columns::ColumnJob>()?;
     module.add_class::<columns::ColumnLayout>()?;
     module.add_class::<columns::ColumnStore>()?;

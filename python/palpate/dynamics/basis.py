@@ -14,6 +14,7 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from palpate import _native
+from palpate.atomic import destination
 from palpate.body import Body, description
 from palpate.cache import cache_directory
 from palpate.dynamics.matrices import Matrices, start_vector
@@ -91,8 +92,9 @@ class ModalBasis:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file; an existing one is replaced only when the new one is complete."""
         shapes = self.shapes.reshape(-1, len(self))
-        remove_leftovers(Path(path))
-        _native.save_basis(Path(path), self.key, json.dumps(self.description), self.eigenvalues, shapes)
+        target = destination(Path(path), StoreError)
+        remove_leftovers(target)
+        _native.save_basis(target, self.key, json.dumps(self.description), self.eigenvalues, shapes)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, body: Body | None = None, mass: str | None = None) -> ModalBasis:

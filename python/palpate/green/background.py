@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from palpate import _native
 from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN
@@ -128,8 +129,7 @@ class BackgroundPrecompute:
             self._end(str(error))
             return
         # What tools needed to know of the stage before is kept under its name, and of no more use.
-        for contact in self._job.target.parent.glob(f"{self._job.target.stem}.*.contact.palpate"):
-            contact.unlink(missing_ok=True)
+        _native.forget_contacts(self._job.target)
         self._take(green, finished)
 
     def _take(self, green: GreensFunction, finished: bool = False) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from palpate import _native, units
+from palpate.atomic import destination
 from palpate.body import Body, description, problem_arrays
 from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
@@ -182,8 +183,9 @@ class GreensFunction:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
-        remove_leftovers(Path(path))
-        self._core.save(Path(path))
+        target = destination(Path(path), StoreError)
+        remove_leftovers(target)
+        self._core.save(target)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, body: Body | None = None) -> GreensFunction:

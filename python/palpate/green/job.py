@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate import _native
+from palpate.atomic import destination
 from palpate.body import Body, SurfaceRegion, description, problem_arrays, surface_region
 from palpate.cache import cache_directory
 from palpate.errors import BodyError, StoreError
@@ -85,6 +86,7 @@ class Job:
         else:
             target = Path(path)
             require_writable(target, StoreError)
+            target = destination(target, StoreError)
         remove_leftovers(target)
         first_ranks = np.searchsorted(body.mesh.surface_nodes, nodes).astype(np.uint32)
         return cls(body, region, problem, first_ranks, key, target, precision)
