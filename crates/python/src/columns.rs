@@ -6,13 +6,14 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_core::green::accuracy::Accuracy;
 use palpate_core::green::{
-    Claim, ColumnStore as Store, Columns, Measurement, Parts, Precision, Problem, Target, Wanted, Working, checksum,
+    ColumnStore as Store, Columns, Measurement, Parts, Precision, Problem, Target, Wanted, Working, checksum,
 };
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
 use crate::allocator::require_scratch_of_products;
+use crate::claim::{StoreClaim, claimed};
 use crate::errors::to_python;
 use crate::green::{named, problem};
 use crate::watched::run_watched;
@@ -142,39 +143,6 @@ impl ColumnLayout {
     fn order<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.parts.order())
     }
-}
-
-/// The right to write a store, until it is released.
-#[pyclass(frozen, module = "palpate._native")]
-pub struct StoreClaim {
-    claim: Arc<Claim>,
-}
-
-#[pymethods]
-impl StoreClaim {
-    /// Claims the store at `path`; `None` while somebody else writes it.
-    #[staticmethod]
-    fn take(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
-        let claim = Claim::take(&path).map_err(|e| to_python(py, e))?;
-        Ok(claim.map(|claim| Self { claim: Arc::new(claim) }))
-    }
-
-    /// Lets others write the store, also where an object that wrote it lives on.
-    fn release(&self) {
-        self.claim.release();
-    }
-}
-
-/// A claim that Python has made, or a new one.
-pub(crate) fn claimed(py: Python<'_>, claim: Option<&StoreClaim>, path: PathBuf) -> PyResult<Arc<Claim>> {
-    if let Some(claim) = claim {
-        return Ok(Arc::clone(&claim.claim));
-    }
-    let busy = || Error::Store {
-        path: path.clone(),
-        reason: "is being computed by another process: wait for it to end".into(),
-    };
-    Claim::take(&path).and_then(|claim| claim.ok_or_else(busy)).map(Arc::new).map_err(|e| to_python(py, e))
 }
 
 /// Blocks of columns on their way into a store.

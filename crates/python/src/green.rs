@@ -18,7 +18,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::allocator::require_scratch_of_products;
 use crate::body::{self, indices, materials, vectors};
-use crate::columns::{StoreClaim, claimed};
+use crate::claim::{StoreClaim, claimed};
 use crate::errors::to_python;
 use crate::watched::{run_watched, run_watched_and};
 

@@ -5,6 +5,7 @@ mod allocator;
 mod body;
 mod changes;
 mod children;
+mod claim;
 mod columns;
 mod connection;
 mod devices;
@@ -52,7 +53,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<columns::ColumnJob>()?;
     module.add_class::<columns::ColumnLayout>()?;
     module.add_class::<columns::ColumnStore>()?;
-    module.add_class::<columns::StoreClaim>()?;
+    module.add_class::<claim::StoreClaim>()?;
     module.add_class::<simulation::SimulationCore>()?;
     module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
     module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;

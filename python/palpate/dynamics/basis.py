@@ -17,6 +17,7 @@ from palpate import _native
 from palpate.atomic import destination
 from palpate.body import Body, description
 from palpate.cache import cache_directory
+from palpate.cache_limit import hold, make_room
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
 from palpate.leftovers import remove_leftovers
@@ -172,6 +173,7 @@ def modes(
         with contextlib.suppress(StoreError):
             basis = ModalBasis.load(target, body=body, mass=mass)
             if len(basis) >= wanted:
+                hold(target, basis)
                 return basis.first(wanted)
     if count is None and free > ALL_MODES_DOFS:
         size = 8e-9 * free**2
@@ -187,6 +189,9 @@ def modes(
             eigenvalues, vectors = _lanczos(body, matrices, wanted, report)
     basis = _basis(matrices, eigenvalues, vectors, key, {**description(body), "mass": mass, "modes": wanted})
     basis.save(target)
+    if path is None:
+        hold(target, basis)
+        make_room(keep=target)
     return basis
 
 

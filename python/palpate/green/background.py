@@ -78,6 +78,7 @@ class BackgroundPrecompute:
             self._fresh = GreensFunction.load(job.target, body=body)
             self._touchable = self._fresh.touchable_nodes
         memory = job.allowed(None)
+        job.make_room()
         # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
         self._child = child = subprocess.Popen(
             [sys.executable, "-m", "palpate.green.child"],
@@ -130,6 +131,8 @@ class BackgroundPrecompute:
             return
         # What tools needed to know of the stage before is kept under its name, and of no more use.
         _native.forget_contacts(self._job.target)
+        if finished:
+            self._job.make_room(written=True)
         self._take(green, finished)
 
     def _take(self, green: GreensFunction, finished: bool = False) -> None:

@@ -107,6 +107,7 @@ def precompute(
         stored = job.stored()
         if stored is not None:
             return _told(stored)
+        job.make_room()
         with _what_is_kept_is_told(job.target):
             if dask is None:
                 discarded = _here(job, claim, memory, progress, first is not None, ready, painted)
@@ -120,7 +121,9 @@ def precompute(
         warnings.warn(
             f"{job.target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
         )
-    return _told(job.load())
+    green = job.load()
+    job.make_room(written=True)
+    return _told(green)
 
 
 def _told_once(target: Path) -> Callable[[], None]:

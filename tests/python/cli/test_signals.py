@@ -12,7 +12,10 @@ import time
 import pytest
 
 # A program started in the background of a shell ignores interrupts, and so do its children.
-HEEDING = "import os, signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); os.execv(sys.argv[1], sys.argv[1:])"
+HEEDING = (
+    "import os, signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "os.execv(sys.argv[1], sys.argv[1:])"
+)
 
 
 def awaited(file, process) -> None:

@@ -125,7 +125,7 @@ def test_columns_that_another_program_changes_are_refused_and_computed_again(bod
     content = np.memmap(partial, dtype=np.uint8, mode="r+")
     content[content.size // 2] ^= 0x40
     content.flush()
-    with pytest.raises(palpate.StoreError, match="another program has changed its finished columns in .*run the same"):
+    with pytest.raises(palpate.StoreError, match=r"another program has changed its finished columns in .*run the same"):
         store.finish()
     assert not path.exists() and len(store.missing()) == 1
     del store
