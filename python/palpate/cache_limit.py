@@ -100,8 +100,9 @@ def hold(path: Path | None, user: object) -> None:
         return
     _used.add(path)
     with contextlib.suppress(OSError):
-        # The time of its last change is that of its last use: that of reading is noted by few systems, and by lists too.
+        # The time of change stands for that of use: few systems note that of reading, and a list reads too.
         os.utime(path)
+    with contextlib.suppress(OSError):
         stream = os.open(path, os.O_RDONLY)
         weakref.finalize(user, os.close, stream)
         if fcntl is not None:

@@ -102,21 +102,20 @@ def precompute(
     stored = job.stored()
     if stored is not None:
         return _told(stored)
-    with claimed(job.target, _told_once(job.target)) as claim:
+    with _what_is_kept_is_told(job.target), claimed(job.target, _told_once(job.target)) as claim:
         # Whoever had the claim before may have finished it.
         stored = job.stored()
         if stored is not None:
             return _told(stored)
         job.make_room()
-        with _what_is_kept_is_told(job.target):
-            if dask is None:
-                discarded = _here(job, claim, memory, progress, first is not None, ready, painted)
-            else:
-                # Of memory the workers see to their own; the files have to have room here.
-                job.allowed(None)
-                # A lost connection, an OSError of the library, is told apart in here.
-                with connected(dask) as client, progress_reporter("precomputing", progress) as report:
-                    discarded = precompute_on(client, job, claim, memory, report)
+        if dask is None:
+            discarded = _here(job, claim, memory, progress, first is not None, ready, painted)
+        else:
+            # Of memory the workers see to their own; the files have to have room here.
+            job.allowed(None)
+            # A lost connection, an OSError of the library, is told apart in here.
+            with connected(dask) as client, progress_reporter("precomputing", progress) as report:
+                discarded = precompute_on(client, job, claim, memory, report)
     if discarded:
         warnings.warn(
             f"{job.target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
