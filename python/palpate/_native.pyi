@@ -7,6 +7,9 @@ import numpy as np
 
 __version__: str
 
+def end_with_parent(watch_input: bool = True) -> None: ...
+def forget_contacts(store: Path) -> None: ...
+def exchange(one: Path, other: Path) -> bool: ...
 def products(single: bool, count: int) -> float: ...
 def stiffness(
     nodes: np.ndarray, tets: np.ndarray, material: np.ndarray
@@ -64,6 +67,11 @@ class DirectMotion:
     def at(self, rows: list[int] | None, order: int) -> np.ndarray: ...
     def energies(self) -> tuple[float, float, float, float]: ...
 
+class StoreClaim:
+    @staticmethod
+    def take(path: Path) -> StoreClaim | None: ...
+    def release(self) -> None: ...
+
 class GreenCore:
     surface_nodes: np.ndarray
     surface_positions: np.ndarray
@@ -99,6 +107,7 @@ class GreenCore:
         memory: int | None = None,
         growth: tuple[np.ndarray, Callable[[], list[int] | None], Callable[[int], Any]] | None = None,
         phase: Callable[[str], Any] | None = None,
+        claim: StoreClaim | None = None,
     ) -> tuple[int, bool]: ...
     @staticmethod
     def plan(

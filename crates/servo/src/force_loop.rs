@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use palpate_core::Result;
+use palpate_core::memory::Ranges;
 use palpate_core::simulation::{Input, Kept, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
 use palpate_devices::{Device, DeviceLimits, Wrench};
 
@@ -48,6 +49,11 @@ pub struct ForceLoop {
 }
 
 impl ForceLoop {
+    /// The memory that its ticks read.
+    pub(crate) fn memory(&self) -> Ranges {
+        self.model.memory()
+    }
+
     /// At rest, at the start of the safety ramp, with one device a tool of the model and in their order.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ mod clock;
 mod emulated;
 mod force_loop;
 mod handoff;
+mod locking;
 mod log;
 mod offline;
 mod preparer;
