@@ -3,6 +3,11 @@
 SI units everywhere: m, N, Pa, kg, s. Nodes are 0-based; arrays are C-ordered.
 """
 
+# ruff: noqa: E402  the imports below take a second
+from palpate.startup import end_quietly_when_interrupted
+
+end_quietly_when_interrupted()
+
 from importlib.metadata import version
 
 from palpate import models, palpation

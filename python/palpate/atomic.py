@@ -1,14 +1,44 @@
-"""Files appear whole or not at all: written beside, then renamed."""
+"""Files and folders appear whole or not at all: written beside, then renamed."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from palpate.leftovers import remove_leftovers
+from palpate import _native
+from palpate.errors import Error
+from palpate.leftovers import is_leftover, remove_leftovers
+
+
+def destination(path: Path, error: type[Error] = Error) -> Path:
+    """File that is written for ``path``: the one that a symbolic link names, so that the link stays.
+
+    Raises
+    ------
+    Error
+        Of the class ``error``: what is there is no regular file, and must not be replaced by one; or links in a circle.
+
+    """
+    try:
+        target = path.resolve() if path.is_symlink() else path
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        return target
+    except (RuntimeError, OSError) as failure:
+        reason = failure.strerror if isinstance(failure, OSError) and failure.strerror else "a circle of symbolic links"
+        raise error(f"{path}: {reason}") from None
+    if not stat.S_ISREG(mode):
+        raise error(f"{path} is {_kind(mode)}, no file that can be replaced: give another name")
+    return target
+
+
+def _kind(mode: int) -> str:
+    kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+    return kinds.get(stat.S_IFMT(mode), "a device")
 
 
 @contextlib.contextmanager
@@ -17,15 +47,18 @@ def written_beside(path: Path) -> Iterator[Path]:
 
     Raises
     ------
+    Error
+        A place that is no regular file.
     OSError
         From within the block, naming ``path`` (a full disk names nothing).
 
     """
-    remove_leftovers(path)
-    partial = path.with_name(f".{os.getpid()}.{path.name}")
+    target = destination(path)
+    remove_leftovers(target)
+    partial = target.with_name(f".{os.getpid()}.{target.name}")
     try:
         yield partial
-        os.replace(partial, path)
+        os.replace(partial, target)
     except OSError as error:
         error.filename = os.fspath(path)
         raise
@@ -35,20 +68,43 @@ def written_beside(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def folder_beside(path: Path) -> Iterator[Path]:
-    """Give an empty folder to fill, which takes the place of ``path`` when the block ends well, and else is deleted."""
-    remove_leftovers(path)
-    partial = path.with_name(f".{os.getpid()}.{path.name}")
-    before = path.with_name(f".{os.getpid()}.{path.name}.before")
+    """Give an empty folder to fill, which takes the place of ``path`` when the block ends well, and else is deleted.
+
+    At every moment the old folder or the new one is there: they are exchanged in one step where the system can do that.
+    Elsewhere an interruption between two renames leaves the old one, and the next call puts it back if the program was
+    killed.
+    """
+    target = path.resolve() if path.is_symlink() else path
+    before = target.with_name(f".{os.getpid()}.{target.name}.before")
+    _put_back(target)
+    remove_leftovers(target)
+    partial = target.with_name(f".{os.getpid()}.{target.name}")
     partial.mkdir()
     try:
         yield partial
-        # A folder that is not empty cannot be replaced in one step.
-        if path.exists():
-            os.replace(path, before)
-        os.replace(partial, path)
+        if not target.exists():
+            os.replace(partial, target)
+        elif not _native.exchange(partial, target):
+            # A folder that is not empty cannot be replaced in one step.
+            os.replace(target, before)
+            os.replace(partial, target)
     except OSError as error:
         error.filename = os.fspath(path)
         raise
     finally:
+        if before.exists() and not target.exists():
+            os.replace(before, target)
         shutil.rmtree(partial, ignore_errors=True)
         shutil.rmtree(before, ignore_errors=True)
+
+
+def _put_back(target: Path) -> None:
+    """Put back a folder that a killed process had moved out of the way of the new one, or remove it."""
+    if not target.parent.is_dir():
+        return
+    for before in target.parent.iterdir():
+        if is_leftover(before, f"{target.name}.before"):
+            if target.exists():
+                shutil.rmtree(before, ignore_errors=True)
+            else:
+                os.replace(before, target)

@@ -38,31 +38,34 @@ class CachedFile:
         By which it is listed and deleted: the path in the cache, the hash of stores cut short.
     size
         Bytes.
-    modified
-        When it was last written, s since 1970.
+    used
+        When it was last written, or read by a precomputation or a scene, s since 1970.
     about
         What it is, in a few words.
     leftover
         Whether it is of no more use: the process that wrote it was killed.
+    being_written
+        Whether a process is writing it.
 
     """
 
     path: Path
     name: str
     size: int
-    modified: float
+    used: float
     about: str
     leftover: bool
+    being_written: bool
 
 
 def cached_files() -> list[CachedFile]:
-    """Files of the cache, the newest first."""
+    """Files of the cache, the last used first."""
     folder = cache_directory()
     found = []
     for file in (*folder.glob("*.palpate*"), *folder.glob(".*.palpate*"), *folder.glob("bench/*")):
         with contextlib.suppress(FileNotFoundError):  # another process may rename or delete it meanwhile
             found.append(_entry(file, folder))
-    return sorted(found, key=lambda file: -file.modified)
+    return sorted(found, key=lambda file: -file.used)
 
 
 def chosen_files(name: str) -> list[CachedFile]:
@@ -88,7 +91,8 @@ def _entry(file: Path, folder: Path) -> CachedFile:
     relative = file.relative_to(folder).as_posix()
     head, dot, ending = relative.partition(".")
     name = f"{head[:12]}{dot}{ending}" if head and "/" not in relative else relative
-    return CachedFile(file, name, stat.st_size, stat.st_mtime, _about(file, leftover), leftover)
+    written = not leftover and _WRITTEN.search(file.name) is not None
+    return CachedFile(file, name, stat.st_size, stat.st_mtime, _about(file, leftover), leftover, written)
 
 
 def _about(file: Path, leftover: bool) -> str:

@@ -17,7 +17,7 @@ from palpate.errors import ClusterError
 from palpate.units import brief_repr
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client, Future, Security
 
 # For the scheduler to answer, and for a first worker to join it, s.
 PATIENCE = 5.0
@@ -31,10 +31,14 @@ Item = TypeVar("Item")
 def connected(dask: str | Client) -> Iterator[Client]:
     """Client of the scheduler at an address, such as ``"tcp://10.0.0.1:8786"``; a client of one's own stays open.
 
+    A ``tls://`` address takes the certificates of dask's own configuration (``distributed.comm.tls``: a file of
+    ``~/.config/dask``, ``DASK_DISTRIBUTED__COMM__TLS__...``), a client of one's own its ``distributed.Security``.
+
     Raises
     ------
     ClusterError
-        dask.distributed is not installed, no scheduler answers, or no worker with this version of Palpate is there.
+        dask.distributed is not installed, no scheduler answers, a ``tls://`` address without certificates or with those
+        of others, or no worker with this version of Palpate is there.
 
     """
     try:
@@ -49,11 +53,13 @@ def connected(dask: str | Client) -> Iterator[Client]:
     if not isinstance(dask, str):
         raise ClusterError(f"dask takes the address of a scheduler, or a distributed.Client; got {brief_repr(dask)}")
     with _quiet():
+        security = _security_for(dask)
         try:
-            client = distributed.Client(dask, timeout=PATIENCE, set_as_default=False)
+            client = distributed.Client(dask, security=security, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, TimeoutError):
+            which = " with these certificates" if security.require_encryption else ""
             raise ClusterError(
-                f"no scheduler answers at {dask}: 'dask scheduler' starts one and prints its address"
+                f"no scheduler answers at {dask}{which}: 'dask scheduler' starts one and prints its address"
             ) from None
         try:
             with _lost_is_told():
@@ -61,6 +67,26 @@ def connected(dask: str | Client) -> Iterator[Client]:
                 yield client
         finally:
             client.close()
+
+
+def _security_for(address: str) -> Security:
+    """Certificates of dask's own configuration, without which nothing goes to an address that asks for them."""
+    from distributed import Security
+
+    security = Security()
+    if not address.startswith("tls://"):
+        return security
+    given = {"ca-file": security.tls_ca_file, "client.cert": security.tls_client_cert}
+    missing = [f"distributed.comm.tls.{name}" for name, value in given.items() if not value]
+    if missing:
+        raise ClusterError(f"{address} needs certificates: dask's configuration has no {' and no '.join(missing)}")
+    try:
+        security.get_connection_args("client")
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"the certificates for {address} cannot be used: {error}") from None
+    # Once certificates are there, nobody may talk to this process without them.
+    security.require_encryption = True
+    return security
 
 
 def dashboard(client: Client) -> str | None:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from palpate.atomic import destination
 from palpate.errors import Error
 
 if sys.version_info >= (3, 11):
@@ -55,13 +56,14 @@ def require_writable(path: Path, error: type[Error]) -> None:
     Raises
     ------
     Error
-        Of the class ``error``: a folder of that name, or no folder to put it in.
+        Of the class ``error``: a folder of that name, a device, a pipe or a socket, or no folder to put it in.
 
     """
     if path.is_dir():
         raise error(f"{path} is a folder: name a file in it, such as {path / 'body'}{path.suffix}")
-    if not path.absolute().parent.is_dir():
-        raise error(f"{path}: there is no folder {path.parent}; make it first")
+    folder = destination(path, error).absolute().parent
+    if not folder.is_dir():
+        raise error(f"{path}: there is no folder {path.parent if not path.is_symlink() else folder}; make it first")
 
 
 def _with_other_ending(path: Path) -> Path | None:

@@ -23,7 +23,7 @@ TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
 # Characters of a wrong value that a message repeats.
 LONGEST_SHOWN = 60
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 
 def quantity(value: str | float, units: dict[str, float], kind: str) -> float:

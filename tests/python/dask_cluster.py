@@ -14,6 +14,8 @@ from pathlib import Path
 
 import distributed
 
+ROLES = ("SCHEDULER", "WORKER", "CLIENT")
+
 
 @contextlib.contextmanager
 def local_cluster(workers: int) -> Iterator[distributed.LocalCluster]:
@@ -28,17 +30,35 @@ def local_cluster(workers: int) -> Iterator[distributed.LocalCluster]:
     assert os.environ.get("RAYON_NUM_THREADS") == before
 
 
+def certificates(folder: Path) -> dict[str, str]:
+    """Make a certificate that signs itself: dask's configuration of it, as variables of the environment."""
+    words = "req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=palpate -addext subjectAltName=IP:127.0.0.1".split()
+    files = ["-keyout", folder / "node.key", "-out", folder / "node.pem"]
+    subprocess.run(["openssl", *words, *files], check=True, capture_output=True)
+    return certificates_in(folder)
+
+
+def certificates_in(folder: Path) -> dict[str, str]:
+    """The same of a certificate that is there."""
+    cert, key = folder / "node.pem", folder / "node.key"
+    prefix = "DASK_DISTRIBUTED__COMM__TLS__"
+    roles = {f"{prefix}{role}__{kind}": path for role in ROLES for kind, path in (("CERT", cert), ("KEY", key))}
+    return {name: str(path) for name, path in {f"{prefix}CA_FILE": cert, **roles}.items()}
+
+
 @contextlib.contextmanager
-def programs(folder: Path) -> Iterator[tuple[str, subprocess.Popen]]:
+def programs(folder: Path, tls: dict[str, str] | None = None) -> Iterator[tuple[str, subprocess.Popen]]:
     """Address and process of ``dask scheduler``, and one ``dask worker``, as a user starts them."""
     file = folder / "scheduler.json"
     started: list[subprocess.Popen] = []
 
     def start(*words: str) -> None:
         command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
-        started.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        environment = {**os.environ, **(tls or {})}
+        started.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment))
 
-    start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
+    protocol = ["--protocol", "tls"] if tls else []
+    start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file), *protocol)
     try:
         until, address = time.monotonic() + 60, ""
         while not address and time.monotonic() < until:

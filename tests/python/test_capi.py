@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -240,3 +241,46 @@ def test_cmake_finds_it_and_its_static_form_links(prefix, tmp_path):
     libs = [f"{prefix}/lib/libpalpate.a" if flag == "-lpalpate" else flag for flag in flags(prefix, "--static")]
     run("gcc", "-std=c99", ROOT / "examples/c/touch.c", "-o", static, *libs)
     assert subprocess.run([static], capture_output=True).returncode == 2
+
+
+def grown_library(folder: Path) -> Path:
+    """Folder of a library whose structs that may grow have one more member at their ends, as a later version has."""
+    copy = folder / "grown"
+    shutil.copytree(ROOT / "crates/capi", copy / "capi", ignore=shutil.ignore_patterns("tests", "examples"))
+    workspace = (ROOT / "Cargo.toml").read_text()
+    workspace = re.sub(r"members = .*", 'members = ["capi"]', workspace).replace('"crates/', f'"{ROOT}/crates/')
+    (copy / "Cargo.toml").write_text(workspace)
+    shutil.copy(ROOT / "Cargo.lock", copy)
+    # By another name, for it is built beside the other one.
+    manifest = (copy / "capi/Cargo.toml").read_text().replace('name = "palpate"', 'name = "palpate_grown"')
+    (copy / "capi/Cargo.toml").write_text(manifest.replace('["cdylib", "staticlib", "lib"]', '["cdylib"]'))
+    grown = []
+    for source in (copy / "capi/src").glob("*.rs"):
+        text = source.read_text()
+        for name in re.findall(r"unsafe impl Sized for (\w+)", text.split("#[cfg(test)]")[0]):
+            whole, added = rf"(pub struct {name} {{.*?)\n}}", r"\1\n    pub added: [f64; 3],\n}"
+            text, count = re.subn(whole, added, text, count=1, flags=re.S)
+            filled = "struct_size: size_of::<Self>() as u32,"
+            after = text.index(filled, text.index(f"struct {name}"))
+            text = text[:after] + text[after:].replace(filled, filled + " added: [7.0; 3],", 1)
+            grown += [name] * count
+        source.write_text(text.replace("//!", "#![allow(missing_docs)]\n//!", 1) if source.name == "lib.rs" else text)
+    assert len(grown) == 6
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    run("cargo", "build", "--release", "--quiet", "--manifest-path", copy / "Cargo.toml", "--target-dir", target)
+    (folder / "lib").mkdir()
+    shutil.copy(target / "release/libpalpate_grown.so", folder / "lib/libpalpate.so.1")
+    return folder / "lib"
+
+
+def test_programs_of_the_first_header_run_with_a_library_whose_structs_have_grown(prefix, block_green, tmp_path):
+    store, program = tmp_path / "block.palpate", tmp_path / "sizes"
+    block_green.save(store)
+    frozen = ["-I", ROOT / "tests/c/abi-1.0", ROOT / "tests/c/sizes.c"]
+    link = ["-L", prefix / "lib", "-lpalpate", "-lm"]
+    run("gcc", "-std=c99", *WARNINGS, *frozen, "-o", program, *link)
+    said = {
+        where: run(program, store, LD_LIBRARY_PATH=str(where)) for where in (prefix / "lib", grown_library(tmp_path))
+    }
+    own, grown = said.values()
+    assert own == grown and float(own.split()[2]) > 0.05, said

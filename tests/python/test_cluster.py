@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from command_line import refused, run
 from conftest import box_mesh
-from dask_cluster import local_cluster, programs
+from dask_cluster import certificates, certificates_in, local_cluster, programs
 
 import palpate
 from palpate import cluster as clusters
@@ -204,3 +204,22 @@ def test_command_line(workers, tmp_path):
         palpate.precompute(body, path=tmp_path / "b.palpate").path.read_bytes() == (tmp_path / "a.palpate").read_bytes()
     )
     refused(run(*command, "tcp://127.0.0.1:1", cwd=tmp_path), "no scheduler answers at tcp://127.0.0.1:1")
+
+
+def test_certificates_of_dasks_own_configuration_are_taken(tmp_path):
+    """A scheduler that asks for certificates: the command has them from the environment, as dask has."""
+    box_mesh(cells=(8, 5, 5)).write(tmp_path / "box.vtu")
+    command = ["precompute", "box.vtu", "--fix", "x < 1mm", "-E", "10kPa", "--nu", "0.4", "-o", "a.palpate", "--dask"]
+    ours, others = tmp_path / "ours", tmp_path / "others"
+    ours.mkdir(), others.mkdir()
+    with programs(ours, certificates(ours)) as (address, _):
+        assert address.startswith("tls://")
+        refused(
+            run(*command, address, cwd=tmp_path),
+            f"{address} needs certificates: dask's configuration has no distributed.comm.tls.ca-file",
+        )
+        strange = run(*command, address, cwd=tmp_path, env={**os.environ, **certificates(others)})
+        refused(strange, f"no scheduler answers at {address} with these certificates")
+        told = run(*command, address, cwd=tmp_path, env={**os.environ, **certificates_in(ours)})
+        assert told.returncode == 0 and f"{address}: 1 worker" in told.stdout, told
+    assert palpate.GreensFunction.load(tmp_path / "a.palpate").touch_error < 0.1

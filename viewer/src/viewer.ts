@@ -46,6 +46,7 @@ export class Viewer {
   private readonly poses = new PoseReader();
   private readonly control = new Control(this.store, (message) => this.connection.send(message));
   private readonly stage: Stage;
+  private readonly pointer: Pointer;
   private readonly plots: Plots;
   private readonly statistics: Statistics;
   private firstStrike = 0;
@@ -70,7 +71,7 @@ export class Viewer {
     const painting = new Painting(store, (message) => this.connection.send(message));
     // Before the pointer that presses.
     new PaintPointer(this.stage, store, painting, new PaintMarks());
-    const pointer = new Pointer(this.stage, store, control);
+    this.pointer = new Pointer(this.stage, store, control);
     new TouchPan(viewport);
     listenToKeys(control, painting, viewport, toggleHelp);
     // Before what reads its colours.
@@ -89,7 +90,7 @@ export class Viewer {
     new TimeLine(store, control);
     new ExamPanel(store, control);
     followNotices(store, control);
-    installTestHooks({ store, stage: this.stage, pointer, statistics: this.statistics, history: this.plots.history });
+    installTestHooks({ store, stage: this.stage, pointer: this.pointer, statistics: this.statistics, history: this.plots.history });
   }
 
   start(): void {
@@ -111,9 +112,12 @@ export class Viewer {
     // Frames of the scene before are not drawn any more, but the server still counts on an answer.
     this.frames.take();
     const again = data.header.name === this.store.get().scene?.name;
+    // With another tool on the same body a press goes on.
+    const held = again ? this.pointer.held : null;
     this.control.takeScene(data.header);
     this.store.update({ sizes: data.bodies.map(({ nodes }) => sidesOf(nodes)) });
     this.stage.setScene(data);
+    if (held) this.pointer.pressAgain(held);
     document.title = `${data.header.title} · Palpate`;
     window.clearTimeout(this.firstStrike);
     // Another tool on the same body is no reason to strike it.

@@ -624,7 +624,8 @@ palpate_status palpate_loop_set_strain_limit(struct palpate_loop *force_loop, do
 palpate_status palpate_loop_set_time_scale(struct palpate_loop *force_loop, double scale);
 
 // Strikes a body in motion: an impulse, N s, on the patch of `radius`, m, around the surface point closest to `point`, m, in the
-// world; the force is half a wave of `duration`, s.
+// world; the force is half a wave of `duration`, s. Strikes that come faster than ticks are given one a tick, in order; 64 may
+// wait.
 palpate_status palpate_loop_strike(struct palpate_loop *force_loop,
                                    uint32_t body,
                                    const double *point,

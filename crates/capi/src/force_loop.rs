@@ -8,11 +8,11 @@
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use glam::DVec3;
-use palpate_core::simulation::Pose;
+use palpate_core::simulation::{Pose, Strike};
 use palpate_devices::Device;
 use palpate_devices::simulated::{self, simulated};
 use palpate_scene::{BodyId, Prepared, ToolId, unit_quaternion};
-use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker};
+use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker, check_period};
 
 use crate::arguments::{hand_out, shared, take_back};
 use crate::device::{DeviceEnd, brought};
@@ -82,6 +82,23 @@ impl FrameSide {
         self.prepared.rank_of_tool(ToolId(handle)).ok_or_else(|| unknown("tool", handle))
     }
 
+    /// Strikes a body in motion.
+    pub fn strike(&mut self, strike: Strike) -> Outcome<()> {
+        match &mut self.runner {
+            Runner::Program { handle, .. } => handle.strike(strike)?,
+            Runner::Thread { servo, .. } => servo.strike(strike)?,
+        }
+        Ok(())
+    }
+
+    /// Refuses devices of the program that cannot be ticked with a time between two ticks, s.
+    pub fn check_period(&self, period: f64) -> Outcome<()> {
+        if let Runner::Thread { .. } = self.runner {
+            return Err(running());
+        }
+        Ok(check_period(&self.prepared.model, &self.prepared.devices, period)?)
+    }
+
     /// Changes the settings; one that is refused changes nothing.
     pub fn set(&mut self, settings: Settings) -> Outcome<()> {
         match &mut self.runner {
@@ -143,12 +160,12 @@ impl Loop {
         if let Runner::Thread { .. } = frame.runner {
             return Err(Refusal::state("the loop's own thread runs already"));
         }
-        let mut tick = self.try_tick()?;
         let (targets, devices) = frame.prepared.tools.iter().map(|_| simulated_device()).unzip();
         let Prepared { model, limits, scheduling, strain, .. } = &frame.prepared;
         let (model, scheduling, strain) = (model.clone(), scheduling.clone(), strain.clone());
         let servo = Servo::start(model, devices, *limits, frame.settings, scheduling, strain, None)?;
-        tick.force_loop = None;
+        // Not before: a start that is refused must not have kept the program from ticking.
+        self.try_tick()?.force_loop = None;
         frame.runner = Runner::Thread { servo: Box::new(servo), targets };
         Ok(())
     }
@@ -210,6 +227,10 @@ impl Loop {
 fn simulated_device() -> (simulated::Handle, Box<dyn Device>) {
     let (handle, device) = simulated();
     (handle, Box::new(device))
+}
+
+pub(crate) fn running() -> Refusal {
+    Refusal::state("the loop's own thread ticks it: call palpate_loop_stop first")
 }
 
 fn unknown(what: &str, handle: u32) -> Refusal {

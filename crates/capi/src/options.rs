@@ -69,7 +69,7 @@ impl Default for BodyOptions {
 // SAFETY: numbers only; the size comes first.
 unsafe impl Sized for BodyOptions {
     const NAME: &str = "palpate_body_options";
-    const FIRST_SIZE: usize = size_of::<Self>();
+    const FIRST_SIZE: usize = 80;
 }
 
 /// What a tool looks like and how it touches. Fill it by palpate_tool_options_init first.
@@ -136,7 +136,7 @@ impl Default for ToolOptions {
 // SAFETY: numbers and pointers only; the size comes first.
 unsafe impl Sized for ToolOptions {
     const NAME: &str = "palpate_tool_options";
-    const FIRST_SIZE: usize = size_of::<Self>();
+    const FIRST_SIZE: usize = 96 + 4 * size_of::<usize>();
 }
 
 impl ToolOptions {
@@ -272,7 +272,7 @@ impl Default for DeviceOptions {
 // SAFETY: numbers only; the size comes first.
 unsafe impl Sized for DeviceOptions {
     const NAME: &str = "palpate_device_limits";
-    const FIRST_SIZE: usize = size_of::<Self>();
+    const FIRST_SIZE: usize = 80;
 }
 
 /// Limits of the safety stage, and how the loop's own thread runs. Read those of a scene by palpate_scene_get_options first.
@@ -308,7 +308,7 @@ impl Default for SceneOptions {
 // SAFETY: numbers only; the size comes first.
 unsafe impl Sized for SceneOptions {
     const NAME: &str = "palpate_scene_options";
-    const FIRST_SIZE: usize = size_of::<Self>();
+    const FIRST_SIZE: usize = 64;
 }
 
 impl SceneOptions {

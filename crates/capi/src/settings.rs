@@ -97,7 +97,8 @@ pub unsafe extern "C" fn palpate_loop_set_time_scale(force_loop: *mut Loop, scal
 }
 
 /// Strikes a body in motion: an impulse, N s, on the patch of `radius`, m, around the surface point closest to `point`, m, in the
-/// world; the force is half a wave of `duration`, s.
+/// world; the force is half a wave of `duration`, s. Strikes that come faster than ticks are given one a tick, in order; 64 may
+/// wait.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_strike(
     force_loop: *mut Loop,
@@ -107,27 +108,27 @@ pub unsafe extern "C" fn palpate_loop_strike(
     radius: f64,
     duration: f64,
 ) -> Status {
-    // SAFETY: the caller's pointers, to three numbers each.
-    unsafe {
-        change(force_loop, |side, settings| {
-            let (point, impulse) = (shared(point.cast(), "point")?, shared(impulse.cast(), "impulse")?);
-            let (point, impulse): (&[f64; 3], &[f64; 3]) = (point, impulse);
-            let rank = side.body(body)?;
-            let numbers = point.iter().chain(impulse).chain([&radius, &duration]);
-            if !numbers.copied().all(f64::is_finite) || radius < 0.0 || duration < 0.0 {
-                return Err(Refusal::argument(
-                    "a strike's numbers must be finite, its radius and duration not negative",
-                ));
-            }
-            if !side.prepared.model.bodies[rank].moves() {
-                return Err(Refusal::argument("the body does not move: a strike does nothing to it"));
-            }
-            settings.strike =
-                Strike { body: rank, point: (*point).into(), impulse: (*impulse).into(), radius, duration };
-            settings.strikes = settings.strikes.wrapping_add(1);
-            Ok(())
-        })
-    }
+    guarded(|| {
+        // SAFETY: the caller's pointers, to three numbers each.
+        let (own, point, impulse) = unsafe {
+            (
+                shared(force_loop, "loop")?,
+                shared(point.cast::<[f64; 3]>(), "point")?,
+                shared(impulse.cast::<[f64; 3]>(), "impulse")?,
+            )
+        };
+        let mut side = own.frame();
+        let rank = side.body(body)?;
+        let numbers = point.iter().chain(impulse).chain([&radius, &duration]);
+        if !numbers.copied().all(f64::is_finite) || radius < 0.0 || duration < 0.0 {
+            return Err(Refusal::argument("a strike's numbers must be finite, its radius and duration not negative"));
+        }
+        if !side.prepared.model.bodies[rank].moves() {
+            return Err(Refusal::argument("the body does not move: a strike does nothing to it"));
+        }
+        side.strike(Strike { body: rank, point: (*point).into(), impulse: (*impulse).into(), radius, duration })?;
+        Ok(Status::PalpateOk)
+    })
 }
 
 /// Lets go of everything, brings bodies in motion to rest and clears a fault; forces ramp in anew.

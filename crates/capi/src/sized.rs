@@ -16,11 +16,12 @@ use crate::status::{Outcome, Refusal};
 pub unsafe trait Sized: Copy + Default {
     /// Its name in C.
     const NAME: &str;
-    /// Its size when it came into the interface: no program has a shorter one.
+    /// Its size when it came into the interface, as a number that never changes: no program has a shorter one.
     const FIRST_SIZE: usize;
 }
 
 fn check<T: Sized>(size: usize) -> Outcome<usize> {
+    const { assert!(T::FIRST_SIZE <= size_of::<T>(), "a struct may grow, not shrink") };
     let own = size_of::<T>();
     match size {
         _ if (T::FIRST_SIZE..=own).contains(&size) => Ok(size),
@@ -76,4 +77,70 @@ pub unsafe fn write_as<T: Sized>(value: &T, to: *mut T, size: usize) -> Outcome<
     // SAFETY: the first member of the caller's struct; `size` fits, for it is at most that of `T`.
     unsafe { to.cast::<u32>().write(size as u32) };
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::status::Status;
+
+    /// A struct of two numbers that has grown by a third one.
+    #[repr(C)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Grown {
+        struct_size: u32,
+        first: u32,
+        second: f64,
+        added: f64,
+    }
+
+    impl Default for Grown {
+        fn default() -> Self {
+            Self { struct_size: size_of::<Self>() as u32, first: 1, second: 2.0, added: 3.0 }
+        }
+    }
+
+    // SAFETY: numbers only; the size comes first.
+    unsafe impl Sized for Grown {
+        const NAME: &str = "grown";
+        const FIRST_SIZE: usize = 16;
+    }
+
+    /// What an older program has, and memory behind it that is not the struct's.
+    #[repr(C)]
+    struct Older {
+        struct_size: u32,
+        first: u32,
+        second: f64,
+        behind: f64,
+    }
+
+    #[test]
+    fn an_older_struct_is_read_and_filled_as_far_as_it_reaches() {
+        let mut older = Older { struct_size: 16, first: 7, second: 8.0, behind: 9.0 };
+        // SAFETY: 16 bytes are there.
+        let read = unsafe { read((&raw const older).cast::<Grown>()) }.expect("an older struct");
+        assert_eq!(read, Grown { struct_size: 16, first: 7, second: 8.0, added: 3.0 });
+        let answer = Grown { first: 4, second: 5.0, added: 6.0, ..Grown::default() };
+        // SAFETY: 16 bytes are there.
+        unsafe { write(&answer, (&raw mut older).cast::<Grown>()) }.expect("an older struct");
+        assert_eq!((older.struct_size, older.first, older.second, older.behind), (16, 4, 5.0, 9.0));
+        // SAFETY: 16 bytes are there.
+        unsafe { write_as(&Grown::default(), (&raw mut older).cast::<Grown>(), 16) }.expect("an older struct");
+        assert_eq!((older.struct_size, older.first, older.second, older.behind), (16, 1, 2.0, 9.0));
+    }
+
+    #[test]
+    fn a_newer_struct_and_none_at_all_are_refused() {
+        for (size, words) in [(32, "newer palpate.h"), (15, "set it to sizeof(grown)"), (0, "sizeof(grown)")] {
+            let mut stated = Grown { struct_size: size, ..Grown::default() };
+            // SAFETY: refused by its size alone.
+            let refusals = unsafe { [read(&raw const stated).err(), write(&Grown::default(), &raw mut stated).err()] };
+            for refusal in refusals {
+                let refusal = refusal.expect("refused");
+                assert_eq!(refusal.status, Status::PalpateErrorArgument);
+                assert!(refusal.message.contains(words), "{}", refusal.message);
+            }
+        }
+    }
 }

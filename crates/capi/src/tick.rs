@@ -5,7 +5,7 @@
 use palpate_devices::{Buttons, Reading, Twist, Wrench};
 
 use crate::arguments::{array, array_mut, require_count, shared};
-use crate::force_loop::{Loop, pose};
+use crate::force_loop::{Loop, pose, running};
 use crate::status::{Outcome, Refusal, Status, guarded};
 
 /// Of palpate_reading.buttons: the tool holds on to what it touches.
@@ -48,8 +48,7 @@ pub unsafe extern "C" fn palpate_loop_check_period(force_loop: *const Loop, peri
     guarded(|| {
         require_period(period)?;
         // SAFETY: the caller's pointer.
-        let side = unsafe { shared(force_loop, "loop") }?.try_tick()?;
-        side.force_loop.as_ref().ok_or_else(running)?.check_period(period)?;
+        unsafe { shared(force_loop, "loop") }?.frame().check_period(period)?;
         Ok(Status::PalpateOk)
     })
 }
@@ -102,10 +101,6 @@ fn reading(said: &DeviceReading, now_ns: u64) -> Reading {
         active: said.active != 0,
         timestamp_ns: if said.timestamp_ns == 0 { now_ns } else { said.timestamp_ns },
     }
-}
-
-fn running() -> Refusal {
-    Refusal::state("the loop's own thread ticks it: call palpate_loop_stop first")
 }
 
 fn require_period(period: f64) -> Outcome<()> {

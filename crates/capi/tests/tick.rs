@@ -28,7 +28,7 @@ use palpate::settings::palpate_loop_reset;
 use palpate::statics::palpate_store_touch;
 use palpate::status::Status;
 use palpate::store::{Store, palpate_store_free};
-use palpate::tick::{DeviceReading, DeviceWrench, palpate_loop_tick};
+use palpate::tick::{DeviceReading, DeviceWrench, palpate_loop_check_period, palpate_loop_tick};
 
 const TICKS: usize = 900;
 
@@ -274,5 +274,34 @@ fn limits_of_a_scene_are_for_loops_that_are_made_later() {
         let (kept, new) = (strongest(own), strongest(later));
         assert!(kept > 0.1 && new <= 0.05 * (1.0 + 1e-12) && new > 0.04, "{kept} N and {new} N");
         palpate_loop_free(later);
+    }
+}
+
+/// What other threads ask for keeps no tick from being made.
+#[test]
+fn a_period_is_checked_while_another_thread_ticks() {
+    let fixture = Fixture::new("period");
+    let (own, over) = (fixture.own as usize, std::sync::atomic::AtomicBool::new(false));
+    let ended = std::sync::atomic::Ordering::Relaxed;
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut checks = 0;
+            while !over.load(ended) {
+                // SAFETY: a living loop.
+                done(unsafe { palpate_loop_check_period(own as *const Loop, PERIOD) });
+                checks += 1;
+            }
+            assert!(checks > 100, "{checks}");
+        });
+        for count in 0..20_000 {
+            assert_eq!(tick(fixture.own, count, &at(0.004)).0, Status::PalpateOk, "tick {count}");
+        }
+        over.store(true, ended);
+    });
+    // SAFETY: a living loop, whose own thread ticks it from now on.
+    unsafe {
+        done(palpate_loop_start(fixture.own));
+        refused(palpate_loop_check_period(fixture.own, PERIOD), Status::PalpateErrorState, "palpate_loop_stop first");
+        done(palpate_loop_stop(fixture.own));
     }
 }

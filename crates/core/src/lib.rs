@@ -20,6 +20,7 @@ mod error;
 pub mod fem;
 mod files;
 pub mod green;
+pub mod memory;
 pub mod mesh;
 pub mod simulation;
 #[cfg(feature = "offline")]

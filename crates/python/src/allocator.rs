@@ -1,7 +1,10 @@
-//! The allocator of the C library during a precomputation.
+//! The allocator of the C library during a precomputation, and the scratch of products of matrices.
 #![allow(unsafe_code)] // libc
 
 use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use palpate_core::{Error, Result};
 
 /// Smallest block that is taken from the system and given back to it by itself, bytes.
 #[cfg(target_env = "gnu")]
@@ -27,6 +30,47 @@ pub fn return_large_blocks() {
             libc::mallopt(libc::M_TRIM_THRESHOLD, KEPT);
         }
     });
+}
+
+/// Refuses work that multiplies matrices where the system does not give the scratch of that.
+///
+/// The library that multiplies them takes twice the third level cache for each thread at its first product, whatever the
+/// matrices, and ends the process where it does not get it. Most of it is never written: it takes addresses, not memory.
+///
+/// # Errors
+/// [`Error::Memory`], with how much it is.
+pub fn require_scratch_of_products() -> Result<()> {
+    static GIVEN: AtomicBool = AtomicBool::new(false);
+    // The threads of the pool, and the one that calls.
+    let (threads, each) = (rayon::current_num_threads() + 1, 2 * third_level_cache());
+    if GIVEN.load(Ordering::Relaxed) {
+        return Ok(());
+    }
+    let mut probes = vec![Vec::<u8>::new(); threads];
+    let refused = probes.iter_mut().any(|probe| probe.try_reserve_exact(each).is_err());
+    drop(probes);
+    if !refused {
+        GIVEN.store(true, Ordering::Relaxed);
+        return Ok(());
+    }
+    let (all, each) = (threads as f64 * each as f64 / 1e9, each as f64 / 1e9);
+    Err(Error::Memory(format!(
+        "products of matrices reserve {all:.1} GB of addresses on this machine, {each:.1} GB a thread: raise the limit of \
+         this process ('ulimit -v'), or let RAYON_NUM_THREADS ask for fewer threads"
+    )))
+}
+
+/// Bytes of the third level cache, as far as the system tells.
+fn third_level_cache() -> usize {
+    let text = std::fs::read_to_string("/sys/devices/system/cpu/cpu0/cache/index3/size").unwrap_or_default();
+    let (number, unit) = text.trim().split_at(text.trim().find(char::is_alphabetic).unwrap_or(text.trim().len()));
+    let unit = match unit {
+        "G" => 1 << 30,
+        "M" => 1 << 20,
+        "K" => 1 << 10,
+        _ => 1,
+    };
+    number.parse::<usize>().unwrap_or(0) * unit
 }
 
 /// Gives back what was freed of small blocks: most of it lies between others, and would be held beside what comes next.

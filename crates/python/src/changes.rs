@@ -15,7 +15,7 @@ use crate::connection::{
 };
 use crate::errors::to_python;
 use crate::scene::{BodyArguments, ToolArguments, scene_body, tool};
-use crate::simulation::SimulationCore;
+use crate::simulation::{Parts, SimulationCore};
 
 /// Bodies and tools of a changed scene, in order: those that stay by their rank before, with `None` for each that is new.
 type Ranks = Vec<Option<usize>>;
@@ -26,80 +26,94 @@ type Places = Vec<([f64; 3], [f64; 4])>;
 #[pyfunction]
 pub fn connect(
     py: Python<'_>,
-    core: &mut SimulationCore,
+    core: &SimulationCore,
     tool: usize,
     device: &mut OpenedDevice,
     workspace: WorkspaceArguments,
     limits: LimitsArguments,
 ) -> PyResult<()> {
+    let _alone = core.changing(py);
     let connected = Connected::new(py, device, workspace, limits)?;
-    let held = core.held_by(tool, &connected.limits);
-    if core.servo().is_none() {
-        core.device_limits[tool] = connected.limits;
-        core.connected[tool] = Some(connected);
-        core.model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
-        return Ok(());
-    }
-    if connected.scheduler.is_some() {
+    let limits = connected.limits;
+    let (changed, runs) = {
+        let parts = core.parts(py);
+        (parts.with_stiffness(parts.held_by(tool, &limits)), parts.servo.is_some())
+    };
+    if runs && connected.scheduler.is_some() {
         let message = "the device's driver calls the loop itself: stop the loop, and start it with the device";
         return Err(to_python(py, Error::Invalid(message.into())));
     }
-    let model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
+    let model = py.detach(|| changed.model()).map_err(|e| to_python(py, e))?;
+    if !runs {
+        let mut parts = core.parts(py);
+        parts.device_limits[tool] = limits;
+        parts.connected[tool] = Some(connected);
+        parts.model = model;
+        return Ok(());
+    }
     let kept = kept_of(&ranks(model.bodies.len()), &ranks(model.tools.len()));
     let mut devices: Vec<_> = model.tools.iter().map(|_| None).collect();
-    let limits = connected.limits;
-    devices[tool] = Some(core.device_of(tool, Some(connected)));
-    core.exchange(py, model, kept, devices, core.settings)?;
-    core.device_limits[tool] = limits;
+    let mut parts = core.parts(py);
+    devices[tool] = Some(parts.device_of(tool, Some(connected)));
+    parts.exchange(py, model, kept, devices, &Settings::default())?;
+    parts.device_limits[tool] = limits;
     Ok(())
 }
 
 /// Lets go of devices that no loop has taken.
 #[pyfunction]
-pub fn disconnect(core: &mut SimulationCore) {
-    core.connected.iter_mut().for_each(|device| *device = None);
+pub fn disconnect(py: Python<'_>, core: &SimulationCore) {
+    core.parts(py).connected.iter_mut().for_each(|device| *device = None);
 }
 
 /// What the device of each tool can render, in the scene.
 #[pyfunction]
-pub fn device_limits(core: &SimulationCore) -> Vec<LimitsArguments> {
-    core.device_limits.iter().map(limits_tuple).collect()
+pub fn device_limits(py: Python<'_>, core: &SimulationCore) -> Vec<LimitsArguments> {
+    core.parts(py).device_limits.iter().map(limits_tuple).collect()
 }
 
 /// Largest stiffness (N/m) that the scene asks for with each tool, and the one that its device leaves of it.
 #[pyfunction]
-pub fn tool_stiffness(core: &SimulationCore) -> Vec<(f64, f64)> {
-    let asked = core.asked.iter().map(|tool| tool.max_stiffness);
-    asked.zip(core.model.tools.iter().map(|tool| tool.max_stiffness)).collect()
+pub fn tool_stiffness(py: Python<'_>, core: &SimulationCore) -> Vec<(f64, f64)> {
+    let parts = core.parts(py);
+    let asked = parts.asked.iter().map(|tool| tool.max_stiffness);
+    asked.zip(parts.model.tools.iter().map(|tool| tool.max_stiffness)).collect()
 }
 
 /// Takes the devices of all tools to be such, before the loop starts: those of a recording, or of a scene.
 #[pyfunction]
-pub fn assume_devices(py: Python<'_>, core: &mut SimulationCore, limits: Vec<LimitsArguments>) -> PyResult<()> {
-    for (tool, limits) in limits.into_iter().enumerate().take(core.asked.len()) {
-        core.device_limits[tool] = limits_of(limits);
-    }
-    let held = core.asked.iter().zip(&core.device_limits).map(|(tool, device)| core.held(tool, device)).collect();
-    core.model = py.detach(|| core.model_with(held)).map_err(|e| to_python(py, e))?;
+pub fn assume_devices(py: Python<'_>, core: &SimulationCore, limits: Vec<LimitsArguments>) -> PyResult<()> {
+    let _alone = core.changing(py);
+    let changed = {
+        let mut parts = core.parts(py);
+        for (tool, limits) in limits.into_iter().enumerate().take(parts.asked.len()) {
+            parts.device_limits[tool] = limits_of(limits);
+        }
+        let tools = parts.asked.iter().zip(&parts.device_limits);
+        parts.with_stiffness(tools.map(|(tool, device)| parts.held(tool, device)).collect())
+    };
+    let model = py.detach(|| changed.model()).map_err(|e| to_python(py, e))?;
+    core.parts(py).model = model;
     Ok(())
 }
 
 /// Takes other bodies and tools: those that stay by their ranks, others in order; all bodies with their places. Devices of
-/// new tools are simulated. The loop goes on if it runs. A body that stays may come with another store of the same surface,
+/// new tools are simulated. The loop goes on if it runs. Gives the number of the scene that it is now. A body that stays may come with another store of the same surface,
 /// in `exchanged` by its rank.
 #[pyfunction]
 #[pyo3(signature = (core, bodies, tools, exchanged=None))]
 pub fn change(
     py: Python<'_>,
-    core: &mut SimulationCore,
+    core: &SimulationCore,
     bodies: (Ranks, Vec<BodyArguments<'_>>, Places),
     tools: (Ranks, Vec<ToolArguments>),
     exchanged: Option<(usize, BodyArguments<'_>)>,
-) -> PyResult<()> {
+) -> PyResult<u64> {
+    let _alone = core.changing(py);
     let ((body_ranks, new_bodies, places), (tool_ranks, new_tools)) = (bodies, tools);
     let parts = new_bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
     let exchanged = exchanged.map(|(rank, body)| PyResult::Ok((rank, scene_body(&body)?))).transpose()?;
-    let before = core.model.clone();
+    let before = core.parts(py).model.clone();
     let make = || -> Result<_> {
         let mut built = parts.into_iter().map(|part| part.model());
         let mut made = new_tools.into_iter().map(tool);
@@ -134,21 +148,23 @@ pub fn change(
     for (rank, (_, own)) in tools.iter().enumerate() {
         (fresh.contact_radius[rank], fresh.friction[rank]) = own.unwrap_or_default();
     }
-    let settings = core.settings.carried_over(&fresh, &kept);
+    let settings = core.parts(py).settings.carried_over(&fresh, &kept);
     let radii = settings.contact_radius[..model.tools.len()].to_vec();
     let checked = py.detach(|| radii.iter().try_for_each(|&radius| model.check_contact_radius(radius)));
     checked.map_err(|e| to_python(py, e))?;
+    let mut parts = core.parts(py);
     let devices = tool_ranks.iter().map(|rank| match rank {
         Some(_) => None,
-        None => Some(core.device_of(usize::MAX, None)),
+        None => Some(parts.device_of(usize::MAX, None)),
     });
     let devices: Vec<_> = devices.collect();
-    core.exchange(py, model.clone(), kept, devices, settings)?;
-    let moved = |rank: &Option<usize>| rank.map_or(DeviceLimits::UNLIMITED, |rank| core.device_limits[rank]);
-    core.device_limits = tool_ranks.iter().map(moved).collect();
+    parts.exchange(py, model.clone(), kept, devices, &fresh)?;
+    let moved = |rank: &Option<usize>| rank.map_or(DeviceLimits::UNLIMITED, |rank| parts.device_limits[rank]);
+    parts.device_limits = tool_ranks.iter().map(moved).collect();
     let asked = tool_ranks.iter().zip(&model.tools);
-    core.asked = asked.map(|(rank, new)| rank.map_or_else(|| new.clone(), |rank| core.asked[rank].clone())).collect();
-    Ok(())
+    parts.asked = asked.map(|(rank, new)| rank.map_or_else(|| new.clone(), |rank| parts.asked[rank].clone())).collect();
+    parts.scene += 1;
+    Ok(parts.scene)
 }
 
 /// Refuses a store of another surface.
@@ -177,7 +193,22 @@ fn kept_of(bodies: &[Option<usize>], tools: &[Option<usize>]) -> Kept {
     kept
 }
 
-impl SimulationCore {
+/// A model with tools that ask for no more than so much.
+struct WithStiffness {
+    model: Arc<Model>,
+    /// None where all tools stay as they are.
+    tools: Option<Vec<ToolModel>>,
+}
+
+impl WithStiffness {
+    /// Prepares it, which takes a while.
+    fn model(self) -> Result<Arc<Model>> {
+        let Some(tools) = self.tools else { return Ok(self.model) };
+        Ok(Arc::new(self.model.changed(self.model.bodies.clone(), tools)?))
+    }
+}
+
+impl Parts {
     /// The device of a tool: the one that is connected, or a simulated one at its target, with the limits that the scene gives it.
     pub(crate) fn device_of(&self, tool: usize, connected: Option<Connected>) -> LoopDevice {
         if let Some(Connected { device, scheduler, .. }) = connected {
@@ -204,32 +235,32 @@ impl SimulationCore {
         self.asked.iter().enumerate().map(of_tool).collect()
     }
 
-    /// The model with tools that ask for no more than so much.
-    fn model_with(&self, held: Vec<f64>) -> Result<Arc<Model>> {
+    /// What the model becomes with tools that ask for no more than so much.
+    fn with_stiffness(&self, held: Vec<f64>) -> WithStiffness {
         let same = self.model.tools.iter().zip(&held).all(|(tool, &held)| tool.max_stiffness == held);
-        if same {
-            return Ok(self.model.clone());
-        }
-        let tools =
-            self.asked.iter().zip(held).map(|(tool, max_stiffness)| ToolModel { max_stiffness, ..tool.clone() });
-        Ok(Arc::new(self.model.changed(self.model.bodies.clone(), tools.collect())?))
+        let tools = self.asked.iter().zip(held);
+        let tools = tools.map(|(tool, max_stiffness)| ToolModel { max_stiffness, ..tool.clone() });
+        WithStiffness { model: self.model.clone(), tools: (!same).then(|| tools.collect()) }
     }
 
-    /// Takes a model some of whose bodies and tools were there before, in the loop too if it runs, with devices where they are new.
+    /// Takes a model some of whose bodies and tools were there before, in the loop too if it runs, with devices where they are
+    /// new, and settings of what is new.
     fn exchange(
         &mut self,
         py: Python<'_>,
         model: Arc<Model>,
         kept: Kept,
         devices: Vec<Option<LoopDevice>>,
-        settings: Settings,
+        fresh: &Settings,
     ) -> PyResult<()> {
+        // As they are now: others may have changed them while the model was prepared.
+        let settings = self.settings.carried_over(fresh, &kept);
         let tools = &kept.tools[..model.tools.len()];
         let strain = self.strain.changed(&model, &kept);
         let (handles, devices): (Vec<_>, Vec<_>) =
             devices.into_iter().map(|new| new.map_or((None, None), |new| (Some(new.handle), Some(new.device)))).unzip();
         let change = SceneChange { model: model.clone(), kept, devices, settings, strain: strain.clone() };
-        if let Some(servo) = self.servo() {
+        if let Some(servo) = &mut self.servo {
             py.detach(|| servo.change(change)).map_err(|e| to_python(py, e))?;
             let mut before: Vec<_> = std::mem::take(&mut self.handles).into_iter().map(Some).collect();
             let of_tool = |(new, rank): (Option<Option<Handle>>, &Option<usize>)| {

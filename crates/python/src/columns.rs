@@ -12,6 +12,8 @@ use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
+use crate::allocator::require_scratch_of_products;
+use crate::claim::{StoreClaim, claimed};
 use crate::errors::to_python;
 use crate::green::{named, problem};
 use crate::watched::run_watched;
@@ -87,6 +89,7 @@ impl ColumnJob {
         let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
+        require_scratch_of_products().map_err(|e| to_python(py, e))?;
         let factored = || Columns::new(&problem, wanted, memory, false, &|_| {}, &|| Ok(()));
         let columns = py.detach(|| pool.install(factored)).map_err(|e| to_python(py, e))?;
         let working = Mutex::new(Memories { free: Vec::new(), allowed: columns.tasks });
@@ -158,7 +161,8 @@ impl ColumnStore {
 impl ColumnStore {
     /// Begins the store at `path`, or goes on with it; `precision_name` as asked for, `measured` by a [`ColumnJob`].
     #[new]
-    #[pyo3(signature = (layout, precision_name, within, measured, path, description))]
+    #[pyo3(signature = (layout, precision_name, within, measured, path, description, claim=None))]
+    #[allow(clippy::too_many_arguments)] // one call of one caller
     fn new(
         py: Python<'_>,
         layout: &ColumnLayout,
@@ -167,6 +171,7 @@ impl ColumnStore {
         measured: GivenMeasured<'_>,
         path: PathBuf,
         description: &str,
+        claim: Option<&StoreClaim>,
     ) -> PyResult<Self> {
         let (name, width, accuracy, response) = measured;
         let unusable = || to_python(py, Error::Invalid(format!("unusable blocks of {width} columns in '{name}'")));
@@ -174,8 +179,9 @@ impl ColumnStore {
         let accuracy = Accuracy::from_slice(&accuracy).ok_or_else(unusable)?;
         let measurement = Measurement { precision, accuracy, response: response.as_array().to_vec(), width };
         let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
-        let target = Target { path: &path, precision: wanted, memory: None, description, phase: &|_| {} };
-        let open = || Store::open(&layout.problem, Arc::clone(&layout.parts), &measurement, &target);
+        let claim = claimed(py, claim, path)?;
+        let target = Target { precision: wanted, memory: None, description, phase: &|_| {} };
+        let open = || Store::open(claim, &layout.problem, Arc::clone(&layout.parts), &measurement, &target);
         let store = py.detach(open).map_err(|e| to_python(py, e))?;
         Ok(Self { store: Mutex::new(store) })
     }

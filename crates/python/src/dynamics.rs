@@ -13,6 +13,7 @@ use palpate_core::solver::Factor;
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
 
+use crate::allocator::require_scratch_of_products;
 use crate::errors::to_python;
 
 /// Steps between two looks at Ctrl-C.
@@ -116,6 +117,7 @@ impl SparseFactor {
     #[new]
     fn new(py: Python<'_>, arguments: CscArguments<'_>, fixed: Vec<u32>) -> PyResult<Self> {
         let matrix = matrix(&arguments);
+        require_scratch_of_products().map_err(|e| to_python(py, e))?;
         let make = || Factor::new(&matrix, &partition(matrix.dimension, fixed)?, Par::rayon(0));
         Ok(Self { factor: py.detach(make).map_err(|e| to_python(py, e))? })
     }

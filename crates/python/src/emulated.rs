@@ -39,7 +39,7 @@ pub fn known_devices() -> Vec<(&'static str, [f64; 3], MechanicsArguments)> {
 #[pyfunction]
 pub fn emulate<'py>(
     py: Python<'py>,
-    core: PyRef<'py, SimulationCore>,
+    core: &SimulationCore,
     devices: Vec<DeviceArguments>,
     limits: Option<[f64; 4]>,
     period: f64,
@@ -48,8 +48,10 @@ pub fn emulate<'py>(
     let (ticks, reach) = until;
     let starts: Vec<DVec3> = devices.iter().map(|(_, _, [start, _], _, _)| DVec3::from(*start)).collect();
     let devices = devices.into_iter().map(device).collect();
-    let limits = limits.map_or(core.limits, stage);
-    let (model, settings, strain) = (core.model.clone(), core.settings, core.strain.clone());
+    let parts = core.parts(py);
+    let limits = limits.map_or(parts.limits, stage);
+    let (model, settings, strain) = (parts.model.clone(), parts.settings, parts.strain.clone());
+    drop(parts);
     let mut columns: [Vec<f64>; 4] = Default::default();
     let mut fault = None;
     let emulation = Emulation { model: &model, limits, settings, strain: &strain, period };

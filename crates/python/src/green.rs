@@ -8,14 +8,17 @@ use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::fem::Supports;
 use palpate_core::green::{
-    Found, GreensFunction, Growth, Phase, Plan, Precision, Problem, Target, Wanted, plan, precompute, precompute_to,
+    Found, GreensFunction, Growth, Phase, Plan, Precision, Problem, Progress, Target, Wanted, plan, precompute,
+    precompute_to,
 };
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, capacitance, contact};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
+use crate::allocator::require_scratch_of_products;
 use crate::body::{self, indices, materials, vectors};
+use crate::claim::{StoreClaim, claimed};
 use crate::errors::to_python;
 use crate::watched::{run_watched, run_watched_and};
 
@@ -57,8 +60,15 @@ pub(crate) fn problem(arguments: &Bound<'_, PyTuple>) -> PyResult<Problem> {
 }
 
 fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
+    require_scratch_of_products()?;
     let stiffness = palpate_core::fem::stiffness(&problem.mesh, &problem.materials);
     palpate_core::green::Interior::new(&stiffness, &problem.supports, &problem.surface_nodes, &problem.loads)
+}
+
+/// Removes what is kept beside a store of contacts with it.
+#[pyfunction]
+pub(crate) fn forget_contacts(store: PathBuf) {
+    contact::forget_kept(&store);
 }
 
 /// The format of a name, if one is named.
@@ -119,7 +129,11 @@ impl GreenCore {
         let precision = precision(py, precision_name)?;
         let total = 3 * problem.touch.len();
         crate::allocator::return_large_blocks();
-        let mut green = run_watched(py, total, progress.as_ref(), |note| precompute(&problem, precision, note))?;
+        let compute = |note: Progress<'_>| {
+            require_scratch_of_products()?;
+            precompute(&problem, precision, note)
+        };
+        let mut green = run_watched(py, total, progress.as_ref(), compute)?;
         green.description = description;
         Ok(Self { green: Arc::new(green) })
     }
@@ -132,7 +146,7 @@ impl GreenCore {
     /// to come next or `None`, and one that is told of each store on the way by its number of touchable nodes.
     /// `phase` is told the name of each phase as it begins.
     #[staticmethod]
-    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None, growth=None, phase=None))]
+    #[pyo3(signature = (arguments, precision_name, within, description, progress, path, memory=None, growth=None, phase=None, claim=None))]
     #[allow(clippy::too_many_arguments)] // one call of one caller
     fn precompute_to(
         py: Python<'_>,
@@ -145,6 +159,7 @@ impl GreenCore {
         memory: Option<usize>,
         growth: Option<(PyReadonlyArray1<'_, u32>, Py<PyAny>, Py<PyAny>)>,
         phase: Option<Py<PyAny>>,
+        claim: Option<&StoreClaim>,
     ) -> PyResult<(usize, bool)> {
         let problem = problem(arguments)?;
         let precision = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
@@ -156,7 +171,8 @@ impl GreenCore {
                 drop(Python::attach(|py| phase.call1(py, (begun.name(),))));
             }
         };
-        let target = Target { path: &path, precision, memory, description, phase: &phase };
+        let claim = claimed(py, claim, path)?;
+        let target = Target { precision, memory, description, phase: &phase };
         let (first, next, ready) = match growth {
             Some((first, next, ready)) => (indices(&first), Some(next), Some(ready)),
             None => (Vec::new(), None, None),
@@ -175,11 +191,12 @@ impl GreenCore {
         };
         crate::allocator::return_large_blocks();
         let found = run_watched_and(py, total, progress.as_ref(), &mut meanwhile, |note| {
+            require_scratch_of_products()?;
             let next = || Some(std::mem::take(&mut *lock())).filter(|nodes| !nodes.is_empty());
             let ready = |nodes| written.store(nodes, Ordering::Relaxed);
             let growth = Growth { first: &first, next: &next, ready: &ready };
             let mut found = Found::default();
-            precompute_to(&problem, &target, &growth, &mut |f| found = f, note)?;
+            precompute_to(claim, &problem, &target, &growth, &mut |f| found = f, note)?;
             Ok(found)
         })?;
         Ok((found.resumed, found.discarded))
@@ -222,7 +239,8 @@ impl GreenCore {
         known: Vec<(usize, f64)>,
         switched: Vec<(usize, f64)>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
-        let answer = py.detach(|| capacitance::solve(&self.green, &known, &switched)).map_err(|e| to_python(py, e))?;
+        let solve = || require_scratch_of_products().and_then(|()| capacitance::solve(&self.green, &known, &switched));
+        let answer = py.detach(solve).map_err(|e| to_python(py, e))?;
         let (u, f) = (answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py));
         Ok((u, f, answer.reactions.into_pyarray(py), answer.error))
     }
@@ -364,8 +382,9 @@ impl GreenCore {
 
 /// Multiplies matrices so many times on every thread, in single precision or in double; the operations that took.
 #[pyfunction]
-pub(crate) fn products(py: Python<'_>, single: bool, count: usize) -> f64 {
-    py.detach(|| palpate_core::green::products(single, count))
+pub(crate) fn products(py: Python<'_>, single: bool, count: usize) -> PyResult<f64> {
+    require_scratch_of_products().map_err(|e| to_python(py, e))?;
+    Ok(py.detach(|| palpate_core::green::products(single, count)))
 }
 
 fn plan_dict<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {

@@ -47,10 +47,9 @@ impl Recording {
         (self.recorder.path().into(), status.ticks, status.bytes, dropped, status.error)
     }
 
-    /// Ends it.
-    pub fn end(self, servo: &mut palpate_servo::Servo) -> RecordingStatus {
+    /// Ends it, after so many ticks.
+    pub fn end(self, made: u64) -> RecordingStatus {
         let path = self.recorder.path().to_owned();
-        let made = servo.end_recording();
         let status = self.recorder.finish(made);
         (path, status.ticks, status.bytes, made.saturating_sub(status.ticks), status.error)
     }

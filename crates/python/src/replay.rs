@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 
 use numpy::{IntoPyArray, PyArray1};
-use palpate_core::simulation::{MAX_BODIES, Mode};
+use palpate_core::simulation::{MAX_BODIES, Mode, Strike};
 use palpate_core::{Error, Result};
 use palpate_recording::{Ticks, same_settings};
 use palpate_servo::{Owner, Settings, TickRecord};
@@ -59,8 +59,8 @@ struct Columns {
     limited: Vec<bool>,
     faults: Vec<Option<String>>,
     events: Vec<(u64, String)>,
-    /// Settings, and the ticks from which they hold.
-    settings: Vec<(u64, Settings)>,
+    /// Settings and the latest strike, and the ticks from which they hold.
+    settings: Vec<(u64, Settings, Strike)>,
     delay_us: Vec<f64>,
     compute_us: Vec<f64>,
     /// Tick, tool, body, mode (2 holds on), whether it slips and is limited.
@@ -113,8 +113,10 @@ impl Columns {
         }
         self.tell(record, tools);
         let (tick, settings) = (record.tick, &record.input.settings);
-        if self.settings.last().is_none_or(|(_, before)| !same_settings(before, settings)) {
-            self.settings.push((tick, *settings));
+        let (before, last) = self.settings.last().map_or((None, Strike::default()), |(_, s, k)| (Some(s), *k));
+        let strike = record.input.strike.unwrap_or(last);
+        if before.is_none_or(|before| !same_settings(before, settings)) || strike != last {
+            self.settings.push((tick, *settings, strike));
         }
         for c in record.output.contacts.iter() {
             let grab = if c.mode == Mode::Grab { 2 } else { 1 };
@@ -141,12 +143,8 @@ impl Columns {
         if input.reset {
             tell("reset".into());
         }
-        if input.strike {
-            tell(format!(
-                "strike of {} N s on body {}",
-                input.settings.strike.impulse.length(),
-                input.settings.strike.body
-            ));
+        if let Some(strike) = input.strike {
+            tell(format!("strike of {} N s on body {}", strike.impulse.length(), strike.body));
         }
         for (rank, fault) in now.iter().enumerate() {
             if let Some(fault) = fault.as_ref().filter(|_| self.faults.get(rank) != Some(fault)) {
@@ -191,7 +189,7 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
     answer.set_item("delay_us", columns.delay_us.into_pyarray(py))?;
     answer.set_item("compute_us", columns.compute_us.into_pyarray(py))?;
     answer.set_item("events", columns.events)?;
-    let settings = columns.settings.iter().map(|(tick, settings)| settings_dict(py, *tick, settings, tools));
+    let settings = columns.settings.iter().map(|settings| settings_dict(py, settings, tools));
     answer.set_item("settings", settings.collect::<PyResult<Vec<_>>>()?)?;
     answer.set_item("contact_state", columns.contact_state.into_pyarray(py))?;
     answer.set_item("contact_numbers", columns.contact_numbers.into_pyarray(py))?;
@@ -200,7 +198,11 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
 }
 
 /// Settings from a tick on, with a stiffness scale for each body there could be.
-fn settings_dict<'py>(py: Python<'py>, tick: u64, settings: &Settings, tools: usize) -> PyResult<Bound<'py, PyDict>> {
+fn settings_dict<'py>(
+    py: Python<'py>,
+    (tick, settings, strike): &(u64, Settings, Strike),
+    tools: usize,
+) -> PyResult<Bound<'py, PyDict>> {
     let tools = tools.min(settings.friction.len());
     let said = PyDict::new(py);
     said.set_item("tick", tick)?;
@@ -209,7 +211,6 @@ fn settings_dict<'py>(py: Python<'py>, tick: u64, settings: &Settings, tools: us
     said.set_item("stiffness_scale", settings.stiffness_scale.to_vec())?;
     said.set_item("strain_limit", settings.strain_limit)?;
     said.set_item("time_scale", settings.time_scale)?;
-    let strike = &settings.strike;
     said.set_item("strike_body", strike.body)?;
     said.set_item("strike_point", strike.point.to_array())?;
     said.set_item("strike_impulse", strike.impulse.to_array())?;
@@ -238,12 +239,13 @@ impl Replay {
     #[new]
     fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> PyResult<Self> {
         let ticks = open(source).map_err(|e| to_python(py, e))?;
-        let tools = core.model.tools.len();
-        let devices = &core.device_limits;
-        let (limits, settings, strain) = (core.limits, core.settings, core.strain.clone());
-        let replay = palpate_servo::Replay::new(&core.model, devices, limits, settings, strain);
+        let parts = core.parts(py);
+        let (model, devices, tools) = (parts.model.clone(), parts.device_limits.clone(), parts.model.tools.len());
+        let (limits, settings, strain) = (parts.limits, parts.settings, parts.strain.clone());
+        drop(parts);
+        let replay = palpate_servo::Replay::new(&model, &devices, limits, settings, strain);
         let replay = replay.map_err(|e| to_python(py, e))?;
-        Ok(Self { parts: Mutex::new((ticks, replay)), model: core.model.clone(), tools })
+        Ok(Self { parts: Mutex::new((ticks, replay)), model, tools })
     }
 
     /// Makes up to so many ticks again: how many there were, and what is not as recorded.

@@ -23,9 +23,11 @@ pub fn rerun<'py>(
     told: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let ticks = open(source).map_err(|e| to_python(py, e))?;
-    let settings = Settings { resets: 0, strikes: 0, watch: None, ..core.settings };
-    let (model, limits, strain) = (core.model.clone(), core.limits, core.strain.clone());
-    let rate = core.scheduling.rate;
+    let parts = core.parts(py);
+    let settings = Settings { resets: 0, watch: None, ..parts.settings };
+    let (model, limits, strain) = (parts.model.clone(), parts.limits, parts.strain.clone());
+    let (rate, devices) = (parts.scheduling.rate, parts.device_limits.clone());
+    drop(parts);
     let mut file = Recorded::new(header(about, &model, rate, false)).map_err(|e| to_python(py, e))?;
     let mut stopped = None;
     let inputs = ticks.enumerate().map_while(|(rank, record)| match record {
@@ -41,8 +43,7 @@ pub fn rerun<'py>(
     });
     let inputs: Inputs<'_> = Box::new(inputs);
     let each = |record: &TickRecord| file.push(record);
-    let devices = &core.device_limits;
-    let made = py.detach(|| palpate_servo::rerun(&model, devices, limits, settings, &strain, inputs, each));
+    let made = py.detach(|| palpate_servo::rerun(&model, &devices, limits, settings, &strain, inputs, each));
     if let Some(error) = stopped {
         return Err(error);
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -11,6 +11,7 @@ use palpate_devices::DeviceLimits;
 use palpate_devices::simulated::{Handle, Target};
 use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, StrainPreparer, TickRecord};
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::connection::{Connected, common_scheduler};
@@ -25,25 +26,34 @@ use crate::strain::StrainMeasure;
 /// Tick, body, point (m), impulse (N s), duration (s) and radius of the patch (m) of a strike.
 type StrikeArguments = (usize, usize, [f64; 3], [f64; 3], f64, f64);
 
-/// Model, limits and settings of a simulation, and its loop while it runs.
-#[pyclass(module = "palpate._native")]
+/// A simulation, and its loop while it runs. Any threads may call at the same time: they wait for each other, for moments.
+#[pyclass(frozen, module = "palpate._native")]
 pub struct SimulationCore {
-    pub(crate) model: Arc<Model>,
-    pub(crate) limits: SafetyLimits,
-    pub(crate) settings: Settings,
-    pub(crate) scheduling: Scheduling,
-    pub(crate) strain: StrainPreparer,
+    parts: Mutex<Parts>,
+    /// Held while bodies, tools and devices change, and while the loop starts or stops, which takes up to seconds; frames
+    /// and settings go on meanwhile. Taken before `parts`.
+    changing: Mutex<()>,
+}
+
+/// Model, limits and settings of a simulation.
+pub(crate) struct Parts {
+    pub model: Arc<Model>,
+    pub limits: SafetyLimits,
+    pub settings: Settings,
+    pub scheduling: Scheduling,
+    pub strain: StrainPreparer,
     /// What the device of each tool can render, in the scene.
-    pub(crate) device_limits: Vec<DeviceLimits>,
+    pub device_limits: Vec<DeviceLimits>,
     /// As the scene asks for them, whatever devices hold.
-    pub(crate) asked: Vec<ToolModel>,
+    pub asked: Vec<ToolModel>,
     /// Devices for the next start; a tool without one is moved by its target.
-    pub(crate) connected: Vec<Option<Connected>>,
+    pub connected: Vec<Option<Connected>>,
     /// Of tools that a target moves.
-    pub(crate) handles: Vec<Option<Handle>>,
-    pub(crate) targets: Vec<Target>,
-    /// Locked by callers from Python among themselves; the loop knows nothing of it.
-    servo: Mutex<Option<Servo>>,
+    pub handles: Vec<Option<Handle>>,
+    pub targets: Vec<Target>,
+    /// Raised whenever bodies or tools change: a frame states of which it is.
+    pub scene: u64,
+    pub servo: Option<Servo>,
     recording: Option<Recording>,
 }
 
@@ -72,7 +82,7 @@ impl SimulationCore {
             Ok((Arc::new(model), settings))
         };
         let (model, settings) = py.detach(prepare).map_err(|e| to_python(py, e))?;
-        Ok(Self {
+        let parts = Parts {
             limits: SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..SafetyLimits::default() },
             settings,
             scheduling: Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 },
@@ -82,42 +92,52 @@ impl SimulationCore {
             connected: model.tools.iter().map(|_| None).collect(),
             handles: Vec::new(),
             targets: vec![Target::default(); model.tools.len()],
-            servo: Mutex::new(None),
+            scene: 0,
+            servo: None,
             recording: None,
             model,
-        })
+        };
+        Ok(Self { parts: Mutex::new(parts), changing: Mutex::new(()) })
     }
 
     /// What measures the strain of a body; before the loop starts.
-    fn set_strain_measure(&mut self, body: usize, measure: &StrainMeasure) {
-        self.strain.set_measure(body, measure.measure.clone());
+    fn set_strain_measure(&self, py: Python<'_>, body: usize, measure: &StrainMeasure) {
+        self.parts(py).strain.set_measure(body, measure.measure.clone());
     }
 
     /// Starts the loop; whether the system granted its priority, and locked memory.
-    fn start(&mut self, py: Python<'_>) -> PyResult<(bool, bool)> {
-        let connected = std::mem::replace(&mut self.connected, self.asked.iter().map(|_| None).collect());
-        let mut parts = Vec::new();
-        for (tool, device) in connected.into_iter().enumerate() {
-            parts.push(self.device_of(tool, device));
-        }
-        let scheduler = common_scheduler(&parts, self.scheduling.rate).map_err(|e| to_python(py, e))?;
-        let (handles, devices): (Vec<_>, Vec<_>) = parts.into_iter().map(|part| (part.handle, part.device)).unzip();
-        self.handles = handles;
-        let (model, limits, settings, scheduling, strain) =
-            (self.model.clone(), self.limits, self.settings, self.scheduling.clone(), self.strain.clone());
+    fn start(&self, py: Python<'_>) -> PyResult<(bool, bool)> {
+        let _alone = self.changing(py);
+        let mut parts = self.parts(py);
+        let none = parts.asked.iter().map(|_| None).collect();
+        let connected = std::mem::replace(&mut parts.connected, none);
+        let devices = connected.into_iter().enumerate().map(|(tool, device)| parts.device_of(tool, device));
+        let devices: Vec<_> = devices.collect();
+        let scheduler = common_scheduler(&devices, parts.scheduling.rate).map_err(|e| to_python(py, e))?;
+        let (handles, devices): (Vec<_>, Vec<_>) = devices.into_iter().map(|part| (part.handle, part.device)).unzip();
+        parts.handles = handles;
+        let (model, limits, settings) = (parts.model.clone(), parts.limits, parts.settings);
+        let (scheduling, strain) = (parts.scheduling.clone(), parts.strain.clone());
+        drop(parts);
         let start = || Servo::start(model, devices, limits, settings, scheduling, strain, scheduler);
-        let servo = py.detach(start).map_err(|e| to_python(py, e))?;
+        let mut servo = py.detach(start).map_err(|e| to_python(py, e))?;
         let realtime = servo.realtime();
-        *self.servo() = Some(servo);
+        let mut parts = self.parts(py);
+        // Others may have changed them meanwhile.
+        servo.set(parts.settings).map_err(|e| to_python(py, e))?;
+        parts.servo = Some(servo);
         Ok((realtime.priority, realtime.locked_memory))
     }
 
     /// Stops the loop.
-    fn stop(&mut self, py: Python<'_>) {
-        let recording = self.recording.take();
-        if let Some(mut servo) = self.servo().take() {
+    fn stop(&self, py: Python<'_>) {
+        let _alone = self.changing(py);
+        let mut parts = self.parts(py);
+        let (recording, servo) = (parts.recording.take(), parts.servo.take());
+        drop(parts);
+        if let Some(mut servo) = servo {
             py.detach(|| {
-                recording.map(|recording| recording.end(&mut servo));
+                recording.map(|recording| recording.end(servo.end_recording()));
                 servo.stop();
             });
         }
@@ -125,26 +145,27 @@ impl SimulationCore {
 
     /// Sets where a simulated tool should go, and its velocity there; `active` false takes it out of the scene.
     fn set_target(
-        &mut self,
+        &self,
+        py: Python<'_>,
         tool: usize,
-        position: [f64; 3],
-        orientation: [f64; 4],
+        place: ([f64; 3], [f64; 4]),
         velocity: [f64; 3],
         active: bool,
         grab: bool,
     ) {
-        let pose = Pose { position: position.into(), orientation: quaternion(orientation) };
+        let pose = Pose { position: place.0.into(), orientation: quaternion(place.1) };
         let target = Target { pose, velocity: velocity.into(), active, grab };
-        let Some(place) = self.targets.get_mut(tool) else { return };
-        *place = target;
-        if let Some(Some(handle)) = self.handles.get_mut(tool) {
+        let mut parts = self.parts(py);
+        let Some(before) = parts.targets.get_mut(tool) else { return };
+        *before = target;
+        if let Some(Some(handle)) = parts.handles.get_mut(tool) {
             handle.set(target);
         }
     }
 
     /// Changes the contact radius (m) of a tool.
-    fn set_contact_radius(&mut self, py: Python<'_>, tool: usize, radius: f64) -> PyResult<()> {
-        let model = self.model.clone();
+    fn set_contact_radius(&self, py: Python<'_>, tool: usize, radius: f64) -> PyResult<()> {
+        let model = self.parts(py).model.clone();
         py.detach(|| model.check_contact_radius(radius)).map_err(|e| to_python(py, e))?;
         self.change(py, |settings| {
             settings.contact_radius.iter_mut().skip(tool).take(1).for_each(|to| *to = radius);
@@ -152,7 +173,7 @@ impl SimulationCore {
     }
 
     /// Changes the coefficient of friction of a tool.
-    fn set_friction(&mut self, py: Python<'_>, tool: usize, friction: f64) -> PyResult<()> {
+    fn set_friction(&self, py: Python<'_>, tool: usize, friction: f64) -> PyResult<()> {
         self.change(py, |settings| {
             settings.friction.iter_mut().skip(tool).take(1).for_each(|to| *to = friction);
         })
@@ -167,7 +188,7 @@ impl SimulationCore {
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = points.as_slice()?.to_vec();
-        let model = self.model.clone();
+        let model = self.parts(py).model.clone();
         let feet = py.detach(|| {
             let of_point = |&point: &[f64; 3]| match model.bodies.get(body).and_then(|body| body.foot(point.into())) {
                 Some(foot) => {
@@ -182,31 +203,31 @@ impl SimulationCore {
     }
 
     /// Young's modulus of a body over that of its Green's function.
-    fn set_stiffness_scale(&mut self, py: Python<'_>, body: usize, scale: f64) -> PyResult<()> {
+    fn set_stiffness_scale(&self, py: Python<'_>, body: usize, scale: f64) -> PyResult<()> {
         self.change(py, |settings| {
             settings.stiffness_scale.iter_mut().skip(body).take(1).for_each(|to| *to = scale);
         })
     }
 
     /// Largest strain to which tools may take the bodies; zero for any.
-    fn set_strain_limit(&mut self, py: Python<'_>, limit: f64) -> PyResult<()> {
+    fn set_strain_limit(&self, py: Python<'_>, limit: f64) -> PyResult<()> {
         self.change(py, |settings| settings.strain_limit = limit)
     }
 
     /// Lets go of everything and clears faults.
-    fn reset(&mut self, py: Python<'_>) -> PyResult<()> {
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.change(py, |settings| settings.resets = settings.resets.wrapping_add(1))
     }
 
     /// Seconds that a body in motion advances in a second.
-    fn set_time_scale(&mut self, py: Python<'_>, time_scale: f64) -> PyResult<()> {
+    fn set_time_scale(&self, py: Python<'_>, time_scale: f64) -> PyResult<()> {
         self.change(py, |settings| settings.time_scale = time_scale)
     }
 
     /// Gives the surface point of a body closest to `point` (m) an impulse, N s, within a duration, s, on a patch of a
     /// radius, m.
     fn strike(
-        &mut self,
+        &self,
         py: Python<'_>,
         body: usize,
         point: [f64; 3],
@@ -214,66 +235,75 @@ impl SimulationCore {
         duration: f64,
         radius: f64,
     ) -> PyResult<()> {
-        self.change(py, |settings| {
-            settings.strike = Strike { body, point: point.into(), impulse: impulse.into(), radius, duration };
-            settings.strikes = settings.strikes.wrapping_add(1);
-        })
+        let strike = Strike { body, point: point.into(), impulse: impulse.into(), radius, duration };
+        match &mut self.parts(py).servo {
+            Some(servo) => servo.strike(strike).map_err(|e| to_python(py, e)),
+            None => Ok(()),
+        }
     }
 
     /// A body and its surface node (rank) whose displacement is logged.
-    fn watch(&mut self, py: Python<'_>, body: usize, node: u32) -> PyResult<()> {
+    fn watch(&self, py: Python<'_>, body: usize, node: u32) -> PyResult<()> {
         self.change(py, |settings| settings.watch = Some((body, node)))
     }
 
-    /// The latest tick as a dictionary; None if the loop does not run. Others may call meanwhile: it is worked out after the
-    /// tick has been taken.
-    fn frame<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let (model, tools, published) = {
-            let mut core = slf.try_borrow_mut()?;
-            let (model, tools) = (core.model.clone(), core.targets.len());
-            let Some(servo) = core.servo() else { return Ok(None) };
-            (model, tools, servo.latest().clone())
+    /// The latest tick as a dictionary; None if the loop does not run. It is worked out after the tick has been taken.
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let (model, (tools, scene), published) = {
+            let mut parts = self.parts(py);
+            let (model, numbers) = (parts.model.clone(), (parts.targets.len(), parts.scene));
+            let Some(servo) = &mut parts.servo else { return Ok(None) };
+            (model, numbers, servo.latest().clone())
         };
-        frame(slf.py(), &model, tools, published).map(Some)
+        let frame = frame(py, &model, tools, published)?;
+        frame.set_item("scene", scene)?;
+        Ok(Some(frame))
     }
 
-    /// Contacts of the latest tick, as in `frame` but without the rest of it; None if the loop does not run.
-    fn contacts(&mut self) -> Option<Vec<ContactRecord>> {
-        let model = self.model.clone();
-        self.servo().as_mut().map(|servo| contact_records(&model, &servo.latest().state))
+    /// Number of the scene, and contacts of the latest tick as in `frame`; None if the loop does not run.
+    fn contacts(&self, py: Python<'_>) -> Option<(u64, Vec<ContactRecord>)> {
+        let mut parts = self.parts(py);
+        let (model, scene) = (parts.model.clone(), parts.scene);
+        parts.servo.as_mut().map(|servo| (scene, contact_records(&model, &servo.latest().state)))
     }
 
     /// Rows (18 a tick) of the log since the last call: time, position and force of the first tool, computing time, wake-up
     /// delay, displacement of the watched node, and time and energies of the watched body.
-    fn drain_log<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn drain_log<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
-        let body = self.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
-        if let Some(servo) = self.servo() {
+        let mut parts = self.parts(py);
+        let body = parts.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
+        if let Some(servo) = &mut parts.servo {
             servo.drain_log(|row| push_row(&mut rows, &row, body));
         }
         rows.into_pyarray(py)
     }
 
     /// Has the running loop begin anew and records it in a new file, with what is known of it.
-    fn begin_recording(&mut self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> PyResult<()> {
-        let header = header(about, &self.model, self.scheduling.rate, true);
-        let Some(servo) = self.servo() else { return Ok(()) };
+    fn begin_recording(&self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> PyResult<()> {
+        let mut parts = self.parts(py);
+        let header = header(about, &parts.model, parts.scheduling.rate, true);
+        let Parts { servo: Some(servo), recording, .. } = &mut *parts else { return Ok(()) };
         let begun = py.detach(|| Recording::begin(&path, header, servo));
-        self.recording = Some(begun.map_err(|e| to_python(py, e))?);
+        *recording = Some(begun.map_err(|e| to_python(py, e))?);
         Ok(())
     }
 
     /// File, ticks, bytes, ticks dropped and why nothing is written any more, of a recording under way.
-    fn recording(&mut self) -> Option<RecordingStatus> {
-        let progress = self.servo().as_mut()?.latest().status.recording;
-        self.recording.as_ref().map(|recording| recording.status(progress.dropped))
+    fn recording(&self, py: Python<'_>) -> Option<RecordingStatus> {
+        let mut parts = self.parts(py);
+        let progress = parts.servo.as_mut()?.latest().status.recording;
+        parts.recording.as_ref().map(|recording| recording.status(progress.dropped))
     }
 
     /// Ends the recording: the same of it as a whole.
-    fn end_recording(&mut self, py: Python<'_>) -> Option<RecordingStatus> {
-        let recording = self.recording.take()?;
-        let servo = self.servo().as_mut()?;
-        Some(py.detach(|| recording.end(servo)))
+    fn end_recording(&self, py: Python<'_>) -> Option<RecordingStatus> {
+        let mut parts = self.parts(py);
+        let recording = parts.recording.take()?;
+        let servo = parts.servo.as_mut()?;
+        let made = py.detach(|| servo.end_recording());
+        drop(parts);
+        Some(py.detach(|| recording.end(made)))
     }
 
     /// Moves the tools through positions (ticks, tools, 3), NaN where one is out of the scene, orientations (ticks, tools,
@@ -292,6 +322,11 @@ impl SimulationCore {
         let grabs = grabs.as_slice()?.to_vec();
         let ticks = positions.shape()[0];
         let (strikes, watch) = extras;
+        let parts = self.parts(py);
+        let (model, limits, strain) = (parts.model.clone(), parts.limits, parts.strain.clone());
+        let settings = Settings { resets: 0, watch: None, ..parts.settings };
+        let (rate, device_limits) = (parts.scheduling.rate, parts.device_limits.clone());
+        drop(parts);
         let strikes: Vec<_> = strikes
             .into_iter()
             .map(|(tick, body, point, impulse, duration, radius)| {
@@ -299,23 +334,21 @@ impl SimulationCore {
             })
             .collect();
         let script = Script {
-            period: 1.0 / self.scheduling.rate,
+            period: 1.0 / rate,
             poses: &poses,
             grabs: &grabs,
             strikes: &strikes,
             watch: &watch,
-            devices: &self.device_limits,
+            devices: &device_limits,
         };
-        let settings = Settings { resets: 0, strikes: 0, watch: None, ..self.settings };
-        let (model, limits, strain) = (self.model.clone(), self.limits, self.strain.clone());
-        let begin = |about| Recorded::new(header(about, &self.model, self.scheduling.rate, false));
+        let begin = |about| Recorded::new(header(about, &model, rate, false));
         let mut file = about.map(begin).transpose().map_err(|e| to_python(py, e))?;
         let each = |record: &TickRecord| file.iter_mut().for_each(|file| file.push(record));
         let recording = py.detach(|| palpate_servo::run(&model, limits, settings, &strain, &script, each));
         let recording = recording.map_err(|e| to_python(py, e))?;
         let file = file.map(Recorded::finish).transpose().map_err(|e| to_python(py, e))?;
         let flat = |vectors: Vec<DVec3>| vectors.iter().flat_map(|f| f.to_array()).collect::<Vec<_>>().into_pyarray(py);
-        let mut energies: Vec<Vec<f64>> = vec![Vec::new(); self.model.bodies.len()];
+        let mut energies: Vec<Vec<f64>> = vec![Vec::new(); model.bodies.len()];
         for (body, of_body) in recording.energies {
             energies[body] = of_body.iter().flat_map(energy_array).collect();
         }
@@ -328,23 +361,30 @@ impl SimulationCore {
         answer.set_item("compute_ns", recording.compute_ns.into_pyarray(py))?;
         answer.set_item("file", file.map(|file| PyBytes::new(py, &file)))?;
         answer.set_item("fault", recording.fault.map(|fault| fault.to_string()))?;
-        debug_assert_eq!(poses.len(), ticks * self.model.tools.len());
+        debug_assert_eq!(poses.len(), ticks * model.tools.len());
         Ok(answer)
     }
 }
 
 impl SimulationCore {
-    pub(crate) fn servo(&mut self) -> &mut Option<Servo> {
-        self.servo.get_mut().unwrap_or_else(PoisonError::into_inner)
+    /// Its parts, for a moment. The interpreter is let go of while others have them.
+    pub(crate) fn parts(&self, py: Python<'_>) -> MutexGuard<'_, Parts> {
+        self.parts.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The right to change bodies, tools and devices, and to start and stop the loop, for as long as it takes.
+    pub(crate) fn changing(&self, py: Python<'_>) -> MutexGuard<'_, ()> {
+        self.changing.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Changes the settings, and hands them to the loop if it runs; a value that is refused changes nothing.
-    fn change(&mut self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> PyResult<()> {
-        let mut settings = self.settings;
+    fn change(&self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> PyResult<()> {
+        let mut parts = self.parts(py);
+        let mut settings = parts.settings;
         change(&mut settings);
-        settings.check(&self.model).map_err(|e| to_python(py, e))?;
-        self.settings = settings;
-        match self.servo() {
+        settings.check(&parts.model).map_err(|e| to_python(py, e))?;
+        parts.settings = settings;
+        match &mut parts.servo {
             Some(servo) => servo.set(settings).map_err(|e| to_python(py, e)),
             None => Ok(()),
         }

@@ -301,7 +301,7 @@ impl Tick {
             delay_ns: record.delay_ns.min(u32::MAX.into()) as u32,
             took_ns: record.took_ns.min(u32::MAX.into()) as u32,
             reset: input.reset,
-            strike: input.strike,
+            strike: input.strike.is_some(),
             fault: input.fault.into(),
             unasked: input.strain.unasked,
             tools: (0..tools).map(|tool| Tool::of(input, tool, &output.tools[tool])).collect(),
@@ -311,8 +311,8 @@ impl Tick {
         }
     }
 
-    /// The record again, with the settings that were in force.
-    pub fn record(&self, settings: Settings) -> TickRecord {
+    /// The record again, with the settings that were in force and the latest strike.
+    pub fn record(&self, (settings, strike): (Settings, Strike)) -> TickRecord {
         let mut strain = StrainArrivals::default();
         strain.unasked = self.unasked;
         self.strain.iter().for_each(|s| strain.push(StrainAsked { body: s.body.into(), tick: s.asked }));
@@ -321,7 +321,7 @@ impl Tick {
             period: self.period,
             settings,
             reset: self.reset,
-            strike: self.strike,
+            strike: self.strike.then_some(strike),
             readings: [Ok(Reading::default()); MAX_TOOLS],
             strain,
             fault: self.fault.into(),
@@ -364,10 +364,9 @@ pub struct SettingsMessage {
 }
 
 impl SettingsMessage {
-    /// Of a record, with some tools and bodies in the scene.
-    pub fn new(record: &TickRecord, tools: usize, bodies: usize, stamp: Time) -> Self {
+    /// Of a record and the latest strike, with some tools and bodies in the scene.
+    pub fn new(record: &TickRecord, strike: &Strike, tools: usize, bodies: usize, stamp: Time) -> Self {
         let settings = &record.input.settings;
-        let strike = &settings.strike;
         Self {
             stamp,
             number: record.tick,
@@ -384,21 +383,21 @@ impl SettingsMessage {
         }
     }
 
-    /// The settings again.
-    pub fn settings(&self) -> Settings {
+    /// The settings and the latest strike again.
+    pub fn settings(&self) -> (Settings, Strike) {
         let mut settings = Settings { strain_limit: self.strain_limit, ..Settings::default() };
         fill(&mut settings.contact_radius, &self.contact_radius);
         fill(&mut settings.friction, &self.friction);
         fill(&mut settings.stiffness_scale, &self.stiffness_scale);
         settings.time_scale = self.time_scale;
-        settings.strike = Strike {
+        let strike = Strike {
             body: self.strike_body.into(),
             point: DVec3::from(self.strike_point),
             impulse: DVec3::from(self.strike_impulse),
             radius: self.strike_radius,
             duration: self.strike_duration,
         };
-        settings
+        (settings, strike)
     }
 }
 
@@ -406,8 +405,8 @@ fn fill(to: &mut [f64], from: &[f64]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
-/// Whether two settings are the same as far as a recording goes: counters and the watched node aside.
+/// Whether two settings are the same as far as a recording goes: the counter and the watched node aside.
 pub fn same_settings(a: &Settings, b: &Settings) -> bool {
-    let counted = |settings: &Settings| Settings { resets: 0, strikes: 0, watch: None, ..*settings };
+    let counted = |settings: &Settings| Settings { resets: 0, watch: None, ..*settings };
     counted(a) == counted(b)
 }

@@ -9,6 +9,7 @@ use cdr_encoding::from_bytes;
 use mcap::read::parse_record;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use palpate_core::simulation::Strike;
 use palpate_core::{Error, Result};
 use palpate_servo::{Settings, TickRecord};
 use serde::Deserialize;
@@ -22,7 +23,7 @@ pub struct Ticks<R = BufReader<File>> {
     /// What was recorded.
     pub about: BTreeMap<String, String>,
     topics: BTreeMap<u16, String>,
-    settings: Option<Settings>,
+    settings: Option<(Settings, Strike)>,
     /// How the file ended; `None` while it has not, and for one that was cut short.
     pub ending: Option<Ending>,
 }

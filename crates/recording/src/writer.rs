@@ -6,6 +6,7 @@ use std::io::{Seek, Write};
 
 use cdr_encoding::to_vec_with_size_hint;
 use mcap::records::{MessageHeader, Metadata};
+use palpate_core::simulation::Strike;
 use palpate_servo::{FaultReason, Settings, TickRecord};
 use serde::Serialize;
 
@@ -49,6 +50,8 @@ pub struct TickWriter<W: Write + Seek> {
     header: Header,
     channels: Channels,
     settings: Option<Settings>,
+    /// The latest one.
+    strike: Strike,
     first_due_ns: Option<u64>,
     /// Number of the tick that should come next; those left out.
     next: u64,
@@ -95,6 +98,7 @@ impl<W: Write + Seek> TickWriter<W> {
             file,
             channels: Channels { ticks, settings, events, tools },
             settings: None,
+            strike: Strike::default(),
             first_due_ns: None,
             next: 0,
             dropped: 0,
@@ -120,10 +124,11 @@ impl<W: Write + Seek> TickWriter<W> {
         }
         self.next = record.tick + 1;
         let settings = &record.input.settings;
-        if self.settings.as_ref().is_none_or(|before| !same_settings(before, settings)) {
-            let message = SettingsMessage::new(record, tools, bodies, stamp);
+        let strike = record.input.strike.unwrap_or(self.strike);
+        if self.settings.as_ref().is_none_or(|before| !same_settings(before, settings)) || strike != self.strike {
+            let message = SettingsMessage::new(record, &strike, tools, bodies, stamp);
             self.write(self.channels.settings, record.tick, now_ns, &message)?;
-            self.settings = Some(*settings);
+            (self.settings, self.strike) = (Some(*settings), strike);
         }
         self.write(self.channels.ticks, record.tick, now_ns, &Tick::new(record, tools, stamp))?;
         self.tell(record, now_ns)?;
@@ -158,8 +163,7 @@ impl<W: Write + Seek> TickWriter<W> {
         if input.reset {
             self.event(INFO, "reset: everything was let go of", now_ns)?;
         }
-        if input.strike {
-            let strike = &input.settings.strike;
+        if let Some(strike) = input.strike {
             let impulse = strike.impulse.length();
             self.event(INFO, format!("strike of {impulse} N s on body {}", strike.body), now_ns)?;
         }

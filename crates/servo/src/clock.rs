@@ -1,5 +1,5 @@
-//! Deadlines on the monotonic clock, real-time scheduling, processors and locked memory: everything of this crate that calls the
-//! operating system.
+//! Deadlines on the monotonic clock, real-time scheduling, processors: all that this crate asks of the operating system but
+//! locked memory (`locking`).
 #![allow(unsafe_code)] // libc
 
 /// Nanoseconds of the monotonic clock: what [`crate::ForceLoop::tick`] is told.
@@ -61,12 +61,6 @@ pub fn keep_to_cpus(cpus: &[usize]) -> bool {
     }
     // SAFETY: `set` is as large as the call is told; 0 names the calling thread.
     unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set) == 0 }
-}
-
-/// Asks that no page of the process is ever swapped out; whether it was granted.
-pub fn lock_memory() -> bool {
-    // SAFETY: takes flags only.
-    unsafe { libc::mlockall(libc::MCL_CURRENT) == 0 }
 }
 
 /// The next deadline on the grid of `period` after `deadline` that is not yet past.

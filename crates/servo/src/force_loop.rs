@@ -4,8 +4,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use palpate_core::Result;
+use palpate_core::memory::Ranges;
 use palpate_core::simulation::{Input, Kept, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
-use palpate_devices::{Device, Wrench};
+use palpate_devices::{Device, DeviceLimits, Wrench};
 
 use crate::change::{ChangeEnd, ChangeHandle, Taken, change_ends};
 use crate::clock;
@@ -48,6 +49,11 @@ pub struct ForceLoop {
 }
 
 impl ForceLoop {
+    /// The memory that its ticks read.
+    pub(crate) fn memory(&self) -> Ranges {
+        self.model.memory()
+    }
+
     /// At rest, at the start of the safety ramp, with one device a tool of the model and in their order.
     ///
     /// # Errors
@@ -155,15 +161,8 @@ impl ForceLoop {
     /// A device that takes fewer wrenches a second, or whose own damping is too weak for the tool's largest stiffness at that
     /// rate: see `DeviceLimits::largest_stiffness`.
     pub fn check_period(&self, period: f64) -> Result<()> {
-        for (tool, device) in self.devices.iter().enumerate() {
-            let limits = device.limits();
-            let (rate, most) = (1.0 / period, limits.rate.unwrap_or(f64::INFINITY));
-            refuse_unless(period >= 1.0 / most, || {
-                format!("a device takes at most {most} wrenches a second, the loop has {rate}")
-            })?;
-            check_stiffness(&self.model, tool, &limits, Some(period))?;
-        }
-        Ok(())
+        let limits: Vec<_> = self.devices.iter().map(|device| device.limits()).collect();
+        check_period(&self.model, &limits, period)
     }
 
     /// Readies a tick that is made again for what did not follow from its input: faults by timing or of drivers, and requests
@@ -239,7 +238,9 @@ impl ForceLoop {
             let _ = device.write(Wrench::default());
         }
         // Asked for before the change, and not yet seen.
-        (self.settings.resets, self.settings.strikes) = (before.settings.resets, before.settings.strikes);
+        self.settings.resets = before.settings.resets;
+        std::mem::swap(&mut self.ends.strikes, &mut before.ends.strikes);
+        self.ends.strikes.follow(kept);
         self.status = Status {
             readings: by_new_rank(&before.status.readings, kept),
             wrenches: by_new_rank(&before.status.wrenches, kept),
@@ -262,10 +263,15 @@ impl ForceLoop {
 
     /// What has come in through the hand-offs since the last tick.
     fn receive(&mut self, period: f64) -> Input {
+        let strikes = self.ends.strikes.count();
         let settings = *self.ends.settings.read();
-        let controls = settings.controls(&self.settings, period, &self.limited);
+        let mut controls = settings.controls(&self.settings, period, &self.limited);
+        if !controls.reset {
+            // A reset ends strikes, that of its tick included.
+            controls.strike = self.ends.strikes.next(strikes, settings.resets, &self.state);
+        }
         let record = self.ends.recorder.input();
-        (record.settings, record.reset, record.strike) = (settings, controls.reset, controls.strike.is_some());
+        (record.settings, record.reset, record.strike) = (settings, controls.reset, controls.strike);
         record.strain = StrainArrivals::default();
         self.ends.strain.receive(&mut self.state, &mut record.strain);
         self.settings = settings;
@@ -376,6 +382,21 @@ impl ForceLoop {
         self.status.fault = fault(self.fault, &self.stages);
         self.publish();
     }
+}
+
+/// As of [`ForceLoop::check_period`], of the devices' limits alone: it may be asked while another thread ticks.
+///
+/// # Errors
+/// The same.
+pub fn check_period(model: &Model, devices: &[DeviceLimits], period: f64) -> Result<()> {
+    for (tool, limits) in devices.iter().enumerate() {
+        let (rate, most) = (1.0 / period, limits.rate.unwrap_or(f64::INFINITY));
+        refuse_unless(period >= 1.0 / most, || {
+            format!("a device takes at most {most} wrenches a second, the loop has {rate}")
+        })?;
+        check_stiffness(model, tool, limits, Some(period))?;
+    }
+    Ok(())
 }
 
 /// A loop that is to take the place of the running one: with another scene, at rest.

@@ -1,12 +1,12 @@
 //! Both ends of the wait-free hand-offs between a force loop and everybody else.
 //!
-//! The latest state goes out and the latest settings come in through triple buffers; every tick goes into a bounded ring,
-//! and is dropped and counted where nobody drains it. Nothing that another thread does can make the loop wait. What else
+//! The latest state goes out and the latest settings come in through triple buffers, strikes through a bounded ring;
+//! every tick goes into another, and is dropped and counted where nobody drains it. Nothing that another thread does can make the loop wait. What else
 //! comes in, prepared off the tick, gets a hand-off of its own here and is taken up in `ForceLoop::receive`.
 
 use std::sync::Arc;
 
-use palpate_core::simulation::{Model, Snapshot};
+use palpate_core::simulation::{Model, Snapshot, Strike};
 use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
@@ -17,6 +17,7 @@ use crate::recorder::{RecorderEnd, RecorderHandle, recorder_ends};
 use crate::safety::SafetyStage;
 use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainEnd, strain_ends};
+use crate::strikes::{StrikeEnd, StrikeHandle, strike_ends};
 
 /// Rows of the log kept for a reader: 20 seconds at 1 kHz.
 const LOG_ROWS: usize = 20_000;
@@ -33,6 +34,7 @@ pub struct Published {
 /// The loop's ends.
 pub(crate) struct LoopEnds {
     pub settings: Output<Settings>,
+    pub strikes: StrikeEnd,
     pub published: Input<Published>,
     pub rows: Producer<LogRow>,
     pub strain: StrainEnd,
@@ -43,6 +45,7 @@ pub(crate) struct LoopEnds {
 pub struct LoopHandle {
     model: Arc<Model>,
     settings: Input<Settings>,
+    strikes: StrikeHandle,
     published: Output<Published>,
     rows: Consumer<LogRow>,
     /// For whoever prepares strain responses.
@@ -53,16 +56,24 @@ pub struct LoopHandle {
 /// Both ends, with settings that have been checked and the safety stages of the start.
 pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings, stages: &[SafetyStage]) -> (LoopEnds, LoopHandle) {
     let (settings_in, settings_out) = triple_buffer(settings);
+    let (strike_end, strikes) = strike_ends(settings.resets);
     let first = Published { status: Status::default(), state: Snapshot::new(model) };
     let (published_in, published_out) = triple_buffer(&first);
     let (producer, consumer) = RingBuffer::new(LOG_ROWS);
     let (strain, preparer) = strain_ends();
     let (recorder_end, recorder) = recorder_ends(stages);
-    let ends =
-        LoopEnds { strain, recorder: recorder_end, settings: settings_out, published: published_in, rows: producer };
+    let ends = LoopEnds {
+        settings: settings_out,
+        strikes: strike_end,
+        published: published_in,
+        rows: producer,
+        strain,
+        recorder: recorder_end,
+    };
     let handle = LoopHandle {
         model: model.clone(),
         settings: settings_in,
+        strikes,
         published: published_out,
         rows: consumer,
         strain: Some(preparer),
@@ -78,8 +89,18 @@ impl LoopHandle {
     /// See [`Settings::check`]; the loop then keeps those it has.
     pub fn set(&mut self, settings: Settings) -> Result<()> {
         settings.check(&self.model)?;
+        self.strikes.count_resets(settings.resets);
         self.settings.write(settings);
         Ok(())
+    }
+
+    /// Strikes a body in motion; wait-free. Strikes are given in order, one a tick, after the settings that were set before;
+    /// a reset takes back those that still wait.
+    ///
+    /// # Errors
+    /// A body that the model does not have; so many strikes that the loop has not come to them.
+    pub fn strike(&mut self, strike: Strike) -> Result<()> {
+        self.strikes.push(&self.model, strike)
     }
 
     /// The end of whoever prepares strain responses.
@@ -102,9 +123,10 @@ impl LoopHandle {
         self.recorder.is_begun()
     }
 
-    /// Belongs to the loop that has taken the place of this one's. The log goes on in the same ring.
+    /// Belongs to the loop that has taken the place of this one's. Log and strikes go on in the same rings.
     pub(crate) fn go_on_as(&mut self, next: LoopHandle) {
-        let Self { model, settings, published, strain, recorder, .. } = next;
+        let Self { model, settings, published, strain, recorder, strikes, .. } = next;
+        self.strikes.count_resets(strikes.resets());
         (self.model, self.settings, self.published) = (model, settings, published);
         (self.strain, self.recorder) = (strain, recorder);
     }

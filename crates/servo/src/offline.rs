@@ -76,15 +76,12 @@ pub fn run(
     force_loop.limit_strain_of(strain.known());
     let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
-    let mut settings = settings;
     let mut strikes = script.strikes.iter().peekable();
     let moving = (0..model.bodies.len()).filter(|&body| model.bodies[body].moves());
     let mut recording = Recording { energies: moving.map(|body| (body, Vec::new())).collect(), ..Recording::default() };
     for tick in 0..script.poses.len() / tools {
         if let Some(&(_, strike)) = strikes.next_if(|(when, _)| *when == tick) {
-            settings.strike = strike;
-            settings.strikes = settings.strikes.wrapping_add(1);
-            handle.set(settings)?;
+            handle.strike(strike)?;
         }
         preparation.hand_over(tick);
         let begun = computed_ns();
@@ -133,10 +130,9 @@ pub fn rerun(
     for (tick, input) in inputs.into_iter().enumerate() {
         let input = input?;
         settings.time_scale = input.settings.time_scale;
-        settings.strike = input.settings.strike;
-        settings.strikes = settings.strikes.wrapping_add(u32::from(input.strike));
         settings.resets = settings.resets.wrapping_add(u32::from(input.reset));
         handle.set(settings)?;
+        input.strike.map_or(Ok(()), |strike| handle.strike(strike))?;
         for (readings, said) in readings.iter_mut().zip(&input.readings) {
             let _ = readings.push(*said);
         }

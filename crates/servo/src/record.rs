@@ -7,7 +7,7 @@
 use glam::DVec3;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{
-    Contact, Contacts, LawKind, MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Mode, Model, State, Wrench,
+    Contact, Contacts, LawKind, MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Mode, Model, State, Strike, Wrench,
 };
 use palpate_devices::{DeviceFault, Reading};
 
@@ -40,7 +40,7 @@ impl TickRecord {
             period: 0.0,
             settings: Settings::default(),
             reset: false,
-            strike: false,
+            strike: None,
             readings: [Ok(Reading::default()); MAX_TOOLS],
             strain: StrainArrivals::default(),
             fault: None,
@@ -57,12 +57,12 @@ pub struct RecordedInput {
     pub due_ns: u64,
     /// Time between two ticks, s.
     pub period: f64,
-    /// Settings of this tick; their counters count for nothing here.
+    /// Settings of this tick; their counter counts for nothing here.
     pub settings: Settings,
     /// Whether everything was let go of.
     pub reset: bool,
-    /// Whether the settings' strike was given.
-    pub strike: bool,
+    /// The strike that was given.
+    pub strike: Option<Strike>,
     /// What each device said.
     pub readings: [Result<Reading, DeviceFault>; MAX_TOOLS],
     /// Strain responses that came before this tick.

@@ -84,7 +84,7 @@ impl Replay {
         settings: Settings,
         strain: StrainPreparer,
     ) -> Result<Self> {
-        let settings = Settings { resets: 0, strikes: 0, ..settings };
+        let settings = Settings { resets: 0, ..settings };
         let (mut readings, mut replayed) = (Vec::new(), Vec::new());
         for &limits in devices {
             let (producer, device) = Replayed::new(limits);
@@ -143,9 +143,9 @@ impl Replay {
 
     fn tick_again(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {
         let resets = self.settings.resets.wrapping_add(u32::from(input.reset));
-        let strikes = self.settings.strikes.wrapping_add(u32::from(input.strike));
-        self.settings = Settings { resets, strikes, ..input.settings };
+        self.settings = Settings { resets, ..input.settings };
         self.handle.set(self.settings)?;
+        input.strike.map_or(Ok(()), |strike| self.handle.strike(strike))?;
         for (readings, said) in self.readings.iter_mut().zip(&input.readings) {
             let _ = readings.push(*said);
         }

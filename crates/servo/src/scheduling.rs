@@ -1,8 +1,10 @@
 //! How the loop's own thread runs: its rate, the processors it keeps to, its priority, and memory that is never swapped out.
 
 use palpate_core::Result;
+use palpate_core::memory::Ranges;
 
-use crate::clock::{allowed_cpus, keep_to_cpus, lock_memory, request_realtime_priority};
+use crate::clock::{allowed_cpus, keep_to_cpus, request_realtime_priority};
+use crate::locking::{lock, lock_thread};
 use crate::log::RealtimeStatus;
 use crate::settings::refuse_unless;
 
@@ -58,15 +60,15 @@ impl Scheduling {
         Ok(())
     }
 
-    /// Gives the calling thread what was asked for; what the system granted.
+    /// Gives the calling thread what was asked for, and keeps in memory what it reads; what the system granted.
     ///
     /// # Errors
     /// A processor that has been taken from the process since it was checked.
-    pub(crate) fn apply(&self) -> Result<RealtimeStatus> {
+    pub(crate) fn apply(&self, memory: Ranges) -> Result<RealtimeStatus> {
         let bound = self.cpus.is_empty() || keep_to_cpus(&self.cpus);
         refuse_unless(bound, || format!("device.cpus: the system refused CPUs {}", ranges(&self.cpus)))?;
         // Locked first: at real-time priority it would keep other programs from the processor for a tenth of a second.
-        let locked_memory = lock_memory();
+        let locked_memory = lock(memory) && lock_thread();
         let priority = self.priority > 0 && request_realtime_priority(self.priority);
         Ok(RealtimeStatus { priority, locked_memory })
     }
@@ -114,7 +116,7 @@ mod tests {
         let last = *all.last().expect("a processor");
         let kept = std::thread::spawn(move || {
             let scheduling = Scheduling { cpus: vec![last], priority: 0, ..Scheduling::at(1000.0) };
-            (scheduling.apply().map(|granted| granted.priority).ok(), allowed_cpus())
+            (scheduling.apply(Ranges::default()).map(|granted| granted.priority).ok(), allowed_cpus())
         });
         assert_eq!(kept.join().expect("a thread that ends"), (Some(false), vec![last]));
         assert_eq!(allowed_cpus(), all, "other threads stay where they are");

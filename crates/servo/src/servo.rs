@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use palpate_core::simulation::{Kept, Model};
+use palpate_core::simulation::{Kept, Model, Strike};
 use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 use rtrb::Consumer;
@@ -14,6 +14,7 @@ use crate::change::ChangeHandle;
 use crate::clock::{next_deadline, now_ns, sleep_until_ns};
 use crate::force_loop::{ForceLoop, Successor};
 use crate::handoff::{LoopHandle, Published};
+use crate::locking::lock;
 use crate::log::{LogRow, RealtimeStatus};
 use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::record::TickRecord;
@@ -103,6 +104,10 @@ impl Servo {
         let limits = placed.iter().map(|device| device.limits()).collect();
         let (mut next, mut next_handle) = ForceLoop::new(model, placed, self.limits, settings)?;
         next.check_period(self.period)?;
+        if self.realtime.locked_memory {
+            // Where the limit of the process is reached, the loop still goes on.
+            lock(next.memory());
+        }
         let worker = next.limit_strain(&mut next_handle, strain)?;
         let silent = || Error::Invalid("the loop does not tick: the scene stays as it was".into());
         let changes = self.changes.as_mut().ok_or_else(silent)?;
@@ -125,6 +130,14 @@ impl Servo {
     /// See [`Settings::check`]; the loop then keeps those it has.
     pub fn set(&mut self, settings: Settings) -> Result<()> {
         self.handle.set(settings)
+    }
+
+    /// See [`LoopHandle::strike`].
+    ///
+    /// # Errors
+    /// A body that the model does not have; so many strikes that the loop has not come to them.
+    pub fn strike(&mut self, strike: Strike) -> Result<()> {
+        self.handle.strike(strike)
     }
 
     /// The latest tick; wait-free.
@@ -215,11 +228,11 @@ impl Device for Awaited {
 fn on_a_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -> Result<(Caller, RealtimeStatus)> {
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = stop.clone();
-    // Locking the memory of a large process takes a tenth of a second: wait, so that the first target set after the
+    // Locking the memory of a large body takes a tenth of a second: wait, so that the first target set after the
     // start is seen by a running loop.
     let (ready_in, ready_out) = std::sync::mpsc::sync_channel(1);
     let ticks = move || {
-        let granted = scheduling.apply();
+        let granted = scheduling.apply(force_loop.memory());
         let realtime = granted.as_ref().copied().unwrap_or_default();
         force_loop.set_realtime(realtime);
         let refused = granted.is_err();

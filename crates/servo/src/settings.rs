@@ -1,6 +1,6 @@
 //! What may be changed while the loop runs.
 
-use palpate_core::simulation::{Controls, Kept, MAX_BODIES, MAX_TOOLS, Model, Strike};
+use palpate_core::simulation::{Controls, Kept, MAX_BODIES, MAX_TOOLS, Model};
 use palpate_core::{Error, Result};
 
 /// What the frame side may change while the loop runs.
@@ -18,10 +18,6 @@ pub struct Settings {
     pub resets: u32,
     /// Seconds that a body in motion advances in a second: below one is slow motion.
     pub time_scale: f64,
-    /// A strike for a body in motion.
-    pub strike: Strike,
-    /// Each new value gives the strike once.
-    pub strikes: u32,
     /// A body and the rank of one of its surface nodes, whose displacement is logged.
     pub watch: Option<(usize, u32)>,
 }
@@ -35,8 +31,6 @@ impl Default for Settings {
             strain_limit: 0.0,
             resets: 0,
             time_scale: 1.0,
-            strike: Strike::default(),
-            strikes: 0,
             watch: None,
         }
     }
@@ -68,7 +62,6 @@ impl Settings {
         for (name, value) in [("strain limit", self.strain_limit), ("time scale", self.time_scale)] {
             refuse_unless(not_negative(value), || format!("the {name} must not be negative, got {value}"))?;
         }
-        check_body(model, self.strike.body, "strike")?;
         self.watch.map_or(Ok(()), |(body, node)| check_node(model, body, node))
     }
 
@@ -85,11 +78,11 @@ impl Settings {
         }
         let new_rank = |old: usize| kept.bodies.iter().position(|&rank| rank == Some(old));
         now.watch = self.watch.and_then(|(body, node)| Some((new_rank(body)?, node)));
-        now.strike.body = new_rank(self.strike.body).unwrap_or(0);
         now
     }
 
-    /// What a tick makes of them, given those of the tick before; the strain of some bodies cannot be limited.
+    /// What a tick makes of them, given those of the tick before, without a strike; the strain of some bodies cannot be
+    /// limited.
     pub(crate) fn controls(&self, before: &Settings, period: f64, limited: &[bool; MAX_BODIES]) -> Controls {
         Controls {
             contact_radius: self.contact_radius,
@@ -98,13 +91,13 @@ impl Settings {
             strain_limit: limited.map(|limited| if limited { self.strain_limit } else { 0.0 }),
             reset: self.resets != before.resets,
             advance: self.time_scale * period,
-            strike: (self.strikes != before.strikes).then_some(self.strike),
+            strike: None,
         }
     }
 }
 
 /// Refuses a body that the model does not have.
-fn check_body(model: &Model, body: usize, what: &str) -> Result<()> {
+pub(crate) fn check_body(model: &Model, body: usize, what: &str) -> Result<()> {
     let bodies = model.bodies.len();
     refuse_unless(body < bodies, || format!("{what}: there is no body {body}, the scene has {bodies}"))
 }

@@ -86,7 +86,7 @@ fn a_drivers_callback_gives_the_bits_of_an_offline_run() {
         let mut wrenches = Vec::new();
         for tick in 0..TICKS {
             if tick == 700 {
-                handle.set(Settings { strike, strikes: 1, ..settings() }).expect("valid settings");
+                handle.strike(strike).expect("room");
             }
             force_loop.tick(now_ns(), PERIOD);
             wrenches.extend_from_slice(&handle.latest().status.wrenches[..2]);
@@ -123,7 +123,7 @@ fn subnormal_numbers_are_flushed_live_and_offline() {
 
     let idle = device(|now_ns| Ok(Reading { timestamp_ns: now_ns, ..Reading::default() }));
     let (mut force_loop, mut handle) = new(model.clone(), vec![idle]);
-    handle.set(Settings { strike, strikes: 1, ..settings() }).expect("valid settings");
+    handle.strike(strike).expect("room");
     (0..100).for_each(|_| force_loop.tick(now_ns(), PERIOD));
     assert_eq!(bits(handle.latest().state.displacements_of(&model, 0, &nodes)), offline);
 
@@ -157,8 +157,9 @@ fn what_does_not_fit_the_scene_is_an_error() {
     refused(make(2, SafetyLimits { max_damping: f64::NAN, ..patient() }, settings()), "strongest damping");
     refused(make(2, patient(), Settings { watch: Some((2, 0)), ..settings() }), "no body 2");
     refused(make(2, patient(), Settings { watch: Some((1, 100_000)), ..settings() }), "no surface node 100000");
-    let strike = Strike { body: 7, ..Strike::default() };
-    refused(make(2, patient(), Settings { strike, ..settings() }), "no body 7");
+    let (_, mut handle) = new(model.clone(), (0..2).map(|_| device(|now_ns| Ok(pressing(now_ns)))).collect());
+    let struck = handle.strike(Strike { body: 7, ..Strike::default() });
+    refused(struck.err().map(|error| error.to_string()), "no body 7");
     refused(make(2, patient(), Settings { time_scale: f64::NAN, ..settings() }), "time scale");
 
     let weak = DeviceLimits { max_stiffness: 2000.0, rate: Some(800.0), ..DeviceLimits::UNLIMITED };

@@ -53,17 +53,16 @@ fn second_tool(tick: u64) -> Reading {
 }
 
 fn settings_at(tick: u64) -> Settings {
-    let strike = Strike {
-        body: 0,
-        point: DVec3::new(0.02, 0.02, 0.1),
-        impulse: DVec3::new(0.0, 0.0, -1e-4),
-        radius: 0.02,
-        duration: 3e-3,
-    };
     let resets = u32::from(tick >= RESET);
-    let strikes = u32::from(tick >= 100) + u32::from(tick >= 1600);
     let watch = (tick / 200 % 2 == 1).then_some((0, 7));
-    Settings { resets, strike, strikes, watch, strain_limit: STRAIN_LIMIT, ..settings() }
+    Settings { resets, watch, strain_limit: STRAIN_LIMIT, ..settings() }
+}
+
+const STRIKES: [u64; 2] = [100, 1600];
+
+fn strike() -> Strike {
+    let (point, impulse) = (DVec3::new(0.02, 0.02, 0.1), DVec3::new(0.0, 0.0, -1e-4));
+    Strike { body: 0, point, impulse, radius: 0.02, duration: 3e-3 }
 }
 
 /// What kinds of tick that was, given the contacts before it.
@@ -81,7 +80,7 @@ fn kinds(tick: u64, before: &[(u64, usize)], published: &Published) -> Vec<&'sta
         both(now.iter().filter(|contact| contact.1 == 0).count() == 2, "two tools"),
         both([0, 1].iter().all(|body| now.iter().any(|contact| contact.1 == *body)), "two bodies"),
         both(state.energy(0).is_some_and(|energy| energy.kinetic > 0.0), "motion"),
-        both(set.strikes != last.strikes, "strike"),
+        both(STRIKES.contains(&tick), "strike"),
         both(set.resets != last.resets, "reset"),
         both(status.fault.is_some(), "fault"),
         both(state.tools[0].refused[1].is_some(), "refused"),
@@ -112,6 +111,10 @@ fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static
     let (mut before, mut records) = (Vec::new(), None);
     for tick in 0..TICKS {
         handle.set(settings_at(tick)).expect("valid settings");
+        if STRIKES.contains(&tick) {
+            // One waits for the tick after.
+            (0..2).for_each(|_| handle.strike(strike()).expect("room"));
+        }
         match tick % RECORDED {
             0 => records = Some(handle.begin_recording().expect("no recording yet")),
             60 => handle.end_recording(),

@@ -50,14 +50,10 @@ fn sliding_readings(tool: usize, now_ns: u64) -> Result<Reading, DeviceFault> {
 }
 
 fn settings_at(tick: u64, strain_limit: f64) -> Settings {
-    let point = DVec3::new(0.02, 0.02, 0.1);
-    let strike = Strike { body: 0, point, impulse: DVec3::new(0.0, 0.0, -1e-3), radius: 0.02, duration: 3e-3 };
     Settings {
         friction: [if tick < 1000 { 0.3 } else { 0.1 }; MAX_TOOLS],
         strain_limit,
         resets: u32::from(tick >= 1200),
-        strike: if tick >= 700 { strike } else { Strike::default() },
-        strikes: u32::from(tick >= 700),
         ..settings()
     }
 }
@@ -68,6 +64,11 @@ fn measured(model: &Arc<Model>) -> StrainPreparer {
         strain.set_measure(body, Arc::new(StrainMeasure::of_surface(&of_body.green().surface)));
     }
     strain
+}
+
+fn strike(times: f64) -> Strike {
+    let (point, impulse) = (DVec3::new(0.02, 0.02, 0.1), DVec3::new(0.0, 0.0, -1e-3 * times));
+    Strike { body: 0, point, impulse, radius: 0.02, duration: 3e-3 }
 }
 
 type Readings = fn(usize, u64) -> Result<Reading, DeviceFault>;
@@ -91,6 +92,10 @@ fn record(model: &Arc<Model>, readings: Readings, strain_limit: f64, begin: u64)
             force_loop.latch(FaultReason::Overrun);
         }
         handle.set(settings_at(tick, strain_limit)).expect("valid settings");
+        if tick == 700 {
+            // One a tick from here on.
+            [1.0, 0.5, -0.7].into_iter().for_each(|times| handle.strike(strike(times)).expect("room"));
+        }
         force_loop.tick(tick * PERIOD_NS, PERIOD);
         if tick % 8 == 0 {
             // On a busy machine the thread beside the loop needs more, until it has answered once.

@@ -11,9 +11,11 @@ from palpate.body.assembly import element_arrays, mass_matrix, stiffness_matrix
 from palpate.body.loads import Loads
 from palpate.body.material import Material, material_rows, warn_of_locking
 from palpate.body.mechanism import find_mechanism
+from palpate.body.overlap import require_apart
 from palpate.body.supports import Fixed, element_components, fixed_mask, rigid_constraint_rank
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
+from palpate.units import brief_repr
 
 
 class Body:
@@ -26,8 +28,9 @@ class Body:
     material
         One :class:`Material`, or one for each region of the mesh, by number or name.
     fixed
-        Supported nodes: indices, an (n,) mask, an (n, 3) mask of components, ``{"z": indices}``, a function of
-        the (n, 3) node positions that returns a mask, or None for a body without supports.
+        Supported nodes: a predicate such as ``"z < min + 1mm"``, indices, an (n,) mask, an (n, 3) mask of components,
+        ``{"z": indices}``, a function of the (n, 3) node positions that returns a mask, or None for a body without
+        supports.
     loads
         What acts on it at rest, before it is touched: weight, pressure, forces.
 
@@ -41,7 +44,8 @@ class Body:
     Raises
     ------
     BodyError
-        An index out of range, a mask of the wrong length, a region without a material.
+        What is no mesh, an index out of range, a mask of the wrong length, supports that hold no node, a region without
+        a material.
 
     """
 
@@ -53,6 +57,11 @@ class Body:
         fixed: Fixed = None,
         loads: Loads | None = None,
     ):
+        if not isinstance(mesh, TetMesh):
+            raise BodyError(
+                f"mesh must be a palpate.TetMesh, got {brief_repr(mesh)}: read a volume mesh by palpate.TetMesh.read, "
+                "fill a surface by palpate.tetrahedralize"
+            )
         self.mesh = mesh
         self.material = material
         self.element_materials = material_rows(mesh, material)
@@ -103,7 +112,7 @@ class Body:
         return element_arrays(self.mesh, self.element_materials)
 
     def require_supported(self) -> None:
-        """Refuse a body that could move without deforming.
+        """Refuse a body that could move without deforming, or two in one place.
 
         Raises
         ------
@@ -117,6 +126,7 @@ class Body:
         if self.fixed_mask.all():
             raise BodyError("every node is fixed: nothing is left to deform")
         labels = element_components(self.mesh.tets, len(self.mesh.nodes))
+        require_apart(self.mesh, labels)
         for part in np.unique(labels):
             members = np.flatnonzero(labels == part)
             rank = rigid_constraint_rank(self.mesh.nodes[members], self.fixed_mask[members])

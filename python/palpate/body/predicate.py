@@ -18,7 +18,7 @@ from palpate.units import LENGTH_UNITS
 AXES = {"x": 0, "y": 1, "z": 2}
 COMPARE = {ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal}
 ARITHMETIC = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
-_NUMBER_WITH_UNIT = re.compile(rf"(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*({'|'.join(LENGTH_UNITS)})\b")
+_NUMBER_WITH_UNIT = re.compile(rf"(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*({'|'.join(LENGTH_UNITS)})\b", re.ASCII)
 
 MAX_LENGTH = 500
 

@@ -8,27 +8,39 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
+from palpate.body.predicate import parse
 from palpate.body.selection import node_indices
 from palpate.errors import BodyError
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
-Fixed = Sequence[int] | np.ndarray | Mapping[str, Sequence[int]] | Callable[[np.ndarray], np.ndarray] | None
+Fixed = str | Sequence[int] | np.ndarray | Mapping[str, Sequence[int]] | Callable[[np.ndarray], np.ndarray] | None
 
 
 def fixed_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
-    """Mask of the fixed components of each node, (n, 3).
+    """Mask of the fixed components of each node, (n, 3); only None fixes none.
 
     Raises
     ------
     BodyError
-        An index out of range, a mask of the wrong length, an unknown axis.
+        An index out of range, a mask of the wrong length, an unknown axis, or supports that hold no node.
 
     """
+    if fixed is None:
+        return np.zeros((len(nodes), 3), dtype=bool)
+    mask = _named_mask(nodes, parse(fixed) if isinstance(fixed, str) else fixed)
+    if not mask.any():
+        of_what = f" = '{fixed}'" if isinstance(fixed, str) else ""
+        low, high = (bound.round(4).tolist() for bound in (nodes.min(axis=0), nodes.max(axis=0)))
+        raise BodyError(
+            f"fixed{of_what} holds no node: the body reaches from {low} to {high} m; None leaves it without supports"
+        )
+    return mask
+
+
+def _named_mask(nodes: np.ndarray, fixed: Fixed) -> np.ndarray:
     count = len(nodes)
     mask = np.zeros((count, 3), dtype=bool)
-    if fixed is None:
-        return mask
     if callable(fixed):
         fixed = np.asarray(fixed(nodes))
         if fixed.shape not in {(count,), (count, 3)} or fixed.dtype != bool:

@@ -62,7 +62,7 @@ def _numbered(surface: np.ndarray, nodes: np.ndarray, what: str) -> np.ndarray:
 def _group(body: Body, name: str) -> np.ndarray | None:
     """Mask of the nodes of a region of the mesh file; None if it has none of that name."""
     mesh = body.mesh
-    number = mesh.region_names.get(name, int(name) if name.isdecimal() else None)
+    number = mesh.region_names.get(name, int(name) if name.isascii() and name.isdecimal() else None)
     elements = mesh.regions == number
     if number is None or not elements.any():
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import warnings
 from pathlib import Path
@@ -11,6 +12,7 @@ import typer
 
 from palpate.cli.bodies import Dask, ElementChoice, MaxSize, Repair, Unit, body_of, in_unit, is_surface, read_any
 from palpate.cli.completion import precisions, units
+from palpate.startup import restore_interrupts
 
 if TYPE_CHECKING:
     from palpate.mesh import TetMesh
@@ -38,7 +40,7 @@ def options(
 
 
 def main() -> None:
-    """Run the command line; a user's mistake is one line and exit code 2, Ctrl-C is 130."""
+    """Run the command line; a user's mistake is one line and exit code 2, Ctrl-C is 130, SIGTERM 143."""
     from palpate.errors import Error, MeshWarning, StoreWarning
 
     def show(message: Warning | str, category: type[Warning], *_args: object, **_kwargs: object) -> None:
@@ -47,6 +49,8 @@ def main() -> None:
 
     warnings.showwarning = show
     try:
+        signal.signal(signal.SIGTERM, _terminate)
+        restore_interrupts()
         app(standalone_mode=True)
     except Error as error:
         sys.exit(_complain(str(error)))
@@ -56,6 +60,12 @@ def main() -> None:
     except KeyboardInterrupt:
         print("palpate: interrupted", file=sys.stderr)
         sys.exit(130)
+
+
+def _terminate(*_signal: object) -> None:
+    """End in order: children are ended and unfinished files are removed. A second signal ends the process at once."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    sys.exit(128 + signal.SIGTERM)
 
 
 def _complain(message: str) -> int:
@@ -221,6 +231,7 @@ def info(
         return
     if file.suffix == ".toml":
         scene = palpate.Scene.read(file)
+        scene.require_files()
         print(f"{file}: scene of {scene.name}")
         for name, value in scene.model_dump(by_alias=True, exclude_none=True).items():
             _print_entry(name, value)

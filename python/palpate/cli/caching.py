@@ -20,22 +20,45 @@ def _names(incomplete: str) -> list[str]:
 
 @cache_app.command("list")
 def cache_list() -> None:
-    """List the precomputed files in the cache: name, size, date, and what they are.
+    """List the precomputed files in the cache: name, size, when they were last used, and what they are.
 
     Example: palpate cache list
     """
     from datetime import datetime
 
     from palpate.cache import cache_directory, cached_files
+    from palpate.cache_limit import cache_limit
 
     files = cached_files()
     width = max((len(file.name) for file in files), default=0)
     for file in files:
-        date = datetime.fromtimestamp(file.modified).strftime("%Y-%m-%d %H:%M")
+        date = datetime.fromtimestamp(file.used).strftime("%Y-%m-%d %H:%M")
         print(f"{file.name:{width}}  {file.size / 1e6:9.1f} MB  {date}  {file.about}")
     left = sum(file.leftover for file in files)
     hint = f", {left} of them leftovers: 'palpate cache clear --leftovers' deletes those" if left else ""
-    print(f"{_counted(len(files))}, {sum(f.size for f in files) / 1e6:.1f} MB in {cache_directory()}{hint}")
+    size, limit = sum(f.size for f in files) / 1e6, cache_limit().size / 1e9
+    print(f"{_counted(len(files))}, {size:.1f} MB of {limit:.3g} GB in {cache_directory()}{hint}")
+
+
+@cache_app.command("limit")
+def cache_limit_command(
+    size: Annotated[
+        str | None, typer.Argument(help="Such as 20GB, or 'default'; what it is and how much is used without it.")
+    ] = None,
+) -> None:
+    """Show or set how large the cache may become: what was used least recently is deleted first.
+
+    By default 10 GB, or a tenth of the disk where that is less. What a program has open stays.
+
+    Example: palpate cache limit 20GB
+    """
+    from palpate.cache import cached_files
+    from palpate.cache_limit import cache_limit, set_cache_limit
+
+    if size is not None:
+        set_cache_limit(None if size == "default" else size)
+    used, limit = sum(file.size for file in cached_files()) / 1e9, cache_limit()
+    print(f"{used:.3g} of {limit.size / 1e9:.3g} GB{'' if limit.is_set else ' (the default)'} are used")
 
 
 @cache_app.command("clear")

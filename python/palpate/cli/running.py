@@ -86,6 +86,7 @@ def demo(
         impulse_history(model, paper, headless or SECONDS, out or Path())
         return
     built = _build(scene_of(model))
+    _print_kept()
     if headless is not None:
         _scripted(built, f"{model}-paper" if paper else model, headless, out or Path(), record)
         return
@@ -152,6 +153,7 @@ def run(
     growing: dict[int, BackgroundPrecompute] = {}
     options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
     built = built_from(file, options, growing if headless is None else None)
+    _print_kept()
     if headless is not None:
         _scripted(built, file.stem, headless, out, record)
         return
@@ -196,6 +198,18 @@ def _view(
     files = {"record": record, "recordings": page.recordings, "maps": maps, "growing": growing}
     server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
     open_viewer(server, browser=page.browser)
+
+
+def _print_kept() -> None:
+    """Print what stays in the cache of what was prepared."""
+    from palpate.cache import cached_files
+    from palpate.cache_limit import cache_limit, kept_by_this_process
+
+    kept = kept_by_this_process()
+    if kept:
+        used, limit = sum(file.size for file in cached_files()) / 1e9, cache_limit().size / 1e9
+        of_all = f"{used:.3g} of {limit:.3g} GB are used ('palpate cache list')"
+        print(f"kept in the cache: {kept / 1e6:.1f} MB of this scene; {of_all}", flush=True)
 
 
 def _force_line(record: PressRecord, max_force: float) -> str:

@@ -14,8 +14,10 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from palpate import _native
+from palpate.atomic import destination
 from palpate.body import Body, description
 from palpate.cache import cache_directory
+from palpate.cache_limit import hold, make_room
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
 from palpate.leftovers import remove_leftovers
@@ -91,8 +93,9 @@ class ModalBasis:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file; an existing one is replaced only when the new one is complete."""
         shapes = self.shapes.reshape(-1, len(self))
-        remove_leftovers(Path(path))
-        _native.save_basis(Path(path), self.key, json.dumps(self.description), self.eigenvalues, shapes)
+        target = destination(Path(path), StoreError)
+        remove_leftovers(target)
+        _native.save_basis(target, self.key, json.dumps(self.description), self.eigenvalues, shapes)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, body: Body | None = None, mass: str | None = None) -> ModalBasis:
@@ -170,6 +173,7 @@ def modes(
         with contextlib.suppress(StoreError):
             basis = ModalBasis.load(target, body=body, mass=mass)
             if len(basis) >= wanted:
+                hold(target, basis)
                 return basis.first(wanted)
     if count is None and free > ALL_MODES_DOFS:
         size = 8e-9 * free**2
@@ -185,6 +189,9 @@ def modes(
             eigenvalues, vectors = _lanczos(body, matrices, wanted, report)
     basis = _basis(matrices, eigenvalues, vectors, key, {**description(body), "mass": mass, "modes": wanted})
     basis.save(target)
+    if path is None:
+        hold(target, basis)
+        make_room(keep=target)
     return basis
 
 

@@ -10,13 +10,16 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from palpate import _native
 from palpate.body import Body, SurfaceRegion, surface_region
-from palpate.errors import BodyError, StoreError
+from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN
+from palpate.green.claim import waits_for
 from palpate.green.function import GreensFunction
 from palpate.green.job import Job
 
@@ -61,6 +64,7 @@ class BackgroundPrecompute:
         self.done, self.columns = 0, 3 * len(job.region)
         self.error: str | None = None
         self._fresh: GreensFunction | None = None
+        self._waits = False
         self._complete = job.stored()
         self._news = threading.Condition()
         self._painted, self._touchable = np.empty(0, np.int64), np.empty(0, np.int64)
@@ -74,11 +78,16 @@ class BackgroundPrecompute:
             self._fresh = GreensFunction.load(job.target, body=body)
             self._touchable = self._fresh.touchable_nodes
         memory = job.allowed(None)
+        job.make_room()
+        # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
         self._child = child = subprocess.Popen(
-            [sys.executable, "-m", "palpate.green.child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [sys.executable, "-m", "palpate.green.child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
         )
-        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first")
-        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first)
+        names = ("arguments", "precision_name", "within", "description", "path", "memory", "first", "key")
+        values = (job.problem, precision, CHOSEN, job.description, job.target, memory, job.first, job.key)
         assert child.stdin is not None and child.stdout is not None
         self._input = child.stdin
         pickle.dump(dict(zip(names, values, strict=True)), self._input)
@@ -95,6 +104,12 @@ class BackgroundPrecompute:
                 self._note(message["done"], message["columns"])
             elif "error" in message:
                 self._end(message["error"])
+            elif "waiting" in message:
+                self._waits = True
+            elif "theirs" in message:
+                # Of another body, perhaps.
+                with contextlib.suppress(StoreError, OSError):
+                    self._take(GreensFunction.load(self._job.target, body=self.body))
             else:
                 self._load(bool(message.get("finished")))
         self._end("the process that computes the columns has ended")
@@ -115,8 +130,12 @@ class BackgroundPrecompute:
             self._end(str(error))
             return
         # What tools needed to know of the stage before is kept under its name, and of no more use.
-        for contact in self._job.target.parent.glob(f"{self._job.target.stem}.*.contact.palpate"):
-            contact.unlink(missing_ok=True)
+        _native.forget_contacts(self._job.target)
+        if finished:
+            self._job.make_room(written=True)
+        self._take(green, finished)
+
+    def _take(self, green: GreensFunction, finished: bool = False) -> None:
         with self._news:
             self._fresh, self._touchable = green, green.touchable_nodes
             if finished:
@@ -174,6 +193,9 @@ class BackgroundPrecompute:
                     raise BodyError(self.error)
                 self._news.wait(0.1)
                 done, columns = self.done, self.columns
+                waits, self._waits = self._waits, False
+            if waits:
+                warnings.warn(waits_for(self._job.target), StoreWarning, stacklevel=2)
             if progress is not None:
                 progress(done, columns)
 

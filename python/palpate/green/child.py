@@ -7,15 +7,19 @@ started it is gone: it ends at once, and what is finished stays in the partial f
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pickle
 import sys
 import threading
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from palpate import _native
 from palpate.errors import Error
+from palpate.green.claim import claimed
 
 
 class _Painted:
@@ -40,6 +44,34 @@ class _Painted:
         return nodes or None
 
 
+class _Watch:
+    """Reports that another process computes the store, and what that has ready."""
+
+    def __init__(self, path: Path, say: Callable[..., None]):
+        self._path, self._say = path, say
+        self._seen: int | None = None
+        self._waits = False
+
+    def __call__(self) -> None:
+        if not self._waits:
+            self._waits = True
+            self._say(waiting=True)
+        with contextlib.suppress(OSError):
+            now = self._path.stat().st_ino
+            if now != self._seen:
+                self._seen = now
+                self._say(theirs=True)
+
+
+def _is_finished(path: Path, key: str) -> bool:
+    """Whether the process that was waited for has finished the store."""
+    try:
+        _native.GreenCore.load(path, key)
+    except (Error, OSError):
+        return False
+    return True
+
+
 def main() -> None:
     """Compute what standard input asks for."""
     arguments = pickle.load(sys.stdin.buffer)
@@ -56,8 +88,11 @@ def main() -> None:
             say(done=done, columns=columns)
 
     growth = (arguments.pop("first"), painted.take, lambda nodes: say(ready=nodes))
+    key, path = arguments.pop("key"), arguments["path"]
     try:
-        _native.GreenCore.precompute_to(**arguments, progress=progress, growth=growth)
+        with claimed(path, _Watch(path, say)) as claim:
+            if not _is_finished(path, key):
+                _native.GreenCore.precompute_to(**arguments, progress=progress, growth=growth, claim=claim)
         say(finished=True)
     except Error as error:
         say(error=str(error))

@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from palpate import _native, units
+from palpate.atomic import destination
 from palpate.body import Body, description, problem_arrays
+from palpate.cache_limit import hold
 from palpate.errors import BodyError, StoreError, TouchWarning
 from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
@@ -61,6 +63,7 @@ class GreensFunction:
     def __init__(self, core: _native.GreenCore, body: Body | None = None):
         self._core = core
         self.body = body
+        hold(self.path, self)
         self.surface_nodes = core.surface_nodes.astype(np.int64)
         self.surface_positions = core.surface_positions.reshape(-1, 3)
         faces, width = core.surface_faces
@@ -182,8 +185,9 @@ class GreensFunction:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the store; an existing file is replaced only when the new one is complete."""
-        remove_leftovers(Path(path))
-        self._core.save(Path(path))
+        target = destination(Path(path), StoreError)
+        remove_leftovers(target)
+        self._core.save(target)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, body: Body | None = None) -> GreensFunction:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate import _native
@@ -12,6 +11,7 @@ from palpate.cluster import failure, require_scheduler, result_of, spread, submi
 from palpate.errors import ClusterError
 from palpate.green import worker
 from palpate.green.bounds import CHOSEN
+from palpate.green.job import Job
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -24,16 +24,14 @@ Report = Callable[[int, int], None] | None
 
 def precompute_on(
     client: Client,
-    problem: worker.Arrays,
-    precision: str | None,
+    what: Job,
+    claim: _native.StoreClaim,
     memory: int | str | None,
-    description: str,
-    target: Path,
     report: Report,
 ) -> bool:
-    """Write the Green's function of a problem to ``target``; whether a partial file of something else was thrown away.
+    """Write the Green's function that is claimed; whether a partial file of something else was thrown away.
 
-    Every worker factorises the problem once. Finished blocks stand in ``<target>.partial``, and are kept whatever
+    Every worker factorises the problem once. Finished blocks stand in ``<store>.partial``, and are kept whatever
     happens to the cluster: the same call, here or without a cluster, goes on from them.
 
     Raises
@@ -42,7 +40,8 @@ def precompute_on(
         Workers that fail, or a scheduler that is lost.
 
     """
-    job = worker.Job(_native.GreenCore.content_key(problem, precision), _native.__version__, precision, memory)
+    problem, precision = what.problem, what.precision
+    job = worker.Job(what.key, _native.__version__, precision, memory)
     held = submit(client, worker.received, problem)
     try:
         measuring = _measure(client, held, job)
@@ -55,7 +54,7 @@ def precompute_on(
         client.cancel(measuring)
         if order != layout.order:
             raise ClusterError("the workers order the columns otherwise: give them the same build of Palpate")
-        store = _native.ColumnStore(layout, precision, CHOSEN, measured, target, description)
+        store = _native.ColumnStore(layout, precision, CHOSEN, measured, what.target, what.description, claim)
         _, width, *_ = measured
         _gather(client, (held, job, order), width, store, report)
         store.finish(report)

@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from palpate import _native
+from palpate.atomic import destination
 from palpate.body import Body, SurfaceRegion, description, problem_arrays, surface_region
 from palpate.cache import cache_directory
+from palpate.cache_limit import make_room
 from palpate.errors import BodyError, StoreError
-from palpate.green.disk import require_room
+from palpate.green.disk import DiskUse, require_room
 from palpate.green.function import GreensFunction
 from palpate.green.memory import allowed_memory, available_memory
 from palpate.input_file import require_writable
@@ -85,6 +87,7 @@ class Job:
         else:
             target = Path(path)
             require_writable(target, StoreError)
+            target = destination(target, StoreError)
         remove_leftovers(target)
         first_ranks = np.searchsorted(body.mesh.surface_nodes, nodes).astype(np.uint32)
         return cls(body, region, problem, first_ranks, key, target, precision)
@@ -100,10 +103,17 @@ class Job:
         """What the file says it was made from, in JSON."""
         return json.dumps(description(self.body))
 
+    def make_room(self, written: bool = False) -> None:
+        """Delete old files where the cache would exceed its limit with what is going to be written there, or was."""
+        if self.target.parent == cache_directory():
+            store = DiskUse.of(3 * len(self.region), self.rows, self.precision or "f16", False).store
+            make_room(0 if written else store, self.target)
+
     def stored(self) -> GreensFunction | None:
         """Give what is in the file, if that matches."""
         if self.target.exists():
-            with contextlib.suppress(StoreError):
+            # It may be deleted meanwhile, to make room in the cache.
+            with contextlib.suppress(StoreError, FileNotFoundError):
                 return self.load()
         return None
 

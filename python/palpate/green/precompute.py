@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,7 @@ from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.cluster import connected
 from palpate.errors import ClusterError, PrecisionWarning, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN, WARNED, error_text, remedy
+from palpate.green.claim import claimed, waits_for
 from palpate.green.function import GreensFunction
 from palpate.green.gathering import precompute_on
 from palpate.green.job import Job
@@ -41,7 +43,8 @@ def precompute(
     """Green's function of a body, from its file if that matches, else computed and written there.
 
     An interrupted computation leaves what it finished in ``<path>.partial``; the next one with the same arguments goes
-    on from there, to the same bits.
+    on from there, to the same bits. One process writes a file at a time: a second one waits for the first, and then
+    takes what that has written, or goes on from it.
 
     Parameters
     ----------
@@ -89,6 +92,8 @@ def precompute(
     -----
     PrecisionWarning
         Touches may be wrong by more than 1 %.
+    StoreWarning
+        Another process computes the same file, and is waited for; or it had left something that does not belong here.
 
     """
     if dask is not None and not (first is None and ready is None and painted is None):
@@ -97,24 +102,43 @@ def precompute(
     stored = job.stored()
     if stored is not None:
         return _told(stored)
-    with _what_is_kept_is_told(job.target):
+    with _what_is_kept_is_told(job.target), claimed(job.target, _told_once(job.target)) as claim:
+        # Whoever had the claim before may have finished it.
+        stored = job.stored()
+        if stored is not None:
+            return _told(stored)
+        job.make_room()
         if dask is None:
-            discarded = _here(job, memory, progress, first is not None, ready, painted)
+            discarded = _here(job, claim, memory, progress, first is not None, ready, painted)
         else:
             # Of memory the workers see to their own; the files have to have room here.
             job.allowed(None)
             # A lost connection, an OSError of the library, is told apart in here.
             with connected(dask) as client, progress_reporter("precomputing", progress) as report:
-                discarded = precompute_on(client, job.problem, precision, memory, job.description, job.target, report)
+                discarded = precompute_on(client, job, claim, memory, report)
     if discarded:
         warnings.warn(
             f"{job.target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
         )
-    return _told(job.load())
+    green = job.load()
+    job.make_room(written=True)
+    return _told(green)
+
+
+def _told_once(target: Path) -> Callable[[], None]:
+    """Make what warns, when it is first called, that another process is waited for."""
+    calls = itertools.count()
+
+    def waiting() -> None:
+        if next(calls) == 0:
+            warnings.warn(waits_for(target), StoreWarning, stacklevel=5)
+
+    return waiting
 
 
 def _here(
     job: Job,
+    claim: _native.StoreClaim,
     memory: int | str | None,
     progress: bool | Callable[[int, int], None],
     staged: bool,
@@ -135,6 +159,7 @@ def _here(
             allowed,
             growth,
             report and report.phase,
+            claim,
         )
     return discarded
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import threading
 
 
 def run_limited(command: list[str], time_limit: float) -> int | None:
     """Exit status of a child in a process group of its own; None if it ran out of time."""
-    # Its input stays open as long as this process lives: see end_with_parent.
+    # Its input stays open as long as this process lives: the child's end_with_parent watches it.
     process = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -36,15 +35,3 @@ def failure_of(status: int | None, time_limit: float) -> str | None:
     if status < 0:
         return f"crashed ({signal.Signals(-status).name})"
     return "returned no tetrahedra" if status else None
-
-
-def end_with_parent() -> None:
-    """In the child: end when the parent does, however that was: its end of our input then closes."""
-
-    def watch() -> None:
-        # Not through sys.stdin: a thread that holds its lock at the end crashes the interpreter.
-        while os.read(0, 1):
-            pass
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

@@ -18,6 +18,7 @@ from palpate.errors import MeshError, MeshWarning
 from palpate.input_file import require_file, require_writable
 from palpate.mesh.cells import CURVED, Block, shape_of, split
 from palpate.mesh.elements import boundary_faces
+from palpate.mesh.gmsh_first import is_first_format, read_first_format
 from palpate.mesh.size import scale_of
 from palpate.units import length_scale
 
@@ -90,13 +91,8 @@ def _read_meshio(path: Path) -> meshio.Mesh:
 
     if path.suffix not in WRITERS:
         raise MeshError(f"{path}: unknown volume format '{path.suffix}'; known are {', '.join(WRITERS)}")
-    with path.open("rb") as file:
-        head = file.read(4)
-    if path.suffix == ".msh" and head == b"$NOD":
-        raise MeshError(
-            f"{path} has Gmsh's first format, which is not read: convert it with "
-            f"'gmsh {path.name} -save -format msh41 -o new.msh'"
-        )
+    if path.suffix == ".msh" and is_first_format(path):
+        return read_first_format(path)
     # meshio prints its complaints and may end the program; both become one error of ours.
     noise = io.StringIO()
     try:

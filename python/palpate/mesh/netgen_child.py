@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.mesh.child import end_with_parent
+from palpate._native import end_with_parent
 
 if TYPE_CHECKING:
     from netgen.meshing import Mesh, MeshingParameters

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.mesh.child import end_with_parent
+from palpate._native import end_with_parent
 
 
 def main(given: str, made: str) -> int:

@@ -12,11 +12,12 @@ import numpy as np
 
 from palpate import models
 from palpate.body import Body, parse
-from palpate.errors import Error, SceneError
+from palpate.errors import Error, SceneError, UnclearUnitError
 from palpate.green import BackgroundPrecompute, GreensFunction, precompute, require_precise
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
-from palpate.mesh.tetrahedralize import tetrahedralize_with
+from palpate.mesh.size import scale_of
+from palpate.mesh.tetrahedralize import closed_surface, tetrahedralize_with
 from palpate.progress import progress_reporter
 from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
@@ -130,6 +131,31 @@ def unsolved_body(scene: SceneTables, rank: int = 0, mesh: TetMesh | None = None
     return _Builder(scene, rank).body(mesh)
 
 
+@contextlib.contextmanager
+def blaming(scene: SceneTables, place: Sequence[str | int], kind: type[Error] | None = SceneError) -> Iterator[None]:
+    """Name the line of a table, or of an entry of an array of tables, in an error that it leads to.
+
+    The error becomes one of a ``kind``; None leaves it what it is.
+    """
+    try:
+        yield
+    except Error as error:
+        table = next(key for key in reversed(place) if isinstance(key, str))
+        message = f"{located(*scene.source, place)}: {table}: {error}"
+        if isinstance(error, UnclearUnitError):
+            raise UnclearUnitError(message, error.fitting) from None
+        raise (kind or type(error))(message) from None
+
+
+def require_files(scene: SceneTables) -> None:
+    """See :meth:`palpate.Scene.require_files`."""
+    for rank in range(len(scene.bodies)):
+        _Builder(scene, rank).require_files()
+    for rank, tool in enumerate(scene.tools):
+        with blaming(scene, ["tool", rank, "shape"]):
+            tool.shape_arguments(scene.folder)
+
+
 class _Builder:
     """Builds one body of a scene."""
 
@@ -141,7 +167,9 @@ class _Builder:
         table = self._table
         place = (table.title, table.position, table.orientation)
         if table.store is not None:
-            return BuiltBody(None, GreensFunction.load(self._scene.folder / table.store), None, *place)
+            with self._blaming_file(["body", self._rank, "store"]):
+                green = GreensFunction.load(self._scene.folder / table.store)
+            return BuiltBody(None, green, None, *place)
         body = self.body()
         green = self._green(body, progress)
         dynamics, where = self._own("dynamics")
@@ -162,6 +190,21 @@ class _Builder:
             with progress_reporter("precomputing what is touched first", progress) as report:
                 return background.wait(report)
 
+    def require_files(self) -> None:
+        """Look at what building would read; a surface that is yet to be filled only by itself."""
+        table = self._table
+        if table.store is not None:
+            self.build(False, None)
+        elif not table.fills_a_surface:
+            self.body()
+        else:
+            with self._blaming_file(["body", self._rank, "mesh"]):
+                surface = closed_surface(self._scene.folder / str(table.mesh))
+                vertices = surface.vertices * scale_of(str(table.mesh), surface.vertices, table.unit)
+            supports, where = self._own("supports")
+            with self._blaming_file(where):
+                _predicate_mask(supports.fixed, vertices)
+
     def _own(self, key: str) -> tuple[Any, list[str | int]]:
         """Table of the body, or that of the whole scene; and its place in the file."""
         own = getattr(self._table, key)
@@ -173,7 +216,8 @@ class _Builder:
         table, mesh = self._table, self.mesh() if mesh is None else mesh
         if table.element == "linear" and mesh.is_quadratic:
             source = table.mesh or table.title
-            raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
+            with self._blaming_file(["body", self._rank, "element"]):
+                raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
         if table.adds_middles:
             mesh = mesh.to_quadratic()
         # With the regions of the file, which those of the scene replace.
@@ -194,23 +238,27 @@ class _Builder:
                 names[_unused(name, names)] = label
         mesh = TetMesh(mesh.nodes, mesh.tets, labels, names)
         loads, where = self._own("loads")
-        body = Body(mesh, material=materials, fixed=self._fixed(mesh), loads=together(loads))
+        with self._blaming_file(self._own("supports")[1]):
+            fixed = self._fixed(mesh)
+        with self._blaming_file(["body", self._rank]):
+            body = Body(mesh, material=materials, fixed=fixed, loads=together(loads))
         for rank, load in enumerate(loads):
             with self._blaming([*where, rank]):
                 load.check(body)
         return body
 
-    @contextlib.contextmanager
-    def _blaming(self, place: Sequence[str | int]) -> Iterator[None]:
-        """Name the line of a table, or of an entry of an array of tables, in an error of the body."""
-        try:
-            yield
-        except Error as error:
-            path, text = self._scene.source
-            table = next(key for key in reversed(place) if isinstance(key, str))
-            raise SceneError(f"{located(path, text, place)}: {table}: {error}") from None
+    def _blaming(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
+        return blaming(self._scene, place)
+
+    def _blaming_file(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
+        """Do the same where the scene is a file: what a program has given needs no line."""
+        return blaming(self._scene, place, None) if self._scene.source[1] else contextlib.nullcontext()
 
     def mesh(self) -> TetMesh:
+        with self._blaming_file(["body", self._rank, "model" if self._table.model is not None else "mesh"]):
+            return self._read_mesh()
+
+    def _read_mesh(self) -> TetMesh:
         table = self._table
         if table.model is not None:
             return models.load(table.model, paper=table.paper)
@@ -228,13 +276,7 @@ class _Builder:
         if fixed is None:
             raise SceneError(f"supports.fixed is missing: '{self._table.title}' needs nodes that are held")
         if isinstance(fixed, str):
-            mask = parse(fixed)(mesh.nodes)
-            if not np.any(mask):
-                low, high = mesh.bounds.round(4).tolist()
-                raise SceneError(
-                    f"no node satisfies supports.fixed = '{fixed}': the body reaches from {low} to {high} m"
-                )
-            return mask
+            return _predicate_mask(fixed, mesh.nodes)
         if self._table.adds_middles and max(fixed, default=0) < len(mesh.nodes):
             mask = np.zeros(len(mesh.nodes), dtype=bool)
             mask[fixed] = True
@@ -242,6 +284,17 @@ class _Builder:
             mask[mesh.tets[:, 4:][between]] = True
             return mask
         return fixed
+
+
+def _predicate_mask(fixed: Any, nodes: np.ndarray) -> np.ndarray | None:
+    """Nodes that a predicate holds, of which there must be some; None for what is no predicate."""
+    if not isinstance(fixed, str):
+        return None
+    mask = parse(fixed)(nodes)
+    if not np.any(mask):
+        low, high = (bound.round(4).tolist() for bound in (nodes.min(axis=0), nodes.max(axis=0)))
+        raise SceneError(f"no node satisfies supports.fixed = '{fixed}': the body reaches from {low} to {high} m")
+    return mask
 
 
 def _file_regions(mesh: TetMesh, tables: int) -> tuple[np.ndarray, dict[str, int]]:

@@ -28,6 +28,9 @@ WORDS = {
 RENAMED = {"view.hold_strain": "strain_limit"}
 
 Place = Sequence[str | int]
+# A key, bare or in quotes, or several with dots between them.
+_KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
+KEYS = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
 
 
 def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel]) -> str:
@@ -85,9 +88,16 @@ def _got(value: Any) -> str:
 
 
 def located(path: Path, text: str, place: Place) -> str:
-    """File and line of a place in it, as far as it is written there."""
-    line = line_of(text, place)
-    return f"{path}:{line}" if line else str(path)
+    """File and line of a place in it; the file's first line for what is missing from it as a whole."""
+    if not text:
+        return str(path)
+    return f"{path}:{line_of(text, place) or _first_line(text)}"
+
+
+def _first_line(text: str) -> int:
+    """First line that says something."""
+    said = (number for number, line in enumerate(text.splitlines(), 1) if line.split("#")[0].strip())
+    return next(said, 1)
 
 
 def line_of(text: str, place: Place) -> int | None:
@@ -96,19 +106,24 @@ def line_of(text: str, place: Place) -> int | None:
     table: list[str | int] = []
     found, depth = None, 0
     for number, line in enumerate(text.splitlines(), 1):
-        head = re.match(r"\s*(\[\[?)\s*([\w.-]+)\s*\]", line)
-        pair = re.match(r"\s*([\w.-]+)\s*=", line)
+        head = re.match(rf"\s*(\[\[?)\s*({KEYS})\s*\]", line)
+        pair = re.match(rf"\s*({KEYS})\s*=", line)
         if head:
-            table = _entered(head[2].split("."), head[1] == "[[", counts)
+            table = _entered(_parts(head[2]), head[1] == "[[", counts)
             here = table
         elif pair:
-            here = [*table, *pair[1].split(".")]
+            here = [*table, *_parts(pair[1])]
         else:
             continue
         shared = _leads_to(here, place)
         if shared > depth:
             found, depth = number, shared
     return found
+
+
+def _parts(keys: str) -> list[str]:
+    """Keys between the dots, without quotes and blanks."""
+    return [key.strip().strip("'\"") for key in keys.split(".")]
 
 
 def _entered(parts: Sequence[str], entry: bool, counts: dict[tuple[str | int, ...], int]) -> list[str | int]:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from palpate.errors import SceneError
 from palpate.green import BackgroundPrecompute
 from palpate.input_file import read_toml
-from palpate.scene.build import BuiltScene, build
+from palpate.scene.build import BuiltScene, build, require_files
 from palpate.scene.mistakes import explain, located
 from palpate.scene.tables import BodyTable, SceneTables
 
@@ -83,8 +83,9 @@ class Scene(SceneTables):
         if len(self.bodies) == 1:
             given |= self.model_fields_set & own
         if body.store is not None and given:
+            where = located(path, text, ["body", rank, "store"])
             raise SceneError(
-                f"{path}: a store carries its own material, supports and loads, and where it may be touched, and "
+                f"{where}: a store carries its own material, supports and loads, and where it may be touched, and "
                 "cannot move: leave those tables out"
             )
 
@@ -92,6 +93,17 @@ class Scene(SceneTables):
     def of_store(cls, path: str | os.PathLike[str]) -> Scene:
         """Scene of a precomputed store, with the default tool and device."""
         return cls(body=BodyTable(store=os.fspath(path)))
+
+    def require_files(self) -> None:
+        """Refuse what building it would refuse of its files, before anything is filled or solved.
+
+        Raises
+        ------
+        Error
+            A file that is missing or cannot be read, supports that hold no node, a region without elements.
+
+        """
+        require_files(self)
 
     def build(
         self,

@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from palpate import models
+from palpate.body import parse
+from palpate.errors import BodyError, UnitError
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
@@ -17,6 +19,7 @@ from palpate.scene.regions import MaterialTable, RegionTable
 from palpate.scene.table import Length, Number, Point, Pressure, Radius, Table, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
 from palpate.scene.touch import TouchTable
+from palpate.units import length_scale
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
@@ -46,6 +49,16 @@ class SupportsTable(Table):
     """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
 
     fixed: Annotated[str | list[int] | None, _NODES] = None
+
+    @field_validator("fixed")
+    @classmethod
+    def _readable(cls, fixed: Any) -> Any:
+        if isinstance(fixed, str):
+            try:
+                parse(fixed)
+            except BodyError as error:
+                raise ValueError(str(error)) from None
+        return fixed
 
 
 class BodyTable(Table):
@@ -86,6 +99,11 @@ class BodyTable(Table):
             raise ValueError("give exactly one of mesh, model and store")
         if self.model is not None and self.model not in models.NAMES:
             raise ValueError(f"unknown model '{self.model}'; there are {', '.join(models.NAMES)}")
+        if self.unit is not None:
+            try:
+                length_scale(self.unit)
+            except UnitError as error:
+                raise ValueError(str(error)) from None
         if abs(np.linalg.norm(self.orientation) - 1.0) > 1e-6:
             raise ValueError(f"orientation must be a unit quaternion w x y z, got {list(self.orientation)}")
         return self

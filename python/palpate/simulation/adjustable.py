@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,8 @@ class Adjustable:
     _friction: list[float]
     _strain_limit: float
     _armed: bool
+    # Held while what is kept here of the settings changes.
+    _keeping: threading.Lock
 
     def set_radius(self, contact_radius: float | str, tool: int | None = None) -> None:
         """Contact radius of contacts that begin from now on, m, of one tool or of all.
@@ -37,7 +41,7 @@ class Adjustable:
         radius = settings.checked_radius(contact_radius)
         for changed in tools:
             self._core.set_contact_radius(changed, radius)
-            self._radii[changed] = radius
+            self._keep("_radii", changed, radius)
 
     def set_friction(self, friction: float, tool: int | None = None) -> None:
         """Coulomb's coefficient of friction from now on, of one tool or of all; 0 slides freely.
@@ -52,7 +56,7 @@ class Adjustable:
         tools = range(len(self._friction)) if tool is None else [self._tool(tool)]
         for changed in tools:
             self._core.set_friction(changed, coefficient)
-            self._friction[changed] = coefficient
+            self._keep("_friction", changed, coefficient)
 
     def friction_of(self, tool: int = 0) -> float:
         """Coulomb's coefficient of friction of a tool."""
@@ -105,8 +109,9 @@ class Adjustable:
             raise SceneError(
                 "the body has several materials, or loads, or moves: its stiffness cannot be changed while running"
             )
-        self._scales[body] = settings.checked_modulus(youngs_modulus) / reference
-        self._core.set_stiffness_scale(body, self._scales[body])
+        scale = settings.checked_modulus(youngs_modulus) / reference
+        self._core.set_stiffness_scale(body, scale)
+        self._keep("_scales", body, scale)
 
     def set_strain_limit(self, strain_limit: float) -> None:
         """Largest strain to which tools may take the bodies from now on; 0 takes the limit away.
@@ -167,6 +172,13 @@ class Adjustable:
 
         """
         self._core.watch(self._body(body), self._rank_of(node, body))
+
+    def _keep(self, name: str, rank: int, value: Any) -> None:
+        """Keep what is set of a tool or body, which another thread may have removed meanwhile."""
+        with self._keeping:
+            values = getattr(self, name)
+            if rank < len(values):
+                values[rank] = value
 
     def _rank_of(self, node: int, body: int) -> int:
         surface = self.bodies[body].green.surface_nodes

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from pydantic import ValidationError
 
@@ -23,6 +25,20 @@ from palpate.vectors import three_numbers
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 Rank = int | None
+Given, Answer = ParamSpec("Given"), TypeVar("Answer")
+
+
+def one_at_a_time(
+    change: Callable[Concatenate[Changing, Given], Answer],
+) -> Callable[Concatenate[Changing, Given], Answer]:
+    """Let threads that change a simulation wait for each other: each begins with what the one before has left."""
+
+    @functools.wraps(change)
+    def alone(simulation: Changing, /, *args: Given.args, **keywords: Given.kwargs) -> Answer:
+        with simulation._changing:
+            return change(simulation, *args, **keywords)
+
+    return alone
 
 
 class Changing:
@@ -42,9 +58,14 @@ class Changing:
     _grab: list[bool]
     _armed: bool
     _running: bool
+    # Of the scene that the loop has, as the core counts them; None while another one comes in.
+    _number: int | None
+    _changing: threading.RLock
+    _keeping: threading.Lock
     _given: dict[int, Device]
     _devices: dict[int, str]
 
+    @one_at_a_time
     def add_body(
         self,
         body: Body | GreensFunction | Scene | Mapping[str, Any],
@@ -70,6 +91,7 @@ class Changing:
         self._exchange(scene, (*self.bodies, built), bodies, list(range(len(self.scene.tools))))
         return len(self.bodies) - 1
 
+    @one_at_a_time
     def remove_body(self, body: int) -> None:
         """Remove a body, and the contacts on it.
 
@@ -87,6 +109,7 @@ class Changing:
         scene = self.scene.model_copy(update={"bodies": tables})
         self._exchange(scene, bodies, kept, list(range(len(self.scene.tools))))
 
+    @one_at_a_time
     def place_body(self, body: int, position: Sequence[float], orientation: Sequence[float] | None = None) -> None:
         """Put a body at a position, m, with an orientation, a unit quaternion w x y z; None keeps the one it has.
 
@@ -106,6 +129,7 @@ class Changing:
         scene = self.scene.model_copy(update={"bodies": tables})
         self._exchange(scene, tuple(bodies), list(range(len(bodies))), list(range(len(self.scene.tools))))
 
+    @one_at_a_time
     def take_store(self, body: int, green: GreensFunction) -> None:
         """Go on with another store of a body, in which more of the same surface may be touched.
 
@@ -122,6 +146,7 @@ class Changing:
         ranks: tuple[list[Rank], list[Rank]] = list(range(len(bodies))), list(range(len(self.scene.tools)))
         self._exchange(self.scene, tuple(bodies), *ranks, exchanged=body)
 
+    @one_at_a_time
     def add_tool(self, device: str | Device = "simulated", **table: Any) -> int:
         """Add a tool, given as in a ``[tool]`` table, moved by a device of a kind or of the program; returns its rank.
 
@@ -160,6 +185,7 @@ class Changing:
                 raise
         return rank
 
+    @one_at_a_time
     def remove_tool(self, tool: int) -> None:
         """Remove a tool, and its contacts; its device is left at zero force.
 
@@ -182,6 +208,7 @@ class Changing:
         if gone is not None and connected:
             gone.close_for_loop()
 
+    @one_at_a_time
     def connect(self, tool: int, device: Device | str) -> str:
         """Let a tool of the running loop be moved by another device: of the program, or of a kind; returns its name.
 
@@ -227,24 +254,28 @@ class Changing:
         new_tools = [tool_arguments(scene, tool) for tool, rank in enumerate(tool_ranks) if rank is None]
         places = [(tuple(body.position), tuple(body.orientation)) for body in bodies]
         other = None if exchanged is None else (exchanged, body_arguments(bodies[exchanged], local))
-        _native.change(self._core, (body_ranks, new_bodies, places), (tool_ranks, new_tools), other)
+        number = _native.change(self._core, (body_ranks, new_bodies, places), (tool_ranks, new_tools), other)
+        # Until all belongs to the new scene, none of it is taken for a frame.
+        self._number = None
         self.scene, self.bodies = scene, bodies
         tools = scene.tools
-        self._scales = [1.0 if rank is None else self._scales[rank] for rank in body_ranks]
-        radii, friction, targets, grab = self._radii, self._friction, self._targets, self._grab
-        new = [rank is None for rank in tool_ranks]
-        kept = [0 if rank is None else rank for rank in tool_ranks]
-        self._radii = [tools[t].contact_radius if new[t] else radii[k] for t, k in enumerate(kept)]
-        self._friction = [tools[t].friction if new[t] else friction[k] for t, k in enumerate(kept)]
-        self._targets = [((0.0, 0.0, 0.0), UPRIGHT) if new[t] else targets[k] for t, k in enumerate(kept)]
-        self._grab = [not new[t] and grab[k] for t, k in enumerate(kept)]
+        with self._keeping:
+            self._scales = [1.0 if rank is None else self._scales[rank] for rank in body_ranks]
+            radii, friction, targets, grab = self._radii, self._friction, self._targets, self._grab
+            new = [rank is None for rank in tool_ranks]
+            kept = [0 if rank is None else rank for rank in tool_ranks]
+            self._radii = [tools[t].contact_radius if new[t] else radii[k] for t, k in enumerate(kept)]
+            self._friction = [tools[t].friction if new[t] else friction[k] for t, k in enumerate(kept)]
+            self._targets = [((0.0, 0.0, 0.0), UPRIGHT) if new[t] else targets[k] for t, k in enumerate(kept)]
+            self._grab = [not new[t] and grab[k] for t, k in enumerate(kept)]
         if self._armed and None in body_ranks:
             for rank, was in enumerate(body_ranks):
                 if was is None:
                     self._core.set_strain_measure(rank, bodies[rank].green.native_strain_measure)
             # The running loop takes the measures with a scene that is otherwise the same.
             everything = (list(range(len(bodies))), [], places), (list(range(len(tools))), [])
-            _native.change(self._core, *everything)
+            number = _native.change(self._core, *everything)
+        self._number = number
 
     def _tool(self, tool: int) -> int:
         raise NotImplementedError

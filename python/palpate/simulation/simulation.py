@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import atexit
 import os
+import threading
+import time
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,7 +22,7 @@ from palpate.errors import SceneError, SimulationError
 from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.input_file import require_writable
-from palpate.scene import BodyMotion, BuiltScene, Scene
+from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
@@ -34,6 +36,8 @@ from palpate.vectors import three_numbers
 
 # A program that ends without a word leaves no device pushing.
 RUNNING: weakref.WeakSet[Simulation] = weakref.WeakSet()
+# How often, and how long each time, s, a frame waits for another thread that changes the scene.
+CHANGE_WAITS, CHANGE_WAIT = 2000, 1e-3
 
 
 @atexit.register
@@ -101,6 +105,8 @@ class Simulation(Adjustable, Changing):
         self._devices: dict[int, str] = {}
         self._strain_limit, self._armed = self.scene.view.strain_limit, False
         self._running = False
+        self._number: int | None = 0
+        self._changing, self._keeping = threading.RLock(), threading.Lock()
         self._to_record: Path | None = None
 
     def __repr__(self) -> str:
@@ -146,9 +152,16 @@ class Simulation(Adjustable, Changing):
             Processors of ``scene.device`` that this process may not run on.
 
         """
+        self._start(lambda: connect(self._core, self.scene, self._given))
+
+    def start_without_devices(self) -> None:
+        """Start the loop with simulated tools alone, whatever moves them in the scene: a device may have gone."""
+        self._start(dict)
+
+    def _start(self, connected: Callable[[], dict[int, str]]) -> None:
         if not self._running:
             self._arm_strain_limit()
-            self._devices = connect(self._core, self.scene, self._given)
+            self._devices = connected()
             RUNNING.add(self)
             try:
                 start_loop(self._core, self.scene.device)
@@ -235,21 +248,23 @@ class Simulation(Adjustable, Changing):
             raise SceneError(f"tool {tool} is moved by {self._devices[tool]}")
         place = three_numbers(position, "a tool's position", SceneError, units.length)
         moving = (0.0, 0.0, 0.0) if velocity is None else three_numbers(velocity, "a tool's velocity", SceneError)
-        turned = self._targets[self._tool(tool)][1]
+        (_, turned), held = self._targets[self._tool(tool)], self._grab[tool]
         if orientation is not None:
             turned = tuple(orientations_of([orientation], np.array([[place]]))[0, 0].tolist())
-        self._targets[tool] = (place, turned)
-        self._core.set_target(tool, place, turned, moving, True, self._grab[tool])
+        self._keep("_targets", tool, (place, turned))
+        self._core.set_target(tool, (place, turned), moving, True, held)
 
     def grab(self, on: bool, tool: int = 0) -> None:
         """Grab the surface near the tool, or let go."""
-        self._grab[self._tool(tool)] = bool(on)
-        self._core.set_target(tool, *self._targets[tool], (0.0, 0.0, 0.0), True, bool(on))
+        target = self._targets[self._tool(tool)]
+        self._keep("_grab", tool, bool(on))
+        self._core.set_target(tool, target, (0.0, 0.0, 0.0), True, bool(on))
 
     def remove(self, tool: int = 0) -> None:
         """Take a tool out of the scene until it is moved again."""
-        self._grab[self._tool(tool)] = False
-        self._core.set_target(tool, *self._targets[tool], (0.0, 0.0, 0.0), False, False)
+        target = self._targets[self._tool(tool)]
+        self._keep("_grab", tool, False)
+        self._core.set_target(tool, target, (0.0, 0.0, 0.0), False, False)
 
     def closest(self, points: np.ndarray, body: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Closest points of a body's surface as tools under the local law meet it: smooth between the nodes.
@@ -284,17 +299,33 @@ class Simulation(Adjustable, Changing):
             The loop does not run.
 
         """
-        raw = self._core.frame()
+        raw, bodies, scales = self._of_this_scene(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
         failed = self._given.get(raw["failed_program"])
         if failed is not None and failed.failure is not None:
             raw["fault"] = f"tool {raw['failed_program']}: {failed.failure}; forces are off until a reset"
-        return frame_of(raw, self.bodies, self._scales)
+        return frame_of(raw, bodies, scales)
 
     def contacts(self) -> list[Contact]:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
-        return [contact_of(record, self.bodies) for record in self._core.contacts() or []]
+        records, bodies, _ = self._of_this_scene(self._core.contacts)
+        return [contact_of(record, bodies) for record in records or []]
+
+    def _of_this_scene(
+        self, read: Callable[[], tuple[int, Any] | None]
+    ) -> tuple[Any, tuple[BuiltBody, ...], list[float]]:
+        """Read from the loop what belongs to the bodies that it comes with; None where it does not run.
+
+        Another thread may be changing the scene: between its change of the loop and that of the bodies are moments.
+        """
+        for _ in range(CHANGE_WAITS):
+            answer, bodies, scales = read(), self.bodies, self._scales
+            number = self._number
+            if answer is None or answer[0] == number:
+                return answer and answer[1], bodies, scales
+            time.sleep(CHANGE_WAIT)
+        raise SimulationError("another thread changes the scene all the time: no frame of it can be read")
 
     @property
     def strain_measure(self) -> StrainMeasure:

@@ -51,7 +51,7 @@ class Case:
         """Value of a varied key, in SI units, as its table holds it."""
         place: Any = self.scene
         for step in key:
-            if isinstance(place, list) and not step.isdigit():
+            if isinstance(place, list) and not _is_rank(step):
                 place = place[0]
             if isinstance(place, list):
                 place = place[int(step)]
@@ -129,7 +129,7 @@ def _put(tables: dict[str, Any], key: Key, value: Any) -> None:
     for step in key[:-1]:
         if isinstance(table, list):
             table = table[_entry(table, step, key)]
-            if step.isdigit():
+            if _is_rank(step):
                 continue
         table = table.setdefault(step, {}) if isinstance(table, dict) else None
     if isinstance(table, list):
@@ -141,7 +141,7 @@ def _put(tables: dict[str, Any], key: Key, value: Any) -> None:
 
 def _entry(tables: Sequence[Any], step: str, key: Key) -> int:
     """Rank of the table that a key means among several of a kind."""
-    if not step.isdigit():
+    if not _is_rank(step):
         if len(tables) == 1:
             return 0
         raise ValueError(f"there are {len(tables)} tables [[{key[0]}]]: say {key[0]}.0 for the first, and so on")
@@ -161,7 +161,7 @@ def _told(path: Path, text: str, error: ValidationError, given: Mapping[Key, tup
 
 
 def _names(place: Sequence[str | int]) -> list[str]:
-    return [str(step) for step in place if not str(step).isdigit()]
+    return [str(step) for step in place if not _is_rank(str(step))]
 
 
 def _names_region(scene: StudyScene) -> bool:
@@ -180,3 +180,8 @@ def _check(scene: StudyScene, path: Path, text: str) -> None:
     ):
         if not holds:
             raise SceneError(f"{located(path, text, place)}: {message}")
+
+
+def _is_rank(step: str) -> bool:
+    """Whether a step of a place is the number of an entry."""
+    return step.isascii() and step.isdigit()

@@ -42,6 +42,8 @@ MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
+# Between two looks at a loop that does not run, s.
+STOPPED_PAUSE = 0.25
 BAD_TOKEN = 4401
 # So often threads pass on the interpreter's lock while the server runs, s; Python's own 5 ms add up to a visible halt
 # where the event loop takes the lock several times for one message.
@@ -54,6 +56,8 @@ class Client:
 
     connection: ServerConnection
     shown: Session | None = None
+    # Of which it was told that its loop does not run.
+    refused: Session | None = None
     wants: Wants = field(default_factory=Wants)
     poses: PoseCoder = field(default_factory=PoseCoder)
     sent: int = 0
@@ -321,10 +325,13 @@ class ViewerServer:
                     message, client.log_seen = await self._worker.call(
                         session.frame_message, client.sent, client.log_seen, client.wants, client.poses
                     )
-                except SimulationError:
-                    # Another model has taken the place of this one meanwhile.
+                except SimulationError as error:
+                    # Another model may have taken the place of this one meanwhile.
                     if session is self._session:
-                        raise
+                        if client.refused is not session:
+                            client.refused = session
+                            await client.send({"type": "error", "text": str(error)})
+                        await asyncio.sleep(STOPPED_PAUSE)
                     client.may_send.set()
                     continue
                 await client.connection.send(message)
@@ -384,7 +391,8 @@ class ViewerServer:
             return
         make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
         building = self._begin_building()
-        self._build_task = asyncio.create_task(self._switch("Changing the tool", make, self._inherit, building))
+        text = "Preparing the tool: a press goes on with it"
+        self._build_task = asyncio.create_task(self._switch(text, make, self._inherit, building))
 
     def _begin_building(self) -> LongWork:
         if self._building is not None:
@@ -405,20 +413,37 @@ class ViewerServer:
             await self._tell_end(await self._worker.call(self._session.recorder.stop, why))
             await self._worker.call(exchange, session)
             await self._tell_all(await self._worker.call(session.settings))
-        except Error as error:
-            await self._tell_all({"type": "error", "text": str(error)})
+        except Exception as error:
+            # None of any kind may leave the pages without a word.
+            why = str(error) if isinstance(error, Error) else f"a mistake within palpate, please report it: {error!r}"
+            await self._tell_all({"type": "error", "text": why})
+            await self._tell_all(await self._worker.call(self._session.settings))
         finally:
             self._building = None
             await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
 
     def _exchange(self, session: Session) -> None:
-        self._session.close()
-        session.start()
+        """Put a session in the place of the one that runs, which goes on where the other does not start."""
+        before = self._session
+        before.close()
+        try:
+            session.start()
+        except BaseException as error:
+            session.close()
+            before.resume()
+            # Its tools may be moved otherwise now: pages get the scene anew.
+            for client in self._clients:
+                client.shown = None
+            if isinstance(error, Error):
+                raise type(error)(f"{error}; the scene shown before goes on") from error
+            raise
         self._session = session
 
     def _inherit(self, session: Session) -> None:
-        session.take_over(self._session)
+        before = self._session
+        session.take_over(before)
         self._exchange(session)
+        session.press_on(before)
 
     def _reporter(self, text: str, work: LongWork) -> Callable[[int, int], None]:
         """Tell all pages how far a long work is, from any thread; it begins with the first call.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import ViewerError
+from palpate.errors import DeviceError, Error, ViewerError
 from palpate.green import GreensFunction
 from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
@@ -85,6 +86,8 @@ class Session:
         low, high = placed.min(axis=0), placed.max(axis=0)
         self._centre, self.size = 0.5 * (low + high), float((high - low).max())
         self._active = [False] * len(scene.tools)
+        # The press under way of each tool, for a session that takes the place of this one.
+        self._pressed: dict[int, Mapping[str, Any]] = {}
         self._strain_limit = scene.view.strain_limit
         largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
@@ -108,6 +111,13 @@ class Session:
     def start(self) -> None:
         """Start the loop."""
         self.simulation.start()
+
+    def resume(self) -> None:
+        """Start the loop again after a stop; a device that has gone leaves its tool to the pointer."""
+        try:
+            self.simulation.start()
+        except DeviceError:
+            self.simulation.start_without_devices()
 
     def close(self) -> None:
         """Stop the loop."""
@@ -142,6 +152,7 @@ class Session:
             if self._active[released]:
                 self.simulation.remove(released)
                 self._active[released] = False
+            self._pressed.pop(released, None)
 
     def handle(self, message: Mapping[str, Any]) -> bool:
         """Do what a controlling client says. Returns whether settings changed.
@@ -214,6 +225,13 @@ class Session:
         self._set_strain_limit(other._strain_limit, {})
         if self._moving is not None and other._moving is not None:
             self._moving.set_time_scale(other._moving.time_scale)
+
+    def press_on(self, other: Session) -> None:
+        """Go on with the presses of another session on the same bodies, as they were last."""
+        for message in other._pressed.values():
+            # A tool that a device moves now is not for the pointer any more.
+            with contextlib.suppress(Error):
+                self._press(message)
 
     def take_store(self, body: int, green: GreensFunction) -> None:
         """Go on with a store of the same body of which more may be touched."""
@@ -356,7 +374,7 @@ class Session:
             self._moving.struck_at = None
         self.simulation.move(position.tolist(), tool=tool, orientation=turned)
         self.simulation.grab(grab, tool)
-        self._active[tool] = True
+        self._active[tool], self._pressed[tool] = True, message
         return False
 
     def _release(self, message: Mapping[str, Any]) -> bool:

@@ -23,9 +23,12 @@ $ENDELM
 """
 
 
-def test_the_first_format_of_gmsh_is_named_with_what_converts_it(tmp_path):
+def test_the_first_format_of_gmsh_is_read(tmp_path):
+    """One that is cut short is refused."""
     (tmp_path / "old.msh").write_text(GMSH_1)
-    refused(run("info", "old.msh", cwd=tmp_path), "old.msh", "Gmsh's first format", "gmsh old.msh -save -format msh41")
+    assert "4 nodes, 1 tetrahedra" in run("info", "old.msh", cwd=tmp_path).stdout
+    (tmp_path / "old.msh").write_text(GMSH_1[: GMSH_1.index("$ELM") + 8])
+    refused(run("info", "old.msh", cwd=tmp_path), "old.msh", "is no whole file of Gmsh's first format")
 
 
 @pytest.mark.parametrize("footer", ["end solid part", "END SOLID", "  end solid part\n"])

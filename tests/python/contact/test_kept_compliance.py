@@ -67,3 +67,10 @@ def test_where_nothing_can_be_written_the_answer_is_the_same(kept):
     file.mkdir()  # a folder stands where the file would
     assert np.array_equal(press(), first)
     assert file.is_dir()
+
+
+def test_few_are_kept_beside_a_store(kept):
+    folder, press = kept
+    for k in range(20):
+        press(radius=5e-3 + 1e-4 * k)
+    assert len(files(folder)) == 16

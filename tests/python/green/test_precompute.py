@@ -247,7 +247,7 @@ except palpate.StoreError as error:
 def test_partial_of_another_body_is_thrown_away(block, tmp_path):
     path = tmp_path / "a.palpate"
     partial = tmp_path / "a.palpate.partial"
-    for content in (b"", b"x" * 10_000, b'{"format":"palpate-partial"}'):
+    for content in (b"x", b"x" * 10_000, b'{"format":"palpate-partial"}'):
         partial.write_bytes(content)
         with pytest.warns(palpate.StoreWarning, match="thrown away"):
             palpate.precompute(block, path=path)

@@ -130,8 +130,10 @@ def test_a_mesher_ends_with_whoever_started_it(tmp_path, end):
         import os, sys, palpate
         from pathlib import Path
         from palpate.mesh.child import run_limited
-        child = "import os, time; from pathlib import Path; from palpate.mesh.child import end_with_parent; "
-        child += "end_with_parent(); Path('child').write_text(str(os.getpid())); time.sleep(100)"
+        child = "import ctypes, os; from pathlib import Path; from palpate._native import end_with_parent; "
+        child += "end_with_parent(); Path('child').write_text(str(os.getpid())); "
+        # The interpreter's lock stays with this thread, as in fTetWild.
+        child += "ctypes.PyDLL(None).sleep(100)"
         run_limited([sys.executable, "-c", child], 100)
     """
     # A program started in the background of a shell ignores interrupts, and so do its children.

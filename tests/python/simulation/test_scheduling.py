@@ -6,6 +6,7 @@ import os
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import palpate
@@ -69,6 +70,23 @@ def test_no_priority_is_asked_for_or_warned_of(block, block_green):
                 thread = int(thread_status("palpate-servo")["id"])
                 assert priority is None or os.sched_getscheduler(thread) == os.SCHED_OTHER
                 assert priority is None or not simulation.frame().statistics["realtime"][0]
+
+
+@linux
+def test_only_what_a_tick_reads_is_locked(block, block_green):
+    def locked() -> int:
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return 1024 * int(next(line for line in lines if line.startswith("VmLck")).split()[1])
+
+    # Mapped by the process, and of no use to a tick.
+    mapped, before = np.zeros(2**28, dtype=np.uint8), locked()
+    with palpate.Simulation(scene_of(block, block_green)) as simulation:
+        more, granted = locked() - before, simulation.frame().statistics["realtime"][1]
+    store = block_green.path.stat().st_size
+    # Beside the store the stack of the loop's thread, and the code: 25 MB.
+    assert more <= store + 50e6, f"{more / 1e6:.0f} MB are locked for a store of {store / 1e6:.0f} MB"
+    assert more >= store / 2 or not granted
+    assert mapped.nbytes == 2**28
 
 
 def test_what_the_machine_does_not_have_is_refused_by_its_key(block, block_green):

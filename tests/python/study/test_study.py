@@ -153,7 +153,7 @@ press.0.point = ["60mm", "25mm", "50mm"]
     path = written(folder, BASE + cases)
     result = run("study", path.name, "--out", "out", cwd=folder)
     assert result.returncode == 2
-    assert "case 2: no node satisfies supports.fixed = 'z < -1'" in result.stderr
+    assert "case 2: study.toml:7: supports: no node satisfies supports.fixed = 'z < -1'" in result.stderr
     with (folder / "out" / "study.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["name"] for row in rows] == ["whole", "whole", "held nowhere", "softer", "softer"]

@@ -39,3 +39,29 @@ def test_a_device_is_shown_and_its_fault_told(block, block_green):
     limited = [str(one.message) for one in told if issubclass(one.category, palpate.DeviceWarning)]
     holds = "tool 0: Haply Inverse3 0A01 holds contacts up to 800 N/m in this scene, which asks for 5000"
     assert [line.rpartition(": ")[0] for line in limited] == [holds]
+
+
+def test_a_change_of_tool_that_fails_leaves_the_scene_as_it_was(block, block_green):
+    """A device unplugged while another tool gets its shape: the page is told, and its frames go on."""
+
+    async def session(built, process):
+        async with serving(built) as server, page(server) as client:
+            scene, _ = await client.receive("scene")
+            assert [tool["device"] for tool in scene["tools"]] == ["Haply Inverse3 0A01", None]
+            process.kill()
+            await client.say(type="shape", tool=1, name="punch")
+            notice, _ = await client.receive("error")
+            assert "Haply" in notice["text"] and notice["text"].endswith("; the scene shown before goes on")
+            again, _ = await client.receive("scene")
+            assert [tool["shape"] for tool in again["tools"]] == ["sphere", "sphere"]
+            assert [tool["device"] for tool in again["tools"]] == [None, None]
+            for tool in (0, 1):
+                place = [0.03 + 0.03 * tool, 0.025, 0.05]
+                await client.say(type="press", tool=tool, position=place, grab=False)
+                await client.frame_where(lambda header, tool=tool: header["tools"][tool]["force"][2] > 0.02)
+
+    with inverse_service("--depth", "0.03") as (address, process):
+        device = {"kind": "haply", "address": address, "position": (0.025, 0.025, 0.056)}
+        scene = palpate.Scene(body={"model": "beam"}, tool=[{"radius": "6mm"}, {"radius": "6mm"}], device=device)
+        with warnings.catch_warnings(action="ignore", category=palpate.DeviceWarning):
+            asyncio.run(session(BuiltScene.of(scene, block, block_green), process))

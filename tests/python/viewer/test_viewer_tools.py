@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from viewer_client import page, serving, settled
 
 import palpate
 from palpate.scene import BuiltScene
+from palpate.viewer.session import Session
 
 TOP = np.array([0.04, 0.025, 0.05])
 RADIUS = 5e-3
@@ -125,5 +127,73 @@ def test_a_tool_that_sticks_stays_a_sphere(block, block_green):
             assert names_of((await client.receive("scene"))[0]) == ["sphere"]
             await client.say(type="shape", tool=0, name="punch")
             assert "may be sphere" in (await client.receive("error"))[0]["text"]
+
+    asyncio.run(session())
+
+
+def test_a_press_during_a_change_of_tool_goes_on_with_the_new_one(block, block_green, monkeypatch):
+    """Changing takes seconds on large bodies: the last press is kept, one that was let go of is not."""
+    built = scene_with(block, block_green, radius=RADIUS, friction=0.2)
+    deep = (TOP - [0.0, 0.0, 5e-4]).tolist()
+    make = Session.__init__
+
+    def take_long(session, *arguments):
+        time.sleep(0.5)
+        make(session, *arguments)
+
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            await client.receive("scene")
+            monkeypatch.setattr(Session, "__init__", take_long)
+            for held in (True, False):
+                await client.say(type="shape", tool=0, name="punch" if held else "sphere")
+                text = ""
+                while not text.startswith("Preparing the tool"):
+                    text = (await client.receive("status"))[0]["text"]
+                await client.say(type="press", tool=0, position=TOP.tolist(), grab=False)
+                await client.say(type="press", tool=0, position=deep, grab=False)
+                if not held:
+                    await client.say(type="release", tool=0)
+                scene, _ = await client.receive("scene")
+                assert scene["tools"][0]["shape"] == ("punch" if held else "sphere")
+                if held:
+                    await client.frame_where(lambda header: header["tools"][0]["force"][2] > 0.02)
+                else:
+                    header, _ = await client.receive("frame")
+                    assert not header["tools"][0]["active"]
+
+    asyncio.run(session())
+
+
+def test_a_tool_that_cannot_be_taken_leaves_the_one_before(block, block_green, monkeypatch):
+    """Whatever a new loop fails of, the page is told, and the frames of the one before go on."""
+    built = scene_with(block, block_green, radius=RADIUS, friction=0.2)
+    start = Session.start
+
+    def refuse(session):
+        if session.built.scene.tools[0].shape == "punch":
+            raise palpate.DeviceError("the device is disconnected: connect it again")
+        if session.built.scene.tools[0].shape == "capsule":
+            raise ZeroDivisionError("of no kind that is expected")
+        start(session)
+
+    monkeypatch.setattr(Session, "start", refuse)
+
+    async def session():
+        async with serving(built) as server, page(server) as client:
+            await client.receive("scene")
+            for name, words in (
+                ("punch", "connect it again; the scene shown before goes on"),
+                ("capsule", "report it"),
+            ):
+                await client.say(type="shape", tool=0, name=name)
+                notice, _ = await client.receive("error")
+                assert words in notice["text"] and "\n" not in notice["text"]
+                scene, _ = await client.receive("scene")
+                assert scene["tools"][0]["shape"] == "sphere"
+                before, _ = await client.receive("frame")
+                await client.frame_where(lambda header, before=before: header["ticks"] > before["ticks"])
+            await client.say(type="press", tool=0, position=TOP.tolist(), grab=False)
+            await client.frame_where(lambda header: header["tools"][0]["force"][2] > 0.02)
 
     asyncio.run(session())

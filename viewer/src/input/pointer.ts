@@ -29,6 +29,8 @@ const HOVER_TRIANGLES_MAX = 30_000;
 /** By which the tool turns for each pixel that the pointer goes with Alt. */
 const DEGREES_PER_PIXEL = 0.5;
 const ALL_PINNED = "All tools are pinned: Escape lets them go.";
+const INSIDE =
+  "The cut shows the inside, which no tool reaches: press the surface beside it, turn the body, or end the cut-away.";
 const ALL_MOVED = "Every tool is moved by a device: press with it.";
 
 /** What one pointer does from when it goes down on a body. */
@@ -42,6 +44,12 @@ interface Drag {
   timer: number;
   /** What was sent last. */
   sent: { position: THREE.Vector3; orientation: THREE.Quaternion | null } | null;
+}
+
+/** A pointer that is held down, and where. */
+export interface Held {
+  down: PointerEvent;
+  place: Place;
 }
 
 export class Pointer {
@@ -118,20 +126,37 @@ export class Pointer {
       this.aim = event;
       return;
     }
-    const pick = this.pick(event);
-    if (!pick) return;
+    const place: Place = [event.clientX, event.clientY];
+    const pick = this.pick(place);
+    if (!pick) {
+      // A drag there turns the body all the same.
+      if (this.stage.showsInside(this.viewport.rayThrough(...place))) this.control.notice(INSIDE);
+      return;
+    }
     const tool = drivenTool(state);
     if (tool === null) return this.control.notice(state.pinned.length > 0 ? ALL_PINNED : ALL_MOVED);
-    this.begin(event, pick, tool, state);
+    event.stopImmediatePropagation();
+    this.begin(event, place, pick, tool, state);
   }
 
-  private begin(event: PointerEvent, pick: Pick, tool: number, { scene, grab: grabWanted, pinned }: State): void {
+  /** The pointer that presses now, for a scene in which the tool is another one. */
+  get held(): Held | null {
+    return this.drag && { down: this.drag.down, place: this.drag.place };
+  }
+
+  /** Presses where the pointer is held down, with the tool that a new scene has. */
+  pressAgain({ down, place }: Held): void {
+    const state = this.store.get();
+    const [pick, tool] = [this.pick(place), drivenTool(state)];
+    if (this.drag === null && inControl(state) && pick && tool !== null) this.begin(down, place, pick, tool, state);
+  }
+
+  private begin(event: PointerEvent, place: Place, pick: Pick, tool: number, state: State): void {
     const { viewport } = this;
-    event.stopImmediatePropagation();
+    const { scene, grab: grabWanted, pinned } = state;
     viewport.controls.enabled = false;
     viewport.canvas.setPointerCapture(event.pointerId);
     const { size, tools } = scene!;
-    const place: Place = [event.clientX, event.clientY];
     // Without another tool a dent that is still seen is the one that this tool has just left.
     const dent = pinned.length > 0 ? pick.dent : 0;
     const sight = this.sight(pick);
@@ -167,7 +192,7 @@ export class Pointer {
     this.aim = null;
     if (!aim || event.type !== "pointerup") return;
     if (Math.hypot(event.clientX - aim.clientX, event.clientY - aim.clientY) > CLICK_PX) return;
-    const pick = this.pick(event);
+    const pick = this.pick([event.clientX, event.clientY]);
     if (!pick || pick.body !== this.store.get().scene?.motion?.body) return;
     const { settled, normal } = pick.inBody;
     const [x, y, z] = normal;
@@ -211,7 +236,7 @@ export class Pointer {
     if (event.pointerType === "touch" || event.buttons !== 0) return;
     const triangles = this.stage.bodies.reduce((sum, { surface }) => sum + surface.triangles.length / 3, 0);
     const able = inControl(this.store.get()) && triangles <= HOVER_TRIANGLES_MAX;
-    this.viewport.canvas.style.cursor = able && this.pick(event) ? this.cursor(event) : "";
+    this.viewport.canvas.style.cursor = able && this.pick([event.clientX, event.clientY]) ? this.cursor(event) : "";
   }
 
   private cursor(event: PointerEvent): string {
@@ -227,8 +252,8 @@ export class Pointer {
     this.handedOver = false;
   }
 
-  private pick(event: PointerEvent): Pick | null {
-    return this.stage.pick(this.viewport.rayThrough(event.clientX, event.clientY));
+  private pick(place: Place): Pick | null {
+    return this.stage.pick(this.viewport.rayThrough(...place));
   }
 
   /** Lets the tool go on towards what the pointer wants. */

@@ -8,7 +8,7 @@ import { isGrowing, touchStates } from "../painting";
 import type { Store, Stroke, Theme } from "../store";
 import { contactsOf } from "../tool_contacts";
 import { BodyView } from "./body_view";
-import type { Pick } from "./body_view";
+import type { Hit, Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
 import { ExamPlaces } from "./exam_places";
 import { FIELD, TISSUE } from "./field_material";
@@ -105,9 +105,19 @@ export class Stage {
 
   /** The point of a body that is seen along a ray; null beside all, and on the inside that a cut shows. */
   pick(raycaster: THREE.Raycaster): Pick | null {
+    return this.firstHit(raycaster)?.pick ?? null;
+  }
+
+  /** Whether a ray first meets the inside that a cut shows. */
+  showsInside(raycaster: THREE.Raycaster): boolean {
+    const hit = this.firstHit(raycaster);
+    return hit !== null && hit.pick === null;
+  }
+
+  private firstHit(raycaster: THREE.Raycaster): Hit | null {
     const hits = this.bodies.map((body) => body.pick(raycaster)).filter((hit) => hit !== null);
     hits.sort((a, b) => a.distance - b.distance);
-    return hits[0]?.pick ?? null;
+    return hits[0] ?? null;
   }
 
   /** The vertices of all bodies that are seen from here. */

@@ -15,6 +15,9 @@ const CONNECTION_WORDS: Record<ConnectionState, string> = {
   refused: "Refused",
 };
 
+/** A notice leaves by itself after so long; faults stay, and so does a notice under the pointer. */
+const NOTICE_MS = 12_000;
+
 export function showConnection(state: ConnectionState): void {
   const element = byId("connection");
   element.dataset["state"] = state;
@@ -46,8 +49,23 @@ export function followNotices(store: Store, control: Control): void {
     byId<HTMLButtonElement>("status-cancel").hidden = !inControl(state);
   });
   store.subscribe(["frame"], ({ frame }) => showFault(frame?.fault ?? null));
+  const leaving = new Map<string, number>();
+  const leave = (text: string) => leaving.set(text, window.setTimeout(() => control.dismiss(text), NOTICE_MS));
+  const stay = (text: string) => window.clearTimeout(leaving.get(text));
   store.subscribe(["notices"], ({ notices }) => {
-    byId("notices").replaceChildren(...notices.map((text) => noticeBanner(text, () => control.dismiss(text))));
+    for (const text of [...leaving.keys()].filter((text) => !notices.includes(text))) {
+      stay(text);
+      leaving.delete(text);
+    }
+    for (const text of notices) if (!leaving.has(text)) leave(text);
+    byId("notices").replaceChildren(
+      ...notices.map((text) => {
+        const banner = noticeBanner(text, () => control.dismiss(text));
+        banner.onpointerenter = () => stay(text);
+        banner.onpointerleave = () => leave(text);
+        return banner;
+      }),
+    );
   });
 }
 

@@ -88,6 +88,10 @@ export class Slider {
       return options.complain(`${name}: '${typed}' is not a number${which}`);
     }
     const [low, high] = options.bounds?.() ?? [Number(this.input.min), Number(this.input.max)];
+    // Of the wrong sign it is a slip of the pen: the end of the range is not what was meant.
+    if (low > 0 && value <= 0) {
+      return options.complain(`${name} must be positive: '${typed.trim()}' is not taken, ${this.text} stays`);
+    }
     const taken = Math.min(Math.max(value, low), high);
     if (taken !== value) options.complain(`${name} goes from ${options.format(low)} to ${options.format(high)}`);
     if (taken !== this.value) options.choose(taken);

@@ -1,8 +1,10 @@
 //! Closest point of the rest surface, with a sign: parry's bounding volume hierarchy and pseudo-normals.
 
 use glam::DVec3;
+use parry3d_f64::partitioning::BvhNode;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
+use crate::memory::Ranges;
 use crate::mesh::Surface;
 use crate::{Error, Result};
 
@@ -28,6 +30,21 @@ pub struct SurfaceQuery {
 }
 
 impl SurfaceQuery {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(self.mesh.vertices());
+        ranges.add(self.mesh.indices());
+        // The hierarchy is one array that shows nothing of itself but its nodes.
+        let nodes = std::cell::Cell::new((usize::MAX, 0));
+        let note = |node: &BvhNode| {
+            let at = std::ptr::from_ref(node).addr();
+            nodes.set((nodes.get().0.min(at), nodes.get().1.max(at + size_of::<BvhNode>())));
+            true
+        };
+        self.mesh.bvh().leaves(note).for_each(drop);
+        ranges.add_addresses(nodes.get().0..nodes.get().1);
+    }
+
     /// Builds the hierarchy.
     ///
     /// # Errors

@@ -8,6 +8,7 @@
 use glam::DVec3;
 
 use super::smooth::SmoothSurface;
+use crate::memory::Ranges;
 
 /// Heights `t` of the centre over the surface, over `R`.
 const HEIGHTS: [f64; 3] = [0.4, 0.7, 1.0];
@@ -29,6 +30,12 @@ pub struct Hollows {
 }
 
 impl Hollows {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.begins);
+        ranges.add(&self.fans);
+    }
+
     /// For a tool that fits into a ball of `radius`, m.
     pub fn new(smooth: &SmoothSurface, radius: f64) -> Self {
         let by_x = sorted(smooth);

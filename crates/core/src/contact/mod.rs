@@ -27,5 +27,6 @@ pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
 pub use refusal::Refusal;
 pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, known_fans};
+pub use regular_store::forget_kept;
 pub use tessellation::Tessellation;
 pub use touchable::TouchPatch;

@@ -15,6 +15,7 @@ use super::face::FaceGeometry;
 use super::lattice::Lattice;
 use super::moments::{CELL_SIZE, Coordinates, Moments, cell_reach, halfway};
 use crate::element::{Face, Tri3, Tri6};
+use crate::memory::Ranges;
 use crate::mesh::{Faces, Surface};
 
 /// Depths whose points are placed beforehand: those of triangles that are not much larger than a fifth of the radius, of which
@@ -47,6 +48,12 @@ pub struct PatchGeometry {
 }
 
 impl PatchGeometry {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.faces);
+        ranges.add(&self.triangles);
+    }
+
     /// Prepares faces and triangles.
     pub fn new(surface: &Surface) -> Self {
         let at = |n: u32| surface.positions[n as usize];

@@ -29,6 +29,7 @@ use super::smooth::{Fan, SmoothSurface};
 use super::{PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, smallest_eigenvalue};
 use crate::contact::Patch;
 use crate::green::GreensFunction;
+use crate::memory::Ranges;
 use crate::mesh::Surface;
 use crate::tensor::{outer, symmetric};
 
@@ -74,6 +75,12 @@ pub struct Moduli {
 }
 
 impl Moduli {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.youngs);
+        ranges.add(&self.poissons);
+    }
+
     /// `E / (1 - nu^2)` of a node, Pa.
     pub fn plane_strain(&self, node: u32) -> f64 {
         self.youngs[node as usize] / (1.0 - self.poissons[node as usize].powi(2))

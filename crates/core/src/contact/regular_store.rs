@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
@@ -13,6 +13,12 @@ use crate::files::{unwritten, write_whole};
 /// Version of what is computed and of the file's layout; part of the key.
 const VERSION: u32 = 4;
 const FORMAT: &str = "palpate-contact";
+/// Ending of the files, behind the beginning of the key.
+const ENDING: &str = "contact.palpate";
+/// Digits of the key in the name of a file.
+const DIGITS: usize = 16;
+/// Files that are kept beside a store: each radius and elastic constant that is tried makes one.
+const MOST_KEPT: usize = 16;
 
 impl RegularCompliance {
     /// Takes what stands beside the store of the body, for a tool of `radius`, m, on a device up to `max_stiffness`, N/m;
@@ -21,14 +27,48 @@ impl RegularCompliance {
     pub fn kept(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
         let Some(store) = &body.green.path else { return Self::new(body, radius, max_stiffness) };
         let key = key(body, radius, max_stiffness);
-        let path = store.with_extension(format!("{}.contact.palpate", &key[..16]));
+        let path = store.with_extension(format!("{}.{ENDING}", &key[..DIGITS]));
         if let Some(found) = load(&path, &key, body.smooth.fans().len()) {
             return found;
         }
         let computed = Self::new(body, radius, max_stiffness);
-        let _ = save(&computed, &path, &key);
+        if save(&computed, &path, &key).is_ok() {
+            remove_oldest(store);
+        }
         computed
     }
+}
+
+/// Removes all that is kept beside a store.
+pub fn forget_kept(store: &Path) {
+    files_of(store).into_iter().for_each(remove);
+}
+
+/// Removes what was written first, as long as there is too much.
+fn remove_oldest(store: &Path) {
+    let mut files = files_of(store);
+    let written = |file: &PathBuf| fs::metadata(file).and_then(|metadata| metadata.modified()).ok();
+    files.sort_by_cached_key(written);
+    files.truncate(files.len().saturating_sub(MOST_KEPT));
+    files.into_iter().for_each(remove);
+}
+
+/// Another process may have removed it before.
+fn remove(file: PathBuf) {
+    drop(fs::remove_file(file));
+}
+
+/// Files beside a store that are its own: those of `organ.left.palpate` begin as those of `organ.palpate` do.
+fn files_of(store: &Path) -> Vec<PathBuf> {
+    let folder = store.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let stem = store.file_stem().unwrap_or_default().to_string_lossy();
+    let is_ours = |name: &str| {
+        let key = name.strip_prefix(&*stem).and_then(|rest| rest.strip_prefix('.'));
+        let key = key.and_then(|rest| rest.strip_suffix(ENDING)).and_then(|rest| rest.strip_suffix('.'));
+        key.is_some_and(|key| key.len() == DIGITS && key.bytes().all(|digit| digit.is_ascii_hexdigit()))
+    };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|entry| entry.file_name().to_str().is_some_and(is_ours)).map(|entry| entry.path()).collect()
 }
 
 /// Hex BLAKE3 hash of everything that determines the blocks.
@@ -75,4 +115,31 @@ fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
 
 fn checksum(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_files_of_a_store_are_its_own_and_bounded() {
+        let folder = std::env::temp_dir().join(format!("palpate-{}-kept", std::process::id()));
+        fs::create_dir_all(&folder).expect("a writable folder");
+        let key = |k: usize| format!("{k:016x}");
+        let of = |stem: &str, k: usize| folder.join(format!("{stem}.{}.contact.palpate", key(k)));
+        for k in 0..MOST_KEPT + 3 {
+            fs::write(of("organ", k), b"").expect("a writable folder");
+            fs::write(of("organ.left", k), b"").expect("a writable folder");
+            // The clock of a file system may be coarse.
+            std::thread::sleep(std::time::Duration::from_millis(12));
+        }
+        let store = folder.join("organ.palpate");
+        remove_oldest(&store);
+        let left: Vec<bool> = (0..MOST_KEPT + 3).map(|k| of("organ", k).exists()).collect();
+        assert_eq!(left, (0..MOST_KEPT + 3).map(|k| k >= 3).collect::<Vec<_>>());
+        forget_kept(&store);
+        assert!(files_of(&store).is_empty());
+        assert_eq!(files_of(&folder.join("organ.left.palpate")).len(), MOST_KEPT + 3);
+        fs::remove_dir_all(&folder).expect("the folder");
+    }
 }

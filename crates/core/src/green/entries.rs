@@ -18,6 +18,7 @@ use super::numbers::{AddColumns, COLUMNS_AT_ONCE, Numbers, One};
 use super::places::{Places, TouchNode};
 use super::precision::Precision;
 use crate::Result;
+use crate::memory::Ranges;
 
 /// Largest magnitude of a stored integer.
 pub const RANGE: f64 = i16::MAX as f64;
@@ -48,6 +49,15 @@ pub struct Entries {
 }
 
 impl Entries {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(self.numbers.bytes());
+        ranges.add(&self.magnitude);
+        ranges.add(&self.scale);
+        ranges.add(&self.free);
+        ranges.add(self.places.nodes());
+    }
+
     /// Numbers of columns of which the first rows, as many as fit, are in memory, and all in `file` if there is one.
     ///
     /// `magnitude` is by stored row; `row_is_fixed` is in the user's order.

@@ -9,6 +9,7 @@ use super::entries::Entries;
 use super::places::TouchNode;
 use super::precision::Precision;
 use crate::Result;
+use crate::memory::Ranges;
 use crate::mesh::Surface;
 
 /// Green's function of a body: columns of touchable surface dofs, rows of surface dofs and then of supported dofs inside.
@@ -49,6 +50,15 @@ pub struct GreensFunction {
 }
 
 impl GreensFunction {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        self.entries.add_memory(ranges);
+        self.surface.add_memory(ranges);
+        ranges.add(&self.surface_nodes);
+        ranges.add(&self.row_is_fixed);
+        ranges.add(&self.free_response);
+    }
+
     /// Number of surface nodes.
     pub fn surface_count(&self) -> usize {
         self.surface_nodes.len()

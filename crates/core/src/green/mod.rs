@@ -36,6 +36,6 @@ pub use places::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]
 pub use precompute::{
-    ColumnStore, Columns, Found, Growth, Listener, Measurement, Parts, Phase, Plan, Problem, Progress, Target, Wanted,
-    Working, checksum, plan, precompute, precompute_to, products,
+    Claim, ColumnStore, Columns, Found, Growth, Listener, Measurement, Parts, Phase, Plan, Problem, Progress, Target,
+    Wanted, Working, checksum, plan, precompute, precompute_to, products,
 };

@@ -7,6 +7,7 @@ use bytemuck::Pod;
 use pulp::{Arch, NullaryFnOnce};
 
 use super::precision::Precision;
+use crate::{Error, Result};
 
 /// A number as it is stored.
 pub trait Stored: Pod {
@@ -74,6 +75,22 @@ impl Numbers {
             Precision::F32 => Numbers::F32(vec![0.0; count + PADDING]),
             Precision::F64 => Numbers::F64(vec![0.0; count + PADDING]),
         }
+    }
+
+    /// Zeros in place of `count` numbers, where memory may not be enough.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn try_zeros(precision: Precision, count: usize) -> Result<Self> {
+        // What the system gives is given back at once: zeros that nobody has written yet take no memory, a copy would.
+        let refused = Vec::<u8>::new().try_reserve_exact((count + PADDING) * precision.bytes());
+        refused.map(|()| Self::zeros(precision, count)).map_err(|_| {
+            let size = count as f64 * precision.bytes() as f64 / 1e9;
+            Error::Memory(format!(
+                "the system does not give the {size:.1} GB of memory that the Green's function takes: free some, or raise \
+                 the limit of this process ('ulimit -v')"
+            ))
+        })
     }
 
     /// Their format.

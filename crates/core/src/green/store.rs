@@ -230,7 +230,7 @@ impl<'a> Reader<'a> {
         let (column, head) = (green.rows * precision.bytes(), columns * precision.bytes());
         let length = columns * column;
         let whole = length <= resident_bytes;
-        let mut numbers = Numbers::zeros(precision, columns * if whole { green.rows } else { columns });
+        let mut numbers = Numbers::try_zeros(precision, columns * if whole { green.rows } else { columns })?;
         let bytes = numbers.bytes_mut();
         let sums = match whole {
             true => sums_while_reading(&self.file, at, bytes),

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::element::{Face, Tri3, Tri6};
+use crate::memory::Ranges;
 use crate::{Error, Result};
 
 /// The elements' faces on the boundary; node indices, counter-clockwise seen from outside.
@@ -90,6 +91,18 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.positions);
+        match &self.faces {
+            Faces::Linear(faces) => ranges.add(faces),
+            Faces::Quadratic(faces) => ranges.add(faces),
+        }
+        ranges.add(&self.triangles);
+        ranges.add(&self.normals);
+        ranges.add(&self.neighbours);
+    }
+
     /// Builds triangles, normals and adjacency.
     ///
     /// # Errors

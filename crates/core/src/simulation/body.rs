@@ -9,6 +9,7 @@ use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurfa
 use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery, barycentric, known_fans};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
+use crate::memory::Ranges;
 use crate::mesh::Surface;
 use crate::{Error, Result};
 
@@ -148,6 +149,22 @@ impl std::ops::Deref for BodyModel {
 }
 
 impl PreparedBody {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        self.green.add_memory(ranges);
+        self.loaded.add_memory(ranges);
+        self.query.add_memory(ranges);
+        self.geometry.add_memory(ranges);
+        ranges.add(&self.free);
+        if let Some(local) = &self.local {
+            local.smooth.add_memory(ranges);
+            local.moduli.add_memory(ranges);
+        }
+        if let Some(dynamics) = &self.dynamics {
+            dynamics.modes.add_memory(ranges);
+        }
+    }
+
     /// The Green's function behind the body.
     pub fn green(&self) -> &GreensFunction {
         &self.green

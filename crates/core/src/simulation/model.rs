@@ -9,6 +9,7 @@ use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::shape::ToolShape;
 use crate::contact::footprint::PressedSurface;
 use crate::contact::{CompliantBody, Hollows, RegularCompliance};
+use crate::memory::Ranges;
 use crate::{Error, Result};
 
 /// Bodies and tools.
@@ -26,6 +27,17 @@ pub struct Model {
 }
 
 impl Model {
+    /// The memory that a tick reads of it. What a tick writes is not in it: pages written a thousand times a second stay.
+    pub fn memory(&self) -> Ranges {
+        let mut ranges = Ranges::default();
+        self.bodies.iter().for_each(|body| body.add_memory(&mut ranges));
+        for regular in self.regular.iter().flatten().flatten() {
+            ranges.add(&regular.fields);
+        }
+        self.hollows.iter().flatten().for_each(|hollows| hollows.add_memory(&mut ranges));
+        ranges
+    }
+
     /// Puts bodies and tools together.
     ///
     /// # Errors

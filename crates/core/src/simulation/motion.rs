@@ -16,7 +16,7 @@ use super::MAX_CONTACTS;
 use super::body::BodyModel;
 use super::contacts::Contacts;
 use super::energy::Account;
-use super::strike::{StrikeInProgress, gather};
+use super::strike::{STRIKES_AT_ONCE, StrikeInProgress, gather};
 use crate::contact::{Patch, SurfacePoint};
 use crate::dynamics::{Energy, Lanes, LoadedPatch, ModalModel, PredictedState, Projection};
 
@@ -34,8 +34,8 @@ pub struct Motion {
     watched: Projection,
     /// Motion less what one contact does to the body at rest, and a modal force.
     remainder: [Vec<Lanes>; 2],
-    /// A strike that is under way.
-    pub(super) strike: StrikeInProgress,
+    /// Strikes, over or under way.
+    strikes: [StrikeInProgress; STRIKES_AT_ONCE],
     account: Account,
     /// Body time not yet stepped through, s.
     pub(super) due: f64,
@@ -55,7 +55,7 @@ impl Motion {
             residual: blocks(),
             watched: Projection::new(modes),
             remainder: [modes.state().q, modes.state().q],
-            strike: StrikeInProgress::new(modes),
+            strikes: std::array::from_fn(|_| StrikeInProgress::new(modes)),
             account: Account::default(),
             due: 0.0,
             time: 0.0,
@@ -66,7 +66,7 @@ impl Motion {
     pub(super) fn rest(&mut self, modes: &ModalModel) {
         self.predicted.rest();
         self.free = Default::default();
-        self.strike.end();
+        self.strikes.iter_mut().for_each(StrikeInProgress::end);
         self.account = Account::default();
         self.due = modes.dt;
     }
@@ -190,9 +190,16 @@ impl Motion {
         others.map(|other| self.residual[slot][other] * contacts.slots[other].force).sum()
     }
 
-    /// Readies a strike from the next step on.
+    /// Whether another strike may begin before those under way are over.
+    pub(super) fn has_room_for_strike(&self) -> bool {
+        self.strikes.iter().any(StrikeInProgress::is_over)
+    }
+
+    /// Readies a strike from the next step on; nothing where there is no room for it.
     pub(super) fn begin_strike(&mut self, modes: &ModalModel, patch: &Patch, impulse: DVec3, duration: f64) {
-        self.strike.begin(modes, &self.predicted.q, patch, impulse, duration);
+        if let Some(strike) = self.strikes.iter_mut().find(|strike| strike.is_over()) {
+            strike.begin(modes, &self.predicted.q, patch, impulse, duration);
+        }
     }
 
     /// Force of a contact on the body at the end of the last step, N; none for one that begins.
@@ -203,13 +210,13 @@ impl Motion {
         }
     }
 
-    /// Ends the step by the forces of contacts and strike, predicts the next, and keeps account of the energy.
+    /// Ends the step by the forces of contacts and strikes, predicts the next, and keeps account of the energy.
     pub(super) fn advance(&mut self, modes: &ModalModel, coupling: f64, contacts: &Contacts, body: usize) {
-        self.strike.advance();
+        self.strikes.iter_mut().for_each(StrikeInProgress::advance);
         let changed = std::array::from_fn(|slot| self.account.changes(contacts, body, slot));
         let before = self.patches(modes, &changed, |account, other| account.last_force(other));
-        // The strike comes behind the contacts: the array is filled with it.
-        let mut loaded = [self.strike.loaded(); MAX_CONTACTS + 1];
+        // Filled with any of them: what is not written below is not used.
+        let mut loaded = [self.strikes[0].loaded(); MAX_CONTACTS + STRIKES_AT_ONCE];
         let mut slots = [0; MAX_CONTACTS];
         let mut count = 0;
         for slot in contacts.on(body) {
@@ -218,8 +225,12 @@ impl Motion {
             count += 1;
         }
         let slots = &slots[..count];
-        let with_strike = count + usize::from(self.strike.force() != DVec3::ZERO);
-        let step = modes.advance(&mut self.predicted, &mut loaded[..with_strike]);
+        let mut with_strikes = count;
+        for strike in self.strikes.iter().filter(|strike| strike.force() != DVec3::ZERO) {
+            loaded[with_strikes] = strike.loaded();
+            with_strikes += 1;
+        }
+        let step = modes.advance(&mut self.predicted, &mut loaded[..with_strikes]);
         for (&slot, patch) in slots.iter().zip(&loaded) {
             self.free[slot] = patch.free;
         }
@@ -230,7 +241,9 @@ impl Motion {
         self.account.book_step(&step);
         self.account.book_contacts(contacts, slots, coupling, &self.residual);
         self.account.book_work((contacts, body), (coupling, weight), &self.residual, &moved);
-        self.account.energy.work += self.strike.work(modes, &self.predicted.q);
+        for strike in &mut self.strikes {
+            self.account.energy.work += strike.work(modes, &self.predicted.q);
+        }
     }
 
     /// Mean displacements of some patches, m, without what their own forces do beyond the modes.

@@ -87,6 +87,12 @@ impl State {
         }
     }
 
+    /// Whether a body could take another strike now, before those under way are over.
+    pub fn has_room_for_strike(&self, body: usize) -> bool {
+        let motion = self.bodies.get(body).and_then(|state| state.motion.as_ref());
+        motion.is_none_or(Motion::has_room_for_strike)
+    }
+
     /// Takes up strain responses that were prepared; the one before is handed back, for its memory must not be freed in a
     /// tick.
     pub fn watch_strain(&mut self, body: usize, watch: Box<StrainWatch>) -> Option<Box<StrainWatch>> {

@@ -8,6 +8,9 @@ use crate::dynamics::{Lanes, LoadedPatch, ModalModel, Projection};
 /// A strike takes no more steps than this: a second at the usual time step.
 const STEPS_MAX: f64 = 1000.0;
 
+/// So many strikes of one body may be under way at once; their forces add up.
+pub(super) const STRIKES_AT_ONCE: usize = 4;
+
 /// The strike of a body, over or under way: forces `a sin(pi k / (n + 1))` at the ends of `n` steps, `dt` times their sum
 /// being the impulse. With `n = 1` it rises to `impulse / dt` and falls in the step after.
 #[derive(Clone, Debug)]

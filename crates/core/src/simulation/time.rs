@@ -8,11 +8,11 @@ use super::scratch::Scratch;
 use super::state::State;
 use crate::contact::patch_weights;
 
-/// Begins a strike where the input asks for one. A second one before the first is over is left out.
+/// Begins a strike where the input asks for one; one that finds no room (`State::has_room_for_strike`) is left out.
 pub(super) fn begin_strike(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
     let (Some(strike), fixed) = (&input.controls.strike, &model.bodies[body]) else { return };
     let (Some(dynamics), Some(motion)) = (&fixed.dynamics, &mut state.bodies[body].motion) else { return };
-    if strike.body != body || !(strike.point.is_finite() && strike.impulse.is_finite()) || !motion.strike.is_over() {
+    if strike.body != body || !(strike.point.is_finite() && strike.impulse.is_finite()) {
         return;
     }
     let Some(closest) = fixed.closest(fixed.placement.point_to_body(strike.point)) else { return };

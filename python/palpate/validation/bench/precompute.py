@@ -274,4 +274,5 @@ def plot(results: list[Result], file: Path) -> None:
 
 
 if __name__ == "__main__":
+    _native.end_with_parent(watch_input=False)
     print(json.dumps([asdict(result) for result in measure(sys.argv[1], int(sys.argv[2]))]))

@@ -304,4 +304,5 @@ def main(text: str) -> None:
 
 
 if __name__ == "__main__":
+    _native.end_with_parent(watch_input=False)
     main(sys.argv[1])

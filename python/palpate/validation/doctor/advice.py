@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from palpate.simulation.scheduling import cpu_ranges
 from palpate.validation.doctor.machine import UNLIMITED, Machine
 
-# Below this locked memory is refused to a loop: mlockall asks for all that the process has mapped, some GB, bytes.
-ENOUGH_MEMORY = 16 * 2**30
+# Below this locked memory may be refused to a loop, bytes: it locks what a tick reads, for each body a store of up to
+# 2 GB, or the touchable part of a larger one.
+ENOUGH_MEMORY = 4 * 2**30
 # The loop itself takes a few per cent of one processor; beyond this others come in its way.
 BUSY = 0.5
 # Clocks that are read without a call of the kernel, or by a fast one.

@@ -21,6 +21,7 @@ pub use weights::{Blended, FanWeights, MAX_FANS};
 
 use self::fans::Fans;
 use self::neighbourhood::LANES;
+use crate::memory::Ranges;
 use crate::mesh::Surface;
 
 /// Fans of nodes whose normals are turned farther than this from a triangle's do not belong to it (cosine).
@@ -44,6 +45,18 @@ pub struct SmoothSurface {
 }
 
 impl SmoothSurface {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.fans);
+        ranges.add(&self.touchable);
+        ranges.add(&self.of_corners);
+        ranges.add(&self.neighbours);
+        self.neighbours.iter().for_each(|of_fan| ranges.add(of_fan));
+        ranges.add(&self.creases);
+        ranges.add(&self.ranges);
+        ranges.add(&self.met);
+    }
+
     /// Fits the surface, all of which may be touched.
     pub fn new(surface: &Surface) -> Self {
         let Fans { fans, of_corners, neighbours, creases } = Fans::new(surface);

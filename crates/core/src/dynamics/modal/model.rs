@@ -10,6 +10,7 @@ use super::kernels::{AddRows, Correct, Dot, FreeStep, Predict};
 use super::lanes::{LANES, Lanes, flat, grouped};
 use crate::dynamics::integration::Integration;
 use crate::dynamics::scheme::Rayleigh;
+use crate::memory::Ranges;
 use crate::{Error, Result};
 
 /// Modes, the rows of their shapes at the wanted dofs, and the step of each mode.
@@ -57,6 +58,14 @@ pub struct ModalScratch {
 }
 
 impl ModalModel {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        for lanes in [&self.shapes, &self.stiffness, &self.flexibility, &self.damping, &self.q_load, &self.v_load] {
+            ranges.add(lanes);
+        }
+        ranges.add(&self.free_steps);
+    }
+
     /// Prepares the recurrences.
     ///
     /// `shapes` holds `rows` x modes numbers, row by row.

@@ -4,11 +4,12 @@
 //! one by its checksum, so a computation goes on at whatever blocks are missing.
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::arrangement::Arrangement;
 use super::block::Block;
+use super::claim::Claim;
 use super::columns::{Measurement, Parts};
 use super::finish::Finished;
 use super::layout::{Layout, Stage};
@@ -28,10 +29,8 @@ use crate::green::store::touch_of_store;
 use crate::green::store_writer::StoreWriter;
 use crate::{Error, Result};
 
-/// Where the operator is to be written, and what of.
+/// How the operator is to be written, and what of.
 pub struct Target<'a> {
-    /// The store.
-    pub path: &'a Path,
     /// Number format asked for.
     pub precision: Wanted,
     /// Bytes that may be taken; `None`: any.
@@ -81,8 +80,14 @@ impl ColumnStore {
     ///
     /// # Errors
     /// The operating system's.
-    pub fn open(problem: &Problem, parts: Arc<Parts>, measurement: &Measurement, target: &Target<'_>) -> Result<Self> {
-        let mut store = Self::begin(problem, parts, measurement, target)?;
+    pub fn open(
+        claim: Arc<Claim>,
+        problem: &Problem,
+        parts: Arc<Parts>,
+        measurement: &Measurement,
+        target: &Target<'_>,
+    ) -> Result<Self> {
+        let mut store = Self::begin(claim, problem, parts, measurement, target)?;
         let parts = Arc::clone(&store.parts);
         store.arrange(parts)?;
         store.found.resumed = store.done();
@@ -95,6 +100,7 @@ impl ColumnStore {
     /// # Errors
     /// The operating system's.
     pub fn open_in_stages(
+        claim: Arc<Claim>,
         problem: &Problem,
         parts: &Parts,
         stages: &[Vec<u32>],
@@ -102,7 +108,7 @@ impl ColumnStore {
         target: &Target<'_>,
     ) -> Result<Self> {
         let arranged = Arc::new(parts.arranged(0, stages));
-        let mut store = Self::begin(problem, arranged, measurement, target)?;
+        let mut store = Self::begin(claim, problem, arranged, measurement, target)?;
         let begun = store.partial.begun();
         let layout = &store.parts.layout;
         let row = |place: usize| layout.row(place) as u32;
@@ -122,7 +128,13 @@ impl ColumnStore {
     }
 
     /// Opens the partial file, without any blocks.
-    fn begin(problem: &Problem, parts: Arc<Parts>, measurement: &Measurement, target: &Target<'_>) -> Result<Self> {
+    fn begin(
+        claim: Arc<Claim>,
+        problem: &Problem,
+        parts: Arc<Parts>,
+        measurement: &Measurement,
+        target: &Target<'_>,
+    ) -> Result<Self> {
         let mut green = geometry(problem, &parts.layout, measurement, target.precision)?;
         target.description.clone_into(&mut green.description);
         let (kind, width) = (measurement.precision.panel_bytes(), measurement.width);
@@ -130,12 +142,11 @@ impl ColumnStore {
             "{{\"format\":\"palpate-partial\",\"version\":{FORMAT_VERSION},\"key\":\"{}\",\"bytes\":{kind},\"width\":{width}}}\n",
             green.key
         );
-        let (partial, discarded) = Partial::open(&partial_path(target.path), &header, &parts.layout, kind)
-            .map_err(|error| of_target(target.path, error))?;
+        let path = claim.target().to_owned();
+        let (partial, discarded) = Partial::open(claim, &header, &parts.layout, kind)?;
         let key = problem.key_of_touch(target.precision.named());
         let found = Found { resumed: 0, discarded };
-        let (path, partial) = (target.path.to_owned(), Arc::new(partial));
-        Ok(Self { path, parts, blocks: Vec::new(), width, partial, green, key, found })
+        Ok(Self { path, parts, blocks: Vec::new(), width, partial: Arc::new(partial), green, key, found })
     }
 
     /// Goes on with the columns in the order of other parts of the same problem; blocks that are the same stay.
@@ -146,7 +157,7 @@ impl ColumnStore {
         self.blocks = parts.layout.blocks(self.width);
         self.parts = parts;
         let partial = Arc::get_mut(&mut self.partial).ok_or_else(task_failed)?;
-        partial.arrange(&self.parts.layout, &self.blocks).map_err(|error| of_target(&self.path, error))
+        partial.arrange(&self.parts.layout, &self.blocks)
     }
 
     /// Rows and columns in their order.
@@ -202,7 +213,7 @@ impl ColumnStore {
         if bytes != Some(panel.len()) {
             return Err(Error::Invalid(format!("block {block} of columns does not have {} bytes", panel.len())));
         }
-        self.partial.put(block, panel).map_err(|error| of_target(&self.path, error))
+        self.partial.put(block, panel)
     }
 
     /// Keeps the panel of a block that has come from elsewhere, with the checksum it was sent with; `false`: it is not the
@@ -220,7 +231,7 @@ impl ColumnStore {
     /// Writes the store from its blocks, `tasks` of them at a time, and removes the partial file.
     ///
     /// # Errors
-    /// A block that is missing, the operating system's, or an interruption.
+    /// A block that is missing or was changed, the operating system's, or an interruption.
     pub fn finish(&mut self, tasks: usize, progress: Progress<'_>) -> Result<()> {
         self.write(self.columns(), tasks, progress)?;
         self.discard();
@@ -231,7 +242,7 @@ impl ColumnStore {
     /// of the problem in which only these may be touched. Where there is one of as many nodes of the same body it stays.
     ///
     /// # Errors
-    /// A block that is missing, the operating system's, or an interruption.
+    /// A block that is missing or was changed, the operating system's, or an interruption.
     pub fn write(&mut self, columns: usize, tasks: usize, progress: Progress<'_>) -> Result<()> {
         let arrangement = Arrangement::new(&self.green.surface.positions, &self.parts.layout, columns);
         let as_large =
@@ -239,16 +250,15 @@ impl ColumnStore {
         if columns < self.columns() && touch_of_store(&self.path).is_some_and(as_large) {
             return Ok(());
         }
-        let written = match self.green.precision() {
+        match self.green.precision() {
             Precision::F64 => self.write_as::<f64>(&arrangement, columns, tasks, progress),
             Precision::F16 | Precision::F32 => self.write_as::<f32>(&arrangement, columns, tasks, progress),
-        };
-        written.map_err(|error| of_target(&self.path, error))
+        }
     }
 
     /// Removes the partial file.
     pub fn discard(&self) {
-        drop(std::fs::remove_file(partial_path(&self.path)));
+        self.partial.discard();
     }
 
     fn write_as<T: Number>(
@@ -277,6 +287,7 @@ impl ColumnStore {
             }
             writer.put(column, bytes)
         })?;
+        self.partial.verify(count)?;
         writer.finish()
     }
 }
@@ -284,14 +295,6 @@ impl ColumnStore {
 /// Checksum of a panel (BLAKE3).
 pub fn checksum(panel: &[u8]) -> [u8; 32] {
     *blake3::hash(panel).as_bytes()
-}
-
-/// The user knows the file asked for, not the one beside it.
-fn of_target(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Io { source, .. } => Error::Io { path: path.to_owned(), source },
-        other => other,
-    }
 }
 
 /// Everything but the numbers.
@@ -338,11 +341,4 @@ fn without_numbers(
     precision: Precision,
 ) -> Entries {
     Entries::new(arrangement.places.clone(), row_is_fixed, magnitude, Numbers::zeros(precision, 0), None)
-}
-
-/// Where unfinished work on a store is kept.
-fn partial_path(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".partial");
-    path.with_file_name(name)
 }

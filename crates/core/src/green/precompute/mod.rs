@@ -6,6 +6,7 @@
 
 mod arrangement;
 mod block;
+mod claim;
 mod column_store;
 mod columns;
 mod finish;
@@ -35,6 +36,7 @@ mod system;
 mod tasks;
 mod tree;
 
+pub use claim::Claim;
 pub use column_store::{ColumnStore, Found, Target, checksum};
 pub use columns::{Columns, Measurement, Parts, Working};
 pub use growth::Growth;

@@ -2,17 +2,21 @@
 //!
 //! Layout: a line of JSON that says what is being computed, padded to [`HEADER`] bytes; the row of each column in solving
 //! order, four bytes each, marked where a block begins; a BLAKE3 sum for each column, used by the first of a block; the
-//! panels. A panel is written before its sum, which also covers the rows of its columns: a block that is torn, missing or
-//! of other columns has a sum that does not fit and is computed again. The order of columns behind the last finished block
-//! may change while the file is in use. It is created under its name and never truncated: another process that holds it
-//! keeps its own.
+//! panels. A panel is written before its sum. The sum also covers the rows of its columns and of all columns before them,
+//! for these decide which rows a panel has: a block that is torn, missing or of another order has a sum that does not fit
+//! and is computed again. The order of columns behind the last finished block may change while the file is in use. One
+//! process writes it at a time ([`Claim`]); before a store made of its panels gets its name, they are compared with their
+//! sums once more ([`Partial::verify`]).
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::File;
+use std::io;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rayon::prelude::*;
 
 use super::block::Block;
+use super::claim::Claim;
 use super::layout::Layout;
 use crate::{Error, Result};
 
@@ -25,8 +29,7 @@ const BEGINS: u32 = 1 << 31;
 
 /// Panels in a file.
 pub struct Partial {
-    path: PathBuf,
-    file: File,
+    claim: Arc<Claim>,
     /// Columns of the operator, its rows, and bytes of a number.
     columns: usize,
     rows: usize,
@@ -39,62 +42,85 @@ struct Held {
     /// First column, in solving order, and the rows of all.
     first: usize,
     rows: Vec<u32>,
+    /// Hash of the rows of all columns up to its last.
+    order: blake3::Hash,
     /// First byte of its panel, and how many there are.
     start: u64,
     length: usize,
-    finished: AtomicBool,
+    /// Sum of the panel that is there.
+    sum: Mutex<Option<blake3::Hash>>,
 }
 
 impl Held {
-    fn sum(&self, panel: &[u8]) -> blake3::Hash {
+    fn sum_of(&self, panel: &[u8]) -> blake3::Hash {
         let mut hash = blake3::Hasher::new();
-        hash.update(bytemuck::cast_slice(&self.rows));
+        hash.update(self.order.as_bytes());
         hash.update(panel).finalize()
+    }
+
+    fn sum(&self) -> MutexGuard<'_, Option<blake3::Hash>> {
+        self.sum.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_finished(&self) -> bool {
+        self.sum().is_some()
     }
 }
 
 impl Partial {
-    /// Opens what an interrupted computation of the same thing left at `path`, or begins anew; [`Self::arrange`] then says
+    /// Goes on with what an interrupted computation of the same thing left, or begins anew; [`Self::arrange`] then says
     /// which blocks there are to be.
     ///
-    /// `description` names everything that determines the numbers but for the order of the columns. Returns whether a file
-    /// with another description had to be thrown away.
+    /// `description` names everything that determines the numbers but for the order of the columns. Returns whether
+    /// something with another description had to be thrown away.
     ///
     /// # Errors
     /// The operating system's.
-    pub fn open(path: &Path, description: &str, layout: &Layout, bytes_per_number: usize) -> Result<(Self, bool)> {
-        let io = |source| Error::Io { path: path.to_owned(), source };
+    pub fn open(
+        claim: Arc<Claim>,
+        description: &str,
+        layout: &Layout,
+        bytes_per_number: usize,
+    ) -> Result<(Self, bool)> {
         let mut header = vec![b' '; HEADER];
         header[..description.len()].copy_from_slice(description.as_bytes());
-        let existing = OpenOptions::new().read(true).write(true).open(path).ok();
-        let (found, (columns, rows)) = (existing.is_some(), (layout.columns, layout.rows()));
-        let of =
-            |file| Self { path: path.to_owned(), file, columns, rows, number: bytes_per_number, blocks: Vec::new() };
-        if let Some(file) = existing {
-            let mut start = vec![0; HEADER];
-            if file.read_exact_at(&mut start, 0).is_ok() && start == header {
-                let mut partial = of(file);
-                partial.find_blocks().map_err(io)?;
-                return Ok((partial, false));
-            }
-            fs::remove_file(path).map_err(io)?;
+        let mut start = vec![0; HEADER];
+        let same = claim.file().read_exact_at(&mut start, 0).is_ok() && start == header;
+        let (columns, rows, blocks) = (layout.columns, layout.rows(), Vec::new());
+        let mut partial = Self { claim, columns, rows, number: bytes_per_number, blocks };
+        if same {
+            partial.find_blocks().map_err(|error| partial.io(error))?;
+            return Ok((partial, false));
         }
-        let file = OpenOptions::new().read(true).write(true).create_new(true).open(path).map_err(io)?;
-        let panels = (HEADER + (size_of::<u32>() + SUM) * columns) as u64;
-        match file.write_all_at(&header, 0).and_then(|()| file.set_len(panels)) {
-            Ok(()) => Ok((of(file), found)),
-            Err(error) => {
-                let _ = fs::remove_file(path);
-                Err(io(error))
-            }
+        let file = partial.file();
+        let found = file.metadata().is_ok_and(|now| now.len() > 0);
+        let begun = file.set_len(0).and_then(|()| file.write_all_at(&header, 0));
+        if let Err(error) = begun.and_then(|()| file.set_len(partial.panels())) {
+            drop(file.set_len(0));
+            return Err(partial.io(error));
         }
+        Ok((partial, found))
+    }
+
+    fn file(&self) -> &File {
+        self.claim.file()
+    }
+
+    /// The user knows the store asked for, not the file beside it.
+    fn io(&self, source: io::Error) -> Error {
+        Error::Io { path: self.claim.target().to_owned(), source }
+    }
+
+    /// First byte of the panels.
+    fn panels(&self) -> u64 {
+        (HEADER + (size_of::<u32>() + SUM) * self.columns) as u64
     }
 
     /// Finds the blocks that the file speaks of, and those of them whose sums fit.
-    fn find_blocks(&mut self) -> std::io::Result<()> {
+    fn find_blocks(&mut self) -> io::Result<()> {
         let (mut table, mut sums) = (vec![0u32; self.columns], vec![0; SUM * self.columns]);
-        if self.file.read_exact_at(bytemuck::cast_slice_mut(&mut table), HEADER as u64).is_err()
-            || self.file.read_exact_at(&mut sums, self.sum_at(0)).is_err()
+        if self.file().read_exact_at(bytemuck::cast_slice_mut(&mut table), HEADER as u64).is_err()
+            || self.file().read_exact_at(&mut sums, self.sum_at(0)).is_err()
         {
             return Ok(());
         }
@@ -109,10 +135,9 @@ impl Partial {
             let held = self.next(rows.iter().map(|entry| entry & !BEGINS).collect());
             let sum = &sums[SUM * held.first..][..SUM];
             panel.resize(held.length, 0);
-            let fits = sum.iter().any(|&byte| byte != 0)
-                && self.file.read_exact_at(&mut panel, held.start).is_ok()
-                && held.sum(&panel).as_bytes() == sum;
-            held.finished.store(fits, Ordering::Release);
+            if sum.iter().any(|&byte| byte != 0) && self.file().read_exact_at(&mut panel, held.start).is_ok() {
+                *held.sum() = Some(held.sum_of(&panel)).filter(|found| found.as_bytes() == sum);
+            }
             self.blocks.push(held);
         }
         Ok(())
@@ -120,19 +145,20 @@ impl Partial {
 
     /// The block of these rows behind the last one.
     fn next(&self, rows: Vec<u32>) -> Held {
-        let panels = (HEADER + (size_of::<u32>() + SUM) * self.columns) as u64;
-        let (first, start) = self
-            .blocks
-            .last()
-            .map_or((0, panels), |last| (last.first + last.rows.len(), last.start + last.length as u64));
+        let mut order = blake3::Hasher::new();
+        let (mut first, mut start) = (0, self.panels());
+        if let Some(last) = self.blocks.last() {
+            (first, start) = (last.first + last.rows.len(), last.start + last.length as u64);
+            order.update(last.order.as_bytes());
+        }
+        let order = order.update(bytemuck::cast_slice(&rows)).finalize();
         let length = rows.len() * (self.rows - first) * self.number;
-        Held { first, rows, start, length, finished: AtomicBool::new(false) }
+        Held { first, rows, order, start, length, sum: Mutex::new(None) }
     }
 
     /// Rows of the blocks up to the last one that is finished.
     pub fn begun(&self) -> Vec<Vec<u32>> {
-        let finished = |held: &Held| held.finished.load(Ordering::Acquire);
-        let count = self.blocks.iter().rposition(finished).map_or(0, |last| last + 1);
+        let count = self.blocks.iter().rposition(Held::is_finished).map_or(0, |last| last + 1);
         self.blocks[..count].iter().map(|held| held.rows.clone()).collect()
     }
 
@@ -149,14 +175,13 @@ impl Partial {
             table.extend(rows.iter().enumerate().map(|(k, &row)| if k == 0 { row | BEGINS } else { row }));
             let mut held = self.next(rows);
             if same && let Some(old) = before.next() {
-                same = old.rows == held.rows;
+                same = old.order == held.order && old.rows.len() == held.rows.len();
                 held = if same { old } else { held };
             }
             self.blocks.push(held);
         }
-        self.file
-            .write_all_at(bytemuck::cast_slice(&table), HEADER as u64)
-            .map_err(|source| Error::Io { path: self.path.clone(), source })
+        let table = bytemuck::cast_slice(&table);
+        self.file().write_all_at(table, HEADER as u64).map_err(|error| self.io(error))
     }
 
     /// Where the checksum of the block stands that begins with a column.
@@ -166,7 +191,7 @@ impl Partial {
 
     /// Whether a block is there.
     pub fn has(&self, block: usize) -> bool {
-        self.blocks[block].finished.load(Ordering::Acquire)
+        self.blocks[block].is_finished()
     }
 
     /// Writes a block.
@@ -175,11 +200,12 @@ impl Partial {
     /// The operating system's.
     pub fn put(&self, block: usize, panel: &[u8]) -> Result<()> {
         let held = &self.blocks[block];
-        self.file
+        let sum = held.sum_of(panel);
+        self.file()
             .write_all_at(panel, held.start)
-            .and_then(|()| self.file.write_all_at(held.sum(panel).as_bytes(), self.sum_at(held.first)))
-            .map_err(|source| Error::Io { path: self.path.clone(), source })?;
-        held.finished.store(true, Ordering::Release);
+            .and_then(|()| self.file().write_all_at(sum.as_bytes(), self.sum_at(held.first)))
+            .map_err(|error| self.io(error))?;
+        *held.sum() = Some(sum);
         Ok(())
     }
 
@@ -189,47 +215,125 @@ impl Partial {
     /// The operating system's.
     pub fn get(&self, block: usize, at: usize, out: &mut [u8]) -> Result<()> {
         let at = self.blocks[block].start + at as u64;
-        self.file.read_exact_at(out, at).map_err(|source| Error::Io { path: self.path.clone(), source })
+        self.file().read_exact_at(out, at).map_err(|error| self.io(error))
+    }
+
+    /// Compares the first blocks with the sums that they had when they were finished. Called after they were read: what
+    /// was read is then what was computed. A block that has changed is no longer there.
+    ///
+    /// # Errors
+    /// A block that another program has changed, or the operating system's.
+    pub fn verify(&self, blocks: usize) -> Result<()> {
+        self.blocks[..blocks].par_iter().try_for_each_init(Vec::new, |panel, held| {
+            panel.resize(held.length, 0);
+            self.file().read_exact_at(panel, held.start).map_err(|error| self.io(error))?;
+            let mut sum = held.sum();
+            if *sum == Some(held.sum_of(panel)) {
+                return Ok(());
+            }
+            *sum = None;
+            let reason = format!(
+                "another program has changed its finished columns in {}; run the same command again to compute them anew",
+                self.claim.path().display()
+            );
+            Err(Error::Store { path: self.claim.target().to_owned(), reason })
+        })
+    }
+
+    /// Removes the file.
+    pub fn discard(&self) {
+        self.claim.discard();
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
-    /// Three rows, all with columns, in this order.
-    fn layout(rows: &[u32]) -> Layout {
-        Layout::of_rows(rows)
+    const BLOCKS: [Block; 2] = [Block { first: 0, width: 2, rows: 3 }, Block { first: 2, width: 1, rows: 1 }];
+
+    /// The blocks of three rows, all with columns, in an order: in a file, those begun there, and whether it was another's.
+    fn open(path: &Path, what: &str, rows: &[u32]) -> (Partial, bool, Vec<Vec<u32>>) {
+        let layout = Layout::of_rows(rows);
+        let claim = Claim::take(path).expect("a writable folder").expect("nobody else's store");
+        let (mut partial, discarded) = Partial::open(Arc::new(claim), what, &layout, 4).expect("a writable folder");
+        let begun = partial.begun();
+        partial.arrange(&layout, &BLOCKS).expect("a writable file");
+        (partial, discarded, begun)
+    }
+
+    fn store(name: &str) -> std::path::PathBuf {
+        std::env::temp_dir().join(format!("palpate-{}-{name}", std::process::id()))
     }
 
     #[test]
     fn torn_and_foreign_blocks_are_not_believed() {
-        let path = std::env::temp_dir().join(format!("palpate-{}.partial", std::process::id()));
-        let blocks = [Block { first: 0, width: 2, rows: 3 }, Block { first: 2, width: 1, rows: 1 }];
-        let open = |what: &str, rows: &[u32]| {
-            let layout = layout(rows);
-            let (mut partial, discarded) = Partial::open(&path, what, &layout, 4).expect("a writable folder");
-            let begun = partial.begun();
-            partial.arrange(&layout, &blocks).expect("a writable file");
-            (partial, discarded, begun)
-        };
-        let (partial, discarded, begun) = open("one", &[2, 0, 1]);
+        let path = store("torn");
+        let (partial, discarded, begun) = open(&path, "one", &[2, 0, 1]);
         assert!(!discarded && !partial.has(0) && !partial.has(1) && begun.is_empty());
         partial.put(0, &[7; 24]).expect("a writable file");
         partial.put(1, &[8; 4]).expect("a writable file");
         // The sum of the second block is there, its numbers are not.
-        partial.file.write_all_at(&[9; 4], partial.blocks[1].start).expect("a writable file");
-        let (resumed, discarded, begun) = open("one", &[2, 0, 1]);
+        partial.file().write_all_at(&[9; 4], partial.blocks[1].start).expect("a writable file");
+        drop(partial);
+        let (resumed, discarded, begun) = open(&path, "one", &[2, 0, 1]);
         assert!(!discarded && resumed.has(0) && !resumed.has(1));
         assert_eq!(begun, [[2, 0]]);
         let mut bytes = [0; 3];
         resumed.get(0, 5, &mut bytes).expect("a readable file");
         assert_eq!(bytes, [7; 3]);
+        drop(resumed);
         // Panels of other columns are not those asked for, even once these are asked for again.
-        let (other, discarded, _) = open("one", &[0, 2, 1]);
+        let (other, discarded, _) = open(&path, "one", &[0, 2, 1]);
         assert!(!discarded && !other.has(0));
-        let (other, discarded, _) = open("two", &[2, 0, 1]);
+        drop(other);
+        let (other, discarded, _) = open(&path, "two", &[2, 0, 1]);
         assert!(discarded && !other.has(0));
-        fs::remove_file(&path).expect("the file");
+        other.discard();
+    }
+
+    #[test]
+    fn a_block_behind_others_than_it_was_computed_behind_is_not_believed() {
+        let path = store("behind");
+        let (partial, ..) = open(&path, "one", &[0, 1, 2]);
+        partial.put(0, &[7; 24]).expect("a writable file");
+        partial.put(1, &[8; 4]).expect("a writable file");
+        drop(partial);
+        // The last block keeps its row and its place; the rows of its panel are others'.
+        drop(open(&path, "one", &[1, 0, 2]));
+        let (partial, _, begun) = open(&path, "one", &[1, 0, 2]);
+        assert!(begun.is_empty() && !partial.has(1));
+        partial.discard();
+    }
+
+    #[test]
+    fn a_block_that_is_changed_after_it_was_finished_is_refused() {
+        let path = store("changed");
+        let (partial, ..) = open(&path, "one", &[0, 1, 2]);
+        partial.put(0, &[7; 24]).expect("a writable file");
+        partial.put(1, &[8; 4]).expect("a writable file");
+        partial.verify(2).expect("the panels as they were written");
+        partial.file().write_all_at(&[9; 4], partial.blocks[0].start).expect("a writable file");
+        assert!(partial.verify(2).is_err() && !partial.has(0) && partial.has(1));
+        partial.discard();
+    }
+
+    #[test]
+    fn a_store_is_claimed_once_until_its_claim_is_dropped() {
+        let path = store("claimed");
+        let claim = Claim::take(&path).expect("a writable folder").expect("nobody else's store");
+        assert!(Claim::take(&path).expect("a writable folder").is_none());
+        drop(claim);
+        assert!(!super::super::claim::partial_path(&path).exists(), "nothing was begun");
+        let claim = Claim::take(&path).expect("a writable folder").expect("nobody else's store");
+        claim.file().set_len(1).expect("a writable file");
+        claim.discard();
+        // The file without a name keeps nobody out, and its end removes nothing of theirs.
+        let next = Claim::take(&path).expect("a writable folder").expect("nobody else's store");
+        drop(claim);
+        assert!(Claim::take(&path).expect("a writable folder").is_none());
+        drop(next);
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::arrangement::Arrangement;
+use super::claim::Claim;
 use super::column_store::{ColumnStore, Found, Target, geometry};
 use super::columns::Columns;
 use super::finish::Finished;
@@ -70,7 +71,7 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
     drop(columns);
     let finished = Finished { parts: &parts, arrangement: &arrangement, blocks: &blocks, panels: &panels, tasks };
     let magnitude = finished.magnitudes()?;
-    let mut numbers = Numbers::zeros(precision, parts.layout.columns * green.rows);
+    let mut numbers = Numbers::try_zeros(precision, parts.layout.columns * green.rows)?;
     let bytes = green.rows * precision.bytes();
     let places: Vec<Mutex<&mut [u8]>> = numbers.bytes_mut().chunks_mut(bytes).map(Mutex::new).collect();
     finished.columns(precision, &magnitude, &|column, bytes| {
@@ -84,14 +85,15 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
 
 /// Solves the reference problem into a file, without ever holding the operator.
 ///
-/// Finished blocks are kept in `<path>.partial`; where a computation of the same thing was interrupted, it goes on, with
+/// Finished blocks are kept in the file of the claim; where a computation of the same thing was interrupted, it goes on, with
 /// the same bits as if it had not been where the same is to be touched first. In stages, the file is a complete store of
 /// the nodes that are ready from the end of the first on.
 ///
 /// # Errors
-/// A singular stiffness, a bound that cannot be kept (nothing is left behind), the operating system's, or
-/// [`Error::Interrupted`] (the finished blocks are left behind, if there are any).
+/// A singular stiffness, a bound that cannot be kept (nothing is left behind), the operating system's, finished blocks
+/// that another program has changed, or [`Error::Interrupted`] (the finished blocks are left behind, if there are any).
 pub fn precompute_to(
+    claim: Arc<Claim>,
     problem: &Problem,
     target: &Target<'_>,
     growth: &Growth<'_>,
@@ -103,7 +105,7 @@ pub fn precompute_to(
         Columns::new(problem, target.precision, target.memory, false, target.phase, &|| go_on(progress, 0, all))?;
     let tasks = columns.tasks;
     let stages = growth.stages(problem);
-    let mut store = ColumnStore::open_in_stages(problem, &columns.parts, &stages, &columns.measurement, target)?;
+    let mut store = ColumnStore::open_in_stages(claim, problem, &columns.parts, &stages, &columns.measurement, target)?;
     columns.arrange(Arc::clone(store.parts()));
     found(store.found);
     (target.phase)(Phase::Columns);
@@ -111,8 +113,8 @@ pub fn precompute_to(
     drop(columns);
     (target.phase)(Phase::Store);
     let result = solved.and_then(|()| store.finish(tasks, progress));
-    // What was finished before an interruption, or a full disk, is worth keeping; otherwise it is in the way.
-    if !matches!(result, Err(Error::Interrupted | Error::Io { .. })) || store.done() == 0 {
+    // What was finished before an interruption, a full disk or a damage is worth keeping; otherwise it is in the way.
+    if !matches!(result, Err(Error::Interrupted | Error::Io { .. } | Error::Store { .. })) || store.done() == 0 {
         store.discard();
     }
     result

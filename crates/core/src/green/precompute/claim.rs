@@ -1,0 +1,100 @@
+//! One writer of a store at a time.
+//!
+//! The panels lie in `<store>.partial`. The process that computes the store holds an exclusive lock on that file; the
+//! system releases it when the process ends, however that ends. Two writers with different first regions would put
+//! different panels in the same places.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::{Error, Result};
+
+/// The right to write a store, until it is released or dropped.
+pub struct Claim {
+    target: PathBuf,
+    path: PathBuf,
+    file: File,
+    released: AtomicBool,
+}
+
+impl Claim {
+    /// Claims the store at `target`; `None` while another process, or another thread of this one, has it.
+    ///
+    /// Where the file system has no locks the store is taken without one: two writers are then found by their sums
+    /// ([`super::partial::Partial::verify`]).
+    ///
+    /// # Errors
+    /// The operating system's.
+    pub fn take(target: &Path) -> Result<Option<Self>> {
+        let path = partial_path(target);
+        let io = |source| Error::Io { path: target.to_owned(), source };
+        loop {
+            let file =
+                OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(io)?;
+            match file.try_lock() {
+                Err(TryLockError::WouldBlock) => return Ok(None),
+                // A file system without locks.
+                Ok(()) | Err(TryLockError::Error(_)) => {}
+            }
+            let claim = Self { target: target.to_owned(), path: path.clone(), file, released: AtomicBool::new(false) };
+            // The writer before removes its file at its end: a lock on a file without a name keeps nobody out.
+            if claim.has_its_name() {
+                return Ok(Some(claim));
+            }
+        }
+    }
+
+    /// The store.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// The file of panels.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// It, open.
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Removes the file of panels.
+    pub fn discard(&self) {
+        if self.has_its_name() {
+            drop(fs::remove_file(&self.path));
+        }
+    }
+
+    /// Lets others write the store. A computation that has not begun leaves nothing.
+    pub fn release(&self) {
+        if self.released.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        if self.file.metadata().is_ok_and(|now| now.len() == 0) {
+            self.discard();
+        }
+        drop(self.file.unlock());
+    }
+
+    fn has_its_name(&self) -> bool {
+        let name = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+        let named = fs::metadata(&self.path).map(name);
+        self.file.metadata().map(name).is_ok_and(|ours| named.is_ok_and(|named| named == ours))
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        self.release();
+    }
+}
+
+/// Where unfinished work on a store is kept.
+pub fn partial_path(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(".partial");
+    path.with_file_name(name)
+}
