@@ -285,5 +285,5 @@ def test_a_store_of_the_format_before_is_refused_with_what_to_do(block_green, tm
     header["__metadata__"]["version"] = "3"
     old = json.dumps(header).encode()
     store.write_bytes(len(old).to_bytes(8, "little") + old + content[8 + length :])
-    with pytest.raises(palpate.StoreError, match="has format version 3, this program reads 4; compute it again"):
+    with pytest.raises(palpate.StoreError, match="has format version 3, this program reads 5; compute it again"):
         palpate.GreensFunction.load(store)
