@@ -22,7 +22,6 @@ mod servo;
 mod settings;
 mod statistics;
 mod strain;
-mod subnormals;
 mod timing;
 
 pub use clock::now_ns;

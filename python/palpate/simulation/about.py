@@ -13,7 +13,7 @@ from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.tables import SceneTables
 
 # Raised when what is recorded, or what follows from it, changes.
-FORMAT = 1
+FORMAT = 2
 
 
 def about(
