@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from palpate import models
+from palpate.fields import STRAIN_LIMIT
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
@@ -20,8 +21,6 @@ from palpate.scene.touch import TouchTable
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
-# Strain of the finite element field at which a tool is held.
-STRAIN_LIMIT = 0.3
 # Rubber on dry glass comes to about 2; beyond this a coefficient is a slip of the pen.
 MOST_FRICTION = 10.0
 
