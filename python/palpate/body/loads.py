@@ -137,6 +137,6 @@ def gravity_mistake(gravity: Sequence[float]) -> str | None:
     if size <= MOST_GRAVITY:
         return None
     return (
-        f"gravity of {size:.4g} m/s^2 is {size / 9.81:.3g} times that of the earth: give it in m/s^2, or with a unit, "
-        f"such as '-981cm/s^2'"
+        f"gravity of {size:.4g} m/s^2 is {size / 9.81:.3g} times that of the earth: give it in m/s^2, "
+        f"such as '-9.81m/s^2'"
     )

@@ -297,8 +297,8 @@ class Simulation(Adjustable, Changing):
 
     def _limit_text(self, what: str) -> str:
         return (
-            f"{what} was held at the strain limit of {100 * self._strain_limit:.0f} % (view.strain_limit), where linear "
-            f"elasticity has no meaning: its force is that of the limit, not of its position; press less deep"
+            f"{what} was held at the strain limit of {100 * self._strain_limit:.0f} % (view.strain_limit): its "
+            f"force is that of the limit, not of its position; press less deep"
         )
 
     def _frame(self) -> Frame:

@@ -68,8 +68,10 @@ impl<'a> Noise<'a> {
         let accuracy = &self.green.accuracy;
         let residual = accuracy.residual(free) + accuracy.residual_of_supports(supports) + self.of_given;
         let magnitude: Vec<f64> = rows.iter().map(|&row| self.green.magnitude(row)).collect();
-        let given = |row: usize| if self.green.row_is_fixed[row] { 0.0 } else { self.of_rows.get(row).copied().unwrap_or(0.0) };
-        let noise: Vec<f64> = rows.iter().zip(&magnitude).map(|(&row, s)| (self.of_row(row) + given(row)) / s).collect();
+        let given =
+            |row: usize| if self.green.row_is_fixed[row] { 0.0 } else { self.of_rows.get(row).copied().unwrap_or(0.0) };
+        let noise: Vec<f64> =
+            rows.iter().zip(&magnitude).map(|(&row, s)| (self.of_row(row) + given(row)) / s).collect();
         let n = rows.len();
         let scaled = Mat::from_fn(n, n, |i, j| capacitance[(i, j)] / (magnitude[i] * magnitude[j]));
         let released = rows.iter().any(|&row| self.green.row_is_fixed[row]);

@@ -143,11 +143,7 @@ impl RigidMotion {
 }
 
 /// All supports that stay; `None` where one of them has no column.
-fn supports(
-    green: &GreensFunction,
-    known: &[(usize, f64)],
-    released: impl Fn(usize) -> bool,
-) -> Option<Vec<Support>> {
+fn supports(green: &GreensFunction, known: &[(usize, f64)], released: impl Fn(usize) -> bool) -> Option<Vec<Support>> {
     let mut given = vec![0.0; 3 * green.touch.len()];
     for &(column, value) in known {
         given[column] = value;

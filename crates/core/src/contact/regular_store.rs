@@ -74,7 +74,10 @@ fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
     let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
     let entry = |bytes: &[u8]| -> FanFields { std::array::from_fn(|i| number(&bytes[8 * i..8 * (i + 1)])) };
     let whole = tensor.dtype() == Dtype::F64 && tensor.shape() == [fans, FIELDS];
-    let right = whole && is_sealed(head_of(&bytes)?) && metadata.get("key")? == key && metadata.get("checksum")? == &checksum(tensor.data());
+    let right = whole
+        && is_sealed(head_of(&bytes)?)
+        && metadata.get("key")? == key
+        && metadata.get("checksum")? == &checksum(tensor.data());
     right.then(|| RegularCompliance { fields: tensor.data().chunks_exact(8 * FIELDS).map(entry).collect() })
 }
 

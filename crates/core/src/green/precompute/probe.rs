@@ -137,11 +137,7 @@ impl Squares {
 
 /// Error of the columns of the touchable supports in the energy norm, each moved by `1 / s_j`, with random signs; `None`
 /// where corrections do not help.
-fn supports_error<C: Number>(
-    problem: &Problem,
-    stiffness: &SymmetricCsc,
-    inverse: &Inverse<'_, C>,
-) -> Option<f64> {
+fn supports_error<C: Number>(problem: &Problem, stiffness: &SymmetricCsc, inverse: &Inverse<'_, C>) -> Option<f64> {
     let supports = &problem.supports;
     let count = supports.free.len();
     let mut loads = vec![0.0; MOTIONS * count];
