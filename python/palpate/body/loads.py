@@ -21,7 +21,6 @@ from palpate.mesh import TetMesh
 from palpate.mesh.shape_functions import surface_integrals
 from palpate.vectors import number, three_numbers
 
-
 # A body in a fast centrifuge; beyond it the number was meant in cm/s^2 or mm/s^2.
 MOST_GRAVITY = 300.0
 

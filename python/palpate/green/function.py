@@ -31,8 +31,8 @@ Components = Sequence[float | str | None]
 # longer than the first touch (1,000,000 tetrahedra, 176,000 nodes: 2 min, 9 GB, and a second for every pose).
 MOST_NODES_INSIDE = 50_000
 
-# A touch may land beside its point by the contact radius, and by this part of the body's longest side: flat triangles lie
-# so far below a curved surface.
+# A touch may land beside its point by the contact radius, and by this part of the body's longest side: flat triangles
+# lie so far below a curved surface.
 BESIDE = 0.01
 
 
@@ -288,8 +288,8 @@ class GreensFunction:
             Whether the point is meant to lie on the surface: one farther from it than the contact radius is refused.
             False takes the closest point, however far.
 
-        A :class:`palpate.TouchWarning` says if the surface is strained by more than 30 %, where linear elasticity has no
-        meaning.
+        A :class:`palpate.TouchWarning` says if the surface is strained by more than 30 %, where linear elasticity
+        has no meaning.
 
         Raises
         ------
@@ -313,8 +313,8 @@ class GreensFunction:
         if on_surface and distance > max(reach, BESIDE * self.extents.max()):
             raise BodyError(
                 f"the touch point lies {size_text([distance])} from the surface of the body, which is "
-                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on: give metres, or text "
-                f"such as '4cm'; on_surface=False takes the closest point"
+                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on: give metres, or "
+                f"text such as '4cm'; on_surface=False takes the closest point"
             )
         try:
             force, u, error = self._core.touch(target, wanted, reach)
@@ -327,8 +327,8 @@ class GreensFunction:
         strain = self.surface_strain.largest(touch.displacements)
         if not strain <= STRAIN_LIMIT:
             warnings.warn(
-                f"the touch strains the surface by {100 * strain:.0f} %, beyond the limit of {100 * STRAIN_LIMIT:.0f} %: "
-                f"linear elasticity has no meaning there; press less deep, or with a larger radius",
+                f"the touch strains the surface by {100 * strain:.0f} %, beyond the limit of {100 * STRAIN_LIMIT:.0f} %"
+                f": linear elasticity has no meaning there; press less deep, or with a larger radius",
                 TouchWarning,
                 stacklevel=2,
             )
@@ -349,8 +349,8 @@ class GreensFunction:
         """Refuse a contact radius that cannot be meant for this body."""
         if radius > self.extents.max():
             raise BodyError(
-                f"the contact radius of {radius:.4g} m is larger than the body, which is {size_text(self.extents)}: give "
-                f"metres, or text such as '5mm'"
+                f"the contact radius of {radius:.4g} m is larger than the body, which is {size_text(self.extents)}: "
+                f"give metres, or text such as '5mm'"
             )
 
     def _too_wide(self, radius: float) -> BodyError:

@@ -34,8 +34,8 @@ def with_radii(scene: SceneTables, greens: Sequence[GreensFunction]) -> SceneTab
     Raises
     ------
     SceneError
-        A contact radius that covers more nodes than a tick can weigh, a rounding wider than the radius, or a tool larger
-        than the bodies or smaller than a hundredth of an element.
+        A contact radius that covers more nodes than a tick can weigh, a rounding wider than the radius, or a tool
+        larger than the bodies or smaller than a hundredth of an element.
 
     """
     for tool in scene.tools:

@@ -33,8 +33,8 @@ from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
 
-# A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until its
-# limit is known.
+# A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
+# its limit is known.
 AT_LIMIT = 0.95
 
 # A program that ends without a word leaves no device pushing.

@@ -16,7 +16,9 @@ TOP = (0.04, 0.025, 0.05)
 
 def test_a_point_off_the_surface_is_refused_unless_it_is_meant(block_green):
     press = (None, None, -1e-3)
-    with pytest.raises(palpate.BodyError, match=r"^the touch point lies 68\.\d+ m from the surface[^\n]*on_surface=False"):
+    with pytest.raises(
+        palpate.BodyError, match=r"^the touch point lies 68\.\d+ m from the surface[^\n]*on_surface=False"
+    ):
         block_green.touch((40.0, 25.0, 50.0), press, 0.005)
     beside = (0.04, 0.025, 0.056)
     with pytest.raises(palpate.BodyError, match="lies 6 mm from the surface of the body, which is 80 x 50 x 50 mm"):
