@@ -60,3 +60,19 @@ fn decay(offset: DVec3, rate: DVec3, period: f64) -> (DVec3, DVec3) {
     let slope = rate + omega * offset;
     (settled((offset + slope * period) * decay), settled((rate - omega * slope * period) * decay))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_at_rest_ends_at_rest_without_subnormal_numbers() {
+        let mut hand = Hand::resting(Pose::at(DVec3::new(0.1, -0.2, 0.3)));
+        for _ in 0..20_000 {
+            hand.follow(Pose::at(DVec3::ZERO), 1e-3);
+            let numbers = [hand.pose.position, hand.twist.linear, hand.twist.angular];
+            assert!(numbers.iter().flat_map(|v| v.to_array()).all(|x| !x.is_subnormal()), "{numbers:?}");
+        }
+        assert_eq!((hand.pose.position, hand.twist.linear), (DVec3::ZERO, DVec3::ZERO));
+    }
+}
