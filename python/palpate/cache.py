@@ -113,7 +113,10 @@ def _about(file: Path, leftover: bool) -> str:
     if made_of.get("format") == "palpate-contact":
         return "what a tool needs to know of the body with the same beginning"
     kind = "modes" if file.name.endswith(".modes.palpate") else f"Green's function, {made_of.get('precision', '')}"
-    about = json.loads(made_of.get("description") or "{}")
+    try:
+        about = json.loads(made_of.get("description") or "{}")
+    except ValueError:
+        return "not a store"
     counts = f"{about.get('nodes')} nodes, {about.get('tets')} {about.get('element')} tetrahedra" if about else ""
     moduli = [f"{1e-3 * values[0]:.4g} kPa" for values in about.get("materials", {}).values()]
     return ", ".join(filter(None, [kind, counts, " and ".join(dict.fromkeys(moduli))]))

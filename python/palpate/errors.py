@@ -93,7 +93,7 @@ class DeviceWarning(PalpateWarning):
 
 
 class TouchWarning(PalpateWarning):
-    """A touch landed on the surface far from the point that was asked for."""
+    """A touch, or the tool of a run, strains the body beyond what linear elasticity can answer."""
 
 
 class RecordingWarning(PalpateWarning):

@@ -20,6 +20,7 @@ mod error;
 pub mod fem;
 mod files;
 pub mod green;
+mod header;
 pub mod memory;
 pub mod mesh;
 pub mod simulation;

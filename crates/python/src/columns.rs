@@ -19,8 +19,8 @@ use crate::green::{named, problem};
 use crate::watched::run_watched;
 
 /// What a store needs to know of a factor: format, columns of a block, accuracy, free response (rows).
-type Measured<'py> = (&'static str, usize, [f64; 4], Bound<'py, PyArray1<f64>>);
-type GivenMeasured<'py> = (String, usize, [f64; 4], PyReadonlyArray1<'py, f64>);
+type Measured<'py> = (&'static str, usize, [f64; 5], Bound<'py, PyArray1<f64>>);
+type GivenMeasured<'py> = (String, usize, [f64; 5], PyReadonlyArray1<'py, f64>);
 
 /// A factored problem: any block of its columns, from any thread.
 #[pyclass(frozen, module = "palpate._native")]

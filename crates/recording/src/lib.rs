@@ -7,6 +7,7 @@ mod messages;
 mod reader;
 mod recorder;
 mod schemas;
+mod sealed;
 mod writer;
 
 pub use messages::same_settings;

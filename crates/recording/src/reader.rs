@@ -15,6 +15,7 @@ use palpate_servo::{Settings, TickRecord};
 use serde::Deserialize;
 
 use crate::messages::{SettingsMessage, Tick};
+use crate::sealed::opened;
 use crate::writer::{ABOUT, END, SETTINGS, TICKS};
 
 /// The ticks of a file, one after the other; nothing of the file is kept but a chunk.
@@ -26,6 +27,10 @@ pub struct Ticks<R = BufReader<File>> {
     settings: Option<(Settings, Strike)>,
     /// How the file ended; `None` while it has not, and for one that was cut short.
     pub ending: Option<Ending>,
+    /// Whether the texts have a checksum; those of the first format have none.
+    sealed: bool,
+    /// Ticks so far.
+    count: u64,
 }
 
 /// How a file ended.
@@ -59,8 +64,10 @@ impl<R: Read> Ticks<R> {
             match records.next() {
                 Some(Ok(Record::Header(_))) => {}
                 Some(Ok(Record::Metadata(metadata))) if metadata.name == ABOUT => {
-                    let about = metadata.metadata;
-                    return Ok(Self { records, about, topics: BTreeMap::new(), settings: None, ending: None });
+                    let damaged = |reason| format!("the recording is damaged: {reason}");
+                    let (about, sealed) = opened(metadata.metadata).map_err(damaged)?;
+                    let topics = BTreeMap::new();
+                    return Ok(Self { records, about, topics, settings: None, ending: None, sealed, count: 0 });
                 }
                 Some(Err(error)) => return Err(format!("this is no recording: {error}")),
                 _ => return Err("this MCAP file was not recorded by Palpate: it does not say what".into()),
@@ -68,17 +75,27 @@ impl<R: Read> Ticks<R> {
         }
     }
 
+    /// The end of a file that has all of its ticks: a chunk whose kind is damaged would be passed over.
+    fn ending_of(&self, texts: BTreeMap<String, String>) -> std::result::Result<Ending, String> {
+        let numbers = if self.sealed { opened(texts)?.0 } else { texts };
+        let number = |name: &str| numbers.get(name).and_then(|number| number.parse::<u64>().ok());
+        match number("ticks") {
+            Some(ticks) if ticks != self.count => Err(format!("{} of {ticks} ticks are there", self.count)),
+            _ => Ok(Ending { dropped: number("dropped").unwrap_or(0) }),
+        }
+    }
+
     fn tick(&mut self, record: Record<'_>) -> std::result::Result<Option<TickRecord>, String> {
         match record {
             Record::Channel(channel) => _ = self.topics.insert(channel.id, channel.topic),
             Record::Metadata(metadata) if metadata.name == END => {
-                let dropped = metadata.metadata.get("dropped").and_then(|number| number.parse().ok());
-                self.ending = Some(Ending { dropped: dropped.unwrap_or(0) });
+                self.ending = Some(self.ending_of(metadata.metadata)?);
             }
             Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
                 Some(SETTINGS) => self.settings = Some(decoded::<SettingsMessage>(&data)?.settings()),
                 Some(TICKS) => {
                     let settings = self.settings.ok_or("a tick comes before its settings")?;
+                    self.count += 1;
                     return Ok(Some(decoded::<Tick>(&data)?.record(settings)));
                 }
                 _ => {}

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use crate::messages::{Log, PoseStamped, SettingsMessage, Tick, Time, WrenchStamped, same_settings};
 use crate::schemas::{NAMES, definition};
+use crate::sealed::sealed;
 
 /// Topics that there are once; those of a tool follow, two a tool.
 pub(crate) const TICKS: &str = "/ticks";
@@ -82,7 +83,7 @@ impl<W: Write + Seek> TickWriter<W> {
             .chunk_size(None)
             .disable_seeking(true);
         let mut file = options.create(file)?;
-        file.write_metadata(&Metadata { name: ABOUT.into(), metadata: header.about.clone() })?;
+        file.write_metadata(&Metadata { name: ABOUT.into(), metadata: sealed(header.about.clone()) })?;
         let mut schemas = Vec::new();
         for name in NAMES {
             schemas.push(file.add_schema(name, "ros2msg", definition(name).as_bytes())?);
@@ -152,7 +153,7 @@ impl<W: Write + Seek> TickWriter<W> {
         let dropped = self.dropped + made.map_or(0, |made| made.saturating_sub(self.next));
         let numbers = [("ticks", self.next - self.dropped), ("dropped", dropped)];
         let metadata = numbers.into_iter().map(|(name, number)| (name.to_owned(), number.to_string())).collect();
-        self.file.write_metadata(&Metadata { name: END.into(), metadata })?;
+        self.file.write_metadata(&Metadata { name: END.into(), metadata: sealed(metadata) })?;
         self.file.finish()?;
         Ok(self.file.into_inner())
     }

@@ -16,7 +16,6 @@ use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::record::{RecordedInput, RecordedTool, StrainArrivals, recorded_port};
 use crate::safety::{Computed, Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
 use crate::settings::{Settings, refuse_unless};
-use crate::subnormals::FlushSubnormals;
 use crate::timing::{Clock, Timing};
 
 /// A simulation with its devices, safety stages and hand-offs, ready to tick.
@@ -112,11 +111,9 @@ impl ForceLoop {
     /// Reads the devices, steps, makes safe and writes the devices; then accounts and publishes.
     ///
     /// `now_ns` is the time for which the tick is due by the monotonic clock ([`crate::now_ns`]), ns: its deadline, or in a
-    /// driver's callback the time of the call. `period` is the time between two ticks, s. Subnormal numbers are flushed
-    /// inside and the thread's mode restored. Never allocates, locks or blocks, and never panics: a panic within becomes a
-    /// latched fault.
+    /// driver's callback the time of the call. `period` is the time between two ticks, s. Never allocates, locks or blocks,
+    /// and never panics: a panic within becomes a latched fault.
     pub fn tick(&mut self, now_ns: u64, period: f64) {
-        let _flush = FlushSubnormals::begin();
         if self.fault == Some(FaultReason::Panic) {
             return self.release();
         }
@@ -184,8 +181,6 @@ impl ForceLoop {
         self.status.realtime = realtime;
     }
 
-    /// Apart from `tick`, so that no arithmetic moves out of where subnormal numbers are flushed.
-    #[inline(never)]
     fn guarded_tick(&mut self, now_ns: u64, period: f64) {
         self.timing.begin(now_ns);
         let changed = self.take_change();

@@ -24,7 +24,6 @@ mod settings;
 mod statistics;
 mod strain;
 mod strikes;
-mod subnormals;
 mod timing;
 
 pub use clock::now_ns;

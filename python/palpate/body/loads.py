@@ -21,6 +21,9 @@ from palpate.mesh import TetMesh
 from palpate.mesh.shape_functions import surface_integrals
 from palpate.vectors import number, three_numbers
 
+# A body in a fast centrifuge; beyond it the number was meant in cm/s^2 or mm/s^2.
+MOST_GRAVITY = 300.0
+
 
 @dataclass(frozen=True, eq=False)
 class Loads(ComparedByValue):
@@ -44,7 +47,7 @@ class Loads(ComparedByValue):
     Raises
     ------
     BodyError
-        A number that is not finite, or a wrong length.
+        A number that is not finite, a wrong length, or a gravity beyond 300 m/s^2.
     UnitError
         Text that is no quantity.
 
@@ -57,6 +60,9 @@ class Loads(ComparedByValue):
 
     def __post_init__(self) -> None:
         gravity = three_numbers(self.gravity, "gravity", BodyError, units.acceleration)
+        mistake = gravity_mistake(gravity)
+        if mistake is not None:
+            raise BodyError(mistake)
         object.__setattr__(self, "gravity", gravity)
         pairs = _pairs(self.pressure, "pressure")
         pressure = [(where, number(units.pressure(value), "pressure", BodyError)) for where, value in pairs]
@@ -122,3 +128,14 @@ def _pairs(given: Any, what: str) -> list[tuple[Selection, Any]]:
         return [(where, value) for where, value in given]
     except (TypeError, ValueError):
         raise BodyError(f"{what} takes pairs of a part of the surface and a load") from None
+
+
+def gravity_mistake(gravity: Sequence[float]) -> str | None:
+    """Say what is wrong with an acceleration, m/s^2, that no body on earth feels; None for any other."""
+    size = float(np.linalg.norm(gravity))
+    if size <= MOST_GRAVITY:
+        return None
+    return (
+        f"gravity of {size:.4g} m/s^2 is {size / 9.81:.3g} times that of the earth: give it in m/s^2, "
+        f"such as '-9.81m/s^2'"
+    )

@@ -177,13 +177,14 @@ def touch(
         str | None, typer.Option(help="Contact radius, such as 5mm; 0 is a point; default: a sixteenth of the body.")
     ] = None,
 ) -> None:
-    """Press a patch of the surface and print the force.
+    """Press a patch of the surface and print the force; exit code 1 where linear elasticity has no meaning.
 
     Example: palpate touch liver.palpate --point 0,4cm,2cm --press=-,-3mm,- --radius 5mm
     """
     import numpy as np
 
     import palpate
+    from palpate.fields import STRAIN_LIMIT
     from palpate.green import error_text
     from palpate.mesh import size_text
     from palpate.scene.default_radius import default_contact_radius
@@ -202,6 +203,8 @@ def touch(
     print(f"estimated error: {error_text(answer.error)}")
     if radius is None:
         print(f"contact radius: {1e3 * reach:.3g} mm, by default; --radius changes it")
+    if not green.surface_strain.largest(answer.displacements) <= STRAIN_LIMIT:
+        raise typer.Exit(1)
 
 
 @app.command()

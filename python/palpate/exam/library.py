@@ -224,12 +224,19 @@ class _Known:
         self.forces: dict[str, list[float]] = {}
         if self._path.exists():
             try:
-                self.forces = json.loads(self._path.read_text())
-            except ValueError:
+                kept = json.loads(self._path.read_text())
+                if kept["sum"] != _sum(kept["forces"]):
+                    raise ValueError("damaged")
+                self.forces = kept["forces"]
+            except (ValueError, KeyError, TypeError):
                 self._path.unlink(missing_ok=True)
 
     def add(self, key: str, row: list[float]) -> None:
         self.forces[key] = row
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with written_beside(self._path) as partial:
-            partial.write_text(json.dumps(self.forces))
+            partial.write_text(json.dumps({"forces": self.forces, "sum": _sum(self.forces)}))
+
+
+def _sum(forces: dict[str, list[float]]) -> str:
+    return hashlib.sha256(json.dumps(forces, sort_keys=True).encode()).hexdigest()

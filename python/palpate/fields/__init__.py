@@ -7,12 +7,13 @@ from palpate.fields.interior import Interior
 from palpate.fields.picture import DeformedSurface
 from palpate.fields.principal import extreme_values, largest_magnitude
 from palpate.fields.result import Result, ResultSource
-from palpate.fields.strain_measure import HONEST_STRAIN, Strained, StrainMeasure, StrainSource
+from palpate.fields.strain_measure import HONEST_STRAIN, STRAIN_LIMIT, Strained, StrainMeasure, StrainSource
 from palpate.fields.stress import StressRecovery, SurfaceStress
 from palpate.fields.surface_strain import SurfaceStrain
 
 __all__ = [
     "HONEST_STRAIN",
+    "STRAIN_LIMIT",
     "DeformedSurface",
     "ElementStrain",
     "Exported",

@@ -18,6 +18,8 @@ import numpy as np
 
 # Linear elasticity is honest to about this strain; beyond it a pose is reported.
 HONEST_STRAIN = 0.1
+# Strain at which the tool of a scene is held, and from which an answer has no meaning.
+STRAIN_LIMIT = 0.3
 
 
 class StrainMeasure(Protocol):

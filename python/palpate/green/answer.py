@@ -26,9 +26,9 @@ class Answer(ComparedByValue, Result):
         (f, 3) N, `K u` at the body's fixed nodes.
     error
         Estimated relative error, 1 is all: largest error of a nodal force or reaction over the largest of them, or of a
-        displacement over the largest, whichever is larger. Forces below a thousandth of what a moved support would take
-        alone are compared with that. It is the error of solving this finite element model with numbers of the store's
-        precision, not that of the model (docs/accuracy.md).
+        displacement over the largest, whichever is larger. Supports that move as one take no force: what is computed is
+        compared with a bound of its rounding. It is the error of solving this finite element model with numbers of the
+        store's precision, not that of the model (docs/accuracy.md).
 
     """
 

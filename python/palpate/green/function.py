@@ -18,7 +18,7 @@ from palpate.atomic import destination
 from palpate.body import Body, description, problem_arrays
 from palpate.cache_limit import hold
 from palpate.errors import BodyError, StoreError, TouchWarning
-from palpate.fields import ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
+from palpate.fields import STRAIN_LIMIT, ElementStrain, StrainMeasure, StressRecovery, SurfaceStrain
 from palpate.green.answer import Answer, Touch
 from palpate.green.bounds import check_error
 from palpate.input_file import require_file
@@ -33,8 +33,9 @@ Components = Sequence[float | str | None]
 # longer than the first touch (1,000,000 tetrahedra, 176,000 nodes: 2 min, 9 GB, and a second for every pose).
 MOST_NODES_INSIDE = 50_000
 
-# A touch that lands farther from its point than this part of the body's longest side was probably meant elsewhere.
-FAR = 0.05
+# A touch may land beside its point by the contact radius, and by this part of the body's longest side: flat triangles
+# lie so far below a curved surface.
+BESIDE = 0.01
 
 
 class GreensFunction:
@@ -137,7 +138,7 @@ class GreensFunction:
     def strain_measure(self) -> StrainMeasure:
         """Measure of the largest strain of answers: by elements; of a bare store or a large body, by the surface."""
         if not self.follows_inside:
-            return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
+            return self.surface_strain
         return ElementStrain(self.stress_recovery)
 
     @property
@@ -268,24 +269,37 @@ class GreensFunction:
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
         return Answer(u, f, self._reactions(f, reactions), error, self)
 
-    def touch(self, point: Sequence[float | str], displacement: Components, radius: float | str = 0.0) -> Touch:
+    def touch(
+        self,
+        point: Sequence[float | str],
+        displacement: Components,
+        radius: float | str = 0.0,
+        *,
+        on_surface: bool = True,
+    ) -> Touch:
         """Press a patch of the surface.
 
         Parameters
         ----------
         point
-            Contact point, m, on the unloaded body; the closest point of the surface is taken, and a
-            :class:`palpate.TouchWarning` tells if it is far off. Lengths may also be text with a unit, such as
-            ``"4cm"``.
+            Contact point, m, on the unloaded body; the closest point of the surface is taken. Lengths may also be text
+            with a unit, such as ``"4cm"``.
         displacement
             Weighted mean displacement of the patch from the unloaded shape, m; None leaves a component free.
         radius
             Contact radius, m; 0 is a point contact.
+        on_surface
+            Whether the point is meant to lie on the surface: one farther from it than the contact radius is refused.
+            False takes the closest point, however far.
+
+        A :class:`palpate.TouchWarning` says if the surface is strained by more than 30 %, where linear elasticity
+        has no meaning.
 
         Raises
         ------
         BodyError
-            A number that is not finite, a negative radius, or one that covers more nodes than a tick can weigh.
+            A number that is not finite, a point that lies too far from the surface, a radius that is negative, larger
+            than the body, or covers more nodes than a tick can weigh.
         UnitError
             Text that is no length.
         PrecisionError
@@ -295,8 +309,17 @@ class GreensFunction:
         reach = units.length(radius)
         if not (np.isfinite(reach) and reach >= 0):
             raise BodyError(f"the contact radius must not be negative, got {reach:g} m")
+        self._require_size(reach)
         target = three_numbers(point, "the touch point", BodyError, units.length)
         wanted = three_components(displacement, "displacement", BodyError, units.length)
+        landed = self._surface_search.closest(np.array([target]))
+        distance = float(np.linalg.norm(landed - target))
+        if on_surface and distance > max(reach, BESIDE * self.extents.max()):
+            raise BodyError(
+                f"the touch point lies {size_text([distance])} from the surface of the body, which is "
+                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on: give metres, or "
+                f"text such as '4cm'; on_surface=False takes the closest point"
+            )
         try:
             force, u, error = self._core.touch(target, wanted, reach)
         except BodyError:
@@ -304,16 +327,35 @@ class GreensFunction:
                 raise
             raise self._too_wide(reach) from None
         check_error(error, self.precision, "the touch", stacklevel=2)
-        landed = self._surface_search.closest(np.array([target]))
-        distance = float(np.linalg.norm(landed - target))
-        if distance > FAR * self.extents.max():
+        touch = Touch(np.array(force), u.reshape(-1, 3), landed, distance, error, self)
+        strain = self.surface_strain.largest(touch.displacements)
+        if not strain <= STRAIN_LIMIT:
             warnings.warn(
-                f"the touch landed at {brief(landed)} m, {size_text([distance])} from the point given: the body is "
-                f"{size_text(self.extents)}, from {brief(self.surface_positions.min(axis=0))} m on",
+                f"the touch strains the surface by {100 * strain:.0f} %, beyond the limit of {100 * STRAIN_LIMIT:.0f} %"
+                f": linear elasticity has no meaning there; press less deep, or with a larger radius",
                 TouchWarning,
                 stacklevel=2,
             )
-        return Touch(np.array(force), u.reshape(-1, 3), landed, distance, error, self)
+        return touch
+
+    @cached_property
+    def surface_strain(self) -> SurfaceStrain:
+        """Measure of the strain in the plane of the surface: it needs no elements, and takes little time."""
+        return SurfaceStrain(self.surface_positions, np.searchsorted(self.surface_nodes, self.surface_faces))
+
+    @cached_property
+    def edge_length(self) -> float:
+        """Median edge of the triangles of the surface, m."""
+        corners = self.surface_positions[np.searchsorted(self.surface_nodes, self.surface_triangles)]
+        return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+
+    def _require_size(self, radius: float) -> None:
+        """Refuse a contact radius that cannot be meant for this body."""
+        if radius > self.extents.max():
+            raise BodyError(
+                f"the contact radius of {radius:.4g} m is larger than the body, which is {size_text(self.extents)}: "
+                f"give metres, or text such as '5mm'"
+            )
 
     def _too_wide(self, radius: float) -> BodyError:
         largest = 1e3 * self.largest_contact_radius(radius)

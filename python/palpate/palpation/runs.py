@@ -61,7 +61,7 @@ def run_all(
         for rank, path in enumerate(paths):
             if rank not in kept.runs:
                 try:
-                    recording = simulation.play(path.positions, path.orientations)
+                    recording = simulation._play(path.positions, path.orientations)
                 except SimulationError as error:
                     raise SimulationError(f"run {rank} of the palpation: {error}") from None
                 kept.keep(rank, (recording.forces, recording.limited))

@@ -8,11 +8,14 @@ import numpy as np
 
 from palpate.errors import SceneError
 from palpate.green import GreensFunction
+from palpate.mesh import size_text
 from palpate.scene.tables import SceneTables, ToolTable
 from palpate.scene.tool_shape import KEYS
 
 # Of the longest side of a body: 5 mm on a block of 8 cm, 12 mm, a thumb, on a liver of 20 cm.
 PART_OF_BODY = 1 / 16
+# A tool smaller than this part of an element's edge was meant in another unit.
+LEAST_OF_EDGE = 0.01
 
 
 def default_radius(green: GreensFunction) -> float:
@@ -31,11 +34,35 @@ def with_radii(scene: SceneTables, greens: Sequence[GreensFunction]) -> SceneTab
     Raises
     ------
     SceneError
-        A contact radius that covers more nodes than a tick can weigh, or a rounding wider than the radius.
+        A contact radius that covers more nodes than a tick can weigh, a rounding wider than the radius, or a tool
+        larger than the bodies or smaller than a hundredth of an element.
 
     """
+    for tool in scene.tools:
+        _require_size(tool, greens)
     tools = [_with_radii(tool, greens) for tool in scene.tools]
     return scene if tools == scene.tools else scene.model_copy(update={"tools": tools})
+
+
+def _require_size(tool: ToolTable, greens: Sequence[GreensFunction]) -> None:
+    """Refuse a tool that cannot be meant for these bodies: its lengths were given in another unit."""
+    given = {"radius": tool.radius, "contact_radius": tool.contact_radius, "length": tool.length}
+    lengths = {name: value for name, value in given.items() if value is not None}
+    if tool.semi_axes is not None:
+        lengths["semi_axes"] = max(tool.semi_axes)
+    largest = max(float(green.extents.max()) for green in greens)
+    edge = min(green.edge_length for green in greens)
+    for name, value in lengths.items():
+        if value > largest:
+            raise SceneError(
+                f"tool.{name} is {value:.4g} m, more than the longest side of the bodies, {size_text([largest])}: give "
+                f"metres, or text such as '6mm'"
+            )
+        if name in ("radius", "semi_axes") and value < LEAST_OF_EDGE * edge:
+            raise SceneError(
+                f"tool.{name} is {value:.4g} m, less than a hundredth of an element, whose edges are "
+                f"{size_text([edge])}: give metres, or text such as '6mm'"
+            )
 
 
 def _with_radii(tool: ToolTable, greens: Sequence[GreensFunction]) -> ToolTable:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pydantic import model_validator
 
-from palpate.body import Body, Loads, parse
+from palpate.body import Body, Loads, gravity_mistake, parse
 from palpate.errors import BodyError
 from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
 
@@ -30,6 +30,9 @@ class LoadTable(Table):
             raise ValueError("give exactly one of gravity, pressure and force")
         if self.gravity is not None and not (self.on is None and self.nodes is None):
             raise ValueError("gravity acts on the whole body: leave 'on' and 'nodes' out")
+        mistake = None if self.gravity is None else gravity_mistake(self.gravity)
+        if mistake is not None:
+            raise ValueError(mistake)
         if self.pressure is not None and (self.on is None or self.nodes is not None):
             raise ValueError("a pressure acts on a part of the surface, such as on = 'z > max - 1mm'")
         if self.force is not None and (self.on is None) == (self.nodes is None):

@@ -11,6 +11,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from palpate import models
 from palpate.body import parse
 from palpate.errors import BodyError, UnitError
+from palpate.fields import STRAIN_LIMIT
 from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
@@ -23,8 +24,6 @@ from palpate.units import length_scale
 
 # As many as the force loop takes.
 MOST_BODIES, MOST_TOOLS = 4, 4
-# Strain of the finite element field at which a tool is held.
-STRAIN_LIMIT = 0.3
 # Rubber on dry glass comes to about 2; beyond this a coefficient is a slip of the pen.
 MOST_FRICTION = 10.0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.tables import SceneTables
 
 # Raised when what is recorded, or what follows from it, changes.
-FORMAT = 1
+FORMAT = 2
 
 
 def about(
@@ -48,17 +48,40 @@ def _tables(scene: SceneTables) -> dict[str, Any]:
     return tables
 
 
+def require_readable(about: Mapping[str, str], name: str) -> None:
+    """Refuse texts that this version cannot read.
+
+    Raises
+    ------
+    SceneError
+        A recording of a later version of Palpate, or one without what every recording has.
+
+    """
+    try:
+        if int(about["format"]) > FORMAT:
+            raise SceneError(
+                f"{name}: the recording was made by Palpate {about['version']}, which is newer: update this one"
+            )
+        scene, keys, names, devices = (json.loads(about[key]) for key in ("scene", "keys", "bodies", "devices"))
+        _, single = json.loads(about["shown"])
+        given = [isinstance(scene, dict), *(isinstance(value, list) for value in (keys, names, devices))]
+        given += [isinstance(single, bool), len(keys) == len(names), all(len(pair) == 2 for pair in keys)]
+        known = {"folder", "name", "clock"} <= set(about) and int(about["tools"]) > 0 and float(about["rate"]) > 0
+    except (KeyError, TypeError, ValueError) as error:
+        raise SceneError(f"{name}: the recording is damaged: {type(error).__name__} in what was recorded") from None
+    if not (all(given) and known):
+        raise SceneError(f"{name}: the recording is damaged: it does not say which scene was recorded")
+
+
 def scene_of(about: dict[str, str]) -> Scene:
     """Scene of a recording.
 
     Raises
     ------
     SceneError
-        One of a later version of Palpate.
+        Tables that this version does not know.
 
     """
-    if int(about["format"]) > FORMAT:
-        raise SceneError(f"the recording was made by Palpate {about['version']}, which is newer: update this one")
     scene = Scene(**json.loads(about["scene"]))
     scene.start_paths_in(Path(about["folder"]))
     return scene

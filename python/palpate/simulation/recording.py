@@ -18,7 +18,7 @@ from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
 from palpate.errors import SceneError
 from palpate.input_file import require_file
-from palpate.simulation.about import shown_of
+from palpate.simulation.about import require_readable, shown_of
 
 LOG_DTYPE = np.dtype(
     [("time", "f8"), ("position", "f8", 3), ("force", "f8", 3), ("compute_us", "f8"), ("wakeup_us", "f8")]
@@ -121,7 +121,7 @@ class Recording(ComparedByValue):
 
     @classmethod
     def _of(cls, source: bytes | Path) -> Recording:
-        columns = _native.read_recording(source)
+        columns = _columns_of(source)
         number = columns["number"]
         shaped = _Shaped(columns)
         rate = float(columns["about"]["rate"])
@@ -255,12 +255,18 @@ class Recording(ComparedByValue):
 
     @cached_property
     def _columns(self) -> dict[str, Any]:
-        return _native.read_recording(self.source)
+        return _columns_of(self.source)
 
     def __repr__(self) -> str:
         largest = np.linalg.norm(self.forces, axis=-1).max(initial=0.0)
         watched = f"{self.displacements.shape[1]} nodes watched"
         return f"Recording({len(self.time)} ticks, largest force {largest:.4g} N, {watched})"
+
+
+def _columns_of(source: bytes | Path) -> dict[str, Any]:
+    columns = _native.read_recording(source)
+    require_readable(columns["about"], str(source) if isinstance(source, Path) else "the recording")
+    return columns
 
 
 class _Shaped:

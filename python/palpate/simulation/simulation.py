@@ -6,6 +6,7 @@ import atexit
 import os
 import threading
 import time
+import warnings
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -18,7 +19,7 @@ from palpate import _native, units
 from palpate.body import Body
 from palpate.devices import Device
 from palpate.dynamics import Energy
-from palpate.errors import SceneError, SimulationError
+from palpate.errors import SceneError, SimulationError, TouchWarning
 from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
 from palpate.input_file import require_writable
@@ -33,6 +34,10 @@ from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
 from palpate.vectors import three_numbers
+
+# A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
+# its limit is known.
+AT_LIMIT = 0.95
 
 # A program that ends without a word leaves no device pushing.
 RUNNING: weakref.WeakSet[Simulation] = weakref.WeakSet()
@@ -104,7 +109,7 @@ class Simulation(Adjustable, Changing):
             self._tool(tool)
         self._devices: dict[int, str] = {}
         self._strain_limit, self._armed = self.scene.view.strain_limit, False
-        self._running = False
+        self._running, self._warned = False, False
         self._number: int | None = 0
         self._changing, self._keeping = threading.RLock(), threading.Lock()
         self._to_record: Path | None = None
@@ -299,6 +304,20 @@ class Simulation(Adjustable, Changing):
             The loop does not run.
 
         """
+        frame = self._frame()
+        if not self._warned and np.any(frame.limited) and frame.largest_strain >= AT_LIMIT * self._strain_limit:
+            self._warned = True
+            warnings.warn(self._limit_text("a tool"), TouchWarning, stacklevel=2)
+        return frame
+
+    def _limit_text(self, what: str) -> str:
+        return (
+            f"{what} was held at the strain limit of {100 * self._strain_limit:.0f} % (view.strain_limit): its "
+            f"force is that of the limit, not of its position; press less deep"
+        )
+
+    def _frame(self) -> Frame:
+        """Read the latest tick, without a word about the limit of strain."""
         raw, bodies, scales = self._of_this_scene(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
@@ -385,7 +404,7 @@ class Simulation(Adjustable, Changing):
         if len(bad):
             raise SceneError(f"position {bad[0, 0]} is not finite")
         # Nobody sees a recording of it: none is written.
-        return self._play(positions, orientations, records=False).forces
+        return self._told(self._play(positions, orientations, records=False)).forces
 
     def play(
         self,
@@ -419,7 +438,15 @@ class Simulation(Adjustable, Changing):
             A fault that latched within the run.
 
         """
-        return self._play(positions, orientations, strikes, watch, grabs)
+        return self._told(self._play(positions, orientations, strikes, watch, grabs))
+
+    def _told(self, recording: Recording) -> Recording:
+        """Warn of ticks in which the limit of strain held a tool."""
+        ticks = recording.limited.reshape(len(recording.limited), -1).any(axis=1)
+        if ticks.any():
+            what = f"in {ticks.sum()} of {len(ticks)} ticks, first in tick {ticks.argmax()}, a tool"
+            warnings.warn(self._limit_text(what), TouchWarning, stacklevel=3)
+        return recording
 
     def _play(
         self,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -150,8 +151,9 @@ class _Finished:
             whole += len(line)
             with contextlib.suppress(ValueError, KeyError, TypeError):
                 kept = json.loads(line)
-                key = kept.pop("key")
-                self.known[key] = Answers(**kept)
+                if kept.pop("sum") == _sum(kept):
+                    key = kept.pop("key")
+                    self.known[key] = Answers(**kept)
         self._stream = path.open("r+b" if path.is_file() else "wb")
         self._stream.truncate(whole)
         self._stream.seek(whole)
@@ -164,5 +166,11 @@ class _Finished:
 
     def keep(self, key: str, answer: Answers) -> None:
         """Add what a body has answered; it is in the system's hands when this returns."""
-        self._stream.write(json.dumps({"key": key, **asdict(answer)}).encode() + b"\n")
+        line = {"key": key, **asdict(answer)}
+        self._stream.write(json.dumps({**line, "sum": _sum(line)}).encode() + b"\n")
         self._stream.flush()
+
+
+def _sum(line: Mapping[str, Any]) -> str:
+    """Checksum of an answer that is kept: a damaged digit would be an answer of its own."""
+    return hashlib.sha256(json.dumps(line, sort_keys=True).encode()).hexdigest()

@@ -116,6 +116,17 @@ def test_damaged_files_are_refused(block, tmp_path):
         palpate.ModalBasis.load(tmp_path / "none")
 
 
+def test_no_changed_byte_of_a_header_of_modes_is_accepted(block, tmp_path):
+    path = tmp_path / "block.modes.palpate"
+    palpate.modes(block, 5, path=path)
+    content = path.read_bytes()
+    for at in range(8 + int.from_bytes(content[:8], "little")):
+        for change in (0x01, 0x10):
+            path.write_bytes(content[:at] + bytes([content[at] ^ change]) + content[at + 1 :])
+            with pytest.raises(palpate.StoreError, match=r"^[^\n]*$"):
+                palpate.ModalBasis.load(path)
+
+
 @pytest.mark.parametrize("count", [0, -1, 10**6, 2.5, True])
 def test_counts_that_make_no_sense_are_refused(block, count):
     with pytest.raises(palpate.BodyError, match="number of modes"):

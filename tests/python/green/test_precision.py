@@ -285,5 +285,95 @@ def test_a_store_of_the_format_before_is_refused_with_what_to_do(block_green, tm
     header["__metadata__"]["version"] = "3"
     old = json.dumps(header).encode()
     store.write_bytes(len(old).to_bytes(8, "little") + old + content[8 + length :])
-    with pytest.raises(palpate.StoreError, match="has format version 3, this program reads 4; compute it again"):
+    with pytest.raises(palpate.StoreError, match="has format version 3, this program reads 5; compute it again"):
         palpate.GreensFunction.load(store)
+
+
+def moved_supports(rng: np.random.Generator, body: palpate.Body) -> dict:
+    """Some or all supports moved, each for itself, as one, or turned."""
+    fixed = np.intersect1d(body.mesh.surface_nodes, body.fixed_nodes)
+    count = int(rng.choice([1, 2, 3, max(1, len(fixed) // 2), len(fixed)]))
+    moved = rng.permutation(fixed)[:count]
+    shift, turn = 1e-3 * rng.normal(size=(2, 3))
+    arms = (body.mesh.nodes[moved] - body.mesh.nodes[moved].mean(axis=0)) / 0.02
+    ways = {
+        "each": 1e-3 * rng.normal(size=(len(moved), 3)),
+        "shifted": np.tile(shift, (len(moved), 1)),
+        "turned": shift + np.cross(turn, arms),
+    }
+    way = ways[str(rng.choice(["each", "each", "shifted", "turned"]))]
+    change = random_change(rng, body) if rng.random() < 0.2 else {"displacements": {}, "forces": {}}
+    released = change.get("release", ())
+    change["displacements"] |= {int(n): tuple(u) for n, u in zip(moved, way, strict=True) if n not in released}
+    return change
+
+
+def body_with_few_supports(rng: np.random.Generator) -> palpate.Body:
+    """Up to three blocks of some cells, whose elements are of mixed materials, held at nodes anywhere."""
+    blocks = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]])[: rng.integers(1, 4)]
+    cells = 1 if len(blocks) > 1 else int(rng.integers(1, 4))
+    mesh, _ = glued_mesh(blocks, cells, lambda p: 0.02 * (p + rng.uniform(-0.1, 0.1, p.shape) / cells))
+    mixed = palpate.TetMesh(mesh.nodes, mesh.tets, rng.integers(0, 3, len(mesh.tets)))
+    contrast = 10.0 ** rng.choice([0, 2, 4, 6])
+    materials = {region: palpate.Material(1e4 * contrast ** rng.uniform(), 0.4) for region in range(3)}
+    few = rng.permutation(len(mesh.nodes))[: int(rng.choice([3, 4, max(3, len(mesh.nodes) // 3)]))]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", palpate.LockingWarning)
+        return palpate.Body(mixed, material=materials, fixed=few)
+
+
+def errors_of_moved_supports(bodies: int, each: int, folder) -> dict[str, np.ndarray]:
+    """Stated and true errors (answers, 2) of each format, those of forces that are rounding alone left out."""
+    errors: dict[str, list] = {name: [] for name in FORMATS}
+    for seed in range(bodies):
+        rng = np.random.default_rng([21, seed])
+        body = body_with_few_supports(rng) if rng.random() < 0.6 else random_body(rng)
+        solver = DirectSolver(body)
+        try:
+            greens = [compliance(body, name, folder) for name in FORMATS]
+        except palpate.BodyError:
+            continue
+        changes = [(change, solver.change(change)) for change in (moved_supports(rng, body) for _ in range(each))]
+        largest = float(solver.K.diagonal().max())
+        for change, (u, f) in changes:
+            # Supports that move as one take no force: what the reference has is the rounding of its matrix.
+            as_one = np.abs(f).max() < 1e-13 * largest * np.abs(u).max()
+            right = (u, np.zeros_like(f) if as_one else f)
+            for green in greens:
+                with contextlib.suppress(palpate.BodyError):
+                    stated, true = error_of_change(green, change, right)
+                    if as_one:
+                        true = relative(green.solve(**change).displacements, u[green.surface_nodes])
+                    errors[green.precision].append((stated, true))
+    return {name: np.array(found) for name, found in errors.items()}
+
+
+@pytest.mark.parametrize(
+    "bodies", [60, pytest.param(1000, marks=[pytest.mark.slow, pytest.mark.timeout(900)])], ids=["some", "5000"]
+)
+def test_answers_with_moved_supports_are_within_their_stated_error(bodies, tmp_path):
+    with without_refusals():
+        errors = errors_of_moved_supports(bodies, 5, tmp_path)
+    for precision, (stated, true) in ((name, found.T) for name, found in errors.items()):
+        assert len(stated) > 4.5 * bodies
+        # The reference's own rounding: entries of its matrix, summed in another order, are other ones by 1e-16.
+        worse = (true > np.maximum(stated, 1e-9)) & (stated <= 1)
+        assert not worse.any(), (precision, stated[worse], true[worse])
+        if precision != "f16":
+            assert (stated > REFUSED).mean() < 0.05
+
+
+def test_supports_that_move_as_one_take_no_force(tmp_path):
+    """In any precision: the columns of the supports cancel each other, and rounding must not be left."""
+    body = half_stiff(1e6)
+    held = body.fixed_nodes
+    turn = np.cross([3e-3, -2e-3, 1e-3], body.mesh.nodes[held]) + [1e-3, 2e-3, -1e-3]
+    for precision in FORMATS:
+        answer = compliance(body, precision, tmp_path).solve(
+            displacements={int(n): u for n, u in zip(held, turn, strict=True)}
+        )
+        stiffest = body.stiffness().diagonal().max()
+        assert np.abs(answer.forces).max() < 1e-11 * stiffest * np.abs(turn).max()
+        expected = np.cross([3e-3, -2e-3, 1e-3], body.mesh.nodes[body.mesh.surface_nodes]) + [1e-3, 2e-3, -1e-3]
+        assert np.abs(answer.displacements - expected).max() < 1e-12
+        assert answer.error < 1e-3

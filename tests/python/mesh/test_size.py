@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from command_line import refused
 from conftest import box_mesh
 
 import palpate
@@ -91,8 +92,9 @@ def test_a_touch_tells_where_it_landed(block, block_green):
     for point, text in [((0.2, 0.1, 0.03), "130 mm"), ((50.0, 20.0, 50.0), "73.38 m")]:
         landed = np.clip(point, 0, [0.08, 0.05, 0.05])
         distance = np.linalg.norm(landed - point)
-        with pytest.warns(palpate.TouchWarning, match=f"{text} from the point given: the body is 80 x"):
-            far = block_green.touch(point, (-1e-3, None, None), 0.01)
+        with pytest.raises(palpate.BodyError, match=f"lies {text} from the surface of the body, which is 80 x"):
+            block_green.touch(point, (-1e-3, None, None), 0.01)
+        far = block_green.touch(point, (-1e-3, None, None), 0.01, on_surface=False)
         assert far.point == pytest.approx(landed, abs=1e-12)
         assert far.distance == pytest.approx(distance, rel=1e-9)
         assert np.array_equal(far.force, block_green.touch(landed, (-1e-3, None, None), 0.01).force)
@@ -103,6 +105,6 @@ def test_the_command_tells_where_a_touch_landed(block_green, tmp_path):
     press = ("touch", "block.palpate", "--press=-,-,-1mm", "--radius", "1cm", "--point")
     on_it = command(*press, "5cm,2cm,5cm", cwd=tmp_path)
     assert "landed" not in on_it.stdout + on_it.stderr
-    far = command(*press, "50,20,50", cwd=tmp_path)
-    assert "landed at [0.08 0.05 0.05] m, 73.38 m off the point" in far.stdout
-    assert "warning: the touch landed at [0.08, 0.05, 0.05] m" in far.stderr
+    beside = command(*press, "5cm,2cm,54mm", cwd=tmp_path)
+    assert "landed at [0.05 0.02 0.05] m, 4 mm off the point" in beside.stdout
+    refused(command(*press, "50,20,50", cwd=tmp_path), "the touch point lies 73.38 m from the surface")

@@ -175,3 +175,40 @@ def test_what_is_no_recording_is_refused(built, tmp_path):
     assert np.array_equal(cut.forces, recording.forces[: len(cut.ticks)])
     made = palpate.replay(cut, built)
     assert made.same and not made.whole and made.ticks == len(cut.ticks)
+
+
+def unchanged(recording: palpate.Recording, whole: palpate.Recording) -> bool:
+    """Whether a recording is another one up to where it says that it was cut short."""
+    count = len(recording.ticks)
+    same = recording.about == whole.about and np.array_equal(recording.ticks, whole.ticks[:count])
+    names = ("time", "forces", "positions", "velocities", "computed_forces", "buttons", "active")
+    same = same and all(np.array_equal(getattr(recording, name), getattr(whole, name)[:count]) for name in names)
+    return same and (count == len(whole.ticks) or recording.dropped is None)
+
+
+def test_no_changed_byte_of_a_recording_gives_another_one(built, tmp_path):
+    whole = palpate.Simulation(built).play(paths()[:60])
+    content, path = whole.source, tmp_path / "damaged.mcap"
+    # What was recorded stands at the beginning; of the chunks some bytes, of the end all.
+    rng = np.random.default_rng(3)
+    places = {*range(9000), *rng.integers(0, len(content), 1500).tolist(), *range(len(content) - 1500, len(content))}
+    for at in sorted(place for place in places if place < len(content)):
+        value = content[at]
+        other = ord("0") + (value - ord("0") + 8) % 10 if chr(value).isdigit() else value ^ 0x10
+        path.write_bytes(content[:at] + bytes([other]) + content[at + 1 :])
+        try:
+            found = palpate.Recording.load(path)
+        except palpate.Error as error:
+            assert "\n" not in str(error)
+        else:
+            assert unchanged(found, whole), at
+
+
+def test_texts_that_are_none_are_refused_in_one_line(built, monkeypatch):
+    """Whole by its checksum, and yet not what this version can read."""
+    simulation = palpate.Simulation(built)
+    for key, text in (("scene", "{"), ("keys", "7"), ("rate", "fast"), ("format", "99"), ("shown", "[]")):
+        about = {**simulation._about((2, False), clock=False), key: text}
+        monkeypatch.setattr(simulation, "_about", lambda *_, about=about, **__: about)
+        with pytest.raises(palpate.Error, match=r"^[^\n]*$"):
+            palpate.replay(simulation.play(paths()[:5]), built if key != "scene" else None)

@@ -9,22 +9,34 @@ use crate::green::{GreensFunction, Precision};
 /// What the columns of an answer add up to.
 pub struct Noise<'a> {
     green: &'a GreensFunction,
-    /// `sum (s_j v_j)^2`, J.
-    size_squared: f64,
+    /// `sum (s_j v_j)^2` over columns of free dofs, and of supports, J.
+    size_squared: [f64; 2],
     /// Of every row, `sum (Psi_ij v_j)^2`; empty where rounding does not follow the entries.
     squares: Vec<f64>,
+    /// Error of the displacements that are given, in the energy norm, sqrt(J).
+    of_given: f64,
+    /// Of every row the error of its displacement, if it is given, m; empty for none.
+    of_rows: Vec<f64>,
 }
 
 impl<'a> Noise<'a> {
     /// Of no column.
     pub fn new(green: &'a GreensFunction) -> Self {
         let follows = green.precision() != Precision::F16;
-        Self { green, size_squared: 0.0, squares: if follows { vec![0.0; green.rows] } else { Vec::new() } }
+        let squares = if follows { vec![0.0; green.rows] } else { Vec::new() };
+        Self { green, size_squared: [0.0; 2], squares, of_given: 0.0, of_rows: Vec::new() }
+    }
+
+    /// Adds what taking a rigid motion out has left: an error of supports in the energy norm, and one of every row, m.
+    pub fn add_motion(&mut self, of_given: f64, of_row: impl Fn(usize) -> f64) {
+        self.of_given = of_given;
+        self.of_rows = (0..3 * self.green.surface_count()).map(of_row).collect();
     }
 
     /// Adds `value` times a column to `response`, and its noise.
     pub fn add_column(&mut self, column: usize, value: f64, response: &mut [f64]) {
-        self.size_squared += (self.green.magnitude(self.green.row_of_column(column)) * value).powi(2);
+        let row = self.green.row_of_column(column);
+        self.size_squared[usize::from(self.green.row_is_fixed[row])] += (self.green.magnitude(row) * value).powi(2);
         if self.squares.is_empty() {
             return self.green.add_column(column, value, response);
         }
@@ -41,7 +53,7 @@ impl<'a> Noise<'a> {
         let precision = self.green.precision();
         match self.squares.get(row) {
             Some(square) => ROUNDING_MARGIN * precision.unit_roundoff() * square.sqrt(),
-            None => rounding_noise(precision, self.green.magnitude(row), self.size_squared.sqrt()),
+            None => rounding_noise(precision, self.green.magnitude(row), self.size_squared.iter().sum::<f64>().sqrt()),
         }
     }
 
@@ -52,9 +64,14 @@ impl<'a> Noise<'a> {
     /// `C` is no such product, and columns are added up by magnitude: `|Psi_iS| |C^-1 r|`.
     pub fn errors(&self, columns: &[usize], capacitance: &Mat<f64>) -> (Vec<f64>, Vec<f64>) {
         let rows: Vec<usize> = columns.iter().map(|&column| self.green.row_of_column(column)).collect();
-        let residual = self.green.accuracy.residual(self.size_squared.sqrt());
+        let [free, supports] = self.size_squared.map(f64::sqrt);
+        let accuracy = &self.green.accuracy;
+        let residual = accuracy.residual(free) + accuracy.residual_of_supports(supports) + self.of_given;
         let magnitude: Vec<f64> = rows.iter().map(|&row| self.green.magnitude(row)).collect();
-        let noise: Vec<f64> = rows.iter().zip(&magnitude).map(|(&row, s)| self.of_row(row) / s).collect();
+        let given =
+            |row: usize| if self.green.row_is_fixed[row] { 0.0 } else { self.of_rows.get(row).copied().unwrap_or(0.0) };
+        let noise: Vec<f64> =
+            rows.iter().zip(&magnitude).map(|(&row, s)| (self.of_row(row) + given(row)) / s).collect();
         let n = rows.len();
         let scaled = Mat::from_fn(n, n, |i, j| capacitance[(i, j)] / (magnitude[i] * magnitude[j]));
         let released = rows.iter().any(|&row| self.green.row_is_fixed[row]);

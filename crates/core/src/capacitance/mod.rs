@@ -11,10 +11,12 @@
 //! is equations 3.8-3.10 of Jun, Choi and Cho with `C = -E^T Psi E`, written without the term that cancels on `S`.
 
 mod error;
+mod rigid;
 
 use error::{Noise, relative_error};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
+use rigid::{Conditions, INPUT_ROUNDING};
 
 use crate::green::GreensFunction;
 use crate::{Error, Result};
@@ -23,9 +25,9 @@ use crate::{Error, Result};
 /// at the condition numbers of usual bodies. Larger, and weakly held bodies are refused; smaller, and floating ones pass.
 const COMPUTED_ERROR: f64 = 1e-11;
 
-/// Part of the force that a moved support would take alone, below which forces count as none: supports that move as one
-/// take none at all, and what remains is rounding.
-const RIGID_FORCE: f64 = 1e-3;
+/// Supports that move as one take no force, and what is computed is the rounding of their displacements: forces below so
+/// many times what it may come to are compared with this.
+const NO_FORCE: f64 = 2e3;
 
 /// Displacements and forces after a change of boundary conditions.
 pub struct Answer {
@@ -51,58 +53,79 @@ pub struct Answer {
 /// [`Error::Precision`], the store does not carry that many neighbouring constraints.
 pub fn solve(green: &GreensFunction, known: &[(usize, f64)], switched: &[(usize, f64)]) -> Result<Answer> {
     green.require_intact()?;
+    // Less a rigid motion `r` of the supports, which changes no force.
+    let relative = Conditions::new(green, known, switched);
     let mut response = if green.loads.is_empty() { vec![0.0; green.rows] } else { green.free_response.clone() };
     let mut noise = Noise::new(green);
-    for &(column, value) in known {
+    for &(column, value) in &relative.known {
         noise.add_column(column, value, &mut response);
     }
     let rows: Vec<usize> = switched.iter().map(|&(column, _)| green.row_of_column(column)).collect();
     let capacitance = switched_square(green, &rows);
-    let unknown = capacitance_solve(green, switched, &capacitance, &response)?;
+    let unknown = capacitance_solve(green, &relative.switched, &capacitance, &response)?;
     for (&(column, _), &q) in switched.iter().zip(&unknown) {
         noise.add_column(column, q, &mut response);
     }
-
-    // Sort knowns and unknowns into displacements and forces, row by row.
-    let (mut displacements, mut forces) = (vec![0.0; green.rows], vec![0.0; green.rows]);
-    for (row, &value) in response.iter().enumerate() {
-        let unknown_side = if green.row_is_fixed[row] { &mut forces } else { &mut displacements };
-        unknown_side[row] = value;
-    }
-    let surface = 3 * green.surface_count();
-    for row in (0..surface).filter(|&row| !green.row_is_fixed[row]) {
-        forces[row] = green.load_on_row(row);
-    }
+    let rigid = |row: usize| relative.motion.as_ref().map_or(0.0, |motion| motion.at(green, row));
+    let (mut displacements, mut forces) = sorted(green, &response, &rigid);
     for &(column, value) in known {
         let row = green.row_of_column(column);
         let known_side = if green.row_is_fixed[row] { &mut displacements } else { &mut forces };
         known_side[row] += value;
     }
-    for (&(column, value), &q) in switched.iter().zip(&unknown) {
-        let row = green.row_of_column(column);
+    for ((&(_, value), &row), &q) in switched.iter().zip(&rows).zip(&unknown) {
         let load = green.load_on_row(row);
-        let (u, f) = if green.row_is_fixed[row] { (q, value + load) } else { (value, q + load) };
+        let (u, f) = if green.row_is_fixed[row] { (q + rigid(row), value + load) } else { (value, q + load) };
         displacements[row] = u;
         forces[row] = f;
     }
-    let columns: Vec<usize> = switched.iter().map(|&(column, _)| column).collect();
-    let (of_unknown, mut errors) = noise.errors(&columns, &capacitance);
-    let mut is_force = green.row_is_fixed.clone();
-    for (&row, error) in rows.iter().zip(of_unknown) {
-        // What was unknown there is known now, and the other way round.
-        (errors[row], is_force[row]) = (error, !is_force[row]);
-    }
-    // `K_jj` times the displacement: what moving a support alone would take.
-    let alone = |&(column, value): &(usize, f64)| {
-        let row = green.row_of_column(column);
-        if green.row_is_fixed[row] { (green.magnitude(row).powi(2) * value).abs() } else { 0.0 }
-    };
-    let least_force = RIGID_FORCE * known.iter().map(alone).fold(0.0, f64::max);
-    let error = relative_error(&errors, &is_force, &displacements, &forces, least_force);
+    let error = error_of(green, &relative, noise, &capacitance, [&displacements, &forces]);
     let reactions = green.fixed_rows.iter().map(|&row| forces[row as usize]).collect();
+    let surface = 3 * green.surface_count();
     displacements.truncate(surface);
     forces.truncate(surface);
     Ok(Answer { displacements, forces, reactions, error })
+}
+
+/// Displacements and forces of all rows but those given: unknowns of the response, and loads.
+fn sorted(green: &GreensFunction, response: &[f64], rigid: &dyn Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>) {
+    let (mut displacements, mut forces) = (vec![0.0; green.rows], vec![0.0; green.rows]);
+    for (row, &value) in response.iter().enumerate() {
+        if green.row_is_fixed[row] {
+            forces[row] = value;
+        } else {
+            displacements[row] = value + rigid(row);
+            forces[row] = green.load_on_row(row);
+        }
+    }
+    (displacements, forces)
+}
+
+/// Estimated error of displacements and forces by row, relative to the largest.
+fn error_of(
+    green: &GreensFunction,
+    relative: &Conditions,
+    mut noise: Noise<'_>,
+    capacitance: &Mat<f64>,
+    [displacements, forces]: [&[f64]; 2],
+) -> f64 {
+    let columns: Vec<usize> = relative.switched.iter().map(|&(column, _)| column).collect();
+    let rows: Vec<usize> = columns.iter().map(|&column| green.row_of_column(column)).collect();
+    let mut least_force = 0.0;
+    if let Some(motion) = &relative.motion {
+        noise.add_motion(motion.residual, |row| INPUT_ROUNDING * motion.at(green, row).abs());
+        if motion.is_everything {
+            let largest = (0..green.rows).filter(|&row| green.row_is_fixed[row]).map(|row| green.magnitude(row));
+            least_force = NO_FORCE * motion.residual * largest.fold(0.0, f64::max);
+        }
+    }
+    let (of_unknown, mut errors) = noise.errors(&columns, capacitance);
+    let mut is_force = green.row_is_fixed.clone();
+    for (row, error) in rows.into_iter().zip(of_unknown) {
+        // What was unknown there is known now, and the other way round.
+        (errors[row], is_force[row]) = (error, !is_force[row]);
+    }
+    relative_error(&errors, &is_force, displacements, forces, least_force)
 }
 
 /// `Psi_SS^-1 [ vb_S - response_S ]`. Symmetric positive definite if only free dofs are prescribed; with released

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use super::regular::{CompliantBody, FIELDS, FanFields, RegularCompliance};
-use crate::Result;
 use crate::files::{unwritten, write_whole};
+use crate::header::{head_of, is_sealed, seal_file, unsealed};
+use crate::{Error, Result};
 
 /// Version of what is computed and of the file's layout; part of the key.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const FORMAT: &str = "palpate-contact";
 /// Ending of the files, behind the beginning of the key.
 const ENDING: &str = "contact.palpate";
@@ -92,11 +93,15 @@ fn save(computed: &RegularCompliance, path: &Path, key: &str) -> Result<()> {
         ("format".to_string(), FORMAT.to_string()),
         ("key".to_string(), key.to_string()),
         ("checksum".to_string(), checksum(bytes)),
+        unsealed(),
     ]);
     let failed = |e| unwritten(path, e);
     let shape = vec![computed.fields.len(), FIELDS];
     let views = [("fields", TensorView::new(Dtype::F64, shape, bytes).map_err(failed)?)];
-    write_whole(path, |partial| safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed))
+    write_whole(path, |partial| {
+        safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed)?;
+        seal_file(partial).map_err(|source| Error::Io { path: path.to_owned(), source })
+    })
 }
 
 /// None for a file that is not there, of another key, damaged, or of another surface.
@@ -109,7 +114,10 @@ fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
     let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
     let entry = |bytes: &[u8]| -> FanFields { std::array::from_fn(|i| number(&bytes[8 * i..8 * (i + 1)])) };
     let whole = tensor.dtype() == Dtype::F64 && tensor.shape() == [fans, FIELDS];
-    let right = whole && metadata.get("key")? == key && metadata.get("checksum")? == &checksum(tensor.data());
+    let right = whole
+        && is_sealed(head_of(&bytes)?)
+        && metadata.get("key")? == key
+        && metadata.get("checksum")? == &checksum(tensor.data());
     right.then(|| RegularCompliance { fields: tensor.data().chunks_exact(8 * FIELDS).map(entry).collect() })
 }
 

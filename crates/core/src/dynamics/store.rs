@@ -7,10 +7,11 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use crate::files::{unwritten, write_whole};
+use crate::header::{head_of, is_sealed, seal_file, unsealed};
 use crate::{Error, Result};
 
 /// Version of the file's layout; part of the key.
-pub const BASIS_VERSION: u32 = 1;
+pub const BASIS_VERSION: u32 = 2;
 const FORMAT: &str = "palpate-modes";
 
 /// Modes of a body.
@@ -53,6 +54,7 @@ impl Basis {
             ("key".to_string(), self.key.clone()),
             ("description".to_string(), self.description.clone()),
             ("checksum".to_string(), self.checksum()),
+            unsealed(),
         ]);
         let failed = |e| unwritten(path, e);
         let modes = self.eigenvalues.len();
@@ -62,7 +64,8 @@ impl Basis {
             ("eigenvalues", view(vec![modes], bytemuck::cast_slice(&self.eigenvalues))?),
             ("shapes", view(vec![rows, modes], bytemuck::cast_slice(&self.shapes))?),
         ];
-        safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed)
+        safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed)?;
+        seal_file(partial).map_err(|source| Error::Io { path: path.to_owned(), source })
     }
 
     /// Reads and verifies a file.
@@ -81,6 +84,9 @@ impl Basis {
         if field("version") != BASIS_VERSION.to_string() {
             let version = field("version");
             return Err(refused(path, format!("has format version {version}, this program reads {BASIS_VERSION}")));
+        }
+        if !head_of(&bytes).is_some_and(is_sealed) {
+            return Err(refused(path, "is damaged: the checksum of its header differs; compute it again"));
         }
         let tensors = SafeTensors::deserialize(&bytes).map_err(broken)?;
         let numbers = |name: &str| -> Result<Vec<f64>> {

@@ -19,8 +19,12 @@
 //! ```
 //!
 //! and the condition of `C` enters by its root only: the reason why a double precision store is right in bodies whose
-//! capacitance matrices have condition numbers of 1e10. `computed` is the largest `|w_j| / s_j` that was measured, so
-//! `|w|` is about `computed |S q|`.
+//! capacitance matrices have condition numbers of 1e10. `computed` is the largest `|w_j| / s_j` that was measured on free
+//! dofs, so `|w|` is about `computed |S q|`.
+//!
+//! Columns of supports may be far worse: a support that holds a stiff part turns it as a whole, and the reaction is a small
+//! difference of large forces. Random signs `z_j / s_j` on all of them give `|w|^2` whose mean is the sum of all
+//! `|w_j|^2 / s_j^2`, and that of any displacements is at most its root times `|S q|`: that root is `supports`.
 //!
 //! Both are estimates, raised by a factor so that they bound what was measured over random bodies (docs/accuracy.md).
 
@@ -39,6 +43,8 @@ pub const COMPUTED_MARGIN: f64 = 3.0;
 pub struct Accuracy {
     /// Largest error of computing an entry, over `s_i s_j`, as measured.
     pub computed: f64,
+    /// Error of the columns of all touchable supports: of moving them by `1 / s_j` each, in the energy norm, as measured.
+    pub supports: f64,
     /// Error of the free response in the energy norm, as measured, sqrt(J).
     pub loads: f64,
     /// Estimated relative error of the force on a node or a patch that is pressed, the largest of those probed.
@@ -49,19 +55,24 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// As a store keeps it.
-    pub fn to_array(self) -> [f64; 4] {
-        [self.computed, self.loads, self.touch, self.stamp]
+    pub fn to_array(self) -> [f64; 5] {
+        [self.computed, self.supports, self.loads, self.touch, self.stamp]
     }
 
     /// From [`Accuracy::to_array`]; `None` for another number of numbers.
     pub fn from_slice(numbers: &[f64]) -> Option<Self> {
-        let &[computed, loads, touch, stamp] = numbers else { return None };
-        Some(Self { computed, loads, touch, stamp })
+        let &[computed, supports, loads, touch, stamp] = numbers else { return None };
+        Some(Self { computed, supports, loads, touch, stamp })
     }
 
-    /// `|w|` of columns with `|S q|` of this `size`, sqrt(J), loads included.
+    /// `|w|` of columns of free dofs with `|S q|` of this `size`, sqrt(J), loads included.
     pub fn residual(self, size: f64) -> f64 {
         COMPUTED_MARGIN * (self.computed * size + self.loads)
+    }
+
+    /// `|w|` of columns of supports with `|S q|` of this `size`, sqrt(J).
+    pub fn residual_of_supports(self, size: f64) -> f64 {
+        COMPUTED_MARGIN * self.supports * size
     }
 }
 

@@ -4,7 +4,7 @@
 use super::precision::Precision;
 
 /// Version of the store's layout; part of the key, so that an old file is recomputed, never misread.
-pub const FORMAT_VERSION: u32 = 4;
+pub const FORMAT_VERSION: u32 = 5;
 
 /// Hex BLAKE3 hash of element, precision, format version and sections of bytes, each with its length.
 #[cfg(feature = "offline")]

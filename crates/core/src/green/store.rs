@@ -27,15 +27,13 @@ use super::numbers::Numbers;
 use super::places::Places;
 use super::precision::Precision;
 use super::store_writer::small_checksum;
+use crate::header::{HEADER_BYTES, is_sealed};
 use crate::mesh::{Faces, Surface};
 use crate::{Error, Result};
 
 /// Largest operator that is held in memory as a whole, bytes. All of the built-in bodies are far below; beyond, a process
 /// should not take memory that only frames need.
 const RESIDENT_BYTES: usize = 2 << 30;
-
-/// Longest header that is read, bytes; safetensors allows no longer one.
-const HEADER_BYTES: u64 = 100_000_000;
 
 impl GreensFunction {
     /// Reads a store and verifies it: format, shapes, the checksum of every block, and `expected_key` if one is given.
@@ -47,13 +45,13 @@ impl GreensFunction {
     }
 }
 
-/// Key and touchable nodes of the store at `path`; `None` where there is none of this version. Only its head is read: what
-/// it says is not verified.
+/// Key and touchable nodes of the store at `path`; `None` where there is none of this version. Only its head is read: the
+/// blocks are not verified.
 #[cfg(feature = "offline")]
 pub fn touch_of_store(path: &Path) -> Option<(String, Vec<u32>)> {
     let reader = Reader::open(path).ok()?;
     let metadata = reader.tensors.metadata().clone().unwrap_or_default();
-    check_metadata(path, &metadata, None).ok()?;
+    check_metadata(&reader, &metadata, None).ok()?;
     Some((metadata.get("key")?.clone(), reader.numbers("touch").ok()?))
 }
 
@@ -61,11 +59,12 @@ pub fn touch_of_store(path: &Path) -> Option<(String, Vec<u32>)> {
 fn load_within(path: &Path, expected_key: Option<&str>, resident_bytes: usize) -> Result<GreensFunction> {
     let reader = Reader::open(path)?;
     let metadata = reader.tensors.metadata().clone().unwrap_or_default();
-    check_metadata(path, &metadata, expected_key)?;
+    check_metadata(&reader, &metadata, expected_key)?;
     reader.green(&metadata, resident_bytes)
 }
 
-fn check_metadata(path: &Path, metadata: &HashMap<String, String>, expected_key: Option<&str>) -> Result<()> {
+fn check_metadata(reader: &Reader<'_>, metadata: &HashMap<String, String>, expected_key: Option<&str>) -> Result<()> {
+    let path = reader.path;
     let field = |name: &str| metadata.get(name).map_or("", String::as_str);
     if field("format") != "palpate-green" {
         return Err(store_error(path, "is not a Palpate Green's function"));
@@ -76,6 +75,9 @@ fn check_metadata(path: &Path, metadata: &HashMap<String, String>, expected_key:
             path,
             format!("has format version {version}, this program reads {FORMAT_VERSION}; compute it again"),
         ));
+    }
+    if !reader.sealed {
+        return Err(reader.damaged("the checksum of its header differs"));
     }
     match expected_key {
         Some(key) if key != field("key") => Err(store_error(
@@ -91,6 +93,8 @@ struct Reader<'a> {
     file: File,
     /// Bytes of the file.
     length: u64,
+    /// Whether the header is as it was written.
+    sealed: bool,
     tensors: Metadata,
     /// First byte of the tensors.
     start: u64,
@@ -112,14 +116,14 @@ impl<'a> Reader<'a> {
         if count > HEADER_BYTES.min(length) {
             return Err(foreign());
         }
-        let mut header = vec![0; count as usize];
-        file.read_exact_at(&mut header, 8).map_err(|_| foreign())?;
-        let tensors: Metadata = serde_json::from_slice(&header).map_err(|_| foreign())?;
+        let mut head = vec![0; 8 + count as usize];
+        file.read_exact_at(&mut head, 0).map_err(|_| foreign())?;
+        let tensors: Metadata = serde_json::from_slice(&head[8..]).map_err(|_| foreign())?;
         let start = 8 + count;
         if start + tensors.data_len() as u64 != length {
             return Err(foreign());
         }
-        Ok(Self { path, file, length, tensors, start })
+        Ok(Self { path, file, length, sealed: is_sealed(&head), tensors, start })
     }
 
     fn damaged(&self, what: &str) -> Error {

@@ -12,6 +12,7 @@ use super::checksums::{Heads, SUM, block_count, sums_in_passing};
 use super::function::GreensFunction;
 use super::key::FORMAT_VERSION;
 use super::precision::Precision;
+use crate::header::{seal, unsealed};
 use crate::{Error, Result};
 
 /// Name, type, shape and bytes of a tensor that describes the body.
@@ -114,7 +115,7 @@ struct Header {
 
 impl Header {
     fn new(green: &GreensFunction, precision: Precision) -> Self {
-        let metadata = serde_json::json!({
+        let mut metadata = serde_json::json!({
             "format": "palpate-green",
             "version": FORMAT_VERSION.to_string(),
             "key": green.key,
@@ -123,6 +124,8 @@ impl Header {
             "description": green.description,
             "geometry_checksum": small_checksum(&green.small_tensors()),
         });
+        let (name, zeros) = unsealed();
+        metadata[name] = zeros.into();
         Self { fields: serde_json::Map::from_iter([("__metadata__".to_string(), metadata)]), end: 0 }
     }
 
@@ -136,7 +139,10 @@ impl Header {
     fn bytes(self) -> Vec<u8> {
         let mut json = serde_json::Value::Object(self.fields).to_string().into_bytes();
         json.resize(json.len().next_multiple_of(8), b' ');
-        [&(json.len() as u64).to_le_bytes()[..], &json].concat()
+        let mut head = [&(json.len() as u64).to_le_bytes()[..], &json].concat();
+        let sealed = seal(&mut head);
+        debug_assert!(sealed, "the header has a place for its sum");
+        head
     }
 }
 

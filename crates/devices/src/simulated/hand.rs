@@ -18,6 +18,9 @@ use crate::{Pose, Twist};
 /// Time constant with which the tip follows its target, s: a step is followed to 98 % in about six of them.
 pub const TIME_CONSTANT: f64 = 0.008;
 
+/// Offsets (m, rad) and rates below it are none: a hand at rest would end in subnormal numbers, which are slow.
+const AT_REST: f64 = 1e-140;
+
 /// Where the hand is and how it moves.
 #[derive(Clone, Copy, Default)]
 pub struct Hand {
@@ -45,9 +48,31 @@ impl Hand {
     }
 }
 
+/// Zero in place of components below [`AT_REST`].
+fn settled(vector: DVec3) -> DVec3 {
+    let of = |x: f64| if x.abs() < AT_REST { 0.0 } else { x };
+    DVec3::new(of(vector.x), of(vector.y), of(vector.z))
+}
+
 /// Offset from the target and its rate after a period.
 fn decay(offset: DVec3, rate: DVec3, period: f64) -> (DVec3, DVec3) {
     let (decay, omega) = ((-period / TIME_CONSTANT).exp(), 1.0 / TIME_CONSTANT);
     let slope = rate + omega * offset;
-    ((offset + slope * period) * decay, (rate - omega * slope * period) * decay)
+    (settled((offset + slope * period) * decay), settled((rate - omega * slope * period) * decay))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_at_rest_ends_at_rest_without_subnormal_numbers() {
+        let mut hand = Hand::resting(Pose::at(DVec3::new(0.1, -0.2, 0.3)));
+        for _ in 0..20_000 {
+            hand.follow(Pose::at(DVec3::ZERO), 1e-3);
+            let numbers = [hand.pose.position, hand.twist.linear, hand.twist.angular];
+            assert!(numbers.iter().flat_map(|v| v.to_array()).all(|x| !x.is_subnormal()), "{numbers:?}");
+        }
+        assert_eq!((hand.pose.position, hand.twist.linear), (DVec3::ZERO, DVec3::ZERO));
+    }
 }

@@ -15,7 +15,7 @@ pub struct FreeStep {
     pub vp: Lanes,
 }
 
-/// Free motion of one step.
+/// Free motion of one step; what has decayed is zero.
 pub struct Predict<'a> {
     pub steps: &'a [FreeStep],
     pub q: &'a mut [Lanes],
@@ -29,13 +29,13 @@ impl NullaryFnOnce for Predict<'_> {
     fn call(self) {
         for (((step, q), v), p) in self.steps.iter().zip(self.q).zip(self.v).zip(self.load) {
             let free = step.qq.times(q).plus(&step.qv, v).plus(&step.qp, p);
-            *v = step.vq.times(q).plus(&step.vv, v).plus(&step.vp, p);
-            *q = free;
+            *v = step.vq.times(q).plus(&step.vv, v).plus(&step.vp, p).settled();
+            *q = free.settled();
         }
     }
 }
 
-/// Effect of the modal forces in `load` on a predicted state.
+/// Effect of the modal forces in `load` on a predicted state; what has decayed is zero.
 pub struct Correct<'a> {
     pub q_load: &'a [Lanes],
     pub v_load: &'a [Lanes],
@@ -51,8 +51,8 @@ impl NullaryFnOnce for Correct<'_> {
         for ((((q_load, v_load), q), v), p) in
             self.q_load.iter().zip(self.v_load).zip(self.q).zip(self.v).zip(self.load)
         {
-            *q = q.plus(q_load, p);
-            *v = v.plus(v_load, p);
+            *q = q.plus(q_load, p).settled();
+            *v = v.plus(v_load, p).settled();
         }
     }
 }

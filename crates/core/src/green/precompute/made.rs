@@ -134,18 +134,17 @@ struct Swept<C> {
     sweep: Sweep<C>,
     response: FreeResponse,
     squares: Squares,
-    computed: f64,
-    loads: f64,
+    measured: Accuracy,
     /// Nothing gives where it may be touched.
     rigid: bool,
 }
 
 impl<C> Swept<C> {
     fn accuracy(&self, precision: Precision) -> Accuracy {
-        self.squares.typical(self.computed, self.loads, precision)
+        self.squares.typical(self.measured, precision)
     }
 
-    fn measured(self, precision: Precision, sweeps: fn(Sweep<C>) -> Sweeps) -> Measured {
+    fn with_accuracy(self, precision: Precision, sweeps: fn(Sweep<C>) -> Sweeps) -> Measured {
         let accuracy = self.accuracy(precision);
         Measured { sweeps: sweeps(self.sweep), response: self.response, accuracy, precision }
     }
@@ -182,7 +181,7 @@ impl Making<'_> {
         require_regular(&softness, &problem.mesh.nodes)?;
         (self.go_on)()?;
         let response = free_response(stiffness, &inverse, supports, &problem.loads, &system.layout.row_dofs)?;
-        let (Some(response), Some(probe)) = (response, Probe::new(problem, &inverse, &softness)) else {
+        let (Some(response), Some(probe)) = (response, Probe::new(problem, stiffness, &inverse, &softness)) else {
             return Ok(None);
         };
         (self.go_on)()?;
@@ -191,7 +190,8 @@ impl Making<'_> {
         let computed = probe.computed_error(&squares);
         // One residual may be small by chance: not below what the columns' residuals were beside the columns.
         let loads = response.error.max(probe.factor_error * response.size);
-        Ok(Some(Swept { sweep, response, squares, computed, loads, rigid: probe.is_empty() }))
+        let measured = Accuracy { computed, supports: probe.supports_error, loads, ..Accuracy::default() };
+        Ok(Some(Swept { sweep, response, squares, measured, rigid: probe.is_empty() }))
     }
 
     /// Sweeps in single precision, which may not be enough for the body.
@@ -216,9 +216,9 @@ impl Making<'_> {
         if precision == Precision::F16
             && let Some(single) = self.single()?
         {
-            return Ok(single.measured(precision, Sweeps::Single));
+            return Ok(single.with_accuracy(precision, Sweeps::Single));
         }
-        Ok(self.double()?.measured(precision, Sweeps::Double))
+        Ok(self.double()?.with_accuracy(precision, Sweeps::Double))
     }
 
     /// The first of the candidates, the cheapest first, within the bound; else the last.
@@ -228,7 +228,7 @@ impl Making<'_> {
             && let Some(single) = self.single()?
             && (candidates.len() == 1 || within(single.accuracy(Precision::F16)) && !single.rigid)
         {
-            return Ok(single.measured(Precision::F16, Sweeps::Single));
+            return Ok(single.with_accuracy(Precision::F16, Sweeps::Single));
         }
         let double = self.double()?;
         let mut others = candidates.iter().copied().filter(|&p| p != Precision::F16 || candidates.len() == 1);
@@ -236,6 +236,6 @@ impl Making<'_> {
         let fits = |&precision: &Precision| double.rigid || within(double.accuracy(precision));
         let best = candidates.last().copied().unwrap_or(Precision::F64);
         let precision = others.find(fits).unwrap_or(best);
-        Ok(double.measured(precision, Sweeps::Double))
+        Ok(double.with_accuracy(precision, Sweeps::Double))
     }
 }

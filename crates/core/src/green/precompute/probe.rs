@@ -3,7 +3,7 @@
 //! The three columns of some nodes are solved and corrected by their residuals until these are small, which leaves what
 //! rounding the entries of `K` itself does. Beside them stand the columns that the sweeps give, and with the
 //! patches around those nodes typical contacts are solved: their errors by the same estimate as an answer's
-//! ([`crate::green::accuracy`]).
+//! ([`crate::green::accuracy`]). Columns of supports are measured all at once, by random motions of theirs.
 
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
@@ -14,6 +14,7 @@ use super::number::Number;
 use super::problem::Problem;
 use super::sweep::{Scratch, Source, Sweep, loaded};
 use super::system::System;
+use crate::fem::SymmetricCsc;
 use crate::green::accuracy::{Accuracy, Pressed, ROUNDING_MARGIN, largest, rounding_noise, unknown_errors};
 use crate::green::precision::Precision;
 use crate::solver::Condition;
@@ -25,6 +26,11 @@ const NODES: usize = 8;
 pub const WIDTH: usize = 3 * NODES;
 /// Columns that are solved by the whole of the factor.
 pub const SOLVED: usize = 3 * PATCHES;
+/// Random motions of the supports that are solved. The largest error is taken: one motion may be spared by chance.
+const MOTIONS: usize = 6;
+/// Rounding of the sums that the entries of `K` are, over all entries of a row. The root of the condition number raises it
+/// to what it is in the energy norm: a stiff part on a soft one is turned by `e K_stiff / K_soft`.
+const ENTRIES_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// A few neighbouring touchable nodes, free along all axes; the first is the one they lie around.
 pub struct Patch {
@@ -40,15 +46,24 @@ pub struct Probe {
     /// Error of the factor's own columns in the energy norm, `|w_j| / s_j`: of sweeps in double precision before they were
     /// corrected, of others what corrections left, for theirs is told by the entries.
     pub factor_error: f64,
+    /// Error of the supports' columns ([`Accuracy::supports`]).
+    pub supports_error: f64,
 }
 
 impl Probe {
     /// Chooses patches, the first where the body is softest beside its own stiffness, the others far from it, and solves;
     /// `None` where corrections do not help.
-    pub fn new<C: Number>(problem: &Problem, inverse: &Inverse<'_, C>, condition: &Condition) -> Option<Self> {
+    pub fn new<C: Number>(
+        problem: &Problem,
+        stiffness: &SymmetricCsc,
+        inverse: &Inverse<'_, C>,
+        condition: &Condition,
+    ) -> Option<Self> {
         let supports = &problem.supports;
         let rank = |dof: u32| supports.free_rank[dof as usize] as usize;
-        let mut probe = Self { patches: Vec::new(), factor_error: 0.0 };
+        let of_entries = ENTRIES_ROUNDING * condition.number.sqrt();
+        let supports_error = supports_error(problem, stiffness, inverse)?.max(of_entries);
+        let mut probe = Self { patches: Vec::new(), factor_error: 0.0, supports_error };
         let dofs_of =
             |nodes: Vec<u32>| nodes.into_iter().flat_map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
         let patches: Vec<Vec<u32>> = chosen_patches(problem, condition).into_iter().map(dofs_of).collect();
@@ -104,12 +119,12 @@ impl Probe {
 pub struct Squares(Vec<Mat<f64>>);
 
 impl Squares {
-    /// Errors of typical contacts with these entries: of the force of pressed nodes and patches, and of nodal forces under
-    /// stamps.
-    pub fn typical(&self, computed: f64, loads: f64, precision: Precision) -> Accuracy {
+    /// Adds to `measured` the errors of typical contacts with these entries: of the force of pressed nodes and patches, and
+    /// of nodal forces under stamps.
+    pub fn typical(&self, measured: Accuracy, precision: Precision) -> Accuracy {
         // Contacts are as deep as they please, loads are not: theirs is told by the answers.
-        let entries = Accuracy { computed, ..Accuracy::default() };
-        let mut typical = Accuracy { computed, loads, ..Accuracy::default() };
+        let entries = Accuracy { computed: measured.computed, ..Accuracy::default() };
+        let mut typical = measured;
         for square in &self.0 {
             for count in [1, square.nrows() / 3] {
                 typical.touch = typical.touch.max(pressed_error(square, count, entries, precision));
@@ -118,6 +133,34 @@ impl Squares {
         }
         typical
     }
+}
+
+/// Error of the columns of the touchable supports in the energy norm, each moved by `1 / s_j`, with random signs; `None`
+/// where corrections do not help.
+fn supports_error<C: Number>(problem: &Problem, stiffness: &SymmetricCsc, inverse: &Inverse<'_, C>) -> Option<f64> {
+    let supports = &problem.supports;
+    let count = supports.free.len();
+    let mut loads = vec![0.0; MOTIONS * count];
+    let nodes = problem.touch.iter().map(|&t| problem.surface_nodes[t as usize]);
+    // A generator whose highest bit is even enough (Steele and Vigna 2021).
+    let mut random: u64 = 1;
+    for dof in nodes.flat_map(|node| 3 * node..3 * node + 3).filter(|&dof| supports.is_fixed(dof)) {
+        let moved = stiffness.diagonal(dof).sqrt().recip();
+        for load in loads.chunks_exact_mut(count) {
+            random = random.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(1);
+            let signed = if random >> 63 == 0 { moved } else { -moved };
+            for (other, entry) in stiffness.column(dof as usize) {
+                if let Some(load) = load.get_mut(supports.free_rank[other as usize] as usize) {
+                    *load -= entry * signed;
+                }
+            }
+        }
+    }
+    if loads.iter().all(|&load| load == 0.0) {
+        return Some(0.0);
+    }
+    let found = inverse.refined(&loads)?;
+    Some(found.first.iter().zip(&found.size).fold(0.0, |most: f64, (error, size)| most.max(error * size)))
 }
 
 /// Nodes of every patch.

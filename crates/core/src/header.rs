@@ -1,0 +1,95 @@
+//! The head of a safetensors file (the header's length and its JSON) under a checksum that stands in the header itself.
+//!
+//! Blocks have checksums of their own. What else an answer depends on (elastic constants, names, shapes and places of the
+//! blocks) is in the header, and a changed digit there would load. The sum is that of all bytes of the head, with zeros in
+//! place of the sum.
+
+use std::fs::OpenOptions;
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+
+/// Name of the sum among the header's texts.
+const NAME: &str = "header_checksum";
+/// Digits of the sum (BLAKE3, hexadecimal).
+const DIGITS: usize = 64;
+/// Longest header that is read, bytes; safetensors allows no longer one.
+pub(crate) const HEADER_BYTES: u64 = 100_000_000;
+
+/// Name and value among the header's texts until [`seal`] writes the sum.
+pub(crate) fn unsealed() -> (String, String) {
+    (NAME.to_string(), "0".repeat(DIGITS))
+}
+
+/// Writes the sum into the head of a file: the length of the header in eight bytes, and the header. `false` where it has no
+/// place for it.
+pub(crate) fn seal(head: &mut [u8]) -> bool {
+    let Some((at, sum)) = sum_of(head) else { return false };
+    head[at..at + DIGITS].copy_from_slice(sum.as_bytes());
+    true
+}
+
+/// Whether the head of a file is as it was sealed.
+pub(crate) fn is_sealed(head: &[u8]) -> bool {
+    sum_of(head).is_some_and(|(at, sum)| head[at..at + DIGITS] == *sum.as_bytes())
+}
+
+/// Writes the sum into the head of a file that has just been written.
+///
+/// # Errors
+/// The operating system's, or a file without a header.
+pub(crate) fn seal_file(path: &Path) -> io::Result<()> {
+    let file = OpenOptions::new().read(true).write(true).open(path)?;
+    let mut count = [0; 8];
+    file.read_exact_at(&mut count, 0)?;
+    let length = u64::from_le_bytes(count);
+    if length > HEADER_BYTES {
+        return Err(io::ErrorKind::InvalidData.into());
+    }
+    let mut head = vec![0; 8 + length as usize];
+    file.read_exact_at(&mut head, 0)?;
+    if !seal(&mut head) {
+        return Err(io::ErrorKind::InvalidData.into());
+    }
+    file.write_all_at(&head, 0)
+}
+
+/// The head of a whole file in memory; `None` where it has none.
+pub(crate) fn head_of(bytes: &[u8]) -> Option<&[u8]> {
+    let length = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
+    bytes.get(..usize::try_from(length).ok()?.checked_add(8)?)
+}
+
+/// Where the sum stands, and what it should be. A quoted name in another text has a backslash before its quotes.
+fn sum_of(head: &[u8]) -> Option<(usize, String)> {
+    let name = format!("\"{NAME}\":\"");
+    let at = head.windows(name.len()).position(|window| window == name.as_bytes())? + name.len();
+    let behind = head.get(at + DIGITS..)?;
+    let mut hash = blake3::Hasher::new();
+    hash.update(&head[..at]);
+    hash.update(&[b'0'; DIGITS]);
+    hash.update(behind);
+    Some((at, hash.finalize().to_hex().to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_other_byte_of_a_sealed_head_passes() {
+        let json = format!(r#"{{"a":"\"header_checksum\":\"7","{NAME}":"{}","b":"10000"}} "#, "0".repeat(DIGITS));
+        let mut head = [&(json.len() as u64).to_le_bytes()[..], json.as_bytes()].concat();
+        assert!(!is_sealed(&head));
+        assert!(seal(&mut head) && is_sealed(&head));
+        assert_eq!(head_of(&[&head[..], b"blocks"].concat()), Some(&head[..]));
+        for at in 0..head.len() {
+            for change in [1, 8, 0x10, 0x80] {
+                head[at] ^= change;
+                assert!(!is_sealed(&head), "byte {at}");
+                head[at] ^= change;
+            }
+        }
+        assert!(!seal(&mut []) && head_of(b"short").is_none());
+    }
+}

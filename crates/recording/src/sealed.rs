@@ -1,0 +1,41 @@
+//! Texts of a recording under a checksum of their own.
+//!
+//! MCAP sums up its chunks of messages, not the metadata beside them. These say which scene was recorded, and at which rate:
+//! what a replay begins from.
+
+use std::collections::BTreeMap;
+
+/// Name of the sum among the texts.
+const SUM: &str = "checksum";
+/// Key of the format of the texts; recordings of the first had no sum.
+const FORMAT: &str = "format";
+const WITHOUT_SUM: &str = "1";
+
+/// Adds the sum of all texts.
+pub(crate) fn sealed(mut texts: BTreeMap<String, String>) -> BTreeMap<String, String> {
+    let sum = sum(&texts);
+    texts.insert(SUM.into(), sum);
+    texts
+}
+
+/// The texts without their sum, and whether they have one.
+///
+/// # Errors
+/// Texts that are not as they were written.
+pub(crate) fn opened(mut texts: BTreeMap<String, String>) -> Result<(BTreeMap<String, String>, bool), String> {
+    match texts.remove(SUM) {
+        Some(written) if written == sum(&texts) => Ok((texts, true)),
+        None if texts.get(FORMAT).is_some_and(|format| format == WITHOUT_SUM) => Ok((texts, false)),
+        _ => Err("the checksum of what was recorded differs".into()),
+    }
+}
+
+/// Sum of the names and texts in their order.
+fn sum(texts: &BTreeMap<String, String>) -> String {
+    let mut hash = blake3::Hasher::new();
+    for text in texts.iter().flat_map(|(name, text)| [name, text]) {
+        hash.update(&(text.len() as u64).to_le_bytes());
+        hash.update(text.as_bytes());
+    }
+    hash.finalize().to_hex().to_string()
+}
