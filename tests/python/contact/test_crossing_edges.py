@@ -1,0 +1,212 @@
+"""Tools that cross straight edges and creases in steps of 4 um: forces without jumps, and no contact that gets lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from crossings import LYING, RADII, TOOLS, UP, Loops, lowest, played
+from scipy.spatial.transform import Rotation
+from strange_bodies import EDGE_LENGTH
+
+STEP, LEAD = 4e-6, 1.5e-3
+# What the force may change by in a tick: this part of it, or so much, N, whichever is larger.
+PART, LEAST = 0.05, 0.01
+# Below this part of the tool's radius a contact has a force.
+DEEP = 0.25
+ACROSS, ALONG = LYING, Rotation.from_rotvec([0.0, 0.0, np.pi / 2]) * LYING
+POSES = {
+    "upright": Rotation.identity(),
+    "across": ACROSS,
+    "along": ALONG,
+    "yawed": Rotation.from_rotvec([0.0, 0.0, np.radians(30)]) * ACROSS,
+    "tilted": Rotation.from_rotvec([0.0, np.radians(12), 0.0]) * ACROSS,
+}
+
+
+@dataclass(frozen=True)
+class Wedge:
+    """An edge through the origin, along y, between two planes with these outward normals; convex, or a crease."""
+
+    normals: tuple[np.ndarray, np.ndarray]
+    convex: bool
+
+    @classmethod
+    def of(cls, kind: str, degrees: float) -> Wedge:
+        angle, convex = np.radians(degrees), kind in ("convex", "ridge")
+        sign = 1.0 if convex else -1.0
+        second = np.array([sign * np.sin(angle), 0.0, -np.cos(angle)])
+        if kind in ("convex", "concave"):
+            return cls((UP, second), convex)
+        # The bisector of the body's angle, or of the air's, is turned upright.
+        turn = Rotation.from_rotvec([0.0, -sign * (np.pi / 2 - angle / 2), 0.0])
+        return cls((turn.apply(UP), turn.apply(second)), convex)
+
+    def inside(self, points: np.ndarray) -> np.ndarray:
+        """How deep points are in the body at the least, m; negative outside."""
+        depths = np.stack([-(points @ normal) for normal in self.normals])
+        return depths.min(axis=0) if self.convex else depths.max(axis=0)
+
+    def touch(self, tool: str, rotation: Rotation, x: float) -> float:
+        """Height of the tool's origin, standing at x in a crease, at which it touches a wall from above, m."""
+        heights = []
+        for normal in self.normals:
+            low = lowest(tool, rotation, normal) + [x, 0.0, 0.0]
+            heights.append(-(low @ normal) / normal[2])
+        return max(heights)
+
+
+def skin(tool: str, rotation: Rotation) -> np.ndarray:
+    """Points (n, 3), m, of a tool's surface about its origin."""
+    given = TOOLS["capsule" if tool == "file" else tool]
+    ways = Rotation.from_rotvec(np.pi / 2 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])).as_matrix()
+    around = np.random.default_rng(0).normal(size=(200, 3))
+    around = np.vstack([around / np.linalg.norm(around, axis=1)[:, None], *ways, *-ways])
+    if given.get("shape") == "ellipsoid":
+        return rotation.apply(around * given["semi_axes"])
+    if given.get("shape") == "punch":
+        turn = np.linspace(0, 2 * np.pi, 40)
+        rings = [
+            np.column_stack([r * np.cos(turn), r * np.sin(turn), 0 * turn])
+            for r in np.linspace(0, given["radius"] - given["rounding"], 8)
+        ]
+        return rotation.apply(np.vstack(rings))
+    spine = np.linspace(0, given.get("length", 0.0), 25)[:, None] * UP
+    return rotation.apply((spine[:, None] + given["radius"] * around).reshape(-1, 3))
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A tool at a depth, m, over or into an edge."""
+
+    kind: str
+    degrees: int
+    tool: str
+    pose: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f"{self.tool} {self.pose}, {1e3 * self.depth:g} mm, {self.kind} {self.degrees}"
+
+    def path(self) -> tuple[np.ndarray, int]:
+        """Origins (t, 3), m, of the tool, and how many of them come down to the first place."""
+        wedge, rotation = Wedge.of(self.kind, self.degrees), POSES[self.pose]
+        left, right = (lowest(self.tool, rotation, np.array([side, 0.0, 0.0]))[0] for side in (1.0, -1.0))
+        middle, half = 0.5 * (left + right), 0.5 * abs(right - left)
+        if self.kind == "convex":
+            # From the middle's place on the top until nothing is over it.
+            ends, height = (-0.4 * half - 2e-3, half + 0.5e-3), -lowest(self.tool, rotation, UP)[2]
+        elif self.kind == "concave":
+            height, normal = -lowest(self.tool, rotation, UP)[2], wedge.normals[1]
+            wall = -(lowest(self.tool, rotation, normal) + (height - self.depth) * UP) @ normal / normal[0] + middle
+            ends = (wall - 2e-3, wall + self.depth)
+        elif self.kind == "ridge":
+            # Its lowest point passes over the edge.
+            middle, _, low = lowest(self.tool, rotation, UP)
+            ends, height = (-3e-3, 3e-3), -low
+        else:
+            ends, height = (-1.5e-3, 1.5e-3), wedge.touch(self.tool, rotation, -middle)
+        x = np.arange(*ends, STEP) - middle
+        y = 0.5 * EDGE_LENGTH + 1.7e-3 - rotation.apply(UP)[1] * 0.5 * TOOLS[self.tool].get("length", 0.0)
+        across = np.column_stack([x, np.full_like(x, y), np.full_like(x, height - self.depth)])
+        down = np.arange(self.depth + LEAD, 0, -10e-6)[:, None] * UP
+        return np.vstack([across[0] + down, across]), len(down)
+
+
+def largest_jump(forces: np.ndarray) -> float:
+    """Largest change from tick to tick over what it may be; at most 1 is smooth."""
+    if not np.isfinite(forces).all():
+        return np.inf
+    size = np.linalg.norm(forces, axis=1)
+    change = np.linalg.norm(np.diff(forces, axis=0), axis=1)
+    return float((change / np.maximum(PART * np.maximum(size[1:], size[:-1]), LEAST)).max())
+
+
+def deepest_without_force(crossing: Crossing, path: np.ndarray, forces: np.ndarray) -> float:
+    """How deep the tool is in the untouched body at the least where there is no force, over its radius."""
+    empty = np.flatnonzero(np.linalg.norm(forces, axis=1) == 0)
+    points, wedge = skin(crossing.tool, POSES[crossing.pose]), Wedge.of(crossing.kind, crossing.degrees)
+    depths = [wedge.inside(points + path[tick]).max() for tick in empty[:: max(1, len(empty) // 50)]]
+    return max(depths, default=0.0) / RADII[crossing.tool]
+
+
+def judged(loops: Loops, crossing: Crossing) -> str | None:
+    """What is wrong with a crossing; None if nothing is."""
+    path, lead = crossing.path()
+    found = played(loops.loop(f"{crossing.kind} {crossing.degrees}", crossing.tool), path, POSES[crossing.pose])
+    jump = largest_jump(found.forces[lead:])
+    lost = deepest_without_force(crossing, path[lead:], found.forces[lead:])
+    if found.size.max() == 0:
+        return f"{crossing}: no force anywhere"
+    if jump <= 1 and lost <= DEEP:
+        return None
+    return f"{crossing}: jumps {jump:.3g} times what is allowed, no force {lost:.2g} radii deep"
+
+
+def crossings(kinds: list[str], degrees: list[int], held: dict[str, list[str]], depths: list[float]) -> list[Crossing]:
+    return [
+        Crossing(kind, angle, tool, pose, depth)
+        for kind in kinds
+        for angle in degrees
+        for tool, poses in held.items()
+        for pose in poses
+        for depth in depths
+    ]
+
+
+QUICK = [
+    Crossing("convex", 90, "sphere", "upright", 1e-3),
+    # The reported ones.
+    Crossing("convex", 90, "capsule", "across", 2e-3),
+    Crossing("convex", 90, "capsule", "yawed", 1e-3),
+    Crossing("convex", 90, "thick capsule", "across", 2e-3),
+    Crossing("convex", 90, "punch", "upright", 1e-3),
+    Crossing("ridge", 60, "punch", "upright", 0.5e-3),
+    Crossing("ridge", 90, "capsule", "along", 0.5e-3),
+    Crossing("concave", 90, "capsule", "across", 1e-3),
+    Crossing("valley", 120, "capsule", "along", 1e-3),
+]
+
+
+@pytest.mark.parametrize("crossing", QUICK, ids=str)
+def test_a_tool_crosses_an_edge_without_a_jump_and_keeps_its_contact(loops, crossing):
+    wrong = judged(loops, crossing)
+    assert wrong is None, wrong
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [30, 60, 90, 120, 150])
+@pytest.mark.parametrize("kind", ["convex", "ridge", "concave", "valley"])
+def test_every_tool_crosses_edges_of_every_angle(loops, kind, degrees):
+    held = {
+        "sphere": ["upright"],
+        "ellipsoid": ["across"],
+        "capsule": ["across", "along", "yawed", "tilted"],
+        "punch": ["upright"],
+        "file": ["across"],
+    }
+    found = [judged(loops, one) for one in crossings([kind], [degrees], held, [1e-3])]
+    wrong = [text for text in found if text]
+    assert not wrong, f"{len(wrong)} of {len(found)}: " + "; ".join(wrong)
+
+
+def test_the_checks_see_a_jump_and_a_contact_that_is_lost():
+    crossing = Crossing("convex", 90, "capsule", "across", 2e-3)
+    path, lead = crossing.path()
+    path = path[lead:]
+    # A tool of so many newtons for each metre that it lies over the top.
+    over = np.clip(-(path[:, 0] - 3e-3), 0.0, None)
+    forces = np.column_stack([0 * over, 0 * over, 40.0 * over])
+    smooth = (largest_jump(forces), deepest_without_force(crossing, path[over > 0], forces[over > 0]))
+    assert smooth[0] <= 1 and smooth[1] <= DEEP
+
+    late = forces.copy()
+    late[len(late) // 3 :] *= 1.1
+    turned = forces.copy()
+    turned[1000] *= -1.0
+    dropped = forces.copy()
+    dropped[500:] = 0.0
+    assert largest_jump(late) > 1
+    assert largest_jump(turned) > 1
+    assert deepest_without_force(crossing, path, dropped) > DEEP
