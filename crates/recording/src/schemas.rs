@@ -14,7 +14,7 @@ const WRENCH: (&str, &str) = ("geometry_msgs/Wrench", "geometry_msgs/Vector3 for
 
 const FAULT: (&str, &str) = (
     "palpate_msgs/Fault",
-    "# 0 none, 1 wrench not finite, 2 reading not finite, 3 stale input, 4 jumping input, 5 overrun, 6 store lost, 7 panic;
+    "# 0 none, 1 wrench not finite, 2 reading not finite, 3 stale input, 4 jumping input, 5 overrun, 6 store lost, 7 panic, 8 contact unsound;
 # of the device: 10 disconnected, 11 stale, 12 not finite, 13 motors off, 14 its driver's own, by number, 15 its program has failed
 uint8 kind
 int32 driver_code

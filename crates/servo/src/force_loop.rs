@@ -306,6 +306,9 @@ impl ForceLoop {
         let share = SafetyStage::scene_share(&mut self.stages);
         for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
             common.into_iter().for_each(|reason| stage.latch(reason));
+            if output.unsound[tool] {
+                stage.latch(FaultReason::ContactUnsound);
+            }
             let computed = Computed { law: output.unlimited[tool], limited: output.wrench_on_device[tool] };
             let wrench = stage.apply(computed, share, period);
             self.status.wrenches[tool] = wrench;

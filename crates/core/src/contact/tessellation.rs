@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::SurfaceQuery;
 use super::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
+use crate::memory::Ranges;
 use crate::mesh::Surface;
 
 /// Most divisions of an edge.
@@ -28,6 +29,8 @@ pub struct Tessellation {
     barycentric: Vec<[f64; 3]>,
     /// The piece across each edge of a piece, for all triangles; `u32::MAX` where there is none.
     across: Vec<[u32; 3]>,
+    /// Which of these edges lie on a crease.
+    creases: Vec<[bool; 3]>,
     /// A ball around each triangle's vertices.
     balls: Vec<(DVec3, f64)>,
 }
@@ -65,6 +68,7 @@ impl Tessellation {
             corners: lattice.pieces(),
             barycentric: lattice.middles(),
             across: lattice.across(surface),
+            creases: lattice.creases(surface.triangles.len(), smooth),
         }
     }
 
@@ -107,6 +111,22 @@ impl Tessellation {
         Some(self.across[piece as usize][k]).filter(|&other| other != u32::MAX)
     }
 
+    /// Whether the edge `(k, k + 1)` of a piece lies on a crease.
+    pub fn is_crease(&self, piece: u32, k: usize) -> bool {
+        self.creases[piece as usize][k]
+    }
+
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
+        ranges.add(&self.vertices);
+        ranges.add(&self.normals);
+        ranges.add(&self.corners);
+        ranges.add(&self.barycentric);
+        ranges.add(&self.across);
+        ranges.add(&self.creases);
+        ranges.add(&self.balls);
+    }
+
     /// Unit outward normal of a piece.
     pub fn normal(&self, piece: u32) -> DVec3 {
         let [a, b, c] = self.corners(piece);
@@ -142,9 +162,7 @@ fn placed(
         }
         let from = FootPoint { triangle: t, ..FootPoint::at(x, flat) };
         match smooth.foot(drawn, x, &from, near) {
-            Some(foot) if !foot.on_crease && foot.position.distance(x) < far => {
-                (foot.position, foot.normal)
-            }
+            Some(foot) if !foot.on_crease && foot.position.distance(x) < far => (foot.position, foot.normal),
             _ => (x, flat),
         }
     };
@@ -171,7 +189,9 @@ impl Lattice {
     fn cells(&self) -> impl Iterator<Item = (usize, usize, bool)> {
         let n = self.n;
         (0..n).flat_map(move |j| {
-            (0..n - j).flat_map(move |i| [(i, j, false), (i, j, true)]).filter(move |&(i, j, turned)| !turned || i + j + 1 < n)
+            (0..n - j)
+                .flat_map(move |i| [(i, j, false), (i, j, true)])
+                .filter(move |&(i, j, turned)| !turned || i + j + 1 < n)
         })
     }
 
@@ -207,6 +227,17 @@ impl Lattice {
         let last = self.n - 1 - q;
         let (i, j) = [(q, 0), (last, q), (0, last)][k];
         self.piece(i, j, false)
+    }
+
+    fn creases(&self, triangles: usize, smooth: &SmoothSurface) -> Vec<[bool; 3]> {
+        let of_triangle = |t: usize| {
+            let creases = smooth.creases_of(t as u32);
+            self.cells().map(move |(i, j, turned)| {
+                let at = [j == 0, i + j + 1 == self.n, i == 0];
+                std::array::from_fn(|k| !turned && at[k] && creases[k])
+            })
+        };
+        (0..triangles).flat_map(of_triangle).collect()
     }
 
     fn across(&self, surface: &Surface) -> Vec<[u32; 3]> {

@@ -46,6 +46,10 @@ pub struct LocalSurface {
     pub smooth: SmoothSurface,
     /// Elastic constants at the surface nodes.
     pub moduli: Moduli,
+    /// The largest `E/(1 - nu^2)` of them, Pa.
+    pub largest_modulus: f64,
+    /// Corners of the box around the surface, m.
+    pub bounds: [DVec3; 2],
 }
 
 /// A body of a scene. Copies share what was prepared.
@@ -107,7 +111,11 @@ impl BodyModel {
         let smooth = SmoothSurface::new(&self.loaded);
         let known = known_fans(&self.green, &self.geometry, &smooth);
         let smooth = smooth.touchable_at(known);
-        self.preparing(|prepared| prepared.local = Some(LocalSurface { smooth, moduli }))
+        let largest_modulus = (0..nodes as u32).map(|node| moduli.plane_strain(node)).fold(0.0, f64::max);
+        let corner =
+            |of: fn(DVec3, DVec3) -> DVec3| self.loaded.positions.iter().copied().reduce(of).unwrap_or_default();
+        let bounds = [corner(DVec3::min), corner(DVec3::max)];
+        self.preparing(|prepared| prepared.local = Some(LocalSurface { smooth, moduli, largest_modulus, bounds }))
     }
 
     /// The same body in motion.

@@ -130,6 +130,8 @@ pub struct Output {
     pub in_contact: [bool; MAX_TOOLS],
     /// Whether the limit of strain keeps each tool from following its device.
     pub limited: [bool; MAX_TOOLS],
+    /// Whether a contact of each tool is not on its body, not at the tool, or stronger than the tool can be: its wrench is zero.
+    pub unsound: [bool; MAX_TOOLS],
 }
 
 /// Where a body stands in the world.

@@ -23,6 +23,7 @@ mod scratch;
 mod slip;
 mod snapshot;
 mod solve;
+mod sound;
 mod state;
 mod step;
 mod strain_watch;

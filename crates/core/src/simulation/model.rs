@@ -6,8 +6,8 @@ use super::body::BodyModel;
 use super::law::takes_cells;
 use super::tool::{LawKind, ToolModel};
 use super::{MAX_BODIES, MAX_TOOLS};
-use crate::contact::shape::ToolShape;
 use crate::contact::footprint::PressedSurface;
+use crate::contact::shape::ToolShape;
 use crate::contact::{CompliantBody, Hollows, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
@@ -34,6 +34,7 @@ impl Model {
         for regular in self.regular.iter().flatten().flatten() {
             ranges.add(&regular.fields);
         }
+        self.pressed.iter().flatten().flatten().for_each(|pressed| pressed.add_memory(&mut ranges));
         self.hollows.iter().flatten().for_each(|hollows| hollows.add_memory(&mut ranges));
         ranges
     }

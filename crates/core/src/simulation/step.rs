@@ -6,6 +6,7 @@ use super::law::{Approach, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::slip::slip;
+use super::sound::is_sound;
 use super::state::{Entry, State};
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, further, limit, solve, time};
@@ -184,6 +185,10 @@ fn answer(model: &Model, state: &State) -> Output {
         }
         output.in_contact[contact.tool] = true;
         output.limited[contact.tool] |= contact.limited;
+        output.unsound[contact.tool] |= !is_sound(model, contact, state.bodies[contact.body].stiffness_scale);
+    }
+    for tool in (0..model.tools.len()).filter(|&tool| output.unsound[tool]) {
+        (output.wrench_on_device[tool], output.unlimited[tool]) = Default::default();
     }
     output
 }

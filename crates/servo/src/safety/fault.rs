@@ -18,6 +18,8 @@ pub struct Fault {
 pub enum FaultReason {
     /// A computed force or torque was not finite.
     WrenchNotFinite,
+    /// A contact was not on its body, not at its tool, or stronger than its tool can be.
+    ContactUnsound,
     /// A device reported a position, orientation or velocity that is not finite.
     ReadingNotFinite,
     /// A device has had no new measurement for too long.
@@ -45,6 +47,9 @@ impl fmt::Display for FaultReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let message = match self {
             FaultReason::WrenchNotFinite => "a computed force was not finite; forces are off until a reset",
+            FaultReason::ContactUnsound => {
+                "a computed contact was not on the body, or stronger than its tool can be; forces are off until a reset"
+            }
             FaultReason::ReadingNotFinite => {
                 "the device reported a position that is not finite; forces are off until a reset"
             }

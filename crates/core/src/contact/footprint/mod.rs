@@ -16,8 +16,9 @@ mod near;
 use glam::{DMat3, DVec3};
 
 pub use self::near::{NearPiece, NearPieces, PosedShape};
-use super::local::cells::{GridFrame, Heights, LEAST_COSINE, Relief};
-use super::smooth::{FanWeights, FootPoint, MAX_FANS, SmoothSurface};
+use super::local::ContactPlane;
+use super::local::cells::{End, GridFrame, Heights, LEAST_COSINE, Relief};
+use super::smooth::{FanWeights, FootPoint, SmoothSurface};
 use super::{SurfaceQuery, Tessellation};
 use crate::tensor::{across, outer};
 
@@ -31,8 +32,8 @@ const FACING: [f64; 2] = [-0.2, 0.5];
 const COMMON: f64 = 0.05;
 /// A piece that does not touch the tool raises the plane by this many times its distance less.
 const LOWERED: f64 = 4.0;
-/// Least cosine between the normals of pieces that meet without a crease.
-const SMOOTH: f64 = 0.97;
+/// Largest cosine between a piece's normal and the way that the tool has come: it does not come through the body.
+const AWAY: f64 = 0.5;
 /// Least cosine between a piece's normal and the direction to the tool for it to be where a contact begins.
 const MET: f64 = 0.2;
 
@@ -64,18 +65,10 @@ pub struct Footprint {
 }
 
 /// Memory of a search.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct FootprintScratch {
     /// The pieces near the tool.
     pub near: NearPieces,
-    /// Gradients of the fans' weights by the tool's rotation.
-    pub by_rotation: [DVec3; MAX_FANS],
-}
-
-impl Default for FootprintScratch {
-    fn default() -> Self {
-        Self { near: NearPieces::default(), by_rotation: [DVec3::ZERO; MAX_FANS] }
-    }
 }
 
 /// A direction that pieces face, and how it follows the tool.
@@ -117,7 +110,8 @@ impl FootprintScratch {
     /// Normal of the piece that the tool is deepest in, or next to, among those that face it and the way `gone` that it has
     /// come; and its distance from the tool, m.
     pub fn first_met(&self, gone: DVec3) -> Option<(DVec3, f64)> {
-        let meets = |near: &&NearPiece| near.normal.dot(near.by_pose[0]) > MET && near.normal.dot(gone) <= 0.0;
+        let away = AWAY * gone.length();
+        let meets = |near: &&NearPiece| near.normal.dot(near.by_pose[0]) > MET && near.normal.dot(gone) <= away;
         let first = self.near.pieces.iter().filter(meets).min_by(|a, b| a.distance.total_cmp(&b.distance));
         first.map(|near| (near.normal, near.distance))
     }
@@ -125,7 +119,7 @@ impl FootprintScratch {
     /// The footprint of a tool whose pieces have been gathered, and the weights of the fans below it. `None` where it is near no
     /// piece.
     pub fn find(
-        &mut self,
+        &self,
         fine: &Tessellation,
         smooth: &SmoothSurface,
         facing: DVec3,
@@ -201,14 +195,13 @@ impl FootprintScratch {
 
     /// Gives the fans the weights of the pieces of their triangles; the triangle next to the middle.
     fn weigh(
-        &mut self,
+        &self,
         fine: &Tessellation,
         smooth: &SmoothSurface,
         (middle, facing): (DVec3, Facing),
         weights: &mut FanWeights,
     ) -> u32 {
         weights.begin();
-        self.by_rotation = [DVec3::ZERO; MAX_FANS];
         let count = fine.pieces_of_triangle() as u32;
         let (mut nearest, mut all, mut touchable) = ((f64::INFINITY, 0), 0.0, 0.0);
         for near in &self.near.pieces {
@@ -222,17 +215,11 @@ impl FootprintScratch {
                     continue;
                 }
                 touchable += weight * part;
-                if let Some(place) = weights.add(fan, weight * part, by[0] * part) {
-                    self.by_rotation[place] += by[1] * part;
-                }
+                weights.add(fan, weight * part, by.map(|by| by * part));
             }
         }
         weights.touchable = if all > 0.0 { touchable / all } else { 0.0 };
-        let sum = weights.normalise();
-        let slope = self.by_rotation.iter().sum::<DVec3>();
-        for ((_, weight), by_rotation) in weights.iter().zip(&mut self.by_rotation) {
-            *by_rotation = if sum > 0.0 { (*by_rotation - slope * weight) / sum } else { DVec3::ZERO };
-        }
+        weights.normalise();
         nearest.1
     }
 }
@@ -266,6 +253,14 @@ impl Sums {
     }
 }
 
+impl PressedSurface {
+    /// Adds the memory that a tick reads.
+    pub(crate) fn add_memory(&self, ranges: &mut crate::memory::Ranges) {
+        self.fine.add_memory(ranges);
+        ranges.add(&self.fields);
+    }
+}
+
 impl Footprint {
     /// The middle as a foot of the tool's place.
     pub fn foot(&self, place: DVec3) -> FootPoint {
@@ -290,6 +285,11 @@ pub struct NearRelief<'a> {
 }
 
 impl Relief for NearRelief<'_> {
+    fn end(&self, plane: &ContactPlane, direction: DVec3, lowest: f64) -> Option<End> {
+        let facing = |near: &&NearPiece| near.normal.dot(plane.axes.z_axis) > 0.0;
+        End::of(self.near.pieces.iter().filter(facing).map(|near| near.corners), plane, direction, lowest)
+    }
+
     fn fill(&self, frame: &GridFrame, heights: &mut Heights) {
         let normal = frame.axes.z_axis;
         let faces = |of: DVec3| of.dot(normal) >= LEAST_COSINE;
@@ -301,7 +301,7 @@ impl Relief for NearRelief<'_> {
                 let edge = [near.corners[k], near.corners[(k + 1) % 3]];
                 match self.fine.across(near.piece, k).map(|beyond| (beyond, self.fine.normal(beyond))) {
                     Some((beyond, turned)) if faces(turned) => {
-                        if near.piece < beyond && turned.dot(near.normal) < SMOOTH {
+                        if near.piece < beyond && self.fine.is_crease(near.piece, k) {
                             heights.even_edge(frame, edge, [near.normal, turned]);
                         }
                     }

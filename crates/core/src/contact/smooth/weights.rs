@@ -24,6 +24,7 @@ pub struct FanWeights {
     fans: [u32; MAX_FANS],
     weights: [f64; MAX_FANS],
     gradients: [DVec3; MAX_FANS],
+    turns: [DVec3; MAX_FANS],
     /// Part of all weight that lies on nodes which may be touched.
     pub touchable: f64,
     arch: Arch,
@@ -59,6 +60,7 @@ impl FanWeights {
             fans: [0; MAX_FANS],
             weights: [0.0; MAX_FANS],
             gradients: [DVec3::ZERO; MAX_FANS],
+            turns: [DVec3::ZERO; MAX_FANS],
             touchable: 0.0,
             arch: Arch::new(),
         }
@@ -69,33 +71,41 @@ impl FanWeights {
         (self.count, self.touchable) = (0, 0.0);
     }
 
-    /// Adds weight, and its gradient, to a fan: where it stands among the weights, or none where there is no room left.
-    pub fn add(&mut self, fan: u32, weight: f64, gradient: DVec3) -> Option<usize> {
+    /// Adds weight to a fan, with its gradients by the tool's place and by its rotation; nothing where there is no room left.
+    pub fn add(&mut self, fan: u32, weight: f64, [by_place, by_rotation]: [DVec3; 2]) {
         let place = match self.fans[..self.count].iter().position(|&known| known == fan) {
             Some(place) => place,
-            None if self.count == MAX_FANS => return None,
+            None if self.count == MAX_FANS => return,
             None => {
                 let place = self.count;
-                (self.fans[place], self.weights[place], self.gradients[place]) = (fan, 0.0, DVec3::ZERO);
+                (self.fans[place], self.weights[place]) = (fan, 0.0);
+                (self.gradients[place], self.turns[place]) = (DVec3::ZERO, DVec3::ZERO);
                 self.count += 1;
                 place
             }
         };
         self.weights[place] += weight;
-        self.gradients[place] += gradient;
-        Some(place)
+        self.gradients[place] += by_place;
+        self.turns[place] += by_rotation;
     }
 
-    /// Scales the weights to a sum of one; returns what they were divided by.
-    pub fn normalise(&mut self) -> f64 {
-        let sum: f64 = self.weights[..self.count].iter().sum();
-        let slope: DVec3 = self.gradients[..self.count].iter().sum();
+    /// Scales the weights to a sum of one.
+    pub fn normalise(&mut self) {
+        let Self { count, weights, gradients, turns, .. } = self;
+        let sum: f64 = weights[..*count].iter().sum();
         let inverse = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        for (weight, gradient) in self.weights[..self.count].iter_mut().zip(&mut self.gradients) {
-            *weight *= inverse;
-            *gradient = (*gradient - slope * *weight) * inverse;
+        let slope: DVec3 = gradients[..*count].iter().sum();
+        let turn: DVec3 = turns[..*count].iter().sum();
+        for place in 0..*count {
+            weights[place] *= inverse;
+            gradients[place] = (gradients[place] - slope * weights[place]) * inverse;
+            turns[place] = (turns[place] - turn * weights[place]) * inverse;
         }
-        sum
+    }
+
+    /// Rank of each fan, and the gradient of its weight by the tool's rotation; zero for a sphere.
+    pub fn with_turns(&self) -> impl Iterator<Item = (usize, DVec3)> + '_ {
+        self.iter().zip(&self.turns).map(|((fan, _), &turn)| (fan, turn))
     }
 
     /// Rank of each fan and its weight.
@@ -144,6 +154,7 @@ impl SmoothSurface {
     /// Weighs the fans around a foot that may be touched.
     pub fn weigh(&self, foot: &FootPoint, weights: &mut FanWeights) {
         weights.near.take_up(self, foot.triangle);
+        weights.turns = [DVec3::ZERO; MAX_FANS];
         self.arch.dispatch(Weighing { foot, weights });
     }
 }

@@ -10,7 +10,7 @@ mod stick;
 
 pub(super) use local::ASKED;
 pub use local::{
-    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, takes_cells,
+    Cells, Guess, LocalBody, LocalContact, LocalResponse, LocalTool, Others, depth_below, evaluate, posed, takes_cells,
 };
 pub use stick::series_compliance;
 

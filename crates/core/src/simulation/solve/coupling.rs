@@ -17,7 +17,7 @@ pub fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots:
         if state.bodies[body].motion.is_none() {
             cover(model, state, &local.weights[a], slot, body);
         }
-        local.others[a].slope = DVec3::ZERO;
+        (local.others[a].slope, local.others[a].turn) = (DVec3::ZERO, DVec3::ZERO);
     }
     let Some(fans) = model.bodies[body].local.as_ref().map(|own| own.smooth.fans()) else { return };
     for (a, &slot) in slots.iter().enumerate() {
@@ -40,6 +40,12 @@ pub fn couple(model: &Model, state: &mut State, local: &mut LocalScratch, slots:
                 block += of_node * (weight / scale);
                 slope += gradient * (own.dot(of_node * force) / scale);
             }
+            let mut turn = DVec3::ZERO;
+            for (fan, by_rotation) in local.weights[a].with_turns().filter(|&(_, turn)| turn != DVec3::ZERO) {
+                let of_node = patches[other].compliance_at(green, fans[fan].node as usize);
+                turn += by_rotation * (own.dot(of_node * force) / scale);
+            }
+            local.others[a].turn += turn;
             if joined > 0.0
                 && let Some(met) = local_body(model, state, tool, body)
             {

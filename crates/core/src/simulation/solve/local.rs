@@ -9,6 +9,7 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::footprint::margin;
 use crate::contact::local::cells::Resolution;
 use crate::contact::regular::WIDTH;
 use crate::contact::{Refusal, patch_weights};
@@ -16,7 +17,7 @@ use crate::simulation::MAX_CONTACTS;
 use crate::simulation::contacts::{Contact, Mode};
 use crate::simulation::covering::Covering;
 use crate::simulation::input::Controls;
-use crate::simulation::law::{Cells, Guess, LocalTool, Others, evaluate, takes_cells};
+use crate::simulation::law::{Cells, Guess, LocalTool, Others, evaluate, posed, takes_cells};
 use crate::simulation::model::Model;
 use crate::simulation::solve::coupling::{couple, cover};
 use crate::simulation::solve::forces::dent_of;
@@ -39,9 +40,14 @@ const LONGEST: f64 = 0.5;
 /// Where the last step is longer than this, over the tool's radius, nothing has been found.
 const LOST: f64 = 2e-3;
 /// Most steps where a tool takes pressure cells, whose every answer costs a hundred times a closed form's; two or three are usual.
-pub const MOST_CELL_STEPS: usize = 6;
-/// A step of such a tool that leaves more of the equation than there was is taken back to this part of it.
-const TAKEN_BACK: f64 = 0.3;
+pub const MOST_CELL_STEPS: usize = 8;
+/// A step of such a tool that leaves more of the equation than there was is taken back to a part of it within these bounds: as a
+/// force that grows with the depth to the power 3/2 would leave nothing.
+const TAKEN_BACK: [f64; 2] = [0.01, 0.5];
+const DEPTH_BY_FORCE: f64 = 2.0 / 3.0;
+/// Where more of the equation than this, over the tool's thickness, is left of it, the tool may have come away: its last answer is
+/// asked for where no force has moved the body.
+const AWAY: f64 = 1e-2;
 /// A step of this length, over the tool's radius, is none.
 const SETTLED: f64 = 1e-7;
 /// A force that differs by less than this part from what was expected is found.
@@ -168,15 +174,27 @@ fn settle(
         }
         if cells {
             let miss = local.miss(slots.len());
-            if miss.is_nan() || miss > least {
-                // The last step, or where it led from.
-                local.take_back(slots.len(), if step + 1 < most { TAKEN_BACK } else { 0.0 });
+            // From a place where nothing touches the method does not find back.
+            let untouched = local.untouched(slots.len());
+            if miss.is_nan() || (miss > least && !untouched) {
+                // A part of the last step, or where it led from.
+                let part = (least / miss).powf(DEPTH_BY_FORCE).clamp(TAKEN_BACK[0], TAKEN_BACK[1]);
+                local.take_back(slots.len(), if step + 1 < most { part } else { 0.0 });
+            } else {
+                least = miss;
+                local.keep(slots.len());
+            }
+            if step + 2 == most && least > AWAY * radius && all_away(model, state, local, slots) {
+                let from = local.from;
+                local.places[..slots.len()].copy_from_slice(&from[..slots.len()]);
                 continue;
             }
-            least = miss;
-            local.keep(slots.len());
+            if miss.is_nan() || (miss > least && !untouched) {
+                continue;
+            }
         }
         let longest = advance(local, system, slots.len());
+        let longest = if cells { local.go_by_power(slots.len()) } else { longest };
         if step >= USUAL_STEPS || longest > LONGEST * radius {
             let share = (LONGEST * radius / longest).min(if step < USUAL_STEPS { 1.0 } else { 0.5 });
             local.steps[..slots.len()].iter_mut().for_each(|step| *step *= share);
@@ -193,6 +211,17 @@ fn settle(
         }
     }
     Outcome::Settled
+}
+
+/// Whether all tools are outside of the planes that they touched, where no force moves the body.
+fn all_away(model: &Model, state: &State, local: &LocalScratch, slots: &[usize]) -> bool {
+    slots.iter().zip(&local.from).all(|(&slot, &from)| {
+        let contact = &state.contacts.slots[slot];
+        let (tool, foot) = (&model.tools[contact.tool], &contact.local.foot);
+        let centre = from + contact.local.orientation * tool.shape.centre();
+        let outside = model.bodies[contact.body].closest(centre).is_some_and(|closest| closest.signed_distance > 0.0);
+        outside && (centre - foot.position).dot(foot.normal) > 0.0
+    })
 }
 
 /// Displacement at a contact that does not come from contacts under the local law: the free motion of the body, or on one at
@@ -221,8 +250,20 @@ fn follow_motion(
     };
     for (a, &slot) in slots.iter().enumerate() {
         let Some(regular) = model.regular[contacts.slots[slot].tool][body].as_deref() else { return };
-        let (foot, weights) = (&contacts.slots[slot].local.foot, &mut local.weights[a]);
-        own.smooth.weigh(foot, weights);
+        let (contact, weights) = (&contacts.slots[slot].local, &mut local.weights[a]);
+        let (foot, tool) = (&contact.foot, &model.tools[contacts.slots[slot].tool]);
+        match model.pressed[contacts.slots[slot].tool][body].as_deref() {
+            // With the weights that its compliance has.
+            Some(pressed) => {
+                let at = posed(&tool.shape, contact, contact.relative);
+                let near = &mut local.footprint.near;
+                near.gather(&pressed.fine, &fixed.query, &at, margin(tool.shape.thickness()));
+                if local.footprint.find(&pressed.fine, &own.smooth, foot.normal, weights).is_none() {
+                    own.smooth.weigh(foot, weights);
+                }
+            }
+            None => own.smooth.weigh(foot, weights),
+        }
         let wide = weights.blend(&regular.fields).values[WIDTH];
         let centre = fixed.material_point(&fixed.surface_point(foot));
         let (surface, patches) = (&fixed.green.surface, &mut covering.patches[body]);
@@ -232,12 +273,14 @@ fn follow_motion(
         }
         motion.follow_contact(&dynamics.modes, contacts, slot);
         motion.leave_out_static(&dynamics.modes, contacts, slot);
-        let mut moving = DMat3::ZERO;
-        for (fan, _, gradient) in weights.with_gradients() {
+        let (mut moving, mut turning) = (DMat3::ZERO, DMat3::ZERO);
+        let turns = weights.with_turns().map(|(_, turn)| turn);
+        for ((fan, _, gradient), turn) in weights.with_gradients().zip(turns) {
             let moved = motion.remaining_displacement(&dynamics.modes, own.smooth.fans()[fan].node);
             moving += outer(gradient, moved);
+            turning += outer(turn, moved);
         }
-        local.others[a].moving = Some(moving);
+        (local.others[a].moving, local.others[a].moving_turn) = (Some(moving), Some(turning));
     }
     for (a, &slot) in slots.iter().enumerate() {
         for (b, &other) in slots.iter().enumerate() {
@@ -350,12 +393,14 @@ fn take_up(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usiz
             None => cover(model, state, &local.weights[a], slot, body),
         }
         let contact: &mut Contact = &mut state.contacts.slots[slot];
+        // What has just begun comes from nowhere.
+        let begun = contact.local.force == DVec3::ZERO && takes_cells(&model.tools[tool].shape);
         (contact.force, contact.local.force) = (response.force, response.force);
         (contact.point, contact.normal) = (response.point, response.normal);
         (contact.displacement, contact.wanted) =
             (contact.local.tool - contact.anchor, contact.local.tool - contact.anchor);
         let own = &mut contact.local;
-        own.advance = local.places[a] - own.relative;
+        own.advance = if begun { DVec3::ZERO } else { local.places[a] - own.relative };
         own.relative = local.places[a];
         own.turned = own.orientation;
         (own.foot, own.sunk) = (response.foot, response.sunk);

@@ -75,6 +75,36 @@ impl LocalScratch {
         (0..count).map(of).fold(0.0, |most: f64, miss| if miss.is_nan() { miss } else { most.max(miss) })
     }
 
+    /// Whether tools touch that did not at the places that are remembered.
+    pub(super) fn untouched(&self, count: usize) -> bool {
+        (0..count).any(|a| self.best[a].1.force == DVec3::ZERO && self.responses[a].force != DVec3::ZERO)
+    }
+
+    /// Lengthens steps out of the surface: where much more force is there than can be, the straight line of Newton's method takes
+    /// back a third of the depth at most, for a force like `d^(3/2)`. With `x = d/d_0`, `c = C F_0/d_0` and what is left of the
+    /// equation, `r`, the next depth is that of `x + c x^(3/2) = 1 + c - r/d_0`. Returns the longest step, m.
+    pub(super) fn go_by_power(&mut self, count: usize) -> f64 {
+        let mut longest = 0.0f64;
+        for a in 0..count {
+            let response = &self.responses[a];
+            let (normal, indentation) = (response.foot.normal, &response.indentation);
+            let depth = 1.5 * indentation.force / indentation.stiffness;
+            let out = self.steps[a].dot(normal);
+            if depth > 0.0 && depth.is_finite() && out > 0.0 {
+                let c = (normal.dot(self.between[a][a] * normal) * indentation.force / depth).max(0.0);
+                // What is left of the equation follows from Newton's own step.
+                let right = (1.0 + c - out * (1.0 + 1.5 * c) / depth).max(0.0);
+                let mut x = 1.0f64;
+                for _ in 0..6 {
+                    x = (x - (x + c * x.powf(1.5) - right) / (1.0 + 1.5 * c * x.sqrt())).max(0.0);
+                }
+                self.steps[a] += normal * ((1.0 - x) * depth - out);
+            }
+            longest = longest.max(self.steps[a].length());
+        }
+        longest
+    }
+
     /// Remembers places and answers. What the force has changed by since the ones before replaces what it was expected to.
     pub(super) fn keep(&mut self, count: usize) {
         for a in 0..count {

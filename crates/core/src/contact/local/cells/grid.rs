@@ -27,6 +27,10 @@ pub struct Side {
     pub gradient: DVec3,
     /// The tool's point that gives it, m.
     pub support: DVec3,
+    /// The point that has it, m: of the tool, or of the surface where that ends first.
+    pub point: DVec3,
+    /// The coordinate's derivative by a motion of the surface.
+    pub by_surface: DVec3,
 }
 
 /// The rectangle, in the frame of the surface.
@@ -68,7 +72,7 @@ impl PosedTool<'_> {
         let axes = [first, DVec3::Z.cross(first)];
         let sides = axes.map(|axis| {
             let (lower, upper) = (self.side(-axis), self.side(axis));
-            [Side { coordinate: -lower.coordinate, gradient: -lower.gradient, support: lower.support }, upper]
+            [lower.turned(), upper]
         });
         Rectangle { axes, sides, angle_by_rotation }
     }
@@ -77,7 +81,7 @@ impl PosedTool<'_> {
     fn side(&self, direction: DVec3) -> Side {
         let mut above = self.support(direction);
         if above.z <= 0.0 {
-            return Side { coordinate: above.dot(direction), gradient: direction, support: above };
+            return Side::of_tool(above.dot(direction), direction, above);
         }
         // Supports sink as their direction turns downwards. The next direction is across the chord of the last two, which ends
         // on a polyhedron, and in between by their heights, which ends elsewhere.
@@ -92,7 +96,7 @@ impl PosedTool<'_> {
             let support = self.support(next);
             if support.z.abs() <= straight {
                 let gradient = next / next.dot(direction);
-                return Side { coordinate: direction.dot(support), gradient, support };
+                return Side::of_tool(direction.dot(support), gradient, support);
             }
             // Nothing lies beyond the chord.
             if step % 2 == 0 && (support - above).dot(next) <= straight {
@@ -108,6 +112,38 @@ impl PosedTool<'_> {
         // The chord's slope is `mu`, and it meets the plane between its ends.
         let support = below - chord * (below.z / chord.z);
         let gradient = direction - DVec3::Z * (chord.dot(direction) / chord.z);
-        Side { coordinate: direction.dot(support), gradient, support }
+        Side::of_tool(direction.dot(support), gradient, support)
+    }
+
+    /// The same rectangle, but no farther than a surface reaches that is higher than the tool's lowest point. `end` has it along a
+    /// direction.
+    pub fn within(&self, rectangle: Rectangle, end: impl Fn(DVec3) -> Option<(DVec3, f64)>) -> Rectangle {
+        let lowest = self.support(DVec3::NEG_Z);
+        let shorter = |side: Side, direction: DVec3| {
+            let Some((point, by_level)) = end(direction) else { return side };
+            let coordinate = point.dot(direction);
+            if coordinate >= side.coordinate {
+                return side;
+            }
+            // The level is that of the tool's lowest point.
+            let gradient = DVec3::Z * by_level;
+            Side { coordinate, gradient, support: lowest, point, by_surface: direction - gradient }
+        };
+        let sides = [0, 1].map(|k| {
+            let ([lower, upper], axis) = (rectangle.sides[k], rectangle.axes[k]);
+            [shorter(lower.turned(), -axis).turned(), shorter(upper, axis)]
+        });
+        Rectangle { sides, ..rectangle }
+    }
+}
+
+impl Side {
+    fn of_tool(coordinate: f64, gradient: DVec3, support: DVec3) -> Self {
+        Self { coordinate, gradient, support, point: support, by_surface: DVec3::ZERO }
+    }
+
+    /// Seen along the opposite direction.
+    fn turned(self) -> Self {
+        Self { coordinate: -self.coordinate, gradient: -self.gradient, by_surface: -self.by_surface, ..self }
     }
 }

@@ -24,7 +24,7 @@ pub use influence::MAX_CELLS;
 use influence::{Grid, Influence};
 use pressure::PressureScratch;
 pub use pressure::{Convergence, MAX_PRODUCTS, TOLERANCE};
-pub use relief::{GridFrame, Heights, LEAST_COSINE, Relief};
+pub use relief::{End, GridFrame, Heights, LEAST_COSINE, Relief};
 
 /// How many cells a side of the grid has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -99,7 +99,7 @@ impl Default for CellScratch {
         Self {
             influence: Influence::new(),
             solver: PressureScratch::new(),
-            heights: Heights::new(),
+            heights: Heights::default(),
             gap: zero,
             slopes: [zero; 2],
             image: zero,
@@ -154,7 +154,11 @@ impl CellProblem<'_> {
         if !(depth > 0.0 && depth.is_finite()) {
             return CellContact::default();
         }
-        let cells = Cells::new(tool.rectangle(), self.resolution.cells(), self.effective_modulus);
+        let rectangle = tool.within(tool.rectangle(), |direction| {
+            let end = relief.end(&self.plane, self.plane.axes * direction, -depth)?;
+            Some((to_plane * (end.point - self.plane.origin), end.by_level))
+        });
+        let cells = Cells::new(rectangle, self.resolution.cells(), self.effective_modulus);
         if !(cells.sides[0] > 0.0 && cells.sides[1] > 0.0) {
             return CellContact::default();
         }

@@ -10,6 +10,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::super::place::ContactPlane;
 use super::influence::{Grid, MAX_CELLS};
 
 /// Largest slope of a height.
@@ -34,10 +35,56 @@ pub struct GridFrame {
     pub lowest: f64,
 }
 
+/// Where a surface that is higher than some level ends.
+#[derive(Clone, Copy, Debug)]
+pub struct End {
+    /// The point, m.
+    pub point: DVec3,
+    /// How far it goes along the direction as the level rises.
+    pub by_level: f64,
+}
+
+impl End {
+    /// The end of triangles along a direction, above a level of the plane.
+    pub fn of(
+        triangles: impl Iterator<Item = [DVec3; 3]>,
+        plane: &ContactPlane,
+        direction: DVec3,
+        level: f64,
+    ) -> Option<Self> {
+        let mut end: Option<(f64, Self)> = None;
+        let mut reach = |point: DVec3, by_level: f64| {
+            let along = (point - plane.origin).dot(direction);
+            if end.is_none_or(|(farthest, _)| along > farthest) {
+                end = Some((along, Self { point, by_level }));
+            }
+        };
+        for corners in triangles {
+            let heights = corners.map(|corner| (corner - plane.origin).dot(plane.axes.z_axis) - level);
+            for k in 0..3 {
+                let (from, to) = ((corners[k], heights[k]), (corners[(k + 1) % 3], heights[(k + 1) % 3]));
+                if from.1 >= 0.0 {
+                    reach(from.0, 0.0);
+                }
+                if (from.1 < 0.0) != (to.1 < 0.0) {
+                    let by_height = (to.0 - from.0) / (to.1 - from.1);
+                    reach(from.0 - by_height * from.1, by_height.dot(direction));
+                }
+            }
+        }
+        end.map(|(_, end)| end)
+    }
+}
+
 /// A surface that a tool is pressed on.
 pub trait Relief {
     /// Enters its heights.
     fn fill(&self, frame: &GridFrame, heights: &mut Heights);
+
+    /// How far it reaches along a direction in the plane, where it is higher than `lowest` over it, m; none if it has no end.
+    fn end(&self, _plane: &ContactPlane, _direction: DVec3, _lowest: f64) -> Option<End> {
+        None
+    }
 }
 
 /// Heights of a surface.
@@ -66,13 +113,20 @@ struct Crease {
     by_side: [f64; 2],
 }
 
-impl Heights {
+impl Default for Heights {
     /// Of nothing.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-        Self { height: [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS], slopes: [zero; 2], carrier: [zero; 3], by_side: [zero; 2] }
+        Self {
+            height: [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS],
+            slopes: [zero; 2],
+            carrier: [zero; 3],
+            by_side: [zero; 2],
+        }
     }
+}
 
+impl Heights {
     /// Forgets the surface.
     pub fn clear(&mut self) {
         self.height = [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS];

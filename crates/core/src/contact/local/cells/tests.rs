@@ -236,7 +236,8 @@ fn the_energy_changes_with_the_plane_as_its_wrenches_have_it() {
         for axis in DVec3::AXES {
             let energy = |shift: f64, turn: f64| {
                 let axes = DMat3::from_axis_angle(axis, turn);
-                cold_on(curvature, &CellProblem { plane: ContactPlane { origin: axis * shift, axes }, ..problem }).energy
+                cold_on(curvature, &CellProblem { plane: ContactPlane { origin: axis * shift, axes }, ..problem })
+                    .energy
             };
             let raised = (energy(h, 0.0) - energy(-h, 0.0)) / (2.0 * h);
             let turned = (energy(0.0, angle) - energy(0.0, -angle)) / (2.0 * angle);
@@ -485,7 +486,10 @@ fn a_sphere_in_a_hollow_is_a_flatter_sphere() {
         for depth in [1e-4, 5e-4] {
             let problem = pressed(&shape, DVec3::ZERO, depth);
             let expected = indent_sphere(depth, 1.0 / (125.0 + curvature), MODULUS).force;
-            assert!(near(cold_on([curvature, 0.0, curvature], &problem).force.z, expected, 0.02), "{curvature} {depth}");
+            assert!(
+                near(cold_on([curvature, 0.0, curvature], &problem).force.z, expected, 0.02),
+                "{curvature} {depth}"
+            );
         }
     }
 }

@@ -55,13 +55,7 @@ impl CellScratch {
     }
 
     /// Energy, wrench and what else follows from the solution, whose residual must still be at hand.
-    pub(super) fn integrate(
-        &mut self,
-        tool: &PosedTool,
-        cells: &Cells,
-        plane: &ContactPlane,
-        q: &Grid,
-    ) -> CellContact {
+    pub(super) fn integrate(&mut self, tool: &PosedTool, cells: &Cells, plane: &ContactPlane, q: &Grid) -> CellContact {
         let mut contact = CellContact::default();
         let mut by_place = ByPlace::default();
         let (mut work, mut moment) = (0.0, DVec3::ZERO);
@@ -139,7 +133,9 @@ impl ByPlace {
                 let share = 0.5 * self.shift[k] + share;
                 contact.force -= share * side.gradient;
                 contact.torque -= share * (side.support - tool.tip).cross(side.gradient);
-                by_angle += share * side.support.dot(turned[k]);
+                contact.body_force += share * side.by_surface;
+                contact.body_torque += share * side.point.cross(side.by_surface);
+                by_angle += share * side.point.dot(turned[k]);
             }
         }
         contact.torque -= by_angle * cells.rectangle.angle_by_rotation;

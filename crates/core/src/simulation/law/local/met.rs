@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::contact::local::effective_modulus;
 use crate::contact::footprint::PressedSurface;
+use crate::contact::local::effective_modulus;
 use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};

@@ -28,6 +28,9 @@ pub struct Others {
     /// at rest, columns by `k`. That part is `f^T (dC_reg/dp') f / 2`: taken from the displacements of nodes it would be the
     /// same but for the patch's width and the modes left out, and slow closed paths near a rim gave out 0.4 % of their peak.
     pub moving: Option<DMat3>,
+    /// The same by the tool's rotation, N m.
+    pub turn: DVec3,
+    pub moving_turn: Option<DMat3>,
 }
 
 /// The answer at one place.
@@ -128,7 +131,12 @@ fn evaluate_shape(
     let Some(footprint) = found else {
         // Away from the body: no force.
         let compliance = DMat3::ZERO;
-        return Some(LocalResponse { foot: contact.foot, compliance, jacobian: DMat3::ZERO, ..LocalResponse::default() });
+        return Some(LocalResponse {
+            foot: contact.foot,
+            compliance,
+            jacobian: DMat3::ZERO,
+            ..LocalResponse::default()
+        });
     };
     if weights.is_outside() {
         return None;
@@ -136,11 +144,12 @@ fn evaluate_shape(
     let fields = weights.blend(&pressed.fields);
     let half_space = HalfSpace::new(body, tool, &fields, contact.part);
     // Gradients by the tool's rotation of `E*` and of `f^T C_reg f / 2`.
-    let (mut modulus_turns, mut compliance_turns) = (DVec3::ZERO, DVec3::ZERO);
-    for ((fan, _), turn) in weights.iter().zip(&cells.footprint.by_rotation) {
+    let moving = others.moving_turn.map_or(DVec3::ZERO, |moving| moving * force);
+    let (mut modulus_turns, mut compliance_turns) = (DVec3::ZERO, others.turn + moving);
+    for (fan, turn) in weights.with_turns() {
         let own = &pressed.fields[fan];
-        modulus_turns += *turn * own[PLANE_STRAIN];
-        compliance_turns += *turn * (0.5 / body.scale * force.dot(compliance_of(own) * force));
+        modulus_turns += turn * own[PLANE_STRAIN];
+        compliance_turns += turn * (0.5 / body.scale * force.dot(compliance_of(own) * force));
     }
     modulus_turns *= half_space.by_own;
     let sunk = sunk(&posed, &footprint);

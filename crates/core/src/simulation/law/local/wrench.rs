@@ -75,9 +75,8 @@ pub fn indent_shape(
     let by_origin = pressed.force - pressed.body_force;
     let by_normal = (moment - pressed.body_torque).cross(normal) - pressed.force * contact.entry;
     let stiffer = pressed.energy / half_space.modulus;
-    let [by_place, by_rotation] = [0, 1].map(|k| {
-        footprint.origin_by[k].transpose() * by_origin + footprint.normal_by[k].transpose() * by_normal
-    });
+    let [by_place, by_rotation] =
+        [0, 1].map(|k| footprint.origin_by[k].transpose() * by_origin + footprint.normal_by[k].transpose() * by_normal);
     Indentation {
         force: pressed.normal_force,
         radius: pressed.stiffness / (2.0 * half_space.modulus),
@@ -95,12 +94,12 @@ mod tests {
     use glam::DQuat;
 
     use super::*;
+    use crate::contact::SurfaceQuery;
     use crate::contact::footprint::{PressedSurface, margin};
     use crate::contact::local::effective_modulus;
     use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON};
     use crate::contact::smooth::tests::{ball, cube, near};
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
-    use crate::contact::SurfaceQuery;
     use crate::mesh::Surface;
     use crate::simulation::law::local::met::LocalBody;
     use crate::simulation::law::local::response::{Guess, LocalResponse, Others, evaluate};
@@ -145,8 +144,7 @@ mod tests {
             for _ in 0..8 {
                 let guess = Guess { place, force: response.force, foot: &contact.foot };
                 let resolution = Resolution::Medium;
-                let cells =
-                    Cells { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
+                let cells = Cells { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
                 let others = Others::default();
                 response = evaluate(body, tool, &contact, guess, others, &mut weights, cells).expect("an answer");
                 (contact.foot, contact.sunk) = (response.foot, response.sunk);
