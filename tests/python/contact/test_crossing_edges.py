@@ -164,7 +164,7 @@ QUICK = [
     Crossing("convex", 90, "punch", "upright", 1e-3),
     Crossing("ridge", 60, "punch", "upright", 0.5e-3),
     Crossing("ridge", 90, "capsule", "along", 0.5e-3),
-    Crossing("concave", 90, "capsule", "across", 1e-3),
+    Crossing("concave", 90, "sphere", "upright", 1e-3),
     Crossing("valley", 120, "capsule", "along", 1e-3),
 ]
 

@@ -15,6 +15,8 @@ use crate::contact::shape::ToolShape;
 const MARGIN: f64 = 4.0;
 /// A contact may lie outside of the box around its body by this part of the tool's size, and this far beyond the tool's reach.
 const BESIDE: f64 = 1.0;
+/// A tool that barely touches is taken to be as deep as this part of its size.
+const LEAST_DEPTH: f64 = 1e-2;
 
 /// Whether the wrench of a contact may leave the tick.
 pub fn is_sound(model: &Model, contact: &Contact, stiffness_scale: f64) -> bool {
@@ -36,6 +38,6 @@ pub fn is_sound(model: &Model, contact: &Contact, stiffness_scale: f64) -> bool 
     let [low, high] = own.bounds.map(|corner| corner - contact.point);
     let on_body = low.max_element() <= BESIDE * size && high.min_element() >= -BESIDE * size;
     let at_tool = contact.point.distance(local.relative) <= (2.0 + BESIDE) * size + depth;
-    let most = MARGIN * 2.0 * own.largest_modulus * stiffness_scale * size * depth;
+    let most = MARGIN * 2.0 * own.largest_modulus * stiffness_scale * size * (depth + LEAST_DEPTH * size);
     on_body && at_tool && contact.force.length() <= most
 }
