@@ -72,7 +72,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
         simulation.record(recording)
     with simulation:
         by_script = 0 not in simulation.devices
-        hardest = simulation._frame()
+        hardest = simulation._read_frame()
         start = time.monotonic()
         try:
             while (elapsed := time.monotonic() - start) < seconds:
@@ -83,7 +83,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
                 time.sleep(1.0 / POINTER_RATE)
                 logs.append(simulation.drain_log())
                 # The press is along a line: the largest force has the largest strain.
-                frame = simulation._frame()
+                frame = simulation._read_frame()
                 depths.append((frame.time, depth_of_first_tool(frame)))
                 if STRAIN_SAMPLES * elapsed >= len(sampled) * seconds:
                     sampled.append(frame)
@@ -93,7 +93,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
                     limited = [max(*limited, frame, key=_force_on_body)] if limited else [frame]
         except KeyboardInterrupt:
             interrupted = True
-        last = simulation._frame()
+        last = simulation._read_frame()
         logs.append(simulation.drain_log())
     log = np.concatenate(logs)
     sampled = sorted([*sampled, hardest, last], key=lambda frame: frame.time)

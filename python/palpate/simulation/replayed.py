@@ -126,6 +126,9 @@ class ReplayedSimulation(Simulation):
             self._frame = frame_of(raw, self.bodies, self._scales)
         return self._frame
 
+    def _read_frame(self) -> Frame:
+        return self.frame()
+
     def drain_log(self) -> np.ndarray:
         """Rows since the last call, none older than :data:`LOG_SECONDS` where many ticks were made at once."""
         rows = np.concatenate([np.empty(0, LOG_DTYPE), *self._rows])

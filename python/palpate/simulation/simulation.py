@@ -304,7 +304,7 @@ class Simulation(Adjustable, Changing):
             The loop does not run.
 
         """
-        frame = self._frame()
+        frame = self._read_frame()
         if not self._warned and np.any(frame.limited) and frame.largest_strain >= AT_LIMIT * self._strain_limit:
             self._warned = True
             warnings.warn(self._limit_text("a tool"), TouchWarning, stacklevel=2)
@@ -316,7 +316,7 @@ class Simulation(Adjustable, Changing):
             f"force is that of the limit, not of its position; press less deep"
         )
 
-    def _frame(self) -> Frame:
+    def _read_frame(self) -> Frame:
         """Read the latest tick, without a word about the limit of strain."""
         raw, bodies, scales = self._of_this_scene(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
         if raw is None:

@@ -441,7 +441,7 @@ class Session:
     def _latest(self) -> Frame:
         now = time.monotonic()
         if self._frame is None or now - self._frame_time > FRAME_AGE:
-            self._frame, self._frame_time = self.simulation._frame(), now
+            self._frame, self._frame_time = self.simulation._read_frame(), now
             self._keep_log()
             if self._moving is not None:
                 self._moving.follow(self._frame.contacts)
@@ -477,7 +477,7 @@ class Session:
         if moving.shows_mode:
             # A shape is shown of a body at rest. A latched fault stays until the person resets it.
             self.release()
-            if self.simulation._frame().statistics["fault"] is None:
+            if self.simulation._read_frame().statistics["fault"] is None:
                 self.simulation.reset()
         return False
 

@@ -75,7 +75,8 @@ def test_a_number_is_typed_and_a_double_click_brings_the_default(page):
 
 
 @pytest.mark.parametrize(
-    ("typed", "why"), [("soft", "is not a number"), ("12 mm", "is not a number"), ("-3", "goes from")]
+    ("typed", "why"),
+    [("soft", "is not a number"), ("12 mm", "is not a number"), ("-3", "must be positive")],
 )
 def test_what_is_no_stiffness_is_told(page, typed, why):
     fill(page, "stiffness", typed)
