@@ -349,7 +349,8 @@ fn every_solution_ends_and_does_not_depend_on_its_start() {
                     "{shape:?} {resolution:?} {:?}",
                     warm.convergence
                 );
-                assert_eq!(warm.depth > 0.0, depth > 0.0);
+                // On a surface that falls away nothing may overlap below the plane.
+                assert!(warm.depth == 0.0 || depth > 0.0);
                 let cold = cold_on(curvature, &problem);
                 assert!(warm.force.distance(cold.force) <= 1e-5 * cold.force.length(), "{shape:?} {resolution:?} {k}");
                 assert!((warm.energy - cold.energy).abs() <= 1e-9 * cold.energy);
