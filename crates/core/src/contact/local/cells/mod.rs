@@ -218,4 +218,6 @@ impl Cells {
 }
 
 #[cfg(test)]
+mod references;
+#[cfg(test)]
 mod tests;
