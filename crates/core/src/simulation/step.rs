@@ -33,7 +33,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
     }
 
     for (tool, said) in state.tools.iter_mut().zip(&input.tools) {
-        tool.has_left |= tool.before.is_some() && !said.active;
+        tool.has_left = (tool.has_left || (tool.before.is_some() && !said.active)) && !input.controls.reset;
         tool.before = (said.active && said.pose.is_finite()).then_some(said.pose);
     }
 
