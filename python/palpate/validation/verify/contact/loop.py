@@ -41,7 +41,7 @@ def loop_of(
 def touch_heights(simulation: Simulation, points: np.ndarray, normals: np.ndarray, around: float) -> np.ndarray:
     """Distance of the tool's centre from each point along its normal at which force begins, (n,) m, by halving.
 
-    Every probe is a press of its own: the tool leaves the scene between them.
+    Every probe is a press of its own: the tool leaves the scene between them, and comes in from outside.
 
     Parameters
     ----------
@@ -56,9 +56,10 @@ def touch_heights(simulation: Simulation, points: np.ndarray, normals: np.ndarra
     low, high = np.full(len(points), around - CLEAR), np.full(len(points), around + CLEAR)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        probes = np.full((len(points), 2, 3), np.nan)
-        probes[:, 1] = points + middle[:, None] * normals
-        forces = simulation.play(probes.reshape(-1, 3)).forces.reshape(probes.shape)[:, 1]
+        probes = np.full((len(points), 3, 3), np.nan)
+        probes[:, 1] = points + (middle + 2 * CLEAR)[:, None] * normals
+        probes[:, 2] = points + middle[:, None] * normals
+        forces = simulation.play(probes.reshape(-1, 3)).forces.reshape(probes.shape)[:, 2]
         touching = np.linalg.norm(forces, axis=1) > 0
         low, high = np.where(touching, middle, low), np.where(touching, high, middle)
     return (low + high) / 2
