@@ -108,12 +108,12 @@ pub fn margin(thickness: f64) -> f64 {
 
 impl FootprintScratch {
     /// Normal of the piece that the tool is deepest in, or next to, among those that face it and the way `gone` that it has
-    /// come; and its distance from the tool, m.
-    pub fn first_met(&self, gone: DVec3) -> Option<(DVec3, f64)> {
+    /// come.
+    pub fn first_met(&self, gone: DVec3) -> Option<DVec3> {
         let away = AWAY * gone.length();
         let meets = |near: &&NearPiece| near.normal.dot(near.by_pose[0]) > MET && near.normal.dot(gone) <= away;
         let first = self.near.pieces.iter().filter(meets).min_by(|a, b| a.distance.total_cmp(&b.distance));
-        first.map(|near| (near.normal, near.distance))
+        first.map(|near| near.normal)
     }
 
     /// The footprint of a tool whose pieces have been gathered, and the weights of the fans below it. `None` where it is near no

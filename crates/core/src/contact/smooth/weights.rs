@@ -154,7 +154,6 @@ impl SmoothSurface {
     /// Weighs the fans around a foot that may be touched.
     pub fn weigh(&self, foot: &FootPoint, weights: &mut FanWeights) {
         weights.near.take_up(self, foot.triangle);
-        weights.turns = [DVec3::ZERO; MAX_FANS];
         self.arch.dispatch(Weighing { foot, weights });
     }
 }
@@ -170,7 +169,7 @@ impl NullaryFnOnce for Weighing<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let FanWeights { near, count, fans, weights, gradients, touchable, .. } = self.weights;
+        let FanWeights { near, count, fans, weights, gradients, turns, touchable, .. } = self.weights;
         let (position, mut all, mut place) = (self.foot.position.to_array(), 0.0, 0);
         let (mut sum, mut slope) = (0.0, DVec3::ZERO);
         for group in near.all() {
@@ -192,6 +191,7 @@ impl NullaryFnOnce for Weighing<'_> {
             }
         }
         *count = place;
+        turns[..place].fill(DVec3::ZERO);
         *touchable = if all > 0.0 { sum / all } else { 0.0 };
         let inverse = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         let relative = slope * inverse;

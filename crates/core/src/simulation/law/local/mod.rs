@@ -142,7 +142,7 @@ fn shape_arrival(
     for left in (0..strides as u32).rev() {
         at.place = place - gone * (f64::from(left) / strides);
         footprint.near.gather(&pressed.fine, drawn.query, &at, margin(thickness));
-        if let Some((normal, _)) = footprint.first_met(if approach.motion.is_some() { DVec3::ZERO } else { gone }) {
+        if let Some(normal) = footprint.first_met(if approach.motion.is_some() { DVec3::ZERO } else { gone }) {
             at.facing = normal;
             break;
         }

@@ -138,7 +138,7 @@ mod tests {
             let mut footprint = FootprintScratch::default();
             let at = PosedShape { facing: DVec3::ZERO, ..posed(shape, &contact, place) };
             footprint.near.gather(&pressed.fine, &self.query, &at, margin(shape.thickness()));
-            contact.foot.normal = footprint.first_met(DVec3::ZERO).expect("a piece").0;
+            contact.foot.normal = footprint.first_met(DVec3::ZERO).expect("a piece");
             contact.entry = 0.003;
             let mut response = LocalResponse::default();
             for _ in 0..8 {
