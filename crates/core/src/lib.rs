@@ -30,3 +30,7 @@ pub mod strain;
 mod tensor;
 
 pub use error::{Error, Result};
+
+// Bodies that tests of the crate share with those beside it.
+#[cfg(test)]
+extern crate self as palpate_core;

@@ -165,6 +165,8 @@ QUICK = [
     Crossing("ridge", 60, "punch", "upright", 0.5e-3),
     Crossing("ridge", 90, "capsule", "along", 0.5e-3),
     Crossing("concave", 90, "sphere", "upright", 1e-3),
+    Crossing("concave", 90, "capsule", "across", 1e-3),
+    Crossing("concave", 60, "ellipsoid", "across", 1e-3),
     Crossing("valley", 120, "capsule", "along", 1e-3),
 ]
 
@@ -175,8 +177,23 @@ def test_a_tool_crosses_an_edge_without_a_jump_and_keeps_its_contact(loops, cros
     assert wrong is None, wrong
 
 
-# Where some tool's force jumps, or is lost: on blades, and where two walls meet in a hollow (docs/accuracy.md).
-OPEN = {("ridge", 30), ("ridge", 60), ("concave", 90), ("valley", 30), ("valley", 60), ("valley", 90), ("valley", 120)}
+@pytest.mark.parametrize("tool", ["capsule", "ellipsoid", "file"])
+def test_in_a_corner_a_tool_presses_both_walls(loops, tool):
+    """Along the floor into a wall: what each does is nearly what it does alone."""
+    path, lead = Crossing("concave", 90, tool, "across", 1e-3).path()
+    simulation = loops.loop("concave 90", tool)
+    both, above = (played(simulation, path + lift * UP, ACROSS).forces[lead:] for lift in (0.0, 1.5e-3))
+    along, alone = both[-1, 0], above[-1, 0]
+    assert np.abs(both[:100, 0]).max() < 0.02 * both[0, 2], "the wall is felt from afar"
+    assert alone < -5e-3 and abs(above[-1, 2]) < 0.2 * abs(alone), "the wall alone presses back"
+    assert abs(along / alone - 1) < 0.15
+    assert abs(both[-1, 2] / both[0, 2] - 1) < 0.15
+    # One wall of the two missing, or a force of the wrong sign, would be seen.
+    assert abs(both[0, 0] / alone - 1) > 0.15 and abs(above[-1, 2] / both[0, 2] - 1) > 0.15
+
+
+# Where some tool's force jumps, or is lost: on blades, in the narrowest hollow, and bridging a wide one (docs/accuracy.md).
+OPEN = {("ridge", 30), ("ridge", 60), ("valley", 30), ("valley", 120)}
 
 
 @pytest.mark.slow

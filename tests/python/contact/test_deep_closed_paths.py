@@ -20,7 +20,7 @@ STEP, AIR = 20e-6, 200e-6
 # Work over the closed path over its peak; how deep tools are pressed, over their radii.
 TOLERANCE = 1e-3
 # What a sphere gives out that slides over the sharp rim of a cup, less than its radius deep (docs/accuracy.md).
-SHARP_RIM = 0.05
+SHARP_RIM = 0.15
 DEPTHS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 CLEAR = 1e-3
 

@@ -19,6 +19,8 @@ const FARTHEST: f64 = 0.3;
 /// A surface in pieces.
 pub struct Tessellation {
     divisions: usize,
+    /// Edge of a piece on average, m.
+    pub edge: f64,
     /// Vertices of each drawn triangle, row by row, m.
     vertices: Vec<DVec3>,
     /// Normals of the smooth surface there; on a crease that of the triangle.
@@ -62,6 +64,7 @@ impl Tessellation {
         };
         Self {
             divisions,
+            edge: mean / divisions as f64,
             balls: vertices.iter().map(ball).collect(),
             normals: vertices.iter().flatten().map(|v| v.1).collect(),
             vertices: vertices.into_iter().flatten().map(|v| v.0).collect(),

@@ -5,12 +5,16 @@
 //! it waits without a force, which then rises from zero with the approach. One that is found with the tool deeper in it than the
 //! tool can have come since counts from there. So a force begins at zero whatever the surface does, and no place makes energy.
 //!
+//! A tool that is no sphere presses all that lies under one plane at once. Another place is a wall that stands on that plane: it is
+//! found among the pieces next to the tool.
+//!
 //! A place is on the side of the surface that the tool has come from: its normal faces the tool's middle. The far side of a thin
 //! part never does.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::contacts::{Contact, Mode};
+use super::covering::Covering;
 use super::law::{ASKED, LocalContact};
 use super::model::Model;
 use super::scratch::Scratch;
@@ -19,6 +23,7 @@ use super::state::State;
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, MAX_PLACES};
 use crate::contact::Hollows;
+use crate::contact::footprint::{PosedShape, PressedSurface};
 use crate::contact::smooth::FootPoint;
 
 /// A place waits from where the tool is as near as this, over the tool's radius.
@@ -38,6 +43,9 @@ pub fn find(model: &Model, state: &mut State, scratch: &mut Scratch, (tool, body
             places[count] = slot;
             count += 1;
         }
+    }
+    if let (Some(pressed), Some(&slot)) = (model.pressed[tool][body].as_deref(), places[..count].first()) {
+        return find_wall(model, state, scratch, pressed, (slot, &places[..count]));
     }
     scratch.covering.near.forget();
     for &slot in &places[..count] {
@@ -81,34 +89,81 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
         let touchable = !scratch.local.weigh(body, &own.smooth, &foot).is_outside();
         let near = depth > -NEAR * radius && depth < DEEPEST * radius;
         if touchable && near && is_another(state, (tool, body), &foot, radius) {
-            let local = LocalContact {
-                tool: local.tool,
-                orientation: local.orientation,
-                turned: local.turned,
-                relative: at,
-                foot,
-                further: true,
-                found: true,
-                came,
-                part: 1.0,
-                share: 1.0,
-                asked: [foot.position; ASKED],
-                ..LocalContact::default()
-            };
-            let begun = Contact {
-                mode: Mode::Press,
-                law: LawKind::Local,
-                tool,
-                body,
-                point: foot.position,
-                normal: foot.normal,
-                anchor: local.tool,
-                bound: f64::INFINITY,
-                local,
-                ..Contact::default()
-            };
-            add_contact(model, state, begun, &scratch.covering);
+            let local = LocalContact { relative: at, foot, found: true, came, turned: local.turned, ..begun(&local) };
+            add_contact(model, state, further_contact((tool, body), local), &scratch.covering);
         }
+    }
+}
+
+/// Looks for a wall that stands on the planes that a tool presses on, which it has come near to.
+fn find_wall(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    pressed: &PressedSurface,
+    (slot, places): (usize, &[usize]),
+) {
+    let Contact { tool, body, local, .. } = state.contacts.slots[slot];
+    let (fixed, shape) = (&model.bodies[body], &model.tools[tool].shape);
+    let Some(own) = &fixed.local else { return };
+    if places.len() >= MAX_PLACES {
+        return;
+    }
+    let mut planes = [local.plane(); MAX_CONTACTS];
+    for (plane, &slot) in planes.iter_mut().zip(places) {
+        *plane = state.contacts.slots[slot].local.plane();
+    }
+    let Covering { footprint, weights, .. } = &mut scratch.covering;
+    let at = PosedShape {
+        shape,
+        place: local.relative + local.advance,
+        rotation: DMat3::from_quat(local.orientation),
+        facing: DVec3::ZERO,
+        sunk: 0.0,
+    };
+    footprint.near.gather(pressed, &fixed.query, &at);
+    let Some((plane, distance)) = footprint.wall_beside(&planes[..places.len()]) else { return };
+    let Some(found) = footprint.find(&pressed.fine, &own.smooth, plane, weights) else { return };
+    if weights.is_outside() {
+        return;
+    }
+    let before = state.tools[tool].before.map(|before| fixed.placement.point_to_body(before.position));
+    let came = 2.0 * local.tool.distance(before.unwrap_or(local.tool));
+    let local = LocalContact {
+        relative: at.place,
+        entry: (-distance - came).max(0.0),
+        foot: found.foot(at.place),
+        ..begun(&local)
+    };
+    let begun = further_contact((tool, body), local);
+    add_contact(model, state, begun, &scratch.covering);
+}
+
+/// What a further place of a tool begins with.
+fn begun(known: &LocalContact) -> LocalContact {
+    LocalContact {
+        tool: known.tool,
+        orientation: known.orientation,
+        turned: known.orientation,
+        further: true,
+        part: 1.0,
+        share: 1.0,
+        ..LocalContact::default()
+    }
+}
+
+fn further_contact((tool, body): (usize, usize), local: LocalContact) -> Contact {
+    Contact {
+        mode: Mode::Press,
+        law: LawKind::Local,
+        tool,
+        body,
+        point: local.foot.position,
+        normal: local.foot.normal,
+        anchor: local.tool,
+        bound: f64::INFINITY,
+        local: LocalContact { asked: [local.foot.position; ASKED], ..local },
+        ..Contact::default()
     }
 }
 

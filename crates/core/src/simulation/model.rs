@@ -125,8 +125,8 @@ fn pressed_surface(
     if !takes_cells(&tool.shape) {
         return None;
     }
-    let fine = PressedSurface::pieces(&body.loaded, &body.query, &local.smooth, tool.shape.thickness());
-    Some(Arc::new(PressedSurface { fine, fields: local.smooth.evened(&regular.fields) }))
+    let thickness = tool.shape.thickness();
+    Some(Arc::new(PressedSurface::new(&body.loaded, &body.query, &local.smooth, &regular.fields, thickness)))
 }
 
 fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {

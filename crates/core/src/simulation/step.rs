@@ -69,10 +69,7 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         }
         if count > 0 {
             if lasts {
-                // A tool that is no sphere touches all places at once.
-                if approach.pressed.is_none() {
-                    further::find(model, state, scratch, (tool, body));
-                }
+                further::find(model, state, scratch, (tool, body));
                 continue;
             }
             if places.iter().any(|&slot| state.contacts.slots[slot].mode == Mode::Free) {
@@ -173,7 +170,7 @@ fn remember(model: &Model, state: &mut State, contact: &Contact) {
     state.tools[tool].entry[body].depth = Approach::at(model, motion, tool, body, position).depth();
 }
 
-fn answer(model: &Model, state: &State) -> Output {
+pub(super) fn answer(model: &Model, state: &State) -> Output {
     let mut output = Output::default();
     for (contact, _) in state.contacts.iter() {
         let placement = &model.bodies[contact.body].placement;

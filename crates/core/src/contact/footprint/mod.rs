@@ -3,13 +3,18 @@
 //! The pieces `i` of the surface near the tool, at distances `s_i` from it, have the weights
 //!
 //! ```text
-//! w_i = A_i (1 - s_i/m)^2 eta(n_i . n)        x = sum w_i x_i / sum w_i        n = sum w_i n_i / |sum w_i n_i|
+//! w_i = A_i (1 - s_i/m)^2 eta(n_i . d_i)      x = sum w_i x_i / sum w_i        n = sum w_i n_i / |sum w_i n_i|
 //! ```
 //!
 //! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes.
-//! The factor `eta` leaves out what faces away, as the other side of a plate does. The plane of the contact is raised over `x`
-//! to the highest piece that the tool may touch. Everything follows the tool's pose with derivatives that are exact but for
-//! the normal inside `eta`, which is the contact's own of the tick before, taken once more.
+//! The factor `eta` leaves out what faces away from the tool's middle, in the direction `d_i`, as the other side of a plate does.
+//! The plane of the contact is raised over `x` to the highest piece that the tool may touch. All this is a function of the tool's
+//! pose alone with exact derivatives, as long as the tool's middle has not sunk in; from then on the middle is taken as lifted
+//! along the contact's normal of the tick before.
+//!
+//! Heights over one plane cannot describe a floor and a wall that stands on it. A wall that rises over the plane of the tick before
+//! is therefore taken down to it, wholly where it is steeper than 78 degrees, not at all up to 45, and pressed as a further place of
+//! the same tool, on a plane of its own.
 
 mod near;
 
@@ -22,12 +27,20 @@ use super::smooth::{FanWeights, FootPoint, SmoothSurface};
 use super::{SurfaceQuery, Tessellation};
 use crate::tensor::{across, outer};
 
-/// Distance from which a piece counts, over the tool's thickness.
-const MARGIN: f64 = 0.3;
+/// Distance from which a piece counts, over the tool's thickness, and over the edge of a piece at the least: more than any point
+/// of a piece is from its middle.
+const MARGIN: [f64; 2] = [0.3, 0.75];
 /// Edge of a piece at most, over the tool's thickness.
 const PIECE: f64 = 0.4;
-/// Cosines between a piece's normal and the contact's from which it counts, and from which it counts fully.
-const FACING: [f64; 2] = [-0.2, 0.5];
+/// Cosines between a piece's normal and the direction to the tool's middle from which it counts, and counts fully.
+const FACING: [f64; 2] = [-0.4, 1.0];
+/// Cosines between the normals of a wall that rises over the contact's plane and of that plane from which it belongs to the
+/// contact, and does so fully.
+const ALIKE: [f64; 2] = [0.2, 0.7];
+/// How far the contact's middle lies before a piece, over the margin, for that to be such a wall, and to be one fully.
+const BEFORE: [f64; 2] = [0.0, 0.5];
+/// A piece that is so much of a wall is pressed as a place of its own.
+const WALL: f64 = 0.9;
 /// Normals whose sum is shorter than this part of their weights have no common direction.
 const COMMON: f64 = 0.05;
 /// A piece that does not touch the tool raises the plane by this many times its distance less.
@@ -41,6 +54,8 @@ const MET: f64 = 0.2;
 pub struct PressedSurface {
     /// In pieces as fine as the tool needs.
     pub fine: Tessellation,
+    /// Distance from the tool within which pieces count, m.
+    pub margin: f64,
     /// What the tool meets at the fans, each evened with those around it.
     pub fields: Vec<super::FanFields>,
 }
@@ -62,6 +77,15 @@ pub struct Footprint {
     pub origin: DVec3,
     /// Its derivatives.
     pub origin_by: [DMat3; 2],
+}
+
+/// A contact's plane as it is known before.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// A point of it, m.
+    pub point: DVec3,
+    /// Unit outward normal.
+    pub normal: DVec3,
 }
 
 /// Memory of a search.
@@ -90,45 +114,53 @@ struct Sums {
 }
 
 impl PressedSurface {
-    /// For tools of a thickness, m, in pieces of which some fit into their width.
-    pub fn pieces(
+    /// For tools of a thickness, m, in pieces of which some fit into their width; the fields at the fans are evened.
+    pub fn new(
         surface: &crate::mesh::Surface,
         query: &SurfaceQuery,
         smooth: &SmoothSurface,
+        fields: &[super::FanFields],
         thickness: f64,
-    ) -> Tessellation {
-        Tessellation::new(surface, query, smooth, PIECE * thickness)
+    ) -> Self {
+        let fine = Tessellation::new(surface, query, smooth, PIECE * thickness);
+        let margin = (MARGIN[0] * thickness).max(MARGIN[1] * fine.edge);
+        Self { fine, margin, fields: smooth.evened(fields) }
     }
 }
 
-/// Distance within which a tool of a thickness looks for pieces, m.
-pub fn margin(thickness: f64) -> f64 {
-    MARGIN * thickness
-}
-
 impl FootprintScratch {
-    /// Normal of the piece that the tool is deepest in, or next to, among those that face it and the way `gone` that it has
+    /// Plane of the piece that the tool is deepest in, or next to, among those that face it and the way `gone` that it has
     /// come.
-    pub fn first_met(&self, gone: DVec3) -> Option<DVec3> {
+    pub fn first_met(&self, gone: DVec3) -> Option<Plane> {
         let away = AWAY * gone.length();
         let meets = |near: &&NearPiece| near.normal.dot(near.by_pose[0]) > MET && near.normal.dot(gone) <= away;
         let first = self.near.pieces.iter().filter(meets).min_by(|a, b| a.distance.total_cmp(&b.distance));
-        first.map(|near| near.normal)
+        first.map(|near| Plane { point: near.middle, normal: near.normal })
+    }
+
+    /// Plane of a wall that stands on all planes that a tool is known to press on, where the tool is nearest to it, and how far it is
+    /// from it, m.
+    pub fn wall_beside(&self, known: &[Plane]) -> Option<(Plane, f64)> {
+        let is_wall = |near: &&NearPiece| {
+            near.facing > MET && known.iter().all(|plane| near.share_of_wall(plane, self.near.margin) > WALL)
+        };
+        let nearest = self.near.pieces.iter().filter(is_wall).min_by(|a, b| a.distance.total_cmp(&b.distance))?;
+        Some((Plane { point: nearest.middle, normal: nearest.normal }, nearest.distance))
     }
 
     /// The footprint of a tool whose pieces have been gathered, and the weights of the fans below it. `None` where it is near no
     /// piece.
     pub fn find(
-        &self,
+        &mut self,
         fine: &Tessellation,
         smooth: &SmoothSurface,
-        facing: DVec3,
+        known: Plane,
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
-        let first = self.sum(Facing { normal: facing, by: [DMat3::ZERO; 2] })?;
-        let facing = first.facing(facing);
-        let sums = self.sum(facing)?;
-        let Facing { normal, by: normal_by } = sums.facing(facing.normal);
+        let margin = self.near.margin;
+        self.near.pieces.iter_mut().for_each(|near| near.take_down(&known, margin));
+        let sums = self.sum()?;
+        let Facing { normal, by: normal_by } = sums.facing(known.normal);
         let inverse = 1.0 / sums.weight;
         let middle = sums.place * inverse;
         let middle_by = [0, 1].map(|k| (sums.place_by[k] - outer(middle, sums.weight_by[k])) * inverse);
@@ -136,7 +168,7 @@ impl FootprintScratch {
         let own = Facing { normal, by: normal_by };
         let (level, level_by) = self.level(middle, middle_by, own);
         let raised = |k: usize| middle_by[k] + outer(normal, level_by[k]) + normal_by[k] * level;
-        let triangle = self.weigh(fine, smooth, (middle, facing), weights);
+        let triangle = self.weigh(fine, smooth, middle, weights);
         Some(Footprint {
             triangle,
             middle,
@@ -148,7 +180,7 @@ impl FootprintScratch {
         })
     }
 
-    fn sum(&self, facing: Facing) -> Option<Sums> {
+    fn sum(&self) -> Option<Sums> {
         let mut sums = Sums {
             weight: 0.0,
             weight_by: [DVec3::ZERO; 2],
@@ -158,7 +190,7 @@ impl FootprintScratch {
             normal_by: [DMat3::ZERO; 2],
         };
         for near in &self.near.pieces {
-            let Some((weight, by)) = facing.weigh(near, self.near.margin) else { continue };
+            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
             let place = near.middle - self.near.centre;
             sums.weight += weight;
             sums.place += place * weight;
@@ -194,18 +226,12 @@ impl FootprintScratch {
     }
 
     /// Gives the fans the weights of the pieces of their triangles; the triangle next to the middle.
-    fn weigh(
-        &self,
-        fine: &Tessellation,
-        smooth: &SmoothSurface,
-        (middle, facing): (DVec3, Facing),
-        weights: &mut FanWeights,
-    ) -> u32 {
+    fn weigh(&self, fine: &Tessellation, smooth: &SmoothSurface, middle: DVec3, weights: &mut FanWeights) -> u32 {
         weights.begin();
         let count = fine.pieces_of_triangle() as u32;
         let (mut nearest, mut all, mut touchable) = ((f64::INFINITY, 0), 0.0, 0.0);
         for near in &self.near.pieces {
-            let Some((weight, by)) = facing.weigh(near, self.near.margin) else { continue };
+            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
             let triangle = near.piece / count;
             let apart = near.middle.distance_squared(middle);
             nearest = if apart < nearest.0 { (apart, triangle) } else { nearest };
@@ -224,21 +250,45 @@ impl FootprintScratch {
     }
 }
 
-impl Facing {
+impl NearPiece {
     /// Weight of a piece, and its derivatives by the tool's place and rotation; `None` for one that does not count.
-    fn weigh(&self, near: &NearPiece, margin: f64) -> Option<(f64, [DVec3; 2])> {
-        let close = 1.0 - near.distance / margin;
-        let t = ((near.normal.dot(self.normal) - FACING[0]) / (FACING[1] - FACING[0])).min(1.0);
-        if close <= 0.0 || t <= 0.0 {
+    fn weigh(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
+        let close = 1.0 - self.distance / margin;
+        let (eta, rise) = rising(self.facing, FACING);
+        if close <= 0.0 || eta <= 0.0 {
             return None;
         }
-        let (eta, rise) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / (FACING[1] - FACING[0]));
-        let by = [0, 1].map(|k| {
-            let turned = self.by[k].transpose() * near.normal;
-            (near.by_pose[k] * (-2.0 * close * eta / margin) + turned * (close * close * rise)) * near.area
-        });
-        Some((near.area * close * close * eta, by))
+        let (by_distance, by_facing) = (-2.0 * close * eta / margin, close * close * rise);
+        let area = self.area * self.joined;
+        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_by[k] * by_facing) * area);
+        Some((area * close * close * eta, by))
     }
+
+    /// How much it is a wall that rises before a plane: one for one that is steep, and stands in front of the plane's point.
+    fn share_of_wall(&self, plane: &Plane, margin: f64) -> f64 {
+        let (alike, _) = rising(self.normal.dot(plane.normal), ALIKE);
+        let (before, _) = rising((plane.point - self.middle).dot(self.normal) / margin, BEFORE);
+        (1.0 - alike) * before
+    }
+
+    /// Takes a wall that rises over the contact down to its plane, the more the steeper it is. Over an edge nothing is taken down:
+    /// the middle lies behind both sides.
+    fn take_down(&mut self, plane: &Plane, margin: f64) {
+        let share = self.share_of_wall(plane, margin);
+        self.joined = 1.0 - share;
+        if share > 0.0 {
+            for corner in &mut self.corners {
+                let height = (*corner - plane.point).dot(plane.normal);
+                *corner -= plane.normal * (height.max(0.0) * share);
+            }
+        }
+    }
+}
+
+/// Rises from zero to one between two bounds, and its slope.
+fn rising(at: f64, [from, to]: [f64; 2]) -> (f64, f64) {
+    let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
+    (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / (to - from))
 }
 
 impl Sums {

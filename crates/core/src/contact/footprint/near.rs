@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::PressedSurface;
 use crate::contact::shape::ToolShape;
 use crate::contact::{SurfaceQuery, Tessellation};
 
@@ -9,6 +10,10 @@ use crate::contact::{SurfaceQuery, Tessellation};
 const MOST_PIECES: usize = 8192;
 /// A piece farther above the middle of the tool than it can be is pushed away by this many times the difference.
 const BEYOND: f64 = 2.0;
+/// A tool that has sunk in deeper than this part of its half height sees from where its middle would be then.
+const EYE: f64 = 0.5;
+/// Next to the eye directions are blurred over this part of the tool's thickness.
+const BLUR: f64 = 0.1;
 
 /// A tool over a surface.
 #[derive(Clone, Copy)]
@@ -41,10 +46,16 @@ pub struct NearPiece {
     pub area: f64,
     /// Farthest corner from the middle, m.
     pub size: f64,
+    /// Share that belongs to the contact: less than one of a wall that rises over it.
+    pub joined: f64,
     /// Of the middle from the tool, m, negative inside.
     pub distance: f64,
     /// Its derivatives by the tool's place, and by its rotation about its origin, m.
     pub by_pose: [DVec3; 2],
+    /// Cosine between the normal and the direction to the tool's eye.
+    pub facing: f64,
+    /// Its derivatives by the tool's place and rotation.
+    pub facing_by: [DVec3; 2],
 }
 
 /// The pieces near a tool.
@@ -82,6 +93,22 @@ impl PosedShape<'_> {
         (self.sunk - half).max(0.0) + margin
     }
 
+    /// The point from which the tool sees the pieces that it may press on: its middle, or above it as far as that has sunk in.
+    fn eye(&self, centre: DVec3) -> DVec3 {
+        let half = (centre - self.support(-self.facing)).dot(self.facing);
+        centre + self.facing * (self.sunk - EYE * half).max(0.0)
+    }
+
+    /// Cosine between a normal and the direction to the eye, and its derivatives by place and rotation.
+    fn sight(&self, (point, normal): (DVec3, DVec3), eye: DVec3) -> (f64, [DVec3; 2]) {
+        let towards = eye - point;
+        let blur = BLUR * self.shape.thickness();
+        let inverse = 1.0 / (towards.length_squared() + blur * blur).sqrt();
+        let cosine = normal.dot(towards) * inverse;
+        let gradient = (normal - towards * (cosine * inverse)) * inverse;
+        (cosine, [gradient, (eye - self.place).cross(gradient)])
+    }
+
     /// Distance of a point from the tool, and its derivatives by place and rotation.
     fn distance(&self, point: DVec3, centre: DVec3, headroom: f64) -> (f64, [DVec3; 2]) {
         let arm = centre - self.place;
@@ -103,11 +130,13 @@ impl PosedShape<'_> {
 }
 
 impl NearPieces {
-    /// Finds the pieces that lie no farther from the tool than `margin`, m.
-    pub fn gather(&mut self, fine: &Tessellation, query: &SurfaceQuery, tool: &PosedShape<'_>, margin: f64) {
+    /// Finds the pieces of a surface that lie next to the tool.
+    pub fn gather(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PosedShape<'_>) {
+        let (fine, margin) = (&pressed.fine, pressed.margin);
         self.pieces.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
         let (centre, headroom) = (self.centre, tool.headroom(margin));
+        let eye = tool.eye(centre);
         let reach = |axis: DVec3| tool.support(axis).dot(axis) + margin + (headroom * tool.facing.dot(axis)).max(0.0);
         let high = DVec3::from_array(DVec3::AXES.map(reach));
         let low = -DVec3::from_array(DVec3::AXES.map(|axis| reach(-axis)));
@@ -121,7 +150,7 @@ impl NearPieces {
             }
             let count = fine.pieces_of_triangle() as u32;
             for piece in triangle * count..(triangle + 1) * count {
-                let near = measured(fine, tool, piece, (centre, headroom));
+                let near = measured(fine, tool, piece, (centre, headroom, eye));
                 if near.distance < near.size + margin && self.pieces.len() < MOST_PIECES {
                     self.pieces.push(near);
                 }
@@ -130,7 +159,12 @@ impl NearPieces {
     }
 }
 
-fn measured(fine: &Tessellation, tool: &PosedShape<'_>, piece: u32, (centre, headroom): (DVec3, f64)) -> NearPiece {
+fn measured(
+    fine: &Tessellation,
+    tool: &PosedShape<'_>,
+    piece: u32,
+    (centre, headroom, eye): (DVec3, f64, DVec3),
+) -> NearPiece {
     let corners = fine.corners(piece);
     let [a, b, c] = corners;
     let middle = (a + b + c) / 3.0;
@@ -138,5 +172,6 @@ fn measured(fine: &Tessellation, tool: &PosedShape<'_>, piece: u32, (centre, hea
     let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
     let (distance, by_pose) = tool.distance(middle, centre, headroom);
     let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
-    NearPiece { piece, corners, middle, normal, area, size, distance, by_pose }
+    let (facing, facing_by) = tool.sight((middle, normal), eye);
+    NearPiece { piece, corners, middle, normal, area, size, joined: 1.0, distance, by_pose, facing, facing_by }
 }

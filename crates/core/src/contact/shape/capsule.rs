@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
-use super::{LineEntry, PrincipalCurvatures, ellipsoid, umbilic};
+use super::{LineEntry, ellipsoid};
 
 /// Square of the part of a direction across the axis below which it runs along it.
 const LEAST_ACROSS: f64 = 1e-30;
@@ -11,14 +11,6 @@ const LEAST_ACROSS: f64 = 1e-30;
 pub(super) fn support(radius: f64, half_length: f64, direction: DVec3) -> DVec3 {
     let end = if direction.z == 0.0 { half_length } else { (1.0 + direction.z.signum()) * half_length };
     DVec3::Z * end + radius * direction.normalize_or_zero()
-}
-
-/// Along the axis its side is straight; its ends are spheres.
-pub(super) fn curvature_at(radius: f64, normal: DVec3) -> PrincipalCurvatures {
-    if normal.z != 0.0 {
-        return umbilic(normal, 1.0 / radius);
-    }
-    PrincipalCurvatures { curvatures: [0.0, 1.0 / radius], directions: [DVec3::Z, normal.cross(DVec3::Z)] }
 }
 
 /// Where a line enters. The capsule lies within the cylinder around its whole axis: a line that enters that beside the segment

@@ -1,8 +1,8 @@
 //! Ellipsoid `sum (x_i/e_i)^2 <= 1`.
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::DVec3;
 
-use super::{LineEntry, PrincipalCurvatures};
+use super::LineEntry;
 
 /// Newton's steps for the closest point; eight are enough except within 1e-6 of the medial surface.
 const MAX_NEWTON_STEPS: usize = 24;
@@ -47,36 +47,6 @@ pub(super) fn signed_distance(semi_axes: DVec3, point: DVec3) -> (f64, DVec3) {
 /// Farthest point in a direction.
 pub(super) fn support(semi_axes: DVec3, direction: DVec3) -> DVec3 {
     semi_axes * (semi_axes * direction).normalize_or_zero()
-}
-
-/// The radii of curvature are the principal values of the second derivative of `h(u) = |e u|`, the distance of the
-/// tangent plane of normal `u` from the centre (Schneider, Convex Bodies, section 2.5).
-pub(super) fn curvature_at(semi_axes: DVec3, normal: DVec3) -> PrincipalCurvatures {
-    let squares = semi_axes * semi_axes;
-    let height = (semi_axes * normal).length();
-    let (first, second) = normal.any_orthonormal_pair();
-    let gradient = squares * normal / height;
-    let entry = |a: DVec3, b: DVec3| ((squares * a).dot(b) - gradient.dot(a) * gradient.dot(b)) / height;
-    let radii = DMat2::from_cols_array(&[
-        entry(first, first),
-        entry(first, second),
-        entry(first, second),
-        entry(second, second),
-    ]);
-    let ([large, small], axis) = symmetric_eigen(radii);
-    let long = (axis.x * first + axis.y * second).normalize();
-    PrincipalCurvatures { curvatures: [1.0 / large, 1.0 / small], directions: [long, normal.cross(long)] }
-}
-
-/// Eigenvalues of a symmetric matrix, larger first, and the unit eigenvector of the larger.
-pub(crate) fn symmetric_eigen(m: DMat2) -> ([f64; 2], DVec2) {
-    let (half_trace, half_difference, off) =
-        (0.5 * (m.x_axis.x + m.y_axis.y), 0.5 * (m.x_axis.x - m.y_axis.y), m.x_axis.y);
-    let spread = half_difference.hypot(off);
-    let angle = 0.5 * off.atan2(half_difference);
-    let large = half_trace + spread;
-    // The product of both is the determinant, which keeps the small one's relative precision.
-    ([large, m.determinant() / large], DVec2::from_angle(angle))
 }
 
 /// Where a line enters.

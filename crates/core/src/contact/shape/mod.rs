@@ -45,15 +45,6 @@ pub enum ToolShape {
     Surface(Box<SurfaceShape>),
 }
 
-/// How the surface bends where it reaches farthest in a direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PrincipalCurvatures {
-    /// Curvatures, 1/m; zero where flat.
-    pub curvatures: [f64; 2],
-    /// Unit directions of the two, perpendicular to each other and to the direction asked for.
-    pub directions: [DVec3; 2],
-}
-
 /// Where a straight line enters a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineEntry {
@@ -137,18 +128,6 @@ impl ToolShape {
         }
     }
 
-    /// Curvatures at the support in a direction; `None` for a surface from a file, which has them at no single point.
-    pub fn curvature_at(&self, direction: DVec3) -> Option<PrincipalCurvatures> {
-        let normal = direction.try_normalize()?;
-        Some(match *self {
-            Self::Sphere { radius } => umbilic(normal, 1.0 / radius),
-            Self::Ellipsoid { semi_axes } => ellipsoid::curvature_at(semi_axes, normal),
-            Self::Capsule { radius, .. } => capsule::curvature_at(radius, normal),
-            Self::Punch { radius, rounding } => punch::curvature_at(radius, rounding, normal),
-            Self::Surface(_) => return None,
-        })
-    }
-
     /// Where the line `origin + s direction` (a unit vector), from an origin outside, first enters the shape. Entries beyond
     /// `reach` may be left out.
     pub fn line_entry(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<LineEntry> {
@@ -218,12 +197,6 @@ fn positive(what: &str, value: f64) -> Result<()> {
 fn distance_to_ball(point: DVec3, radius: f64) -> (f64, DVec3) {
     let length = point.length();
     (length - radius, if length > 0.0 { point / length } else { DVec3::NEG_Z })
-}
-
-/// Equal curvatures in all directions.
-fn umbilic(normal: DVec3, curvature: f64) -> PrincipalCurvatures {
-    let (first, second) = normal.any_orthonormal_pair();
-    PrincipalCurvatures { curvatures: [curvature; 2], directions: [first, second] }
 }
 
 #[cfg(test)]

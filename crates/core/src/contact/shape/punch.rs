@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
-use super::{LineEntry, PrincipalCurvatures, umbilic};
+use super::LineEntry;
 
 /// Length of the cylinder over its radius.
 pub(super) const LENGTH: f64 = 4.0;
@@ -32,18 +32,6 @@ pub(super) fn support(radius: f64, rounding: f64, direction: DVec3) -> DVec3 {
     let across = direction.xy().normalize_or_zero().extend(0.0);
     let end = if direction.z == 0.0 { 0.0 } else { direction.z.signum() * (half - rounding) };
     DVec3::Z * (half + end) + (radius - rounding) * across + rounding * direction.normalize_or_zero()
-}
-
-/// On the rim, a torus: `1/rounding` along the meridian, and around the axis the inverse of the normal's length down to it.
-pub(super) fn curvature_at(radius: f64, rounding: f64, normal: DVec3) -> PrincipalCurvatures {
-    let sine = normal.xy().length();
-    if sine == 0.0 {
-        return umbilic(normal, 0.0);
-    }
-    let around = DVec3::Z.cross(normal) / sine;
-    let meridian = if normal.z == 0.0 { 0.0 } else { 1.0 / rounding };
-    let parallel = 1.0 / ((radius - rounding) / sine + rounding);
-    PrincipalCurvatures { curvatures: [parallel, meridian], directions: [around, normal.cross(around)] }
 }
 
 /// Where a line enters, up to `reach`.

@@ -114,32 +114,6 @@ fn supports_reach_farther_than_anything_inside() {
     }
 }
 
-/// The boundary falls away from its tangent plane by half the curvature times the squared distance.
-#[test]
-fn curvatures_are_those_of_the_boundary() {
-    for shape in shapes() {
-        for normal in directions(30) {
-            let told = shape.curvature_at(normal).unwrap();
-            let support = shape.support(normal);
-            for k in 0..2 {
-                let (curvature, along) = (told.curvatures[k], told.directions[k]);
-                assert!(along.dot(normal).abs() < 1e-12);
-                let h = 1e-3 / curvature;
-                let fall =
-                    |by: f64| shape.line_entry(support + by * along + normal, -normal, 2.0).unwrap().distance - 1.0;
-                let measured = (fall(h) + fall(-h)) / (h * h);
-                assert!((measured / curvature - 1.0).abs() < 1e-3, "{shape:?} {normal}: {measured} {curvature}");
-            }
-            assert!(told.directions[0].dot(told.directions[1]).abs() < 1e-12);
-        }
-    }
-    // Flat and straight places.
-    let punch = ToolShape::punch(0.006, 0.001).unwrap().curvature_at(DVec3::NEG_Z).unwrap();
-    assert_eq!(punch.curvatures, [0.0, 0.0]);
-    let side = ToolShape::capsule(0.004, 0.015).unwrap().curvature_at(DVec3::X).unwrap();
-    assert_eq!(side.curvatures, [0.0, 250.0]);
-}
-
 #[test]
 fn lines_enter_where_the_distance_is_first_zero() {
     for shape in shapes() {

@@ -35,6 +35,8 @@ const NEXT: f64 = 0.25;
 const SAME_SIDE: f64 = 0.3;
 /// Feet closer than this, over the tool's radius, are one.
 const ONE: f64 = 0.02;
+/// Planes of a tool that is no sphere whose normals have a larger cosine than this are one.
+const ALIKE: f64 = 0.7;
 /// Two places of a tool closer than this, over its radius, are carried along as one the closer they are: nodes do not tell
 /// them apart.
 const JOINED: f64 = 0.5;
@@ -214,6 +216,14 @@ pub fn go_on(tool: &ToolModel, contact: &mut Contact) -> bool {
     !(fades || far)
 }
 
+/// Whether two places of a tool have become one: a tool that is no sphere presses all on a plane at once.
+fn are_one(tool: &ToolModel, first: &FootPoint, second: &FootPoint) -> bool {
+    match takes_cells(&tool.shape) {
+        true => first.normal.dot(second.normal) > ALIKE,
+        false => first.position.distance(second.position) < ONE * tool.radius,
+    }
+}
+
 /// Lets the later of two places fade that have become one.
 pub fn join(model: &Model, state: &mut State, slots: &[usize]) {
     for (a, &slot) in slots.iter().enumerate() {
@@ -222,8 +232,7 @@ pub fn join(model: &Model, state: &mut State, slots: &[usize]) {
             let touch = first.mode != Mode::Free && second.mode != Mode::Free;
             let same = touch && (first.tool, first.body) == (second.tool, second.body);
             let last = same && !first.local.held && !second.local.held && first.law == second.law;
-            let one = ONE * model.tools[second.tool].radius;
-            if last && first.local.foot.position.distance(second.local.foot.position) < one {
+            if last && are_one(&model.tools[second.tool], &first.local.foot, &second.local.foot) {
                 match second.force == DVec3::ZERO {
                     true => state.contacts.clear(slot),
                     false => hold(&mut state.contacts.slots[slot]),

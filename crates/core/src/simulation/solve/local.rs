@@ -9,7 +9,6 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::contact::footprint::margin;
 use crate::contact::local::cells::Resolution;
 use crate::contact::regular::WIDTH;
 use crate::contact::{Refusal, patch_weights};
@@ -257,8 +256,8 @@ fn follow_motion(
             Some(pressed) => {
                 let at = posed(&tool.shape, contact, contact.relative);
                 let near = &mut local.footprint.near;
-                near.gather(&pressed.fine, &fixed.query, &at, margin(tool.shape.thickness()));
-                if local.footprint.find(&pressed.fine, &own.smooth, foot.normal, weights).is_none() {
+                near.gather(pressed, &fixed.query, &at);
+                if local.footprint.find(&pressed.fine, &own.smooth, contact.plane(), weights).is_none() {
                     own.smooth.weigh(foot, weights);
                 }
             }

@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::friction::Friction;
+use crate::contact::footprint::Plane;
 use crate::contact::smooth::FootPoint;
 
 /// How many requests for strain are remembered: more than are under way.
@@ -60,4 +61,11 @@ pub struct LocalContact {
     pub(in crate::simulation) share: f64,
     /// Places at which its strain was asked for, m, by the lowest digits of its serial then.
     pub(in crate::simulation) asked: [DVec3; ASKED],
+}
+
+impl LocalContact {
+    /// The plane of the contact of a tool that is no sphere, as it was a tick ago.
+    pub fn plane(&self) -> Plane {
+        Plane { point: self.foot.position, normal: self.foot.normal }
+    }
 }

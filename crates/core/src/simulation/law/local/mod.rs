@@ -33,7 +33,7 @@ use glam::{DMat3, DVec3};
 
 use super::{Approach, Law};
 use crate::contact::Refusal;
-use crate::contact::footprint::{NearPiece, PosedShape, PressedSurface, margin};
+use crate::contact::footprint::{NearPiece, PosedShape, PressedSurface};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FootPoint, Neighbourhood};
 use crate::simulation::body::LocalSurface;
@@ -131,7 +131,7 @@ fn shape_arrival(
     let (body, shape) = (approach.body, &approach.tool.shape);
     let (drawn, rotation, thickness) = (body.drawn(), DMat3::from_quat(approach.orientation), shape.thickness());
     let closest = body.closest(place + rotation * shape.centre())?;
-    if closest.signed_distance > shape.bounding_radius() + margin(thickness) + approach.gone.length() {
+    if closest.signed_distance > shape.bounding_radius() + pressed.margin + approach.gone.length() {
         return None;
     }
     let Covering { footprint, weights, .. } = covering;
@@ -139,20 +139,19 @@ fn shape_arrival(
     let gone = if jumped { DVec3::ZERO } else { approach.gone };
     let strides = (gone.length() / (STRIDE * thickness)).ceil().clamp(1.0, MOST_STRIDES);
     let mut at = PosedShape { shape, place, rotation, facing: DVec3::ZERO, sunk: 0.0 };
+    let mut met = None;
     for left in (0..strides as u32).rev() {
         at.place = place - gone * (f64::from(left) / strides);
-        footprint.near.gather(&pressed.fine, drawn.query, &at, margin(thickness));
-        if let Some(normal) = footprint.first_met(if approach.motion.is_some() { DVec3::ZERO } else { gone }) {
-            at.facing = normal;
+        footprint.near.gather(pressed, drawn.query, &at);
+        met = footprint.first_met(if approach.motion.is_some() { DVec3::ZERO } else { gone });
+        if met.is_some() {
             break;
         }
     }
-    if at.facing == DVec3::ZERO {
-        return None;
-    }
-    let at = PosedShape { place, sunk: gone.length(), ..at };
-    footprint.near.gather(&pressed.fine, drawn.query, &at, margin(thickness));
-    let found = footprint.find(&pressed.fine, &local.smooth, at.facing, weights)?;
+    let met = met?;
+    let at = PosedShape { place, sunk: gone.length(), facing: met.normal, ..at };
+    footprint.near.gather(pressed, drawn.query, &at);
+    let found = footprint.find(&pressed.fine, &local.smooth, met, weights)?;
     let facing = |near: &&NearPiece| near.normal.dot(found.normal) > 0.0;
     let deepest = footprint.near.pieces.iter().filter(facing).map(|near| -near.distance).fold(0.0, f64::max);
     Some((found.foot(place), deepest))

@@ -6,7 +6,7 @@ use super::LocalContact;
 use super::friction::{Answer, Friction};
 use super::met::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{Cells, indent_shape, posed, sunk};
-use crate::contact::footprint::{PressedSurface, margin};
+use crate::contact::footprint::PressedSurface;
 use crate::contact::local::{WidenedContact, Widening};
 use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
@@ -125,9 +125,8 @@ fn evaluate_shape(
 ) -> Option<LocalResponse> {
     let Guess { place, force, .. } = guess;
     let posed = posed(tool.shape, contact, place);
-    let near = margin(tool.shape.thickness());
-    cells.footprint.near.gather(&pressed.fine, body.drawn.query, &posed, near);
-    let found = cells.footprint.find(&pressed.fine, body.smooth, contact.foot.normal, weights);
+    cells.footprint.near.gather(pressed, body.drawn.query, &posed);
+    let found = cells.footprint.find(&pressed.fine, body.smooth, contact.plane(), weights);
     let Some(footprint) = found else {
         // Away from the body: no force.
         let compliance = DMat3::ZERO;

@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
     use crate::contact::SurfaceQuery;
-    use crate::contact::footprint::{PressedSurface, margin};
+    use crate::contact::footprint::PressedSurface;
     use crate::contact::local::effective_modulus;
     use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON};
     use crate::contact::smooth::tests::{ball, cube, near};
@@ -127,8 +127,8 @@ mod tests {
 
         fn press(&self, shape: &ToolShape, place: DVec3, orientation: DQuat) -> LocalResponse {
             let drawn = DrawnSurface { surface: &self.surface, query: &self.query };
-            let fine = PressedSurface::pieces(&self.surface, &self.query, &self.smooth, shape.thickness());
-            let pressed = PressedSurface { fine, fields: self.smooth.evened(&self.fields) };
+            let pressed =
+                PressedSurface::new(&self.surface, &self.query, &self.smooth, &self.fields, shape.thickness());
             let body =
                 LocalBody { drawn, smooth: &self.smooth, fields: &self.fields, pressed: Some(&pressed), scale: 1.0 };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
@@ -137,8 +137,9 @@ mod tests {
             let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
             let mut footprint = FootprintScratch::default();
             let at = PosedShape { facing: DVec3::ZERO, ..posed(shape, &contact, place) };
-            footprint.near.gather(&pressed.fine, &self.query, &at, margin(shape.thickness()));
-            contact.foot.normal = footprint.first_met(DVec3::ZERO).expect("a piece");
+            footprint.near.gather(&pressed, &self.query, &at);
+            let met = footprint.first_met(DVec3::ZERO).expect("a piece");
+            (contact.foot.position, contact.foot.normal) = (met.point, met.normal);
             contact.entry = 0.003;
             let mut response = LocalResponse::default();
             for _ in 0..8 {
@@ -196,15 +197,18 @@ mod tests {
     #[test]
     fn the_wrench_over_an_edge_is_the_gradient_of_the_energy() {
         let body = Body::new(cube());
-        // Long and flat tools have several planes on which they may settle there.
-        for (shape, _) in shapes().into_iter().take(1) {
+        for (shape, _) in shapes() {
             for k in 0..9 {
                 let angle = (f64::from(k) * 11.25 + 0.3).to_radians();
                 let towards = DVec3::new(angle.sin(), 0.02, angle.cos()).normalize();
-                let orientation = DQuat::from_rotation_arc(DVec3::Z, towards) * DQuat::from_rotation_z(0.3 + angle);
+                // Of one that stands upright the cells have no direction.
+                let lies = matches!(shape, ToolShape::Capsule { .. });
+                let lying = DQuat::from_rotation_x(if lies { 1.5 } else { 0.0 });
+                let orientation =
+                    DQuat::from_rotation_arc(DVec3::Z, towards) * DQuat::from_rotation_z(0.3 + angle) * lying;
                 let lowest = orientation * shape.support(orientation.conjugate() * -towards);
                 let place = DVec3::new(1.0, 0.52, 1.0) - lowest - 0.04 * towards;
-                check(&body, &shape, (place, orientation), 0.1);
+                check(&body, &shape, (place, orientation), 0.15);
             }
         }
     }
