@@ -9,6 +9,7 @@
 mod bare;
 mod body;
 mod graph;
+mod load;
 mod packed;
 mod prepared;
 mod tool;

@@ -141,29 +141,30 @@ def precompute(
 
     Example: palpate precompute liver.vtu --fix "z < min + 5mm" --touch "z > 2cm" --first "z > 3cm" -o a.palpate
     """
-    import palpate
     from palpate import units
-    from palpate.body import surface_region
+    from palpate.body import Loads, Material, surface_region
     from palpate.cli.bodies import cluster
+    from palpate.errors import StoreError
+    from palpate.green import GreensFunction, plan, precompute
     from palpate.input_file import require_writable
 
     if out is not None:
-        require_writable(out, palpate.StoreError)
-    material = palpate.Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
-    loads = None if gravity is None else palpate.Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
+        require_writable(out, StoreError)
+    material = Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
+    loads = None if gravity is None else Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
     with cluster(dask) as workers:
         made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
         body = body_of(made, material, fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
         asked = {"precision": precision, "touch": region, "first": first}
         asked |= {"path": out, "memory": memory, "dask": workers}
-        planned = palpate.plan(body, **asked)
+        planned = plan(body, **asked)
         print(f"{planned}{' at most: the precision is chosen by the body' if precision is None else ''}")
 
-        def ready(green: palpate.GreensFunction) -> None:
+        def ready(green: GreensFunction) -> None:
             print(f"{green.path}: {len(green.touchable_nodes)} nodes can be touched by now")
 
-        green = palpate.precompute(body, **asked, ready=ready if workers is None else None)
+        green = precompute(body, **asked, ready=ready if workers is None else None)
     print(f"{green.path}: {_green_line(green)}")
     print(_precision_line(green))
 
@@ -183,14 +184,13 @@ def touch(
     """
     import numpy as np
 
-    import palpate
     from palpate.fields import STRAIN_LIMIT
-    from palpate.green import error_text
+    from palpate.green import GreensFunction, error_text
     from palpate.mesh import size_text
     from palpate.scene.default_radius import default_contact_radius
     from palpate.units import length
 
-    green = palpate.GreensFunction.load(store)
+    green = GreensFunction.load(store)
     where = [length(v) for v in point.split(",")]
     how = [None if v.strip() == "-" else length(v) for v in press.split(",")]
     reach = default_contact_radius(green) if radius is None else length(radius)
@@ -219,21 +219,24 @@ def info(
 
     Example: palpate info liver.palpate
     """
-    import palpate
+    from palpate.dynamics import ModalBasis
+    from palpate.green import GreensFunction
+    from palpate.mesh import TetMesh
+    from palpate.scene import Scene
 
     if file.name.endswith(".modes.palpate"):
-        basis = palpate.ModalBasis.load(file)
+        basis = ModalBasis.load(file)
         print(f"{file}: {len(basis)} modes, {basis.frequencies[0]:.4g} to {basis.frequencies[-1]:.4g} Hz")
         _print_origin(basis.description, basis.key)
         return
     if file.suffix == ".palpate":
-        green = palpate.GreensFunction.load(file)
+        green = GreensFunction.load(file)
         print(f"{file}: {_green_line(green)}")
         print(f"  {_precision_line(green)}")
         _print_origin(green.description, green.key)
         return
     if file.suffix == ".toml":
-        scene = palpate.Scene.read(file)
+        scene = Scene.read(file)
         scene.require_files()
         print(f"{file}: scene of {scene.name}")
         for name, value in scene.model_dump(by_alias=True, exclude_none=True).items():
@@ -248,7 +251,7 @@ def info(
         print_surface(file, unit)
         return
     # A size that needs asking about is what this command tells.
-    made = palpate.TetMesh.read(file, unit or "m")
+    made = TetMesh.read(file, unit or "m")
     print(f"{file}: {_mesh_line(made)}")
     low, high = 1e3 * made.bounds
     print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * made.volume:.4g} cm3")

@@ -106,14 +106,14 @@ def body_of(mesh: TetMesh, material: Material, fix: str, loads: Loads | None = N
         A predicate that holds nowhere.
 
     """
-    import palpate
-    from palpate.body import parse
+    from palpate.body import Body, parse
+    from palpate.errors import BodyError
 
     mask = parse(fix)(mesh.nodes)
     if not mask.any():
         low, high = mesh.bounds.round(4).tolist()
-        raise palpate.BodyError(f"no node satisfies --fix '{fix}': the body reaches from {low} to {high} m")
-    return palpate.Body(mesh, material=material, fixed=mask, loads=loads)
+        raise BodyError(f"no node satisfies --fix '{fix}': the body reaches from {low} to {high} m")
+    return Body(mesh, material=material, fixed=mask, loads=loads)
 
 
 def likely_units(path: Path) -> list[str]:

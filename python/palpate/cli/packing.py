@@ -19,9 +19,10 @@ def pack(
 
     Example: palpate pack scene.toml liver.pack
     """
-    import palpate
+    from palpate import simulation
+    from palpate.scene import Scene
 
-    read = palpate.Scene.of_store(scene) if scene.suffix == ".palpate" else palpate.Scene.read(scene)
-    palpate.pack(read, out)
+    read = Scene.of_store(scene) if scene.suffix == ".palpate" else Scene.read(scene)
+    simulation.pack(read, out)
     size = sum(file.stat().st_size for file in out.iterdir())
     print(f"{out}: {len(read.bodies)} bodies, {len(read.tools)} tools, {size / 1e6:.1f} MB")

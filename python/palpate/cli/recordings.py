@@ -40,18 +40,19 @@ def replay(
 
     Example: palpate replay press.mcap --headless
     """
-    import palpate
+    from palpate import simulation
     from palpate.errors import SceneError
+    from palpate.scene import Scene
 
-    recording = palpate.Recording.load(file)
-    given = None if scene is None else palpate.Scene.read(scene)
+    recording = simulation.Recording.load(file)
+    given = None if scene is None else Scene.read(scene)
     try:
         if not headless:
             from palpate.viewer.live import open_replay
 
             open_replay(recording, given, host=host, port=port, browser=browser)
             return
-        made = palpate.replay(recording, given, progress=True)
+        made = simulation.replay(recording, given, progress=True)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error
     print(_said_of(file, recording, made))

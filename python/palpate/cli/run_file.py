@@ -186,8 +186,9 @@ def _radii(tool: Any, radius: str) -> dict[str, float]:
 
 def _bare(file: Path, options: RunOptions) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
-    import palpate
     from palpate import units
+    from palpate.body import Material
+    from palpate.green import precompute
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
 
@@ -212,9 +213,9 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
         told.append(f"E = {modulus} (-E)")
     if options.poissons_ratio is None:
         told.append(f"Poisson's ratio {ratio} (--nu)")
-    material = palpate.Material(units.pressure(modulus), ratio, units.density(density))
+    material = Material(units.pressure(modulus), ratio, units.density(density))
     body = body_of(mesh, material, fix)
-    green = palpate.precompute(body)
+    green = precompute(body)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
     of_loop = {name: getattr(options, name) for name in OF_LOOP}

@@ -23,8 +23,8 @@ def record(
 
     Example: palpate bench record examples/block.toml examples/two_bodies.toml --minutes 10
     """
-    from palpate import Scene
     from palpate.progress import narrated, progress_reporter
+    from palpate.scene import Scene
     from palpate.validation.bench.record import run_session
 
     results = []

@@ -14,7 +14,6 @@ from palpate.cli.app import app
 from palpate.cli.completion import formats
 
 if TYPE_CHECKING:
-    from palpate.scene import Scene
     from palpate.sessions import Comparison, QuantityDifference
     from palpate.simulation import Recording
 
@@ -45,14 +44,15 @@ def export(
 
     Example: palpate export press.mcap --out results/press.pvd --rate 60
     """
-    import palpate
+    from palpate import sessions
+    from palpate.scene import Scene
     from palpate.units import time
 
     target = _target(file, to, out)
     recording = _loaded(file)
     span = {"start": time(start), "end": None if end is None else time(end)}
-    same = None if scene is None else palpate.Scene.read(scene)
-    for written in palpate.export(recording, target, rate=rate, scene=same, progress=True, **span):
+    same = None if scene is None else Scene.read(scene)
+    for written in sessions.export(recording, target, rate=rate, scene=same, progress=True, **span):
         print(written)
 
 
@@ -119,13 +119,14 @@ def compare(
 
 
 def _rerun(recording: Recording, scene: Path) -> Recording:
-    import palpate
     from palpate.progress import narrated
+    from palpate.scene import Scene
+    from palpate.sessions import rerun
 
-    read: Scene = palpate.Scene.read(scene)
+    read = Scene.read(scene)
     with narrated(f"preparing {read.name}"):
         built = read.build()
-    return palpate.rerun(recording, built, progress=True)
+    return rerun(recording, built, progress=True)
 
 
 def _write(out: Path, both: tuple[Recording, Recording], files: tuple[Path, Path], keep: bool) -> None:

@@ -96,10 +96,9 @@ def touches(
     """
     from dataclasses import asdict, replace
 
-    from palpate import Scene
     from palpate.models import NAMES
     from palpate.progress import narrated
-    from palpate.scene import model_scene
+    from palpate.scene import Scene, model_scene
     from palpate.validation.bench.emulation import frictionless, known_devices
     from palpate.validation.bench.touches import HANDS, controls, hardest_at_rest, touches
     from palpate.validation.bench.zwidth import Spring

@@ -15,10 +15,10 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 
 import numpy as np
 
-import palpate
 from palpate.atomic import written_beside
 from palpate.body import Body, Material, parse
 from palpate.cache import cache_directory
@@ -219,7 +219,7 @@ class _Known:
     """Forces at the places of an exam by the key of the store, kept in a file of the cache."""
 
     def __init__(self, exam: ExamFile, places: Places):
-        said = json.dumps([palpate.__version__, exam.what_is_felt(), places.points.tolist()], sort_keys=True)
+        said = json.dumps([version("palpate"), exam.what_is_felt(), places.points.tolist()], sort_keys=True)
         self._path = cache_directory() / f"{hashlib.sha256(said.encode()).hexdigest()[:32]}.felt.palpate"
         self.forces: dict[str, list[float]] = {}
         if self._path.exists():

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from palpate import __version__
 from palpate.errors import Error, SimulationError, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
@@ -33,6 +33,7 @@ from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.session import Session, Wants, choices
 from palpate.viewer.surface_map import SurfaceMap
 
+VERSION = version("palpate")
 DEFAULT_PORT = 8642
 FRAME_RATE = 60.0
 # Bounds on what a client may send and how many there may be.
@@ -241,7 +242,7 @@ class ViewerServer:
         """Tell a page what it needs to know before its first scene."""
         role = "control" if self._controller is client else "watch"
         models = choices(self._models)
-        await client.send({"type": "welcome", "role": role, "version": __version__, "models": models})
+        await client.send({"type": "welcome", "role": role, "version": VERSION, "models": models})
         await client.send(await self._worker.call(self._computing.message, self._session))
 
     async def _welcome(self, connection: ServerConnection) -> bool:
