@@ -60,7 +60,7 @@ fn without_force<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance) -> Result
             }
             return ControlFlow::Continue(());
         };
-        let force = bench.motors().wrench.force;
+        let force = bench.motors().force;
         if after_fault > facts.late_ticks && force.length() > facts.force_tolerance {
             return ControlFlow::Break(Err(format!("{force} N, {after_fault} ticks after the fault: {fault}")));
         }
@@ -85,7 +85,7 @@ fn works_again<B: Bench>(rig: &mut Rig<B>) -> Verdict {
         });
         let (said, _) = spring.tick(device, now_ns);
         good = if said.is_ok() { good + 1 } else { 0 };
-        let force = bench.motors().wrench.force;
+        let force = bench.motors().force;
         if good > 2 * facts.late_ticks && force.length() > facts.force_tolerance {
             return ControlFlow::Break(Err(format!("{force} N before the reset")));
         }

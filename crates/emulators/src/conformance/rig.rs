@@ -147,7 +147,7 @@ impl<B: Bench> Rig<B> {
                 return ControlFlow::Continue(());
             }
             ControlFlow::Break(match (said, spring.fault) {
-                (Ok(reading), None) => Ok(Seen { reading, written, motors: bench.motors().wrench }),
+                (Ok(reading), None) => Ok(Seen { reading, written, motors: bench.motors() }),
                 (Err(fault), _) | (_, Some(fault)) => Err(format!("a fault of a device that is well: {fault}")),
             })
         });

@@ -48,7 +48,7 @@ pub fn write_and_settle<B: Bench>(rig: &mut Rig<B>, wrench: Wrench) -> Result<Wr
             return ControlFlow::Continue(());
         }
         ControlFlow::Break(match said.and(written) {
-            Ok(()) => Ok(bench.motors().wrench),
+            Ok(()) => Ok(bench.motors()),
             Err(fault) => Err(format!("{wrench:?} is answered by a fault: {fault}")),
         })
     });
@@ -105,7 +105,7 @@ fn refuses_nan<B: Bench>(rig: &mut Rig<B>) -> Verdict {
                 left -= 1;
                 return ControlFlow::Continue(());
             }
-            ControlFlow::Break(bench.motors().wrench)
+            ControlFlow::Break(bench.motors())
         });
         let force = motors.ok_or("no ticks")?.force;
         close_to("the force", force, DVec3::ZERO, rig.facts.force_tolerance)?;
@@ -123,7 +123,7 @@ fn stops<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     let force = rig.each_tick(60_000, move |bench, _, _| {
         // One more tick's length, for the machine that runs the suite sleeps when it likes.
         match began.elapsed() > holds + PERIOD {
-            true => ControlFlow::Break(bench.motors().wrench.force),
+            true => ControlFlow::Break(bench.motors().force),
             false => ControlFlow::Continue(()),
         }
     });
@@ -139,7 +139,7 @@ fn closes<B: Bench>(seat: &mut Seat<B>) -> Verdict {
             Ok((rig.facts.force_tolerance, rig.facts.force_holds))
         })?;
         std::thread::sleep(holds);
-        let left = seat.bench().motors().wrench.force;
+        let left = seat.bench().motors().force;
         close_to("the force after closing", left, DVec3::ZERO, tolerance)?;
     }
     Ok(())
