@@ -30,7 +30,7 @@ def built() -> Path:
 def library(name: str) -> str:
     """File of an emulated library, such as ``"hd"``."""
     found = [*built().glob(f"libpalpate_emulated_{name}.*")]
-    return str(next(file for file in found if file.suffix in (".so", ".dylib", ".dll")))
+    return str(next(file for file in found if file.suffix in (".so", ".dylib")))
 
 
 @contextmanager
