@@ -7,6 +7,5 @@ pub mod library;
 mod priority;
 mod tip;
 
-pub use hand::{HAND_VARIABLE, hand_from_environment};
 pub use priority::be_on_time;
 pub use tip::{SteeredTip, Tip};

@@ -195,7 +195,7 @@ fn every_release_of_haplys_service_conforms() {
     });
 }
 
-/// `cargo test --release -p palpate-emulators --test conformance minute -- --ignored --nocapture`; so below.
+/// `cargo test --release -p palpate-emulators --test conformance minute -- --ignored --nocapture --test-threads 1`.
 fn endures_a_minute_at_1_khz(bench: impl Bench) {
     let figures = endure(bench, Endurance { ticks: 60_000, hurried: false }).expect("no tick missed");
     println!("{figures:#?}");

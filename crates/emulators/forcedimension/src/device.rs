@@ -32,9 +32,9 @@ pub struct Device {
     /// Whether the motors are on.
     enabled: bool,
     force_off_cause: i32,
-    /// What the motors were told last, which they put out whenever they are on.
-    told: Wrench,
-    told_at: Instant,
+    /// The latest command, which the motors put out whenever they are on.
+    commanded: Wrench,
+    commanded_at: Instant,
     /// In steps of 125 microseconds; 0: none.
     pub watchdog: u8,
     measured: Option<Tip>,
@@ -59,8 +59,8 @@ impl Emulated for Device {
             moved: now,
             enabled: false,
             force_off_cause: force_off::NONE,
-            told: Wrench::default(),
-            told_at: now,
+            commanded: Wrench::default(),
+            commanded_at: now,
             watchdog: 0,
             measured: None,
         })
@@ -79,14 +79,14 @@ impl Emulated for Device {
             self.switch(true, force_off::NONE);
         }
         if !self.hardware.is_plugged() {
-            self.told = Wrench::default();
+            self.commanded = Wrench::default();
             self.switch(false, force_off::UNPLUGGED);
         }
     }
 
     fn motors(&mut self) -> Wrench {
         self.advance();
-        self.put_out()
+        self.output()
     }
 }
 
@@ -98,7 +98,7 @@ pub struct Library {
 }
 
 impl Device {
-    /// What every call of an open device begins with: it has moved, and may have switched off.
+    /// Begins a call to the open device, which has moved meanwhile and may have switched off.
     pub fn begin_call(&mut self) -> Result<(), i32> {
         self.advance();
         match (self.hardware.is_open(), self.hardware.is_connected()) {
@@ -128,28 +128,28 @@ impl Device {
     fn advance(&mut self) {
         let now = Instant::now();
         let allowed = Duration::from_micros(125 * u64::from(self.watchdog)) + WATCHDOG_LENIENCY;
-        if self.enabled && self.watchdog > 0 && now - self.told_at > allowed {
+        if self.enabled && self.watchdog > 0 && now - self.commanded_at > allowed {
             self.switch(false, force_off::WATCHDOG);
         }
         self.hardware.tip.advance((now - self.moved).as_secs_f64());
         self.moved = now;
     }
 
-    /// Motors off, or on again with what they were told last.
+    /// Switches the motors off, or on again with the latest command.
     fn switch(&mut self, enabled: bool, cause: i32) {
-        (self.enabled, self.force_off_cause, self.told_at) = (enabled, cause, Instant::now());
-        self.hardware.tip.write(self.put_out().force);
+        (self.enabled, self.force_off_cause, self.commanded_at) = (enabled, cause, Instant::now());
+        self.hardware.tip.write(self.output().force);
     }
 
     pub fn open(&mut self) {
         self.hardware.set_open(true);
-        (self.watchdog, self.measured, self.told) = (0, None, Wrench::default());
+        (self.watchdog, self.measured, self.commanded) = (0, None, Wrench::default());
         self.switch(false, force_off::NONE);
     }
 
     pub fn close(&mut self) {
         self.hardware.set_open(false);
-        self.told = Wrench::default();
+        self.commanded = Wrench::default();
         self.switch(false, force_off::NONE);
     }
 
@@ -160,7 +160,7 @@ impl Device {
         }
     }
 
-    /// What measuring and telling forces fails with, and nothing else.
+    /// The error of measurements and commands.
     fn check_geometry(&self) -> Result<(), i32> {
         if self.has(Disturbance::DriverError) { Err(error::GEOMETRY) } else { Ok(()) }
     }
@@ -182,24 +182,24 @@ impl Device {
         self.measured.map_or_else(|| self.measure().map(|(tip, _)| tip), Ok)
     }
 
-    /// Tells the motors. They put out whatever it is: a driver keeps to their largest force.
-    pub fn tell(&mut self, wrench: Wrench) -> Result<(), i32> {
+    /// Commands a wrench. Its size is not limited: drivers keep to the largest force.
+    pub fn command(&mut self, wrench: Wrench) -> Result<(), i32> {
         self.check_geometry()?;
         if !wrench.force.is_finite() || !wrench.torque.is_finite() {
             return Err(error::INVALID);
         }
         let torque = if self.model.active_wrist { wrench.torque } else { DVec3::ZERO };
-        self.told = Wrench { torque, ..wrench };
+        self.commanded = Wrench { torque, ..wrench };
         if !self.enabled {
             return Err(error::NOT_ENABLED);
         }
-        self.told_at = Instant::now();
+        self.commanded_at = Instant::now();
         self.hardware.tip.write(wrench.force);
         Ok(())
     }
 
-    fn put_out(&self) -> Wrench {
-        if self.enabled { self.told } else { Wrench::default() }
+    fn output(&self) -> Wrench {
+        if self.enabled { self.commanded } else { Wrench::default() }
     }
 
     /// Power, connection, whether it is to be initialised, and why its motors are off, where the vendor has them.

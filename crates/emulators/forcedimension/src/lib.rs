@@ -3,8 +3,8 @@
 //! From the vendor's documentation: results below zero are errors, told apart by the calling thread's last error, 1 is
 //! a measurement that is repeated because it was asked for too early; no forces before they are enabled; a watchdog; causes of
 //! motors that are off. Which error an unplugged device answers with is an assumption (2, communication), as is that the device
-//! has to be opened anew afterwards. Assumed for the worst: motors that have been off and are on again put out what they were
-//! told last, and motors put out what they are told, however large.
+//! has to be opened anew afterwards. Assumed for the worst: motors that have been off and are on again put out the latest
+//! command, and motors put out a command of any size.
 //!
 //! `PALPATE_EMULATED_FORCEDIMENSION` names the models that are plugged in (`omega.3`, `omega.6`, `omega.7`, `delta.3`, `sigma.7`,
 //! `lambda.7`, `falcon`, by commas), `PALPATE_EMULATED_HAND` leads the hand that holds each.
@@ -225,15 +225,15 @@ pub unsafe extern "system" fn dhdGetOrientationFrame(matrix: *mut [c_double; 9],
     unsafe { put(std::array::from_fn(|entry| matrix.cast::<c_double>().wrapping_add(entry)), rows) }
 }
 
-fn tell(id: c_char, force: DVec3, torque: DVec3) -> c_int {
+fn command(id: c_char, force: DVec3, torque: DVec3) -> c_int {
     let wrench = Wrench { force: from_vendor(force), torque: from_vendor(torque) };
-    let code = with(id, |device| device.tell(wrench).map(|()| 0));
+    let code = with(id, |device| device.command(wrench).map(|()| 0));
     perhaps_nonsense(id, code, &mut [])
 }
 
 #[unsafe(no_mangle)]
 pub extern "system" fn dhdSetForce(x: c_double, y: c_double, z: c_double, id: c_char) -> c_int {
-    tell(id, DVec3::new(x, y, z), DVec3::ZERO)
+    command(id, DVec3::new(x, y, z), DVec3::ZERO)
 }
 
 #[unsafe(no_mangle)]
@@ -246,7 +246,7 @@ pub extern "system" fn dhdSetForceAndTorque(
     about_z: c_double,
     id: c_char,
 ) -> c_int {
-    tell(id, DVec3::new(x, y, z), DVec3::new(about_x, about_y, about_z))
+    command(id, DVec3::new(x, y, z), DVec3::new(about_x, about_y, about_z))
 }
 
 #[unsafe(no_mangle)]

@@ -49,8 +49,8 @@ pub struct Device {
     framed_tick: Option<u64>,
     /// Part of the force that the amplifiers let through.
     ramp: f64,
-    put_out: Wrench,
-    put_out_at: Instant,
+    output: Wrench,
+    output_at: Instant,
 }
 
 impl Emulated for Device {
@@ -86,8 +86,8 @@ impl Emulated for Device {
             framed: false,
             framed_tick: None,
             ramp: 1.0,
-            put_out: Wrench::default(),
-            put_out_at: Instant::now(),
+            output: Wrench::default(),
+            output_at: Instant::now(),
         })
     }
 
@@ -98,15 +98,15 @@ impl Emulated for Device {
     fn disturb(&mut self, disturbance: Option<Disturbance>) {
         self.hardware.disturb(disturbance);
         if !self.hardware.is_plugged() {
-            self.put_out(Wrench::default());
+            self.set_output(Wrench::default());
         }
     }
 
     fn motors(&mut self) -> Wrench {
-        if self.put_out_at.elapsed() > AMPLIFIER_HOLDS && self.put_out != Wrench::default() {
-            self.put_out(Wrench::default());
+        if self.output_at.elapsed() > AMPLIFIER_HOLDS && self.output != Wrench::default() {
+            self.set_output(Wrench::default());
         }
-        self.put_out
+        self.output
     }
 
     fn hurry(as_fast_as_possible: bool) {
@@ -131,7 +131,7 @@ impl Device {
     pub fn set_initialised(&mut self, initialised: bool) {
         self.hardware.set_open(initialised);
         (self.force_output, self.framed, self.ramp) = (false, false, 1.0);
-        self.put_out(Wrench::default());
+        self.set_output(Wrench::default());
     }
 
     /// Time passes, s.
@@ -176,18 +176,18 @@ impl Device {
         let Wrench { force, torque } = self.commanded;
         if !force.is_finite() || force.length() > self.max_force * (1.0 + 1e-9) {
             self.ramp = 0.0;
-            self.put_out(Wrench::default());
+            self.set_output(Wrench::default());
             return Err(error::EXCEEDED_MAX_FORCE);
         }
         let share = if self.force_output { self.ramp } else { 0.0 };
         let torque = if self.has_torque { torque } else { DVec3::ZERO };
-        self.put_out(Wrench { force: share * force, torque: share * torque });
+        self.set_output(Wrench { force: share * force, torque: share * torque });
         self.ramp = (self.ramp + RAMP / self.max_force * period).min(1.0);
         Ok(())
     }
 
-    fn put_out(&mut self, wrench: Wrench) {
-        (self.put_out, self.put_out_at) = (wrench, Instant::now());
+    fn set_output(&mut self, wrench: Wrench) {
+        (self.output, self.output_at) = (wrench, Instant::now());
         self.hardware.tip.write(wrench.force);
     }
 }

@@ -105,7 +105,7 @@ impl Arm {
         let moment = |time: f64| self.began + Duration::from_secs_f64(time);
         let at = moment(self.tip.time());
         let until = self.command.map(|(_, until)| moment(until));
-        self.end.tell(Commanded { motors: MotorForce { force, at }, until });
+        self.end.publish(Commanded { motors: MotorForce { force, at }, until });
         if force != self.motors.force {
             self.tip.write(force);
             if self.changes.len() < MOST_CHANGES {

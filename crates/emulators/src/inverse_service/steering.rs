@@ -67,8 +67,8 @@ impl ArmEnd {
         if self.put.update() { *self.put.output_buffer_mut() } else { None }
     }
 
-    /// Tells what is on the motors.
-    pub fn tell(&mut self, commanded: Commanded) {
+    /// Publishes what is on the motors.
+    pub fn publish(&mut self, commanded: Commanded) {
         self.commanded.write(commanded);
     }
 }

@@ -84,7 +84,7 @@ impl EmulatedLibrary {
     /// When the library is not there, or is not an emulated one.
     pub fn with_devices(name: &str, devices: &str) -> Self {
         let path = built_library(name);
-        let alone = one_at_a_time(&path).lock().unwrap_or_else(PoisonError::into_inner);
+        let alone = lock_of(&path).lock().unwrap_or_else(PoisonError::into_inner);
         // SAFETY: the emulated libraries have no initialisation, and export a value of this type under this name.
         let steering = unsafe {
             let library: &'static Library = Box::leak(Box::new(Library::new(&path).expect("a library that loads")));
@@ -114,7 +114,7 @@ impl Deref for EmulatedLibrary {
 }
 
 /// The lock of a library.
-fn one_at_a_time(path: &Path) -> &'static Mutex<()> {
+fn lock_of(path: &Path) -> &'static Mutex<()> {
     static LOCKS: Mutex<BTreeMap<PathBuf, &'static Mutex<()>>> = Mutex::new(BTreeMap::new());
     let mut locks = LOCKS.lock().unwrap_or_else(PoisonError::into_inner);
     locks.entry(path.to_owned()).or_insert_with(|| Box::leak(Box::default()))
