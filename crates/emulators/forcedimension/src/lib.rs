@@ -14,6 +14,7 @@
 #![allow(clippy::missing_safety_doc, missing_docs)]
 
 mod device;
+mod error;
 mod models;
 
 use std::cell::Cell;
@@ -25,20 +26,6 @@ use palpate_emulators::conformance::Disturbance;
 use palpate_emulators::library::{Steering, World, rotation, steering, world};
 
 use crate::device::Device;
-
-/// Numbers of errors.
-mod error {
-    pub const NONE: i32 = 0;
-    pub const COMMUNICATION: i32 = 2;
-    pub const NO_DEVICE_FOUND: i32 = 5;
-    pub const NOT_AVAILABLE: i32 = 6;
-    pub const GEOMETRY: i32 = 8;
-    pub const EXPERT_MODE_DISABLED: i32 = 9;
-    pub const INVALID_INDEX: i32 = 15;
-    pub const NOT_ENABLED: i32 = 19;
-    pub const DEVICE_IN_USE: i32 = 20;
-    pub const INVALID: i32 = 21;
-}
 
 /// The values are those of the last call.
 const TIMEGUARD: c_int = 1;

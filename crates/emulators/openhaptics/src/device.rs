@@ -9,11 +9,10 @@ use palpate_devices::Wrench;
 use palpate_devices::emulated::known;
 use palpate_emulators::Tip;
 use palpate_emulators::conformance::Disturbance;
-use palpate_emulators::library::{Emulated, Hardware, World};
+use palpate_emulators::library::{Emulated, Hardware, World, world};
 
-use crate::errors::Library;
+use crate::library::Library;
 use crate::numbers::error;
-use crate::scheduler;
 
 /// Name of the default device.
 pub const DEFAULT: &str = "Default Device";
@@ -110,7 +109,7 @@ impl Emulated for Device {
     }
 
     fn hurry(as_fast_as_possible: bool) {
-        scheduler::hurry(as_fast_as_possible);
+        world::<Self>().library.hurried = as_fast_as_possible;
     }
 }
 

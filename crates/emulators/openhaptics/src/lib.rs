@@ -15,7 +15,7 @@
 #![allow(clippy::missing_safety_doc, missing_docs)]
 
 mod device;
-mod errors;
+mod library;
 mod numbers;
 mod scheduler;
 
@@ -26,7 +26,7 @@ use palpate_emulators::conformance::Disturbance;
 use palpate_emulators::library::{Random, Steering, World, rotation, steering, world};
 
 use crate::device::{DEFAULT, Device, Snapshot};
-use crate::errors::{ErrorInfo, with};
+use crate::library::ErrorInfo;
 use crate::numbers::{INVALID_HANDLE, calibration, capability, error, parameter};
 use crate::scheduler::Callback;
 
@@ -56,6 +56,18 @@ fn may_call() -> bool {
 /// An error of no device.
 fn raise(code: u32) {
     world::<Device>().library.raise(code, INVALID_HANDLE);
+}
+
+/// Does something with an initialised device; errors lie on the stack.
+fn with<R>(world: &mut World<Device>, handle: u32, act: impl FnOnce(&mut Device) -> Result<R, u32>) -> Option<R> {
+    let device = world.devices.get_mut(handle as usize).filter(|device| device.is_initialised());
+    match device.ok_or(error::BAD_HANDLE).and_then(act) {
+        Ok(result) => Some(result),
+        Err(code) => {
+            world.library.raise(code, handle);
+            None
+        }
+    }
 }
 
 /// Does something with the current device.

@@ -36,7 +36,6 @@ struct Schedule {
 
 static SCHEDULE: Mutex<Schedule> = Mutex::new(Schedule { scheduled: Vec::new(), next: 1, thread: None });
 static RUNNING: AtomicBool = AtomicBool::new(false);
-static HURRIED: AtomicBool = AtomicBool::new(false);
 static TICKS: AtomicU64 = AtomicU64::new(0);
 
 thread_local! {
@@ -59,11 +58,6 @@ fn is_running() -> bool {
 /// Number of the tick, while the scheduler runs.
 pub fn tick() -> Option<u64> {
     is_running().then(|| TICKS.load(Ordering::Acquire))
-}
-
-/// Without pauses between ticks.
-pub fn hurry(on: bool) {
-    HURRIED.store(on, Ordering::Release);
 }
 
 pub fn add(callback: Callback, data: *mut c_void) -> c_ulong {
@@ -113,7 +107,7 @@ fn run() {
     let mut last = Instant::now();
     let mut deadline = last;
     while is_running() {
-        let hurried = HURRIED.load(Ordering::Acquire);
+        let hurried = world::<Device>().library.hurried;
         if !hurried {
             deadline = (deadline + PERIOD).max(Instant::now());
             std::thread::sleep(deadline - Instant::now().min(deadline));

@@ -1,11 +1,8 @@
-//! The library's one stack of errors, and the device of the calls that name none.
+//! What the library has beside its devices: one stack of errors, the device of the calls that name none.
 
 use std::ffi::c_int;
 
-use palpate_emulators::library::World;
-
-use crate::device::Device;
-use crate::numbers::{INVALID_HANDLE, error};
+use crate::numbers::INVALID_HANDLE;
 
 /// Most errors on the stack.
 const DEEPEST: usize = 64;
@@ -23,12 +20,14 @@ pub struct ErrorInfo {
 pub struct Library {
     /// Device of the calls that name none.
     pub current: u32,
+    /// Ticks without pauses.
+    pub hurried: bool,
     errors: Vec<ErrorInfo>,
 }
 
 impl Default for Library {
     fn default() -> Self {
-        Self { current: INVALID_HANDLE, errors: Vec::new() }
+        Self { current: INVALID_HANDLE, hurried: false, errors: Vec::new() }
     }
 }
 
@@ -43,17 +42,5 @@ impl Library {
     /// The newest error.
     pub fn pop(&mut self) -> ErrorInfo {
         self.errors.pop().unwrap_or(ErrorInfo { device: self.current, ..ErrorInfo::default() })
-    }
-}
-
-/// Does something with an initialised device; errors lie on the stack.
-pub fn with<R>(world: &mut World<Device>, handle: u32, act: impl FnOnce(&mut Device) -> Result<R, u32>) -> Option<R> {
-    let device = world.devices.get_mut(handle as usize).filter(|device| device.is_initialised());
-    match device.ok_or(error::BAD_HANDLE).and_then(act) {
-        Ok(result) => Some(result),
-        Err(code) => {
-            world.library.raise(code, handle);
-            None
-        }
     }
 }
