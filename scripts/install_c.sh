@@ -21,20 +21,10 @@ lib="$prefix/lib"
 place() { install -m "$1" "$2" "$3.new" && mv -f "$3.new" "$3"; }
 place_library() { install -m "$1" "$2" "$3.new" && strip -S "$3.new" && mv -f "$3.new" "$3"; }
 place 644 "$root/crates/capi/include/palpate.h" "$prefix/include/palpate.h"
-case "$(uname -s)" in
-    Darwin)
-        shared="libpalpate.$major.dylib"
-        place_library 755 "$built/libpalpate.dylib" "$lib/libpalpate.$major.$minor.dylib"
-        ln -sfn "libpalpate.$major.$minor.dylib" "$lib/$shared"
-        ln -sfn "$shared" "$lib/libpalpate.dylib"
-        ;;
-    *)
-        shared="libpalpate.so.$major"
-        place_library 755 "$built/libpalpate.so" "$lib/libpalpate.so.$major.$minor"
-        ln -sfn "libpalpate.so.$major.$minor" "$lib/$shared"
-        ln -sfn "$shared" "$lib/libpalpate.so"
-        ;;
-esac
+shared="libpalpate.so.$major"
+place_library 755 "$built/libpalpate.so" "$lib/libpalpate.so.$major.$minor"
+ln -sfn "libpalpate.so.$major.$minor" "$lib/$shared"
+ln -sfn "$shared" "$lib/libpalpate.so"
 place_library 644 "$built/libpalpate.a" "$lib/libpalpate.a"
 
 cat >"$lib/pkgconfig/palpate.pc" <<END

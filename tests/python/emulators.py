@@ -12,6 +12,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 
+# The way of the hand that holds a device: 8 mm below the middle of its workspace and up again, every second.
+PRESS = "0 0 0 5; 0.5 0 0 -8; 1 0 0 5"
+# Held loosely in one place.
+REST = "0 0 0 0"
+
 
 @cache
 def built() -> Path:
@@ -25,15 +30,15 @@ def built() -> Path:
 def library(name: str) -> str:
     """File of an emulated library, such as ``"hd"``."""
     found = [*built().glob(f"libpalpate_emulated_{name}.*")]
-    return str(next(file for file in found if file.suffix in (".so", ".dylib", ".dll")))
+    return str(next(file for file in found if file.suffix in (".so", ".dylib")))
 
 
 @contextmanager
-def inverse_service(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """Address and process of a service that runs."""
-    program = built() / "inverse-service"
-    command = [str(program), "--port", "0", "--events-port", "0", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+def inverse_service(hand: str = PRESS) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """Address and process of a service with an arm in a hand."""
+    command = [str(built() / "inverse-service"), "--port", "0", "--events-port", "0"]
+    environment = {**os.environ, "PALPATE_EMULATED_HAND": hand}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stdout is not None
         line = process.stdout.readline()
         address = re.search(r"ws://\S+", line)

@@ -1,58 +1,56 @@
 //! The device of a tool whose readings the program brings and whose wrenches it takes.
 
+use std::sync::{Arc, Mutex};
+
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Wrench};
-use triple_buffer::{Input, Output, triple_buffer};
 
-/// A wrench, and the tick that it answers.
-type Answer = (u64, Wrench);
+/// What a tick reads and writes.
+#[derive(Default)]
+struct Exchange {
+    reading: Reading,
+    wrench: Wrench,
+}
 
-/// The loop's end: both hand-offs are used within one tick by the thread that makes it.
-pub struct BroughtDevice {
-    readings: Output<(u64, Reading)>,
-    wrenches: Input<Answer>,
+/// The program's end. Both ends are used within one tick, by the thread that makes it: the lock is always free.
+pub struct DeviceEnd(Arc<Mutex<Exchange>>);
+
+/// The loop's end.
+pub struct ProgramDevice {
+    exchange: Arc<Mutex<Exchange>>,
     limits: DeviceLimits,
 }
 
-/// The program's end.
-pub struct DeviceEnd {
-    readings: Input<(u64, Reading)>,
-    wrenches: Output<Answer>,
-}
-
 /// Both ends of a device.
-pub fn brought(limits: DeviceLimits) -> (DeviceEnd, BroughtDevice) {
-    let (readings_in, readings_out) = triple_buffer(&(0, Reading::default()));
-    let (wrenches_in, wrenches_out) = triple_buffer(&(0, Wrench::default()));
-    let end = DeviceEnd { readings: readings_in, wrenches: wrenches_out };
-    (end, BroughtDevice { readings: readings_out, wrenches: wrenches_in, limits })
+pub fn program_device(limits: DeviceLimits) -> (DeviceEnd, ProgramDevice) {
+    let exchange = Arc::new(Mutex::default());
+    (DeviceEnd(Arc::clone(&exchange)), ProgramDevice { exchange, limits })
 }
 
 impl DeviceEnd {
-    /// What the loop reads in the tick of that number.
-    pub fn bring(&mut self, tick: u64, reading: Reading) {
-        self.readings.write((tick, reading));
+    /// Sets what the next tick reads.
+    pub fn bring(&mut self, reading: Reading) {
+        if let Ok(mut exchange) = self.0.try_lock() {
+            *exchange = Exchange { reading, wrench: Wrench::default() };
+        }
     }
 
-    /// What the loop put out in the tick of that number; nothing where it put out nothing.
-    pub fn take(&mut self, tick: u64) -> Wrench {
-        let (answered, wrench) = *self.wrenches.read();
-        if answered == tick { wrench } else { Wrench::default() }
+    /// What the tick put out since; nothing where it put out nothing.
+    pub fn take(&mut self) -> Wrench {
+        self.0.try_lock().map_or(Wrench::default(), |exchange| exchange.wrench)
     }
 }
 
-impl Device for BroughtDevice {
+impl Device for ProgramDevice {
     fn name(&self) -> &str {
         "the program's device"
     }
 
     fn read(&mut self, _now_ns: u64, _period: f64) -> Result<Reading, DeviceFault> {
-        Ok(self.readings.read().1)
+        self.exchange.try_lock().map(|exchange| exchange.reading).map_err(|_| DeviceFault::Stale)
     }
 
     fn write(&mut self, wrench: Wrench) -> Result<(), DeviceFault> {
-        let tick = self.readings.output_buffer().0;
-        self.wrenches.write((tick, wrench));
-        Ok(())
+        self.exchange.try_lock().map(|mut exchange| exchange.wrench = wrench).map_err(|_| DeviceFault::Stale)
     }
 
     fn limits(&self) -> DeviceLimits {

@@ -15,7 +15,7 @@ use palpate_scene::{BodyId, Prepared, ToolId, unit_quaternion};
 use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker, check_period};
 
 use crate::arguments::{hand_out, shared, take_back};
-use crate::device::{DeviceEnd, brought};
+use crate::device::{DeviceEnd, program_device};
 use crate::scene::SceneGraph;
 use crate::status::{Outcome, Refusal, Status, guarded};
 use crate::store::Store;
@@ -42,8 +42,6 @@ pub(crate) struct TickSide {
     /// None while the loop's own thread runs.
     pub force_loop: Option<ForceLoop>,
     pub ends: Vec<DeviceEnd>,
-    /// Ticks so far.
-    pub count: u64,
 }
 
 /// What frames and settings need.
@@ -116,13 +114,13 @@ fn to_be_ticked(prepared: &Prepared, settings: Settings) -> Outcome<(TickSide, R
         .devices
         .iter()
         .map(|limits| {
-            let (end, device) = brought(*limits);
+            let (end, device) = program_device(*limits);
             (end, Box::new(device) as Box<dyn Device>)
         })
         .unzip();
     let (mut force_loop, mut handle) = ForceLoop::new(prepared.model.clone(), devices, prepared.limits, settings)?;
     let worker = force_loop.limit_strain(&mut handle, prepared.strain.clone())?;
-    let side = TickSide { force_loop: Some(force_loop), ends, count: 0 };
+    let side = TickSide { force_loop: Some(force_loop), ends };
     Ok((side, Runner::Program { handle: Box::new(handle), _worker: worker }))
 }
 

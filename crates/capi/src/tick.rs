@@ -80,13 +80,12 @@ pub unsafe extern "C" fn palpate_loop_tick(
         let side = &mut *side;
         require_count("tools", tools, side.ends.len())?;
         let force_loop = side.force_loop.as_mut().ok_or_else(running)?;
-        side.count += 1;
         for (end, said) in side.ends.iter_mut().zip(readings) {
-            end.bring(side.count, reading(said, now_ns));
+            end.bring(reading(said, now_ns));
         }
         force_loop.tick(now_ns, period);
         for (end, to) in side.ends.iter_mut().zip(wrenches) {
-            let Wrench { force, torque } = end.take(side.count);
+            let Wrench { force, torque } = end.take();
             *to = DeviceWrench { force: force.to_array(), torque: torque.to_array() };
         }
         Ok(if force_loop.fault().is_some() { Status::PalpateFault } else { Status::PalpateOk })

@@ -51,6 +51,16 @@ impl Frame {
     }
 }
 
+/// Largest deviation of a matrix from a rotation: vendors compute in double precision.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// Rotation of a vendor's matrix; not a number if it is none.
+pub(crate) fn rotation(matrix: DMat3) -> DQuat {
+    let square = (matrix * matrix.transpose() - DMat3::IDENTITY).to_cols_array();
+    let is_rotation = matrix.determinant() > 0.0 && square.iter().all(|entry| entry.abs() < ROTATION_TOLERANCE);
+    if is_rotation { DQuat::from_mat3(&matrix).normalize() } else { DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 0.0) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

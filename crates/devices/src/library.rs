@@ -4,6 +4,7 @@
 #![allow(unsafe_code)] // To run somebody else's code is unsafe, whatever its declarations say.
 
 use std::env;
+use std::ffi::{CStr, c_char};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -99,6 +100,18 @@ impl<A: Sync> Libraries<A> {
         loaded.push((path.clone(), api));
         Ok(Loaded { path, api })
     }
+}
+
+/// A string of a library on one line; empty for null.
+///
+/// # Safety
+/// Null, or a string that ends with a zero and stays for the length of the call.
+pub(crate) unsafe fn text(pointer: *const c_char) -> String {
+    if pointer.is_null() {
+        return String::new();
+    }
+    // SAFETY: by the caller.
+    one_line(&unsafe { CStr::from_ptr(pointer) }.to_string_lossy())
 }
 
 /// Messages of loaders have line breaks.

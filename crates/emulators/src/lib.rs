@@ -1,10 +1,11 @@
 //! Emulated haptic devices, for tests and for people without hardware, and the suite that every driver passes against its own.
 
 pub mod conformance;
+mod hand;
 pub mod inverse_service;
+pub mod library;
 mod priority;
-mod steered;
-pub mod vendor;
+mod tip;
 
 pub use priority::be_on_time;
-pub use steered::{HAND_VARIABLE, SteeredTip, hand_from_environment};
+pub use tip::{SteeredTip, Tip};

@@ -1,20 +1,18 @@
 //! The driver of Haply's arms against the emulated Inverse Service.
 
-mod haply_bench;
+mod haply_service;
 
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
-use palpate_devices::emulated::{Hand, Tip, Wanted, known};
+use palpate_devices::emulated::{self, Hand, Wanted, known};
 use palpate_devices::haply::{list, open};
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, Wrench};
-use palpate_emulators::conformance::assert_conforms;
-use palpate_emulators::inverse_service::{
-    Condition, GripKind, Held, InverseService, MIDDLE, Options, Persona, Trouble,
-};
+use palpate_emulators::inverse_service::{InverseService, MIDDLE, Options, Persona, Trouble};
+use palpate_emulators::{SteeredTip, Tip};
 use serde_json::json;
 
-use haply_bench::{ARM, HaplyBench, alone, beside_others, service};
+use haply_service::{ARM, alone, beside_others, service};
 
 const PERIOD: f64 = 1e-3;
 
@@ -57,7 +55,7 @@ fn the_origin_is_the_middle_of_the_workspace_where_it_can_be_chosen() {
         let service = service(persona);
         let mut device = opened(&service);
         let held = DVec3::new(0.01, 0.02, -0.03);
-        service.hold(ARM, Held::at(held));
+        service.set_tip(ARM, Tip::at(held));
         tick_until(&mut *device, DVec3::ZERO, "the place", |said| {
             said.is_ok_and(|reading| (reading.pose.position - held - origin).length() < 1e-12)
         });
@@ -86,8 +84,8 @@ fn limits_tell_the_measured_delay() {
 fn lists_what_there_is_and_says_what_to_do() {
     let _beside = beside_others();
     let service = service(Persona::V34);
-    service.add_held_arm("0B02", "minverse");
-    service.set_condition("0B02", Condition { calibrated: false, ..Condition::default() });
+    service.add_arm("0B02", "minverse", SteeredTip::held());
+    service.set_calibrated("0B02", false);
     let listing = list(&connection(&service));
     assert_eq!(listing.missing, None);
     let found: Vec<_> = listing.found.iter().map(|found| (found.id.as_str(), found.name.as_str())).collect();
@@ -151,7 +149,7 @@ fn an_arm_in_use_is_refused_and_a_second_one_is_not() {
     until_force(&mut *first, &service, DVec3::X);
     let error = open(&connection(&service)).err().expect("in use").to_string();
     assert!(error.contains("is used by another program"), "{error}");
-    service.add_held_arm("0B02", "inverse3x");
+    service.add_arm("0B02", "inverse3x", SteeredTip::held());
     let mut second = opened(&service);
     assert_eq!(second.name(), "Haply Inverse3x 0B02");
     for _ in 0..50 {
@@ -271,7 +269,7 @@ fn replies_that_nobody_asked_for_do_not_make_readings_old() {
     let mut device = opened(&service);
     service.set_trouble(Some(Trouble::Twice));
     tick_until(&mut *device, DVec3::ZERO, "a second", |_| service.messages() > 1000);
-    service.hold(ARM, Held::at(DVec3::Y));
+    service.set_tip(ARM, Tip::at(DVec3::Y));
     let began = Instant::now();
     tick_until(&mut *device, DVec3::ZERO, "the new place", |said| {
         said.is_ok_and(|reading| reading.pose.position == DVec3::Y)
@@ -361,7 +359,8 @@ fn the_way_into_a_wall_is_where_hand_and_wall_balance() {
     let expected = wanted.z * hand.stiffness / (wall + hand.stiffness);
     // Friction holds the tip within this.
     let play = 1.1 * mechanics.dry_friction / (wall + hand.stiffness);
-    service.add_arm(ARM, "inverse3", Tip::new(mechanics, DVec3::ZERO, Some(hand)));
+    let tip = emulated::Tip::new(mechanics, DVec3::ZERO, Some(hand));
+    service.add_arm(ARM, "inverse3", SteeredTip::free(tip));
     let mut device = opened(&service);
     let mut depths = Vec::new();
     for _ in 0..1500 {
@@ -383,45 +382,17 @@ fn grips_fall_asleep_and_wake() {
     let service = service(Persona::V34);
     let mut device = opened(&service);
     let turned = glam::DQuat::from_rotation_x(0.3);
-    service.hold(ARM, Held { orientation: turned, ..Held::at(DVec3::ZERO) });
-    service.press(haply_bench::GRIP, Buttons(3));
+    service.set_tip(ARM, Tip { orientation: turned, ..Tip::at(DVec3::ZERO) });
+    service.press(haply_service::GRIP, Buttons(3));
     let both = |said: Result<palpate_devices::Reading, DeviceFault>| {
         said.is_ok_and(|reading| reading.buttons == Buttons(3) && reading.pose.orientation.angle_between(turned) < 1e-6)
     };
     tick_until(&mut *device, DVec3::ZERO, "buttons and orientation", both);
-    service.wake(haply_bench::GRIP, false);
+    service.wake(haply_service::GRIP, false);
     // What is held is let go, and the tool stays as it was.
     tick_until(&mut *device, DVec3::ZERO, "no buttons", |said| {
         said.is_ok_and(|reading| reading.buttons == Buttons(0) && reading.pose.orientation.angle_between(turned) < 1e-6)
     });
-    service.wake(haply_bench::GRIP, true);
+    service.wake(haply_service::GRIP, true);
     tick_until(&mut *device, DVec3::ZERO, "buttons and orientation", both);
-    service.add_grip("61577", GripKind::Wired, ARM);
-}
-
-#[test]
-fn the_version_is_told_by_http() {
-    use std::io::{Read, Write};
-    let _beside = beside_others();
-    let service = service(Persona::V35);
-    let address = service.address();
-    let port = address.trim_start_matches("ws://").split('?').next().unwrap();
-    let mut stream = std::net::TcpStream::connect(port).unwrap();
-    stream.write_all(b"GET /version HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
-    let mut text = String::new();
-    stream.read_to_string(&mut text).unwrap();
-    assert!(text.starts_with("HTTP/1.1 200 OK") && text.contains("haply-inverse-service"), "{text}");
-}
-
-/// With all releases at the same time: the suite runs again what fails while the machine stalls. Tests
-/// begin in the order of their names: this one and the long ones after it run beside each other.
-#[test]
-fn the_suite_passes_with_services_of_3_1_to_3_5() {
-    let _beside = beside_others();
-    std::thread::scope(|scope| {
-        for persona in [Persona::V31, Persona::V34, Persona::V35] {
-            let named = std::thread::Builder::new().name(format!("service of {}", persona.name()));
-            named.spawn_scoped(scope, move || assert_conforms(HaplyBench::new(persona))).expect("a thread");
-        }
-    });
 }

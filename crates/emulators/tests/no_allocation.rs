@@ -9,8 +9,9 @@ use std::time::Duration;
 
 use glam::DVec3;
 use palpate_devices::{Connection, Device, Opened, Wrench, forcedimension, haply, openhaptics};
+use palpate_emulators::SteeredTip;
 use palpate_emulators::inverse_service::{InverseService, Options};
-use palpate_emulators::vendor::built_library;
+use palpate_emulators::library::EmulatedLibrary;
 
 use counting_allocator::allocations;
 
@@ -24,14 +25,10 @@ fn counted(device: &mut dyn Device, tick: u64) -> u64 {
     count
 }
 
-fn connection(library: &str) -> Connection {
-    Connection { library: Some(built_library(library)), ..Connection::default() }
-}
-
 #[test]
 fn a_tick_of_haply() {
     let service = InverseService::start(&Options::default()).expect("a free port");
-    service.add_held_arm("0A01", "inverse3");
+    service.add_arm("0A01", "inverse3", SteeredTip::held());
     let connection = Connection { address: Some(service.address()), ..Connection::default() };
     let mut device = haply::open(&connection).expect("opens").device;
     let ticks = (0..500).map(|tick| {
@@ -43,14 +40,16 @@ fn a_tick_of_haply() {
 
 #[test]
 fn a_tick_of_force_dimension() {
-    let mut device = forcedimension::open(&connection("palpate_emulated_dhd")).expect("opens").device;
+    let library = EmulatedLibrary::with_devices("palpate_emulated_dhd", "omega.6");
+    let mut device = forcedimension::open(&library.connection(None)).expect("opens").device;
     let most = (0..1000).map(|tick| counted(&mut *device, tick)).max();
     assert_eq!(most, Some(0));
 }
 
 #[test]
 fn a_tick_of_openhaptics() {
-    let Opened { mut device, scheduler } = openhaptics::open(&connection("palpate_emulated_hd")).expect("opens");
+    let library = EmulatedLibrary::with_devices("palpate_emulated_hd", "Touch");
+    let Opened { mut device, scheduler } = openhaptics::open(&library.connection(None)).expect("opens");
     let scheduler = scheduler.expect("the library has its own loop");
     let (sender, results) = channel();
     let (mut tick, mut most) = (0, 0);

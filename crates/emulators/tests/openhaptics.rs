@@ -1,113 +1,16 @@
 //! The driver of the Touch and the PHANTOM devices against an emulated library.
 
-use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use glam::DVec3;
-use palpate_devices::{Buttons, Connection, Device, DeviceFault, OpenError, Opened, Reading, Wrench, openhaptics};
-use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, Motors, Tip, assert_conforms, endure};
-use palpate_emulators::vendor::{
-    MOTORS_OFF, NO_SCHEDULER, NONSENSE, READS_FAIL, Steering, UNCALIBRATED, built_library, disturbance_number,
-};
+use palpate_devices::{Connection, Device, DeviceFault, Opened, Reading, Wrench, openhaptics};
+use palpate_emulators::Tip;
+use palpate_emulators::conformance::Disturbance;
+use palpate_emulators::library::EmulatedLibrary;
 
-/// There is one library a process, and its devices are the same for all tests.
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-
-struct Emulated {
-    steering: Steering,
-    library: PathBuf,
-    _alone: MutexGuard<'static, ()>,
-}
-
-fn emulated(models: &str) -> Emulated {
-    let alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let library = built_library("palpate_emulated_hd");
-    let steering = Steering::load(&library).expect("the emulated library");
-    steering.reset(models);
-    Emulated { steering, library, _alone: alone }
-}
-
-impl Emulated {
-    fn connection(&self, id: Option<&str>) -> Connection {
-        Connection { id: id.map(str::to_owned), library: Some(self.library.clone()), ..Connection::default() }
-    }
-}
-
-/// The suite's thread is another than the test's.
-struct OnBench {
-    steering: Steering,
-    connection: Connection,
-}
-
-fn bench(emulated: &Emulated) -> OnBench {
-    OnBench { steering: emulated.steering, connection: emulated.connection(None) }
-}
-
-impl Bench for OnBench {
-    fn facts(&self) -> Facts {
-        Facts {
-            middle: DVec3::ZERO,
-            position_tolerance: 1e-9,
-            velocity_tolerance: 1e-9,
-            velocity_settles: Duration::ZERO,
-            force_tolerance: 1e-6,
-            turns: true,
-            buttons: 2,
-            late_ticks: 0,
-            stale_after: Duration::from_millis(100),
-            force_holds: Duration::from_millis(50),
-            recovers_within: Duration::from_secs(5),
-            driver_error: DeviceFault::Driver(0x0304),
-            hurries: true,
-        }
-    }
-
-    fn open(&mut self) -> Result<Opened, OpenError> {
-        openhaptics::open(&self.connection)
-    }
-
-    fn set_tip(&mut self, tip: Tip) {
-        self.steering.set_tip(0, tip);
-    }
-
-    fn press(&mut self, buttons: Buttons) {
-        self.steering.press(0, buttons);
-    }
-
-    fn motors(&mut self) -> Motors {
-        self.steering.motors(0)
-    }
-
-    fn disturb(&mut self, disturbance: Option<Disturbance>) {
-        self.steering.disturb(0, disturbance_number(disturbance));
-    }
-
-    fn hurry(&mut self, as_fast_as_possible: bool) {
-        self.steering.hurry(as_fast_as_possible);
-    }
-}
-
-#[test]
-fn a_touch_conforms() {
-    let emulated = emulated("Touch");
-    assert_conforms(bench(&emulated));
-}
-
-#[test]
-fn a_device_with_motors_of_rotation_conforms() {
-    let emulated = emulated("PHANTOM Premium 1.5 6DOF");
-    assert_conforms(bench(&emulated));
-}
-
-/// A minute at 1 kHz: `cargo test --release -p palpate-emulators --test openhaptics -- --ignored --nocapture`.
-#[test]
-#[ignore = "a minute"]
-fn a_minute_at_1_khz() {
-    let emulated = emulated("Touch");
-    let figures = endure(bench(&emulated), Endurance { ticks: 60_000, hurried: false }).expect("no tick missed");
-    println!("{figures:#?}");
-    assert!(figures.seconds < 90.0);
+fn emulated(models: &str) -> EmulatedLibrary {
+    EmulatedLibrary::with_devices("palpate_emulated_hd", models)
 }
 
 /// Ticks of the library, with what a device says in each; a loop that stops after some of them.
@@ -147,16 +50,16 @@ fn two_devices_share_a_tick_and_are_told_apart() {
     assert!(unknown.contains("Right") && unknown.contains("Touch Setup"), "{unknown}");
     assert!(opened[1].device.name().contains("PHANTOM Omni"));
     assert_eq!((opened[0].device.limits().max_stiffness, opened[1].device.limits().max_stiffness), (400.0, 700.0));
-    let steering = emulated.steering;
+    let steering = emulated.steering();
     steering.set_tip(0, Tip::at(0.01 * DVec3::X));
     steering.set_tip(1, Tip::at(0.02 * DVec3::Y));
     let forces = ticks(opened, 20, move |tick, devices| {
         // From the middle on, the second one is unplugged; its errors lie on the stack of both.
-        steering.disturb(1, if tick < 10 { 0 } else { disturbance_number(Some(Disturbance::Unplugged)) });
+        steering.disturb(1, if tick < 10 { None } else { Some(Disturbance::Unplugged) });
         let said = [devices[0].read(tick as u64, 1e-3), devices[1].read(tick as u64, 1e-3)];
         let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
         let _ = devices[1].write(Wrench { force: DVec3::Z, torque: DVec3::ZERO });
-        (said, [steering.motors(0).wrench.force, steering.motors(1).wrench.force])
+        (said, [steering.motors(0).force, steering.motors(1).force])
     });
     let place = |said: Result<Reading, DeviceFault>| said.map(|reading| reading.pose.position);
     let ([first, second], motors) = forces[5];
@@ -167,16 +70,16 @@ fn two_devices_share_a_tick_and_are_told_apart() {
     assert!(first.is_ok(), "{first:?}");
     assert_eq!(second, Err(DeviceFault::Disconnected));
     assert_eq!(motors, [DVec3::X, DVec3::ZERO]);
-    assert_eq!(steering.motors(0).wrench.force, DVec3::ZERO);
+    assert_eq!(steering.motors(0).force, DVec3::ZERO);
 }
 
 #[test]
 fn a_device_that_is_not_calibrated_gets_no_force() {
     let emulated = emulated("Touch");
-    emulated.steering.disturb(0, UNCALIBRATED);
+    emulated.disturb(0, Some(Disturbance::Uncalibrated));
     let error = openhaptics::open(&emulated.connection(None)).err().expect("refused").to_string();
     assert!(error.contains("not calibrated") && error.contains("inkwell"), "{error}");
-    emulated.steering.disturb(0, 0);
+    emulated.disturb(0, None);
     assert!(openhaptics::open(&emulated.connection(None)).is_ok());
 }
 
@@ -195,7 +98,7 @@ fn a_panic_does_not_reach_the_library() {
     }));
     begun.expect("the scheduler starts");
     std::thread::sleep(Duration::from_millis(100));
-    assert_eq!(emulated.steering.motors(0).wrench.force, DVec3::ZERO);
+    assert_eq!(emulated.motors(0).force, DVec3::ZERO);
     let second = scheduler.start(Box::new(|| ())).expect_err("it runs").to_string();
     assert!(second.contains("in use"), "{second}");
     scheduler.stop();
@@ -213,7 +116,7 @@ fn the_list_tells_what_there_is_and_what_is_in_the_way() {
     let listing = openhaptics::list(&emulated.connection(None));
     assert!(listing.found[0].obstacle.as_ref().is_some_and(|obstacle| obstacle.what.contains("in use")));
     drop(opened);
-    emulated.steering.reset("");
+    emulated.reset("");
     let missing = openhaptics::list(&emulated.connection(None)).missing.expect("nothing is there").to_string();
     assert!(missing.contains("Touch Setup"), "{missing}");
     let nowhere = Connection { library: Some("/nowhere/libHD.so".into()), ..Connection::default() };
@@ -226,24 +129,24 @@ fn the_list_tells_what_there_is_and_what_is_in_the_way() {
 fn nonsense_is_survived() {
     let emulated = emulated("Touch");
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
-    let steering = emulated.steering;
+    let steering = emulated.steering();
     steering.hurry(true);
     let good = ticks(opened, 20_000, move |tick, devices| {
         // Some errors say that the device is gone; then it is well for a while, to come back.
-        steering.disturb(0, if tick % 1000 < 900 { NONSENSE } else { 0 });
+        steering.disturb(0, if tick % 1000 < 900 { Some(Disturbance::Nonsense) } else { None });
         let said = devices[0].read(1000 * tick as u64, 1e-3);
         if let Ok(reading) = said {
             assert!(reading.pose.is_finite() && reading.twist.linear.is_finite() && reading.twist.angular.is_finite());
         }
         let _ = devices[0].write(Wrench { force: 0.5 * DVec3::X, torque: DVec3::ZERO });
-        let force = steering.motors(0).wrench.force;
+        let force = steering.motors(0).force;
         assert!(force == DVec3::ZERO || (force - 0.5 * DVec3::X).length() < 1e-12, "{force}");
         said.is_ok()
     });
     steering.hurry(false);
     println!("{} good readings of {}", good.iter().filter(|good| **good).count(), good.len());
     for _ in 0..200 {
-        steering.disturb(0, NONSENSE);
+        steering.disturb(0, Some(Disturbance::Nonsense));
         let _ = openhaptics::list(&emulated.connection(None));
     }
 }
@@ -253,12 +156,12 @@ fn nonsense_is_survived() {
 fn warm_motors_are_told_and_cool() {
     let emulated = emulated("Touch");
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
-    let steering = emulated.steering;
+    let steering = emulated.steering();
     let said = ticks(opened, 300, move |tick, devices| {
-        steering.disturb(0, if (5..10).contains(&tick) { MOTORS_OFF } else { 0 });
+        steering.disturb(0, if (5..10).contains(&tick) { Some(Disturbance::MotorsOff) } else { None });
         let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
         let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
-        (said, steering.motors(0).wrench.force.x)
+        (said, steering.motors(0).force.x)
     });
     assert_eq!(said[4], (Ok(()), 1.0));
     assert_eq!(said[7], (Err(DeviceFault::MotorsOff), 0.0));
@@ -272,10 +175,10 @@ const PUSHED: Wrench = Wrench { force: DVec3::X, torque: DVec3::ZERO };
 #[test]
 fn another_thread_than_the_librarys_calls_nothing_of_it() {
     let emulated = emulated("Touch");
-    let steering = emulated.steering;
+    let steering = emulated.steering();
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
     let said = ticks(opened, 3, move |tick, devices| {
-        let before = steering.motors(0).wrench.force;
+        let before = steering.motors(0).force;
         let first = &mut devices[0];
         let elsewhere = (tick == 1).then(|| {
             std::thread::scope(|scope| {
@@ -298,14 +201,14 @@ fn another_thread_than_the_librarys_calls_nothing_of_it() {
 fn a_device_that_cannot_be_read_is_let_go_at_once() {
     let emulated = emulated("Touch");
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
-    let steering = emulated.steering;
+    let steering = emulated.steering();
     let said = ticks(opened, 12, move |tick, devices| {
         if tick == 10 {
-            steering.disturb(0, READS_FAIL);
+            steering.disturb(0, Some(Disturbance::ReadsFail));
         }
         let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
         let _ = devices[0].write(if said.is_ok() { PUSHED } else { Wrench::default() });
-        (said, steering.motors(0).wrench.force)
+        (said, steering.motors(0).force)
     });
     assert_eq!(said[9], (Ok(()), DVec3::X));
     assert_eq!(said[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
@@ -319,12 +222,12 @@ fn no_force_outlives_the_ticks_of_the_library() {
         openhaptics::open(&emulated.connection(None)).expect("the default device"),
         openhaptics::open(&emulated.connection(Some("Left"))).expect("the other one"),
     ];
-    let steering = emulated.steering;
+    let steering = emulated.steering();
     let said = ticks(opened, 300, move |tick, devices| {
         if tick == 10 {
-            steering.disturb(1, disturbance_number(Some(Disturbance::Unplugged)));
+            steering.disturb(1, Some(Disturbance::Unplugged));
         }
-        let kept = steering.motors(0).wrench.force;
+        let kept = steering.motors(0).force;
         let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
         let _ = devices[0].write(PUSHED);
         let _ = devices[1].read(tick as u64, 1e-3);
@@ -367,13 +270,13 @@ fn a_scheduler_that_does_not_start_again_is_a_fault() {
         while said.recv_timeout(Duration::from_secs(5)).expect("the loop ticks") != wanted {}
     };
     until(Ok(()));
-    emulated.steering.disturb(0, disturbance_number(Some(Disturbance::Unplugged)));
+    emulated.disturb(0, Some(Disturbance::Unplugged));
     until(Err(DeviceFault::Disconnected));
-    emulated.steering.disturb(0, NO_SCHEDULER);
+    emulated.disturb(0, Some(Disturbance::SchedulerFails));
     std::thread::sleep(Duration::from_millis(1500));
     while said.try_recv().is_ok() {}
     assert_eq!(said.recv_timeout(Duration::from_millis(300)), Ok(Err(DeviceFault::Disconnected)));
-    emulated.steering.disturb(0, 0);
+    emulated.disturb(0, None);
     until(Ok(()));
     scheduler.stop();
 }

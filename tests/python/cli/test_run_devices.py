@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulators import inverse_service, library
+from emulators import PRESS, inverse_service, library
 
 VARIABLES = ("PALPATE_HAPLY_ADDRESS", "PALPATE_OPENHAPTICS_LIBRARY", "PALPATE_FORCEDIMENSION_LIBRARY")
-# Above the top of the block, whose corner is the origin: there the middle of the device's workspace lies.
+# Above the top of the block, whose corner is the origin: first touch is in the middle of the device's workspace.
 TABLE = "[[device]]\nposition = [{}, 0.025, 0.056]\n"
-# Of the emulated libraries: down to 8 mm below first touch and up again, every second.
-PRESS = "0 0 0 5; 0.5 0 0 -8; 1 0 0 5"
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +65,7 @@ def test_a_library_moves_the_first_tool(scene, kind, variable, emulated):
 
 
 def test_two_devices_at_once(scene):
-    with inverse_service("--depth", "0.03") as (address, _):
+    with inverse_service() as (address, _):
         hand = {"PALPATE_FORCEDIMENSION_LIBRARY": library("dhd"), "PALPATE_EMULATED_HAND": PRESS}
         done = run(scene, "forcedimension", "haply", seconds=4.0, PALPATE_HAPLY_ADDRESS=address, **hand)
     assert done.returncode == 0, done.stderr
@@ -85,7 +83,7 @@ def test_the_first_recording_of_devices_is_made_again(scene):
 
 
 def test_a_service_that_dies_ends_the_force_and_is_told(scene):
-    with inverse_service("--depth", "0.03") as (address, process):
+    with inverse_service() as (address, process):
         command = [sys.executable, "-m", "palpate", "run", scene.name, "--headless", "6", "--device", "haply"]
         environment = {**os.environ, "PALPATE_HAPLY_ADDRESS": address}
         with subprocess.Popen(

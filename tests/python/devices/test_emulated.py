@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from emulators import inverse_service, library
+from emulators import REST, inverse_service, library
 
 # The libraries read what is plugged in when they are loaded: a process of its own.
 PROGRAM = """
@@ -33,14 +33,14 @@ print(json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told():
-    with inverse_service("--hand", "rest") as (address, _):
+    with inverse_service(REST) as (address, _):
         environment = {
             **os.environ,
             "PALPATE_HAPLY_ADDRESS": f"{address}&hold=50",
             "PALPATE_OPENHAPTICS_LIBRARY": library("hd"),
             "PALPATE_FORCEDIMENSION_LIBRARY": library("dhd"),
             "PALPATE_EMULATED_FORCEDIMENSION": "omega.3",
-            "PALPATE_EMULATED_HAND": "0 0 0 0",
+            "PALPATE_EMULATED_HAND": REST,
         }
         command = [sys.executable, "-c", PROGRAM]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)

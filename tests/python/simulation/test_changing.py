@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 from conftest import box_mesh
-from emulators import inverse_service
+from emulators import REST, inverse_service
 
 import palpate
 
@@ -144,7 +144,7 @@ def test_what_cannot_be_is_refused(green, tmp_path):
 
 
 def test_devices_come_and_go_while_the_loop_runs(green, monkeypatch):
-    with inverse_service("--hand", "rest") as (address, process), palpate.Simulation(scene_of(green)) as simulation:
+    with inverse_service(REST) as (address, process), palpate.Simulation(scene_of(green)) as simulation:
         monkeypatch.setenv("PALPATE_HAPLY_ADDRESS", address)
         with pytest.warns(palpate.DeviceWarning, match="800 N/m"):
             tool = simulation.add_tool("haply", radius="6mm", contact="patch", contact_radius="12mm")

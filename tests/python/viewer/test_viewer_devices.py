@@ -30,7 +30,7 @@ def test_a_device_is_shown_and_its_fault_told(block, block_green):
             assert gone["fault"].startswith("tool 0: the device is disconnected: connect it again")
             assert gone["tools"][0]["force"] == [0, 0, 0] and gone["tools"][1]["force"][2] > 0.0
 
-    with inverse_service("--depth", "0.03") as (address, process):
+    with inverse_service() as (address, process):
         device = {"kind": "haply", "address": address, "position": (0.025, 0.025, 0.056)}
         tools = [{"radius": "6mm"}, {"radius": "6mm"}]
         scene = palpate.Scene(body={"model": "beam"}, tool=tools, device=device)
@@ -60,7 +60,7 @@ def test_a_change_of_tool_that_fails_leaves_the_scene_as_it_was(block, block_gre
                 await client.say(type="press", tool=tool, position=place, grab=False)
                 await client.frame_where(lambda header, tool=tool: header["tools"][tool]["force"][2] > 0.02)
 
-    with inverse_service("--depth", "0.03") as (address, process):
+    with inverse_service() as (address, process):
         device = {"kind": "haply", "address": address, "position": (0.025, 0.025, 0.056)}
         scene = palpate.Scene(body={"model": "beam"}, tool=[{"radius": "6mm"}, {"radius": "6mm"}], device=device)
         with warnings.catch_warnings(action="ignore", category=palpate.DeviceWarning):

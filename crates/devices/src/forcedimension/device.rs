@@ -8,15 +8,13 @@ use super::guard::{Guard, State};
 use super::held::Held;
 use super::library::{Dhd, Freshness, fault};
 use super::{Traits, ffi::Id};
+use crate::frame::rotation;
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Frame, OpenError, Pose, Reading, Twist, Wrench};
 
 const FRAME: Frame = Frame::TowardsRightUp;
 
 /// Longest time for which the library may repeat a measurement, ns.
 const STALE_AFTER_NS: u64 = 20_000_000;
-
-/// Largest deviation of a matrix from a rotation: the vendor's are of double precision.
-const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// An open device. When it is dropped its motors are off.
 pub struct ForceDimensionDevice {
@@ -70,10 +68,7 @@ impl ForceDimensionDevice {
 
 /// Rotation of a matrix by its rows; not a number if it is none.
 fn orientation(rows: [[f64; 3]; 3]) -> DQuat {
-    let matrix = DMat3::from_cols_array_2d(&rows).transpose();
-    let square = (matrix * matrix.transpose() - DMat3::IDENTITY).to_cols_array();
-    let is_rotation = matrix.determinant() > 0.0 && square.iter().all(|entry| entry.abs() < ROTATION_TOLERANCE);
-    if is_rotation { DQuat::from_mat3(&matrix).normalize() } else { DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 0.0) }
+    rotation(DMat3::from_cols_array_2d(&rows).transpose())
 }
 
 impl Device for ForceDimensionDevice {

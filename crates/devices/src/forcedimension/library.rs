@@ -1,20 +1,18 @@
 //! Calls of DHD with Rust's types.
 #![allow(unsafe_code)] // Every call into the vendor's library is one.
 
-use std::ffi::{CStr, c_char, c_int};
+use std::ffi::c_int;
 
 use glam::DVec3;
 
 use super::ffi::{self, Api, Id, error, result, status};
-use crate::library::{Libraries, Loaded, Search};
+use crate::library::{Libraries, Loaded, Search, text};
 use crate::{Connection, DeviceFault, OpenError};
 
 const SEARCH: Search = Search {
     product: "Force Dimension's SDK",
     variable: "PALPATE_FORCEDIMENSION_LIBRARY",
-    names: if cfg!(windows) {
-        &["drd64.dll", "dhd64.dll", "drd.dll", "dhd.dll"]
-    } else if cfg!(target_os = "macos") {
+    names: if cfg!(target_os = "macos") {
         &["libdrd.dylib", "libdhd.dylib"]
     } else {
         &["libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"]
@@ -233,17 +231,4 @@ pub fn fault(code: c_int) -> DeviceFault {
         error::TIMEOUT => DeviceFault::Stale,
         code => DeviceFault::Driver(code),
     }
-}
-
-/// A string of the library on one line.
-///
-/// # Safety
-/// Null, or a string that ends with a zero and stays for the length of the call.
-unsafe fn text(pointer: *const c_char) -> String {
-    if pointer.is_null() {
-        return String::new();
-    }
-    // SAFETY: by the caller.
-    let text = unsafe { CStr::from_ptr(pointer) }.to_string_lossy();
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -2,12 +2,10 @@
 
 /// Above that of the loop by default, 80: the loop waits for what the thread brings, which takes it some microseconds of each
 /// exchange.
-#[cfg(unix)]
 const PRIORITY: u8 = 81;
 
 /// Asks for real-time scheduling (`SCHED_FIFO`), as the loop does for its own thread. Without it the thread works as well, on a
 /// machine that is not busy.
-#[cfg(unix)]
 pub fn raise() {
     use thread_priority::unix::{
         RealtimeThreadSchedulePolicy::Fifo, ThreadSchedulePolicy::Realtime, set_thread_priority_and_policy,
@@ -17,7 +15,3 @@ pub fn raise() {
     let wanted = thread_priority::ThreadPriority::Crossplatform(priority);
     let _ = set_thread_priority_and_policy(thread_native_id(), wanted, Realtime(Fifo));
 }
-
-/// Only systems with real-time scheduling have it.
-#[cfg(not(unix))]
-pub fn raise() {}

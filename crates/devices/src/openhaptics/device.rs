@@ -8,6 +8,7 @@ use super::errors::fault;
 use super::ffi::{Handle, error, parameter};
 use super::library::Hd;
 use super::scheduler::{HdScheduler, Slot};
+use crate::frame::rotation;
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Frame, Pose, Reading, Twist, Wrench};
 
 const FRAME: Frame = Frame::RightUpTowards;
@@ -18,9 +19,6 @@ const MILLI: f64 = 1e-3;
 /// Longest time between two ticks of the library's scheduler after which its measurements are trusted, ns: the library does
 /// not tell how old they are.
 const STALE_AFTER_NS: u64 = 100_000_000;
-
-/// Largest deviation of a transform's columns from a rotation.
-const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// An open device. When it is dropped its motors are off.
 pub struct TouchDevice {
@@ -106,10 +104,7 @@ impl TouchDevice {
 /// Rotation of a transform whose columns lie one after the other; not a number if it is none.
 fn orientation(transform: &[f64; 16]) -> DQuat {
     let column = |first: usize| DVec3::new(transform[first], transform[first + 1], transform[first + 2]);
-    let matrix = DMat3::from_cols(column(0), column(4), column(8));
-    let square = (matrix * matrix.transpose() - DMat3::IDENTITY).to_cols_array();
-    let is_rotation = matrix.determinant() > 0.0 && square.iter().all(|entry| entry.abs() < ROTATION_TOLERANCE);
-    if is_rotation { DQuat::from_mat3(&matrix).normalize() } else { DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 0.0) }
+    rotation(DMat3::from_cols(column(0), column(4), column(8)))
 }
 
 impl Device for TouchDevice {

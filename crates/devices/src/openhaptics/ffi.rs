@@ -15,7 +15,7 @@ pub type Enum = c_uint;
 pub type CallbackCode = c_uint;
 /// A callback of the scheduler.
 pub type Callback = unsafe extern "system" fn(*mut c_void) -> CallbackCode;
-/// A scheduled callback: 64 bits on Linux, 32 on Windows, as C's `unsigned long` is.
+/// A scheduled callback.
 pub type SchedulerHandle = c_ulong;
 
 pub const INVALID_HANDLE: Handle = 0xFFFF_FFFF;

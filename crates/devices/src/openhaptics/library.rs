@@ -1,27 +1,21 @@
 //! Calls of HD with Rust's types.
 #![allow(unsafe_code)] // Every call into the vendor's library is one.
 
-use std::ffi::{CStr, CString, c_char, c_void};
+use std::ffi::{CString, c_void};
 
 use super::ffi::{self, Api, Callback, Enum, Handle, INVALID_HANDLE, SchedulerHandle, error, parameter};
-use crate::library::{Libraries, Loaded, Search};
+use crate::library::{Libraries, Loaded, Search, text};
 use crate::{Connection, OpenError};
 
 const SEARCH: Search = Search {
     product: "OpenHaptics (HD)",
     variable: "PALPATE_OPENHAPTICS_LIBRARY",
-    names: if cfg!(windows) {
-        &["HD.dll", "hd.dll"]
-    } else if cfg!(target_os = "macos") {
+    names: if cfg!(target_os = "macos") {
         &["libHD.dylib"]
     } else {
         &["libHD.so", "libHD.so.3.5", "libHD.so.3.4", "libHD.so.3.0", "libHD.so.3"]
     },
-    folders: if cfg!(windows) {
-        &[("OH_SDK_BASE", "lib/x64"), ("OH_SDK_BASE", "bin/x64")]
-    } else {
-        &[("GTDD_HOME", "lib"), ("OH_SDK_BASE", "lib")]
-    },
+    folders: &[("GTDD_HOME", "lib"), ("OH_SDK_BASE", "lib")],
     advice: "install 3D Systems' device driver and OpenHaptics 3",
 };
 
@@ -191,17 +185,4 @@ impl Hd {
         // SAFETY: no arguments.
         unsafe { (self.0.stop_scheduler)() };
     }
-}
-
-/// A string of the library on one line.
-///
-/// # Safety
-/// Null, or a string that ends with a zero and stays for the length of the call.
-unsafe fn text(pointer: *const c_char) -> String {
-    if pointer.is_null() {
-        return String::new();
-    }
-    // SAFETY: by the caller.
-    let text = unsafe { CStr::from_ptr(pointer) }.to_string_lossy();
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,9 +1,11 @@
 //! What an emulated device gives the suite.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use palpate_devices::{Buttons, DeviceFault, OpenError, Opened, Wrench};
+
+use crate::tip::Tip;
 
 /// An emulated device and the way to open its driver on it.
 ///
@@ -25,8 +27,8 @@ pub trait Bench: Send + 'static {
     /// Holds these buttons and no others.
     fn press(&mut self, buttons: Buttons);
 
-    /// What the motors put out.
-    fn motors(&mut self) -> Motors;
+    /// What the motors put out on the hand.
+    fn motors(&mut self) -> Wrench;
 
     /// Makes something go wrong, instead of what went wrong before; `None`: all is well again.
     fn disturb(&mut self, disturbance: Option<Disturbance>);
@@ -35,54 +37,55 @@ pub trait Bench: Send + 'static {
     fn hurry(&mut self, _as_fast_as_possible: bool) {}
 }
 
-/// A place of the tip and its motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tip {
-    /// From the middle of the workspace, m.
-    pub position: DVec3,
-    /// m/s.
-    pub velocity: DVec3,
-    /// Of the stylus, from how it lies at rest.
-    pub orientation: DQuat,
-    /// rad/s.
-    pub angular_velocity: DVec3,
-}
-
-impl Default for Tip {
-    fn default() -> Self {
-        Self::at(DVec3::ZERO)
-    }
-}
-
-impl Tip {
-    /// At rest.
-    pub fn at(position: DVec3) -> Self {
-        Self { position, velocity: DVec3::ZERO, orientation: DQuat::IDENTITY, angular_velocity: DVec3::ZERO }
-    }
-}
-
-/// What the motors put out, and since when.
-#[derive(Clone, Copy, Debug)]
-pub struct Motors {
-    /// On the hand.
-    pub wrench: Wrench,
-    /// When they were last told so.
-    pub at: Instant,
-}
-
-/// What goes wrong.
+/// What goes wrong. The suite uses the first five of them; the rest is for the tests of single drivers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
 pub enum Disturbance {
     /// The cable is out.
-    Unplugged,
-    /// The vendor's software reports an error of the device whenever it is asked where it is, by a number that [`Facts::driver_error`] tells.
+    Unplugged = 1,
+    /// The vendor's software reports an error of the device whenever it is asked where it is, by the number of [`Facts::driver_error`].
     DriverError,
-    /// The vendor's software says that it is of a version with which the driver cannot work.
+    /// The vendor's software has a version with which the driver cannot work.
     WrongVersion,
     /// The vendor's software answers too late, for longer than [`Facts::stale_after`].
     SlowReplies,
     /// Positions are not numbers.
     NotFinite,
+    /// Every answer of the vendor's software is random.
+    Nonsense,
+    /// The device has not been calibrated since it was switched on.
+    Uncalibrated,
+    /// The motors are off: too warm, or by a button that somebody holds down.
+    MotorsOff,
+    /// Measuring fails as if the device were unplugged. It is not: its motors keep what they have been told.
+    ReadsFail,
+    /// The scheduler of the vendor's software does not start.
+    SchedulerFails,
+}
+
+impl Disturbance {
+    const ALL: [Self; 10] = [
+        Self::Unplugged,
+        Self::DriverError,
+        Self::WrongVersion,
+        Self::SlowReplies,
+        Self::NotFinite,
+        Self::Nonsense,
+        Self::Uncalibrated,
+        Self::MotorsOff,
+        Self::ReadsFail,
+        Self::SchedulerFails,
+    ];
+
+    /// Its number, by which it goes into an emulated library; 0 is none.
+    pub fn number(disturbance: Option<Self>) -> u32 {
+        disturbance.map_or(0, |disturbance| disturbance as u32)
+    }
+
+    /// The one of a number.
+    pub fn numbered(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|disturbance| *disturbance as u32 == number)
+    }
 }
 
 /// What is known of an emulated device and of its driver.

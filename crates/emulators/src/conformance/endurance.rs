@@ -71,7 +71,7 @@ fn run<B: Bench>(rig: &mut Rig<B>, endurance: Endurance) -> Result<Figures, Stri
             Err(seen) => ControlFlow::Break(Err(seen)),
         });
     rig.hurry(false);
-    figures.unwrap_or_else(|| Err("no ticks".to_owned()))
+    figures
 }
 
 /// The tip on its way around.
@@ -136,7 +136,7 @@ impl Round {
         remember(&mut self.forces, written.force, self.facts.late_ticks);
         // What is late at the beginning is from before it.
         if tick > 2 * self.facts.late_ticks {
-            let motors = bench.motors().wrench.force;
+            let motors = bench.motors().force;
             let suspended = asked.elapsed() > SUSPENDED || gap > SUSPENDED.as_secs_f64();
             self.compare(&reading, motors, suspended).map_err(|seen| format!("tick {tick}: {seen}"))?;
         }

@@ -19,9 +19,10 @@ mod spring;
 mod stalls;
 mod wrenches;
 
-pub use bench::{Bench, Disturbance, Facts, Motors, Tip};
+pub use bench::{Bench, Disturbance, Facts};
 pub use endurance::{Endurance, Figures, endure};
 
+use crate::tip::Tip;
 use rig::Rig;
 use stalls::StallWatch;
 

@@ -1,7 +1,5 @@
 //! What the device says: places, motion, orientation, buttons.
 
-use std::ops::ControlFlow;
-
 use glam::{DQuat, DVec3};
 use palpate_devices::{Buttons, Reading};
 
@@ -60,16 +58,10 @@ fn places<B: Bench>(rig: &mut Rig<B>) -> Verdict {
 fn moved<B: Bench>(rig: &mut Rig<B>, tip: Tip) -> Result<Reading, String> {
     let (facts, mut spring) = (rig.facts, Spring::to(rig.facts.middle));
     rig.settle(Spring::to(facts.middle), move |bench| bench.set_tip(tip))?;
-    let mut left = (facts.velocity_settles.as_secs_f64() / PERIOD.as_secs_f64()).ceil() as usize + facts.late_ticks;
-    rig.each_tick(left + 1, move |_, device, now_ns| {
-        let (said, _) = spring.tick(device, now_ns);
-        if left > 0 {
-            left -= 1;
-            return ControlFlow::Continue(());
-        }
-        ControlFlow::Break(said.map_err(|fault| format!("a fault of a device that is well: {fault}")))
+    let ticks = (facts.velocity_settles.as_secs_f64() / PERIOD.as_secs_f64()).ceil() as usize + facts.late_ticks;
+    rig.after(ticks, move |_, device, now_ns| {
+        spring.tick(device, now_ns).0.map_err(|fault| format!("a fault of a device that is well: {fault}"))
     })
-    .unwrap_or_else(|| Err("no ticks".to_owned()))
 }
 
 fn motion<B: Bench>(rig: &mut Rig<B>) -> Verdict {

@@ -85,19 +85,19 @@ impl<B: Bench> Rig<B> {
     pub fn each_tick<R: Send + 'static>(
         &mut self,
         most: usize,
-        mut job: impl FnMut(&mut B, &mut dyn Device, u64) -> ControlFlow<R> + Send + 'static,
-    ) -> Option<R> {
+        mut job: impl FnMut(&mut B, &mut dyn Device, u64) -> ControlFlow<Result<R, String>> + Send + 'static,
+    ) -> Result<R, String> {
         let (sender, results) = channel();
         let mut ticks = 0;
         locked(&self.parts).job = Some(Box::new(move |bench, device, now_ns| {
             ticks += 1;
             match job(bench, device, now_ns) {
                 ControlFlow::Break(result) => {
-                    let _ = sender.send(Some(result));
+                    let _ = sender.send(result);
                     ControlFlow::Break(())
                 }
                 ControlFlow::Continue(()) if ticks >= most => {
-                    let _ = sender.send(None);
+                    let _ = sender.send(Err(format!("no result after {most} ticks")));
                     ControlFlow::Break(())
                 }
                 ControlFlow::Continue(()) => ControlFlow::Continue(()),
@@ -109,13 +109,30 @@ impl<B: Bench> Rig<B> {
         }
     }
 
+    /// Calls `job` at each of some ticks and once more: the last result.
+    pub fn after<R: Send + 'static>(
+        &mut self,
+        mut ticks: usize,
+        mut job: impl FnMut(&mut B, &mut dyn Device, u64) -> Result<R, String> + Send + 'static,
+    ) -> Result<R, String> {
+        self.each_tick(ticks + 1, move |bench, device, now_ns| {
+            let result = job(bench, device, now_ns);
+            if ticks == 0 {
+                return ControlFlow::Break(result);
+            }
+            ticks -= 1;
+            ControlFlow::Continue(())
+        })
+    }
+
     /// The driver's thread ticks.
-    fn wait<R>(&self, results: &Receiver<Option<R>>, most: usize) -> Option<R> {
-        results.recv_timeout(PATIENCE + 2 * PERIOD * most as u32).ok().flatten()
+    fn wait<R>(&self, results: &Receiver<Result<R, String>>, most: usize) -> Result<R, String> {
+        let in_time = results.recv_timeout(PATIENCE + 2 * PERIOD * most as u32);
+        in_time.unwrap_or_else(|_| Err("the driver's scheduler does not tick".to_owned()))
     }
 
     /// This thread ticks. A deadline that is missed is not made up for: the ticks that follow would be too close.
-    fn tick_here<R>(&self, results: &Receiver<Option<R>>) -> Option<R> {
+    fn tick_here<R>(&self, results: &Receiver<Result<R, String>>) -> Result<R, String> {
         let mut deadline = Instant::now();
         loop {
             let hurried = {
@@ -136,22 +153,17 @@ impl<B: Bench> Rig<B> {
 
     /// Does something to the device, and lets the spring answer until reading and motors must show it.
     pub fn settle(&mut self, mut spring: Spring, act: impl FnOnce(&mut B) + Send + 'static) -> Result<Seen, String> {
-        let (mut act, mut left) = (Some(act), 2 * self.facts.late_ticks);
-        let seen = self.each_tick(left + 1, move |bench, device, now_ns| {
+        let mut act = Some(act);
+        self.after(2 * self.facts.late_ticks, move |bench, device, now_ns| {
             if let Some(act) = act.take() {
                 act(bench);
             }
             let (said, written) = spring.tick(device, now_ns);
-            if left > 0 {
-                left -= 1;
-                return ControlFlow::Continue(());
-            }
-            ControlFlow::Break(match (said, spring.fault) {
-                (Ok(reading), None) => Ok(Seen { reading, written, motors: bench.motors().wrench }),
+            match (said, spring.fault) {
+                (Ok(reading), None) => Ok(Seen { reading, written, motors: bench.motors() }),
                 (Err(fault), _) | (_, Some(fault)) => Err(format!("a fault of a device that is well: {fault}")),
-            })
-        });
-        seen.unwrap_or_else(|| Err("no ticks".to_owned()))
+            }
+        })
     }
 
     /// Ticks as fast as possible, where the device allows it.

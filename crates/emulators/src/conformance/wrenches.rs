@@ -39,20 +39,13 @@ fn pushes_back<B: Bench>(rig: &mut Rig<B>) -> Verdict {
 
 /// Writes a wrench until the motors must have it.
 pub fn write_and_settle<B: Bench>(rig: &mut Rig<B>, wrench: Wrench) -> Result<Wrench, String> {
-    let mut left = rig.facts.late_ticks;
-    let done = rig.each_tick(left + 1, move |bench, device, now_ns| {
+    rig.after(rig.facts.late_ticks, move |bench, device, now_ns| {
         let said = device.read(now_ns, PERIOD.as_secs_f64());
-        let written = device.write(wrench);
-        if left > 0 {
-            left -= 1;
-            return ControlFlow::Continue(());
-        }
-        ControlFlow::Break(match said.and(written) {
-            Ok(()) => Ok(bench.motors().wrench),
+        match said.and(device.write(wrench)) {
+            Ok(()) => Ok(bench.motors()),
             Err(fault) => Err(format!("{wrench:?} is answered by a fault: {fault}")),
-        })
-    });
-    done.unwrap_or_else(|| Err("no ticks".to_owned()))
+        }
+    })
 }
 
 fn torques<B: Bench>(rig: &mut Rig<B>) -> Verdict {
@@ -97,18 +90,12 @@ fn clamps<B: Bench>(rig: &mut Rig<B>) -> Verdict {
 fn refuses_nan<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     for broken in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         write_and_settle(rig, Wrench { force: DVec3::X, torque: DVec3::ZERO })?;
-        let mut left = rig.facts.late_ticks;
-        let motors = rig.each_tick(left + 1, move |bench, device, now_ns| {
+        let motors = rig.after(rig.facts.late_ticks, move |bench, device, now_ns| {
             let _ = device.read(now_ns, PERIOD.as_secs_f64());
             let _ = device.write(Wrench { force: DVec3::new(0.5, broken, 0.0), torque: DVec3::ZERO });
-            if left > 0 {
-                left -= 1;
-                return ControlFlow::Continue(());
-            }
-            ControlFlow::Break(bench.motors().wrench)
-        });
-        let force = motors.ok_or("no ticks")?.force;
-        close_to("the force", force, DVec3::ZERO, rig.facts.force_tolerance)?;
+            Ok(bench.motors())
+        })?;
+        close_to("the force", motors.force, DVec3::ZERO, rig.facts.force_tolerance)?;
         // The fault, if it was one, is over with the next good wrench.
         let _ = write_and_settle(rig, Wrench::default());
     }
@@ -123,11 +110,10 @@ fn stops<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     let force = rig.each_tick(60_000, move |bench, _, _| {
         // One more tick's length, for the machine that runs the suite sleeps when it likes.
         match began.elapsed() > holds + PERIOD {
-            true => ControlFlow::Break(bench.motors().wrench.force),
+            true => ControlFlow::Break(Ok(bench.motors().force)),
             false => ControlFlow::Continue(()),
         }
-    });
-    let force = force.ok_or("no ticks")?;
+    })?;
     close_to("the force after the loop has stopped", force, DVec3::ZERO, rig.facts.force_tolerance)
 }
 
@@ -139,7 +125,7 @@ fn closes<B: Bench>(seat: &mut Seat<B>) -> Verdict {
             Ok((rig.facts.force_tolerance, rig.facts.force_holds))
         })?;
         std::thread::sleep(holds);
-        let left = seat.bench().motors().wrench.force;
+        let left = seat.bench().motors().force;
         close_to("the force after closing", left, DVec3::ZERO, tolerance)?;
     }
     Ok(())

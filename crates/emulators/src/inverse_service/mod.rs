@@ -9,8 +9,6 @@
 //! second session's forces are ignored while another one's hold, how messages of 3.0 look, where the middle of the workspace is.
 
 mod arm;
-mod grip;
-mod motion;
 mod persona;
 mod requests;
 mod server;
@@ -21,9 +19,7 @@ mod steering;
 mod trouble;
 mod world;
 
-pub use arm::{Condition, MIDDLE};
-pub use grip::GripKind;
-pub use motion::Held;
+pub use arm::MIDDLE;
 pub use persona::Persona;
 pub use server::{InverseService, Options};
 pub use steering::MotorForce;

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 /// A release, by its dialect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Persona {
     /// 3.0: maps by device instead of arrays.
     V30,
@@ -12,6 +12,7 @@ pub enum Persona {
     /// 3.4: beside that the values last commanded, custom grips and the channel of events.
     V34,
     /// 3.5: beside that payloads by their own keys, presets, a session object, `{}` for transforms that do nothing.
+    #[default]
     V35,
 }
 

@@ -1,25 +1,24 @@
 //! The service as a whole: its sockets, and what a test does to it.
 
 use std::collections::BTreeMap;
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use palpate_devices::{Buttons, emulated};
+use palpate_devices::Buttons;
 use serde_json::json;
 
-use super::arm::{Arm, Condition};
-use super::grip::{Grip, GripKind};
-use super::motion::{Held, Motion};
+use super::arm::{Arm, Grip};
 use super::persona::Persona;
 use super::session;
 use super::shared::{Shared, locked};
 use super::steering::{MotorForce, TestEnd, ends};
 use super::trouble::Trouble;
 use super::world::World;
+use crate::tip::{SteeredTip, Tip};
 
 /// Time between two looks for clients.
 const LOOK: Duration = Duration::from_millis(2);
@@ -27,35 +26,16 @@ const LOOK: Duration = Duration::from_millis(2);
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// What to emulate.
+#[derive(Default)]
 pub struct Options {
-    /// Port of the simulation channel and of HTTP; 0 for a free one.
+    /// Port of the simulation channel; 0 for a free one.
     pub port: u16,
     /// Port of the channel of events; 0 for a free one.
     pub events_port: u16,
     /// The release.
     pub persona: Persona,
-    /// Time after which a command that is not repeated ends. UNVERIFIED: the vendor states none.
-    pub idle_timeout: Duration,
-    /// Largest force of the motors an axis, N. UNVERIFIED: that of other programs.
-    pub max_force: f64,
-    /// Shortest time from a message to its reply.
+    /// Time from a message to its reply.
     pub latency: Duration,
-    /// By how much it may be longer.
-    pub jitter: Duration,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            port: 0,
-            events_port: 0,
-            persona: Persona::V35,
-            idle_timeout: Duration::from_millis(100),
-            max_force: 10.0,
-            latency: Duration::ZERO,
-            jitter: Duration::ZERO,
-        }
-    }
 }
 
 /// A running service. It ends when it is dropped.
@@ -80,17 +60,11 @@ impl InverseService {
         let events_listener = TcpListener::bind(("127.0.0.1", options.events_port))?;
         let (address, events) = (listener.local_addr()?, events_listener.local_addr()?);
         let began = Instant::now();
-        let mut world = World::new(options.persona, began);
-        (world.idle_timeout, world.max_force) = (options.idle_timeout, options.max_force);
-        let shared = Arc::new(Shared::new(world, options.latency, options.jitter));
+        let shared = Arc::new(Shared::new(World::new(options.persona, began), options.latency));
         let stop = Arc::new(AtomicBool::new(false));
         let mut service = Self { shared, stop, threads: Vec::new(), address, events, began, ends: Mutex::default() };
         service.listen(listener, |stream, shared| {
-            thread::spawn(move || {
-                if !answer_http(&stream) {
-                    session::serve(stream, &shared);
-                }
-            });
+            thread::spawn(move || session::serve(stream, &shared));
         })?;
         service.listen(events_listener, |stream, shared| {
             let timeouts =
@@ -122,34 +96,25 @@ impl InverseService {
         format!("ws://{}?events={}", self.address, self.events.port())
     }
 
-    /// Adds an arm that a test holds in the middle of its workspace.
-    pub fn add_held_arm(&self, id: &str, kind: &'static str) {
-        self.add(id, kind, Motion::Held(Held::at(glam::DVec3::ZERO), self.began.elapsed().as_secs_f64()));
-    }
-
-    /// Adds an arm that its mechanics and a hand move, in metres from the middle of its workspace.
-    pub fn add_arm(&self, id: &str, kind: &'static str, tip: emulated::Tip) {
-        self.add(id, kind, Motion::Free(Box::new(tip)));
-    }
-
-    fn add(&self, id: &str, kind: &'static str, motion: Motion) {
+    /// Adds an arm.
+    pub fn add_arm(&self, id: &str, kind: &'static str, tip: SteeredTip) {
         let (test_end, arm_end) = ends(self.began);
         locked(&self.ends).insert(id.into(), test_end);
-        locked(&self.shared.world).arms.push(Arm::new((id, kind), motion, (self.began, arm_end)));
+        locked(&self.shared.world).arms.push(Arm::new((id, kind), tip, (self.began, arm_end)));
     }
 
     /// Adds a grip that is paired with an arm.
-    pub fn add_grip(&self, id: &str, kind: GripKind, arm: &str) {
-        locked(&self.shared.world).grips.push(Grip::new(id, kind, arm));
+    pub fn add_grip(&self, id: &str, arm: &str) {
+        locked(&self.shared.world).grips.push(Grip::new(id, arm));
     }
 
-    /// Holds the tip of an arm somewhere.
+    /// Puts the tip of an arm somewhere.
     ///
     /// # Panics
     /// No such arm.
-    pub fn hold(&self, id: &str, held: Held) {
+    pub fn set_tip(&self, id: &str, tip: Tip) {
         let since = self.began.elapsed().as_secs_f64();
-        locked(&self.ends).get_mut(id).expect("an arm of the emulator").hold(held, since);
+        locked(&self.ends).get_mut(id).expect("an arm of the emulator").put(tip, since);
     }
 
     /// Holds buttons of a grip.
@@ -162,11 +127,10 @@ impl InverseService {
         self.change_grip(id, |grip| grip.awake = awake);
     }
 
-    /// Changes what the status of an arm says; its cable aside.
-    pub fn set_condition(&self, id: &str, condition: Condition) {
+    /// Lets the status of an arm say whether it is calibrated.
+    pub fn set_calibrated(&self, id: &str, calibrated: bool) {
         self.change_arm(id, |arm| {
-            let plugged = arm.condition.plugged;
-            arm.condition = Condition { plugged, ..condition };
+            arm.calibrated = calibrated;
             arm.release();
         });
     }
@@ -196,8 +160,7 @@ impl InverseService {
 
     /// Ends all connections, as a service that starts anew.
     pub fn drop_connections(&self) {
-        self.shared.next_generation();
-        locked(&self.shared.listeners).clear();
+        self.shared.drop_connections();
     }
 
     /// What the motors of an arm put out now.
@@ -214,14 +177,6 @@ impl InverseService {
     /// No such arm.
     pub fn take_changes(&self, id: &str) -> Vec<MotorForce> {
         self.change_arm(id, |arm| std::mem::take(&mut arm.changes)).expect("an arm of the emulator")
-    }
-
-    /// How many commands to an arm were larger than its motors.
-    ///
-    /// # Panics
-    /// No such arm.
-    pub fn clamped(&self, id: &str) -> u64 {
-        self.change_arm(id, |arm| arm.clamped).expect("an arm of the emulator")
     }
 
     /// What clients sent since the last call that the service would not take.
@@ -259,23 +214,4 @@ impl Drop for InverseService {
             let _ = thread.join();
         }
     }
-}
-
-/// Answers `GET /version`, which comes to the same port; whether it was that.
-fn answer_http(stream: &TcpStream) -> bool {
-    const ASKED: &[u8] = b"GET /version ";
-    let mut head = [0; ASKED.len()];
-    let mut stream = stream;
-    if stream.set_read_timeout(Some(PATIENCE)).is_err() || stream.peek(&mut head).is_err() || head != ASKED {
-        return false;
-    }
-    let body = json!({"project_name": "haply-inverse-service", "project_version": "emulated"}).to_string();
-    let length = body.len();
-    let _ = write!(
-        stream,
-        "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
-    );
-    // What is not read would cut the answer off.
-    let _ = stream.read(&mut [0; 4096]);
-    true
 }

@@ -96,7 +96,7 @@ impl Client {
             return false;
         }
         let later = trouble.as_ref().map_or(Duration::ZERO, Trouble::delay);
-        let due = Instant::now() + shared.latency() + later;
+        let due = Instant::now() + shared.latency + later;
         let messages = match &trouble {
             Some(trouble) => trouble.spoil(state),
             None => vec![Message::text(state.to_string())],

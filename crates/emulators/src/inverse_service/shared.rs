@@ -9,7 +9,7 @@ use tungstenite::{Message, WebSocket};
 
 use super::world::World;
 
-/// Shared by the threads of a service.
+/// What the threads of a service share.
 pub struct Shared {
     /// What is behind the sockets.
     pub world: Mutex<World>,
@@ -17,11 +17,8 @@ pub struct Shared {
     pub listeners: Mutex<Vec<WebSocket<TcpStream>>>,
     /// Sessions of an earlier one end.
     generation: AtomicU64,
-    /// Shortest time from a message to its reply, and by how much it may be longer, ns.
-    latency_ns: AtomicU64,
-    jitter_ns: AtomicU64,
-    /// State of the sequence that spreads latencies.
-    sequence: AtomicU64,
+    /// Time from a message to its reply.
+    pub latency: Duration,
 }
 
 /// The lock of what no thread leaves half done.
@@ -31,15 +28,8 @@ pub fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Shared {
     /// Around a world.
-    pub fn new(world: World, latency: Duration, jitter: Duration) -> Self {
-        Self {
-            world: Mutex::new(world),
-            listeners: Mutex::default(),
-            generation: AtomicU64::new(0),
-            latency_ns: AtomicU64::new(latency.as_nanos() as u64),
-            jitter_ns: AtomicU64::new(jitter.as_nanos() as u64),
-            sequence: AtomicU64::new(0),
-        }
+    pub fn new(world: World, latency: Duration) -> Self {
+        Self { world: Mutex::new(world), listeners: Mutex::default(), generation: AtomicU64::new(0), latency }
     }
 
     /// Number that changes when all connections are to end.
@@ -48,19 +38,12 @@ impl Shared {
     }
 
     /// Ends all connections.
-    pub fn next_generation(&self) {
+    pub fn drop_connections(&self) {
         self.generation.fetch_add(1, Ordering::Relaxed);
+        locked(&self.listeners).clear();
     }
 
-    /// Time to the next reply: evenly spread by the multiples of the golden ratio, the same in every run.
-    pub fn latency(&self) -> Duration {
-        let step = self.sequence.fetch_add(0x9e37_79b9_7f4a_7c15, Ordering::Relaxed);
-        let share = (step >> 11) as f64 / (1_u64 << 53) as f64;
-        let jitter = self.jitter_ns.load(Ordering::Relaxed) as f64 * share;
-        Duration::from_nanos(self.latency_ns.load(Ordering::Relaxed) + jitter as u64)
-    }
-
-    /// Sends the events of the world to whoever listens.
+    /// Sends the events of the world to all listeners.
     pub fn send_events(&self) {
         let events = std::mem::take(&mut locked(&self.world).events);
         for event in events {

@@ -3,8 +3,7 @@
 use glam::{DQuat, DVec3};
 use serde_json::{Map, Value, json};
 
-use super::arm::{Arm, MIDDLE};
-use super::grip::{Grip, GripKind};
+use super::arm::{Arm, Grip, MIDDLE};
 use super::persona::Persona;
 use super::world::{Session, World};
 
@@ -30,17 +29,16 @@ fn identity(persona: Persona) -> Value {
 pub fn render(world: &World, number: u64, full: bool) -> Value {
     let session = world.sessions.get(&number).cloned().unwrap_or_default();
     let persona = world.persona;
-    let plugged = world.arms.iter().filter(|arm| arm.condition.plugged);
+    let plugged = world.arms.iter().filter(|arm| arm.plugged);
     let arms = plugged.map(|arm| (arm.id.clone(), render_arm(world, arm, &session, number, full)));
     let mut message = Map::new();
     message.insert("inverse3".into(), collected(persona, arms));
-    for kind in [GripKind::Wired, GripKind::Wireless, GripKind::Custom] {
-        if kind == GripKind::Custom && persona < Persona::V34 {
-            continue;
-        }
-        let grips = world.grips.iter().filter(|grip| grip.kind == kind);
-        let grips = grips.map(|grip| (grip.id.clone(), render_grip(persona, grip, full)));
-        message.insert(kind.array().into(), collected(persona, grips));
+    let grips = world.grips.iter().map(|grip| (grip.id.clone(), render_grip(persona, grip, full)));
+    message.insert("wireless_verse_grip".into(), collected(persona, grips));
+    // Grips by cable and those with an extension: there are none.
+    message.insert("verse_grip".into(), collected(persona, std::iter::empty()));
+    if persona >= Persona::V34 {
+        message.insert("custom_verse_grip".into(), collected(persona, std::iter::empty()));
     }
     message.insert("session_id".into(), json!(number));
     if persona >= Persona::V35 {
@@ -60,10 +58,10 @@ fn collected(persona: Persona, entries: impl Iterator<Item = (String, Value)>) -
 fn render_arm(world: &World, arm: &Arm, session: &Session, number: u64, full: bool) -> Value {
     let persona = world.persona;
     let mut entry = json!({"device_id": arm.id, "state": arm_state(persona, arm, session), "status": {
-        "calibrated": arm.condition.calibrated,
+        "calibrated": arm.calibrated,
         "in_use": arm.commanded_by().is_some_and(|other| other != number),
-        "power_supply": arm.condition.power_supply,
-        "ready": arm.condition.ready,
+        "power_supply": true,
+        "ready": true,
         "started": true,
     }});
     if full {
@@ -132,26 +130,17 @@ fn arm_config(persona: Persona, arm: &Arm, session: &Session) -> Value {
 }
 
 fn render_grip(persona: Persona, grip: &Grip, full: bool) -> Value {
-    let mut state = json!({
+    let state = json!({
         "hall": 0, "orientation": quaternion(grip.orientation), "transform": identity(persona),
+        "buttons": {"a": grip.holds(0), "b": grip.holds(1), "c": grip.holds(2)},
+        "battery_level": 0.8, "battery_voltage": 3.9,
     });
-    let status = if grip.kind == GripKind::Wired {
-        state["button"] = json!(grip.holds(0));
-        json!({"error": 0, "ready": grip.awake})
-    } else {
-        state["buttons"] = json!({"a": grip.holds(0), "b": grip.holds(1), "c": grip.holds(2)});
-        state["battery_level"] = json!(0.8);
-        state["battery_voltage"] = json!(3.9);
-        json!({"connected": grip.awake, "awake": grip.awake, "ready": grip.awake})
-    };
-    if grip.kind == GripKind::Custom {
-        state["extension_data"] = json!([0_u8; 12].as_slice());
-    }
+    let status = json!({"connected": grip.awake, "awake": grip.awake, "ready": grip.awake});
     let mut entry = json!({"device_id": grip.id, "state": state, "status": status});
     if full {
         entry["config"] = json!({
-            "port": "/dev/ttyACM1", "type": grip.kind.array(), "major_version": 1, "minor_version": 2,
-            "hardware_version": 1, "streaming_mode": if grip.kind == GripKind::Wired { "USB" } else { "Radio" },
+            "port": "/dev/ttyACM1", "type": "wireless_verse_grip", "major_version": 1, "minor_version": 2,
+            "hardware_version": 1, "streaming_mode": "Radio",
         });
     }
     entry

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 use triple_buffer::{Input, Output, triple_buffer};
 
-use super::motion::Held;
+use crate::tip::Tip;
 
 /// What the motors were told, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,27 +28,27 @@ pub struct Commanded {
 
 /// The arm's end.
 pub struct ArmEnd {
-    held: Output<Option<(Held, f64)>>,
+    put: Output<Option<(Tip, f64)>>,
     commanded: Input<Commanded>,
 }
 
 /// The test's end.
 pub struct TestEnd {
-    held: Input<Option<(Held, f64)>>,
+    put: Input<Option<(Tip, f64)>>,
     commanded: Output<Commanded>,
 }
 
 /// Both ends, of an arm without force.
 pub fn ends(began: Instant) -> (TestEnd, ArmEnd) {
     let none = Commanded { motors: MotorForce { force: DVec3::ZERO, at: began }, until: None };
-    let ((held, is_held), (commands, commanded)) = (triple_buffer(&None), triple_buffer(&none));
-    (TestEnd { held, commanded }, ArmEnd { held: is_held, commanded: commands })
+    let ((put, is_put), (commands, commanded)) = (triple_buffer(&None), triple_buffer(&none));
+    (TestEnd { put, commanded }, ArmEnd { put: is_put, commanded: commands })
 }
 
 impl TestEnd {
-    /// Holds the tip from a time on, s.
-    pub fn hold(&mut self, held: Held, since: f64) {
-        self.held.write(Some((held, since)));
+    /// Puts the tip somewhere from a time on, s.
+    pub fn put(&mut self, tip: Tip, since: f64) {
+        self.put.write(Some((tip, since)));
     }
 
     /// What is on the motors now.
@@ -62,13 +62,13 @@ impl TestEnd {
 }
 
 impl ArmEnd {
-    /// Where a test holds the tip since a time, s, if it has said so since the last call.
-    pub fn newly_held(&mut self) -> Option<(Held, f64)> {
-        if self.held.update() { *self.held.output_buffer_mut() } else { None }
+    /// Where a test has put the tip since the last call, and when, s.
+    pub fn newly_put(&mut self) -> Option<(Tip, f64)> {
+        if self.put.update() { *self.put.output_buffer_mut() } else { None }
     }
 
-    /// Tells what is on the motors.
-    pub fn tell(&mut self, commanded: Commanded) {
+    /// Publishes what is on the motors.
+    pub fn publish(&mut self, commanded: Commanded) {
         self.commanded.write(commanded);
     }
 }

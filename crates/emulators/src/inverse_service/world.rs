@@ -1,14 +1,12 @@
 //! All that is behind the sockets: arms, grips, sessions, time.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::arm::Arm;
-use super::grip::Grip;
-use super::motion::Measured;
+use super::arm::{Arm, Grip};
 use super::persona::Persona;
 use super::requests::Request;
 use super::trouble::Trouble;
@@ -25,8 +23,6 @@ pub struct Session {
     pub presets: BTreeMap<String, String>,
     /// Basis, if it has chosen one.
     pub basis: Option<String>,
-    /// Messages that it has sent.
-    pub messages: u64,
 }
 
 impl Session {
@@ -48,10 +44,6 @@ pub struct World {
     pub sessions: BTreeMap<u64, Session>,
     /// What is wrong with its replies.
     pub trouble: Option<Trouble>,
-    /// Time after which a command that is not repeated ends.
-    pub idle_timeout: Duration,
-    /// Largest force of the motors an axis, N.
-    pub max_force: f64,
     /// What clients sent that the service would not take.
     pub complaints: Vec<String>,
     /// Events that have not been sent yet.
@@ -71,8 +63,6 @@ impl World {
             grips: Vec::new(),
             sessions: BTreeMap::new(),
             trouble: None,
-            idle_timeout: Duration::from_millis(100),
-            max_force: 10.0,
             complaints: Vec::new(),
             events: Vec::new(),
             messages: 0,
@@ -120,8 +110,8 @@ impl World {
     /// Puts a cable in or out.
     pub fn plug(&mut self, id: &str, plugged: bool) {
         self.advance();
-        let Some(arm) = self.arm(id).filter(|arm| arm.condition.plugged != plugged) else { return };
-        arm.condition.plugged = plugged;
+        let Some(arm) = self.arm(id).filter(|arm| arm.plugged != plugged) else { return };
+        arm.plugged = plugged;
         arm.release();
         let data = json!({"device_family": "inverse3", "device_id": id});
         self.announce(if plugged { "device-connected" } else { "device-disconnected" }, "notice", data);
@@ -151,7 +141,6 @@ impl World {
             self.take_device(number, device.id.as_str(), device.force, device.probe);
         }
         let Some(session) = self.sessions.get_mut(&number) else { return request.full_state };
-        session.messages += 1;
         session.profile = request.profile.or(session.profile.take());
         session.basis = request.basis.or(session.basis.take());
         for device in request.devices {
@@ -163,17 +152,16 @@ impl World {
     }
 
     fn take_device(&mut self, number: u64, id: &str, force: Option<DVec3>, probe: bool) {
-        let limits = (self.max_force, self.idle_timeout);
-        let Some(arm) = self.arm(id).filter(|arm| arm.condition.plugged) else { return };
+        let Some(arm) = self.arm(id).filter(|arm| arm.plugged) else { return };
         if force.is_some() && arm.commanded_by().is_some_and(|other| other != number) {
             return self.announce("device-busy", "warning", json!({"device_family": "inverse3", "device_id": id}));
         }
         if let Some(force) = force {
-            arm.command(number, force, limits);
+            arm.command(number, force);
         }
         if probe {
             arm.refresh();
-            let Measured { orientation, .. } = arm.measured;
+            let orientation = arm.measured.orientation;
             let paired = self.grips.iter_mut().filter(|grip| grip.arm == id && grip.awake);
             paired.for_each(|grip| grip.orientation = orientation);
         }
@@ -184,16 +172,16 @@ impl World {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::motion::{Held, Motion};
     use super::super::state::render;
     use super::super::steering::ends;
     use super::*;
+    use crate::tip::SteeredTip;
 
     /// Takes messages whatever is in them: motors stay within their force, and states are JSON.
     fn takes(messages: &[String], persona: Persona) {
         let began = Instant::now();
         let mut world = World::new(persona, began);
-        world.arms.push(Arm::new(("0A01", "inverse3"), Motion::Held(Held::at(DVec3::X), 0.0), (began, ends(began).1)));
+        world.arms.push(Arm::new(("0A01", "inverse3"), SteeredTip::held(), (began, ends(began).1)));
         let session = world.begin_session();
         for message in messages {
             let full = world.take(session, message);

@@ -6,25 +6,16 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use palpate_devices::haply::open;
 use palpate_devices::{Connection, Wrench};
-use palpate_emulators::conformance::{Endurance, endure};
-use palpate_emulators::inverse_service::{Held, Persona};
+use palpate_emulators::Tip;
+use palpate_emulators::inverse_service::Persona;
 
-use super::{ARM, HaplyBench, alone, service};
+use super::{ARM, alone, service};
 
 const SECONDS: f64 = 10.0;
 /// Of the tip whose place tells the time, m/s.
 const SPEED: f64 = 0.01;
 /// Between the forces of two ticks, rad: the last one has not come round.
 const ANGLE: f64 = 5e-4;
-
-/// A minute of real time in which nothing is missed.
-#[test]
-#[ignore = "a minute of real time"]
-fn a_minute_at_1_khz() {
-    let _alone = alone();
-    let endurance = Endurance { ticks: 60_000, hurried: false };
-    println!("{:?}", endure(HaplyBench::new(Persona::V35), endurance).expect("a minute without a fault"));
-}
 
 /// What exchanges cost and how late they make a loop of 1 kHz, by their rate.
 #[test]
@@ -36,7 +27,7 @@ fn delay_and_cost_by_rate() {
         let address = format!("{}&rate={rate}", service.address());
         let mut device = open(&Connection { address: Some(address), ..Connection::default() }).expect("opens").device;
         let began = Instant::now();
-        service.hold(ARM, Held { velocity: SPEED * DVec3::Z, ..Held::at(DVec3::ZERO) });
+        service.set_tip(ARM, Tip { velocity: SPEED * DVec3::Z, ..Tip::at(DVec3::ZERO) });
         let (mut ages, mut written) = (Vec::new(), Vec::new());
         let (mut due, mut faults) = (Instant::now(), 0);
         let (messages, spent) = (service.messages(), driver_time());
