@@ -32,12 +32,13 @@ FORBIDDEN = {
 }
 
 # Folders of the Python package, lowest first: each imports from those before it. The modules at its top come before
-# all of them, the package itself, which exports the public names, where its name stands.
+# all of them, the package itself, which exports the public names, where its name stands. Benchmarks are a package of
+# their own, which nothing of this one imports.
 PYTHON_ORDER = (
     *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation", "palpation"),
     *("sessions", "study"),
-    *("palpate", "viewer", "validation/plots", "exam", "validation/verify", "validation/bench", "validation/doctor"),
-    "cli",
+    *("palpate", "viewer", "validation/plots", "exam", "validation/verify", "validation/ticks", "validation/doctor"),
+    *("cli", "benches"),
 )
 
 # What in backquotes can only be a name of code: with `::` or a dot, in CamelCase, or words joined by underscores;
@@ -132,7 +133,7 @@ def dependency_problems() -> list[str]:
 
 
 def python_import_problems() -> list[str]:
-    """Circles among the modules of the Python package, and imports against the order of its folders.
+    """Circles among the modules of the Python packages, and imports against the order of their folders.
 
     Imports inside functions and for type checkers count too.
     """
@@ -140,7 +141,7 @@ def python_import_problems() -> list[str]:
     order = ", ".join(f"`{name}`" for name in PYTHON_ORDER)
     if order not in " ".join((ROOT / "ARCHITECTURE.md").read_text().split()):
         problems.append(f"ARCHITECTURE.md does not give the order of the Python folders: {order}")
-    graph = python_import_graph(ROOT / "python")
+    graph = python_import_graph({"palpate": ROOT / "python", "benches": ROOT})
     for module, imported in graph.items():
         problems += [
             f"{module} imports {other}: {python_folder(other)} comes after {python_folder(module)}"
@@ -153,12 +154,13 @@ def python_import_problems() -> list[str]:
     return problems
 
 
-def python_import_graph(root: Path) -> dict[str, set[str]]:
-    """Modules of the package ``palpate`` below a folder, and the modules of it that each imports."""
+def python_import_graph(packages: dict[str, Path]) -> dict[str, set[str]]:
+    """Modules of packages, each below its folder, and the modules of these packages that each imports."""
     files = {}
-    for path in sorted((root / "palpate").rglob("*.py")):
-        parts = path.relative_to(root).with_suffix("").parts
-        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    for package, root in packages.items():
+        for path in sorted((root / package).rglob("*.py")):
+            parts = path.relative_to(root).with_suffix("").parts
+            files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return {
         module: {
             known if known in files else known.rpartition(".")[0]
@@ -170,7 +172,7 @@ def python_import_graph(root: Path) -> dict[str, set[str]]:
 
 
 def imported_names(path: Path, package: str) -> Iterator[str]:
-    """Everything of the package that a file imports, with the module it comes from; the compiled module aside."""
+    """Everything of the packages that a file imports, with the module it comes from; the compiled module aside."""
     for node in ast.walk(ast.parse(path.read_text())):
         names = []
         if isinstance(node, ast.Import):
@@ -179,13 +181,13 @@ def imported_names(path: Path, package: str) -> Iterator[str]:
             above = ".".join(package.split(".")[: len(package.split(".")) + 1 - node.level]) if node.level else ""
             source = ".".join(part for part in (above, node.module) if part)
             names = [f"{source}.{alias.name}" for alias in node.names]
-        yield from (name for name in names if name.split(".")[0] == "palpate" and name != "palpate._native")
+        yield from (n for n in names if n.split(".")[0] in ("palpate", "benches") and n != "palpate._native")
 
 
 def python_folder(module: str) -> str:
     """Folder of a module in the order; "top" for the modules at the top of the package."""
-    if module == "palpate":
-        return "palpate"
+    if module == "palpate" or module.split(".")[0] == "benches":
+        return module.split(".")[0]
     if module == "palpate.__main__":
         return PYTHON_ORDER[-1]
     path = "/".join(module.split(".")[1:])
@@ -242,7 +244,7 @@ def dead_name_problems() -> list[str]:
 
 def length_problems() -> list[str]:
     """Source files too long to be read in one go."""
-    patterns = ("crates/*/src/**/*.rs", "python/**/*.py", "tests/**/*.py", "viewer/src/**/*.ts")
+    patterns = ("crates/*/src/**/*.rs", "python/**/*.py", "benches/*.py", "tests/**/*.py", "viewer/src/**/*.ts")
     sources = [p for pattern in patterns for p in ROOT.glob(pattern)]
     return [
         f"{p.relative_to(ROOT)} has more than {MAX_FILE_LINES} lines"
