@@ -378,8 +378,8 @@ def as_tables(rows: Sequence[Row]) -> list[Table]:
             lines.append(
                 [
                     *(str(row.labels[label]) for label in labels),
-                    *(_number(getattr(row, figure)) for figure in figures),
-                    *(_number(row.beside.get(key)) for key in beside),
+                    *(_cell(getattr(row, figure), ".1f") for figure in figures),
+                    *(_cell(row.beside.get(key), ".4g") for key in beside),
                 ]
             )
         headings = [*labels, *("p99.9" if figure == "p999" else figure for figure in figures), *beside]
@@ -387,8 +387,8 @@ def as_tables(rows: Sequence[Row]) -> list[Table]:
     return found
 
 
-def _number(value: float | None) -> str:
-    return "" if value is None else str(int(value)) if value == int(value) else f"{value:.1f}"
+def _cell(value: float | None, style: str) -> str:
+    return "" if value is None else format(value, style)
 
 
 def tick(
@@ -403,7 +403,8 @@ def tick(
     """Time every kind of tick: by patch, law, tool, number of contacts and size of the body.
 
     The envelope takes some ten minutes. With --out rows are kept in tick.json as they come, a run that was interrupted
-    goes on from there, and the envelope is drawn into envelope.png.
+    goes on from there, and the envelope is drawn into envelope.png. With 'c', exit code 1 if C++ takes more than 1.2
+    times as long as Rust.
 
     Example: python -m benches tick envelope --quick --out envelope
     """
@@ -425,3 +426,5 @@ def tick(
 
         plot_envelope([row for row in rows if row.table == "envelope"], folder / "envelope.png")
         wrote(folder / "tick.json", folder / "envelope.png")
+    if any(row.beside.get(tick_from_c.RATIO, 0.0) > tick_from_c.MOST for row in rows):
+        raise typer.Exit(1)

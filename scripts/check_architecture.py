@@ -186,8 +186,9 @@ def imported_names(path: Path, package: str) -> Iterator[str]:
 
 def python_folder(module: str) -> str:
     """Folder of a module in the order; "top" for the modules at the top of the package."""
-    if module == "palpate" or module.split(".")[0] == "benches":
-        return module.split(".")[0]
+    package = module.partition(".")[0]
+    if package in ("benches", module):
+        return package
     if module == "palpate.__main__":
         return PYTHON_ORDER[-1]
     path = "/".join(module.split(".")[1:])
