@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benches import contact_peers
+from benches.contact_at_points import forces_at_mesh_points
 from benches.output import Json, Out, Table, made, show
 from palpate.body import Body
 from palpate.figures import COLORS, empty_figure, write_figure
@@ -25,7 +26,6 @@ from palpate.validation.ticks import played
 from palpate.validation.verify.contact import tools
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.reference import Block, body_on_table, sphere_press, top_nodes
-from palpate.validation.verify.contact.signorini import at_the_meshs_points
 from palpate.validation.verify.solution import green_of
 
 BLOCK, RADIUS = Block(), 0.01
@@ -105,7 +105,7 @@ def _own_rows(body: Body, name: str) -> list[Row]:
     """By the local law, and at the mesh's own points."""
     green = green_of(body, touch=top_nodes(body, WITHIN))
     places = _places(body)
-    nodal = [at_the_meshs_points(green, body.mesh, tools.sphere(RADIUS, tuple(place)), DEPTHS) for place in places]
+    nodal = [forces_at_mesh_points(green, body.mesh, tools.sphere(RADIUS, tuple(place)), DEPTHS) for place in places]
     local, cost = _local_forces(body, green, places)
     return [Row("Palpate", name, local, cost), Row(AT_POINTS, name, np.array(nodal))]
 

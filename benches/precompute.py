@@ -189,28 +189,31 @@ def dense_inverse(system: System, columns: np.ndarray) -> np.ndarray:
     return now() - started
 
 
+def solved(
+    system: System, columns: np.ndarray, factorise: Callable[[], Callable[[np.ndarray], np.ndarray]], width: int
+) -> np.ndarray:
+    """Time a factorisation, and its solutions for so many right-hand sides at a time, scaled to all columns."""
+    started = now()
+    solve = factorise()
+    factored = now()
+    for right in system.blocks(columns, width):
+        solve(right)[system.columns]
+    return system.scaled(factored - started, now() - factored, columns)
+
+
 def superlu(system: System, columns: np.ndarray) -> np.ndarray:
     """Time SciPy's splu in its mode for symmetric matrices."""
     from scipy.sparse.linalg import splu
 
-    started = now()
-    factor = splu(system.matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    factored = now()
-    for right in system.blocks(columns, 64):
-        factor.solve(right)[system.columns]
-    return system.scaled(factored - started, now() - factored, columns)
+    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    return solved(system, columns, lambda: splu(system.matrix, **options).solve, 64)
 
 
 def cholmod(system: System, columns: np.ndarray) -> np.ndarray:
     """Time CHOLMOD, supernodal and ordered by METIS; 64 right-hand sides at a time were best."""
     from sksparse.cholmod import cholesky
 
-    started = now()
-    factor = cholesky(system.matrix, mode="supernodal", ordering_method="metis")
-    factored = now()
-    for right in system.blocks(columns, 64):
-        factor(right)[system.columns]
-    return system.scaled(factored - started, now() - factored, columns)
+    return solved(system, columns, lambda: cholesky(system.matrix, mode="supernodal", ordering_method="metis"), 64)
 
 
 def pardiso(system: System, columns: np.ndarray) -> np.ndarray:
@@ -221,12 +224,12 @@ def pardiso(system: System, columns: np.ndarray) -> np.ndarray:
     solver = PyPardisoSolver(mtype=2)
     upper = scipy.sparse.triu(system.matrix, format="csr")
     upper.sort_indices()
-    started = now()
-    solver.factorize(upper)
-    factored = now()
-    for right in system.blocks(columns, 128):
-        solver.solve(upper, right)[system.columns]
-    took = system.scaled(factored - started, now() - factored, columns)
+
+    def factorise() -> Callable[[np.ndarray], np.ndarray]:
+        solver.factorize(upper)
+        return lambda right: solver.solve(upper, right)
+
+    took = solved(system, columns, factorise, 128)
     solver.free_memory(everything=True)
     return took
 
