@@ -16,13 +16,13 @@ import numpy as np
 
 from benches import contact_peers
 from benches.contact_at_points import forces_at_mesh_points
-from benches.output import Json, Out, Table, made, show
+from benches.output import Json, Out, Table, make_folder, show
 from palpate.body import Body
 from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.green import GreensFunction
 from palpate.progress import narrated
 from palpate.simulation import Simulation
-from palpate.validation.ticks import played
+from palpate.validation.ticks import tick_times
 from palpate.validation.verify.contact import tools
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
 from palpate.validation.verify.contact.reference import Block, body_on_table, sphere_press, top_nodes
@@ -123,7 +123,7 @@ def _local_forces(body: Body, green: GreensFunction, places: np.ndarray) -> tupl
 
 
 def _tick_times(simulation: Simulation, path: np.ndarray) -> np.ndarray:
-    return played(simulation, np.ascontiguousarray(path[:, None]), 1)[0, -len(DEPTHS) :]
+    return tick_times(simulation, np.ascontiguousarray(path[:, None]), 1)[0, -len(DEPTHS) :]
 
 
 def _peer_rows() -> list[Row]:
@@ -198,5 +198,5 @@ def contact(out: Out = None, as_json: Json = False) -> None:
     more = {"radius": RADIUS, "depths": DEPTHS, "truth": results.truth, "missing": results.missing}
     ratios = {"ratios": [row.means / results.truth for row in results.rows]}
     show(as_json, results.rows, as_table(results), **more, **ratios)
-    if folder := made(out):
+    if folder := make_folder(out):
         plot(results, folder / "contact.png")

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benches.output import Json, Out, Table, made, show
+from benches.output import Json, Out, Table, make_folder, show
 from palpate import models
 from palpate.body import Body, Material
 from palpate.figures import COLORS, empty_figure, write_figure
@@ -156,5 +156,5 @@ def elements(out: Out = None, as_json: Json = False) -> None:
     with narrated("measuring both elements on a cube and on the liver"):
         rows = run()
     show(as_json, rows, as_table(rows))
-    if folder := made(out):
+    if folder := make_folder(out):
         plot(rows, folder / "elements.png")

@@ -148,7 +148,7 @@ def emulate(
     return Motion(*(answer[name].reshape(-1, len(held), 3) for name in names))
 
 
-def tireless(device: Device) -> Device:
+def unlimited_device(device: Device) -> Device:
     """Return the device without the limits that it states."""
     return replace(device, max_force=INFINITE, max_stiffness=INFINITE, max_damping=INFINITE)
 

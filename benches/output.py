@@ -79,14 +79,14 @@ def transposed(
     return Table(title, ["", *names], [None if line is None else [line[0], *line[1]] for line in lines], notes=notes)
 
 
-def made(folder: Path | None) -> Path | None:
+def make_folder(folder: Path | None) -> Path | None:
     """Make the folder of ``--out``."""
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
-def wrote(*paths: Path) -> None:
+def print_written(*paths: Path) -> None:
     """Say which files were written."""
     print(f"wrote {', '.join(map(str, paths))}", file=sys.stderr)
 

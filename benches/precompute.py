@@ -26,7 +26,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from benches.output import ROOT, Json, Out, Table, made, show
+from benches.output import ROOT, Json, Out, Table, make_folder, show
 from palpate import _native, models
 from palpate.body import Body, Material, problem_arrays
 from palpate.cache import cache_directory
@@ -189,7 +189,7 @@ def dense_inverse(system: System, columns: np.ndarray) -> np.ndarray:
     return now() - started
 
 
-def solved(
+def time_solver(
     system: System, columns: np.ndarray, factorise: Callable[[], Callable[[np.ndarray], np.ndarray]], width: int
 ) -> np.ndarray:
     """Time a factorisation, and its solutions for so many right-hand sides at a time, scaled to all columns."""
@@ -206,14 +206,14 @@ def superlu(system: System, columns: np.ndarray) -> np.ndarray:
     from scipy.sparse.linalg import splu
 
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    return solved(system, columns, lambda: splu(system.matrix, **options).solve, 64)
+    return time_solver(system, columns, lambda: splu(system.matrix, **options).solve, 64)
 
 
 def cholmod(system: System, columns: np.ndarray) -> np.ndarray:
     """Time CHOLMOD, supernodal and ordered by METIS; 64 right-hand sides at a time were best."""
     from sksparse.cholmod import cholesky
 
-    return solved(system, columns, lambda: cholesky(system.matrix, mode="supernodal", ordering_method="metis"), 64)
+    return time_solver(system, columns, lambda: cholesky(system.matrix, mode="supernodal", ordering_method="metis"), 64)
 
 
 def pardiso(system: System, columns: np.ndarray) -> np.ndarray:
@@ -229,7 +229,7 @@ def pardiso(system: System, columns: np.ndarray) -> np.ndarray:
         solver.factorize(upper)
         return lambda right: solver.solve(upper, right)
 
-    took = solved(system, columns, factorise, 128)
+    took = time_solver(system, columns, factorise, 128)
     solver.free_memory(everything=True)
     return took
 
@@ -298,7 +298,7 @@ def precompute(
     """
     with narrated("measuring; the larger bodies take minutes"):
         results = run(sizes.split(","), [int(count) for count in threads.split(",")])
-    if folder := made(out):
+    if folder := make_folder(out):
         plot(results, folder / "precompute.png")
     left_out = [f"{peer} was left out: pip install {package}" for peer, package in missing_peers().items()]
     tables = as_tables(results)

@@ -19,7 +19,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from benches.output import ROOT, Json, Out, Table, count_of, made, show, wrote
+from benches.output import ROOT, Json, Out, Table, count_of, make_folder, print_written, show
 from benches.rows_file import RowsFile
 from benches.scale_row import Job, Row
 from palpate.atomic import written_beside
@@ -66,7 +66,7 @@ class Results:
 def run(settings: Settings, keep: Path | None = None, report: Callable[[str], None] = lambda _: None) -> Results:
     """Measure; rows are kept in a file as they come, and those that it has already are not measured again.
 
-    ``report`` is told the size and the stage.
+    ``report`` is called with the size and the stage.
 
     Raises
     ------
@@ -79,29 +79,29 @@ def run(settings: Settings, keep: Path | None = None, report: Callable[[str], No
     rows = {row.pop("size"): Row(**row) for row in file.read()}
     for size in settings.sizes:
         if size not in rows:
-            rows[size] = _measured(settings.job(size), report)
+            rows[size] = _measure_in_child(settings.job(size), report)
             file.write([{"size": size, **asdict(row)} for size, row in rows.items()])
     return Results(settings, {size: rows[size] for size in sorted(settings.sizes)})
 
 
-def _measured(job: Job, report: Callable[[str], None]) -> Row:
+def _measure_in_child(job: Job, report: Callable[[str], None]) -> Row:
     """Measure in a child, whose last line is the row."""
     command = [sys.executable, "-m", "benches.scale_row", json.dumps(asdict(job))]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as child:
-        told: dict[str, Any] = {}
+        message: dict[str, Any] = {}
         try:
             for line in child.stdout or ():
-                told = json.loads(line)
-                if "stage" in told:
-                    report(f"{job.tetrahedra} tetrahedra: {told['stage']}")
+                message = json.loads(line)
+                if "stage" in message:
+                    report(f"{job.tetrahedra} tetrahedra: {message['stage']}")
             failure = child.stderr.read() if child.stderr else ""
         except BaseException:
             child.kill()
             raise
-    if child.returncode or "row" not in told:
+    if child.returncode or "row" not in message:
         lines = failure.strip().splitlines() or [f"its process ended with status {child.returncode}"]
         raise Error(f"{job.tetrahedra} tetrahedra cannot be measured: {lines[-1]}")
-    return Row(**told["row"])
+    return Row(**message["row"])
 
 
 def total(row: Row) -> float:
@@ -140,8 +140,8 @@ def table(results: Results) -> tuple[list[str], list[list[str]]]:
         return [title, *cells, f"{powers[power]:.2f}" if power in powers else ""]
 
     def times(name: str) -> list[str]:
-        told = [(row.seconds.get(name), row.cpu_seconds.get(name)) for row in rows]
-        return ["-" if wall is None else _seconds(wall, cpu) for wall, cpu in told]
+        times = [(row.seconds.get(name), row.cpu_seconds.get(name)) for row in rows]
+        return ["-" if wall is None else _seconds(wall, cpu) for wall, cpu in times]
 
     lines = [
         line("nodes", None, [str(row.nodes) for row in rows]),
@@ -235,14 +235,14 @@ def scale(
         None if surface is None else str(surface.resolve()),
         None if memory is None else int(memory_units(memory)),
     )
-    folder = made(out)
+    folder = make_folder(out)
     with Console(stderr=True).status("measuring") as status:
         results = run(settings, folder and folder / "scale.json", status.update)
     if folder is not None:
         plot(results, folder / "scale.png")
         with written_beside(folder / "scale.md") as partial:
             partial.write_text(markdown(results))
-        wrote(folder / "scale.json", folder / "scale.md", folder / "scale.png")
+        print_written(folder / "scale.json", folder / "scale.md", folder / "scale.png")
     notes = [
         "seconds on the wall; of all processors, which other programs disturb less",
         "power: of the number of tetrahedra, fitted to the processors' time",

@@ -26,7 +26,7 @@ from palpate.green.memory import memory_in_use, peak_memory
 from palpate.mesh import TetMesh, filling, tetrahedralize
 from palpate.mesh.tetrahedralize import read_surface
 from palpate.simulation import Simulation
-from palpate.validation.ticks import CELL, DEPTH, FRICTION, HELD, RADIUS, played, strokes
+from palpate.validation.ticks import CELL, DEPTH, FRICTION, HELD, RADIUS, strokes, tick_times
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.validation.verify.grids import box
 
@@ -123,10 +123,10 @@ def processor_seconds() -> float:
 class Stages:
     """Clock of the stages; each ends where the next begins."""
 
-    def __init__(self, tell: Callable[[str], None]):
+    def __init__(self, report: Callable[[str], None]):
         self.seconds: dict[str, float] = {}
         self.cpu_seconds: dict[str, float] = {}
-        self._tell, self._name, self._begun = tell, "", (0.0, 0.0)
+        self._report, self._name, self._begun = report, "", (0.0, 0.0)
 
     def begin(self, name: str) -> None:
         """End the stage before, and begin one; an empty name begins none."""
@@ -136,22 +136,22 @@ class Stages:
                 kept[self._name] = kept.get(self._name, 0.0) + end - start
         self._name, self._begun = name, now
         if name:
-            self._tell(name)
+            self._report(name)
 
 
-def measure(job: Job, tell: Callable[[str], None] = lambda _: None) -> Row:
-    """Measure one size in this process; ``tell`` is called as each stage begins."""
-    stages = Stages(tell)
-    mesh = meshed(job, stages)
+def measure(job: Job, report: Callable[[str], None] = lambda _: None) -> Row:
+    """Measure one size in this process; ``report`` is called as each stage begins."""
+    stages = Stages(report)
+    mesh = make_mesh(job, stages)
     stages.begin("body")
-    body = Body(mesh, material=Material(10e3, 0.45), fixed=held(mesh, job))
-    touch = region(mesh, job.touched)
+    body = Body(mesh, material=Material(10e3, 0.45), fixed=held_nodes(mesh, job))
+    touch = touch_region(mesh, job.touched)
     problem = problem_arrays(body, touch)
     stages.begin("")
     row = Row(len(mesh.tets), len(mesh.nodes), len(mesh.surface_nodes), len(touch))
     allowed = None if job.memory is None else job.memory - memory_in_use()
     row.peak_whole = peak_memory()
-    forget_peak()
+    reset_peak()
     used = memory_in_use()
     allowed = None if job.memory is None else job.memory - used
     with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:
@@ -164,13 +164,13 @@ def measure(job: Job, tell: Callable[[str], None] = lambda _: None) -> Row:
         row.planned = used + _native.GreenCore.plan(problem, job.precision, allowed)["memory"]
         stages.begin("opening")
         green = GreensFunction(_native.GreenCore.load(path, None), body)
-    felt(row, body, green, touch, stages)
+    press_and_draw(row, body, green, touch, stages)
     row.seconds, row.cpu_seconds = stages.seconds, stages.cpu_seconds
     row.peak_whole = max(row.peak_whole, peak_memory())
     return row
 
 
-def meshed(job: Job, stages: Stages) -> TetMesh:
+def make_mesh(job: Job, stages: Stages) -> TetMesh:
     """Mesh of a job, with its surface."""
     if job.surface is None:
         stages.begin("meshing")
@@ -189,13 +189,13 @@ def meshed(job: Job, stages: Stages) -> TetMesh:
     return mesh
 
 
-def held(mesh: TetMesh, job: Job) -> np.ndarray:
+def held_nodes(mesh: TetMesh, job: Job) -> np.ndarray:
     """Nodes that hold the body, (n,) mask: those on the table, or the lowest part of a surface."""
     low, high = mesh.bounds[:, 2]
     return mesh.nodes[:, 2] <= low + (1e-9 if job.surface is None else HELD_PART * (high - low))
 
 
-def region(mesh: TetMesh, count: int) -> np.ndarray:
+def touch_region(mesh: TetMesh, count: int) -> np.ndarray:
     """So many surface nodes, or all, around the highest in the middle, ascending."""
     nodes = mesh.nodes[mesh.surface_nodes]
     middle = nodes.mean(axis=0)
@@ -208,7 +208,7 @@ def region(mesh: TetMesh, count: int) -> np.ndarray:
     return np.sort(mesh.surface_nodes[nearest])
 
 
-def felt(row: Row, body: Body, green: GreensFunction, touch: np.ndarray, stages: Stages) -> None:
+def press_and_draw(row: Row, body: Body, green: GreensFunction, touch: np.ndarray, stages: Stages) -> None:
     """Open, touch, press and slide anywhere in the region, and draw."""
     stages.begin("contact law")
     simulation = loop_of(body, green, [sphere(RADIUS, FRICTION)])
@@ -216,9 +216,9 @@ def felt(row: Row, body: Body, green: GreensFunction, touch: np.ndarray, stages:
     places, normals = even_places(body.mesh, touch)
     path = script(places, normals)
     stages.begin("first touch")
-    played(simulation, path[: 1 + HELD], 1)
+    tick_times(simulation, path[: 1 + HELD], 1)
     stages.begin("")
-    times = played(simulation, path, PLAYS)
+    times = tick_times(simulation, path, PLAYS)
     row.ticks, row.tick_median, row.tick_noisy = len(path), float(np.median(times)), float(times.max())
     row.tick_worst = float(times.min(axis=0).max())
     row.frame = frame_us(simulation, path[1, 0])
@@ -274,19 +274,19 @@ def frame_us(simulation: Simulation, pressed: np.ndarray) -> float:
     return 1e6 * float(np.median(times))
 
 
-def forget_peak() -> None:
+def reset_peak() -> None:
     """Begin the peak anew where the system allows it, so that what a mesh has taken does not count."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
 
 def main(text: str) -> None:
-    """Measure the job of ``text``, and print what there is to tell."""
+    """Measure the job of ``text``, and print stages and row as lines of JSON."""
 
-    def tell(**what: Any) -> None:
-        print(json.dumps(what), flush=True)
+    def write(**message: Any) -> None:
+        print(json.dumps(message), flush=True)
 
-    tell(row=asdict(measure(Job(**json.loads(text)), lambda stage: tell(stage=stage))))
+    write(row=asdict(measure(Job(**json.loads(text)), lambda stage: write(stage=stage))))
 
 
 if __name__ == "__main__":

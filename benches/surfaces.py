@@ -89,7 +89,7 @@ def run(
     for count in triangles:
         for limit in most:
             if limit is None or limit < count:
-                rows.append(_measured(Dome(count, sys.maxsize if limit is None else limit), page))
+                rows.append(_measure(Dome(count, sys.maxsize if limit is None else limit), page))
     return rows
 
 
@@ -156,8 +156,8 @@ class _Displacement:
 
     def picture(self, _name: str, displacements: np.ndarray, _interior: bool, _full_scale: float | None) -> Picture:
         sizes = np.sqrt(np.einsum("ij,ij->i", displacements, displacements))
-        told = {name: getattr(DISPLACEMENT, name) for name in ("name", "title", "unit", "signed", "gaps")}
-        header = {**told, "min": 0.0, "max": 1e3 * DEPTH, "largest": 1e3 * float(sizes.max())}
+        known = {name: getattr(DISPLACEMENT, name) for name in ("name", "title", "unit", "signed", "gaps")}
+        header = {**known, "min": 0.0, "max": 1e3 * DEPTH, "largest": 1e3 * float(sizes.max())}
         return Picture(header, displacements, np.rint(255.0 * np.minimum(sizes / DEPTH, 1.0)), False)
 
     def largest_strain(self, _displacements: np.ndarray) -> float:
@@ -179,7 +179,7 @@ class DomeSession(Session):
         return self._dome.displacements(time.monotonic())
 
 
-def _measured(dome: Dome, page: bool) -> Row:
+def _measure(dome: Dome, page: bool) -> Row:
     coder, sizes, times = PoseCoder(), [], []
     deflated, deflating = [], []
     for frame in range(FRAMES):

@@ -32,7 +32,7 @@ import typer
 
 from benches import tick_from_c
 from benches.contact_numpy import contact_us, solve_us
-from benches.output import Json, Out, Table, made, show, wrote
+from benches.output import Json, Out, Table, make_folder, print_written, show
 from benches.rows_file import RowsFile
 from benches.tick_case import Case, Play, Row
 from palpate import _native, models
@@ -117,7 +117,7 @@ def run(
     cases = [case for table in tables for case in CASES[table](settings)]
     for count, case in enumerate(cases, 1):
         if not any(row.belongs_to(case.table, case.labels) for row in rows):
-            rows += case.measured()
+            rows += case.measure()
             file.write([asdict(row) for row in rows])
         if report is not None:
             report(count, len(cases))
@@ -255,7 +255,7 @@ def _local_play(cells: tuple[int, int, int], name: str) -> Play:
     middle = press_centres(body, [(0.0, 0.0)])[0]
     tools, path, orientation = _motions(middle)[name]
     motion = _motion(body, PLATE_MODES, UNLIMITED["max_stiffness"]) if "in motion" in name else None
-    # The tool comes from above, which is not told.
+    # The tool comes from above in ticks without a name.
     lead = np.stack([path[0] + lift * UP for lift in np.linspace(3e-3, 0, 31)[:-1]])
     simulation = loop_of(body, green, tools, motion=motion)
     moved = np.ascontiguousarray(np.concatenate([lead, path]).reshape(len(lead) + TICKS, -1, 3))
@@ -414,7 +414,7 @@ def tick(
         raise Error(f"no table is called '{unknown[0]}'; there are {', '.join(TABLES)}")
     if "c" in chosen and prefix is None:
         raise Error("the table 'c' needs the library: 'make install PREFIX=DIR', then --prefix DIR")
-    folder = made(out)
+    folder = make_folder(out)
     with progress_reporter("timing ticks", True) as report:
         keep = None if folder is None else folder / "tick.json"
         rows = run([name for name in chosen if name != "c"], QUICK if quick else Settings(), keep, report)
@@ -425,6 +425,6 @@ def tick(
         from benches.tick_plot import plot_envelope
 
         plot_envelope([row for row in rows if row.table == "envelope"], folder / "envelope.png")
-        wrote(folder / "tick.json", folder / "envelope.png")
+        print_written(folder / "tick.json", folder / "envelope.png")
     if any(row.beside.get(tick_from_c.RATIO, 0.0) > tick_from_c.MOST for row in rows):
         raise typer.Exit(1)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.simulation import Simulation
-from palpate.validation.ticks import UPRIGHT, Times, played, running
+from palpate.validation.ticks import UPRIGHT, Times, tick_times, time_loop
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Row:
     Attributes
     ----------
     table, labels
-        Where the row stands, and what tells it from others there.
+        Where the row stands, and what distinguishes it there.
     median, p999, worst
         Of all plays; None where only shortest times count.
     shortest, mean, costliest
@@ -89,13 +89,13 @@ class Play:
 
 @dataclass(frozen=True)
 class Case:
-    """Rows of one simulation: their table, what tells them from others, and what prepares the play."""
+    """Rows of one simulation: their table, what distinguishes them, and the function that prepares them."""
 
     table: str
     labels: dict[str, Any]
     prepare: Callable[[], Play]
 
-    def measured(self) -> list[Row]:
+    def measure(self) -> list[Row]:
         """Play, and run the loop."""
         play = self.prepare()
         times, kinds = _times(play), np.array(play.kinds)
@@ -105,7 +105,7 @@ class Case:
             if kind
         ]
         if play.seconds:
-            loop = running(play.simulation, play.path, play.seconds)
+            loop = time_loop(play.simulation, play.path, play.seconds)
             for name, of_loop, missed in (
                 ("running: computing", loop.compute_us, loop.missed_computing),
                 ("running: waking up", loop.wakeup_us, loop.missed_waking),
@@ -120,8 +120,8 @@ class Case:
 def _times(play: Play) -> np.ndarray:
     """Play: times of all plays, (plays, ticks) us."""
     if not play.at_once:
-        return played(play.simulation, play.path, play.plays, play.orientation)
+        return tick_times(play.simulation, play.path, play.plays, play.orientation)
     parts = np.split(play.path, play.places)
     path = np.ascontiguousarray(np.concatenate([part for part in parts for _ in range(play.plays)]))
-    times = played(play.simulation, path, 1, play.orientation).reshape(play.places, play.plays, -1)
+    times = tick_times(play.simulation, path, 1, play.orientation).reshape(play.places, play.plays, -1)
     return times.transpose(1, 0, 2).reshape(play.plays, -1)

@@ -108,7 +108,7 @@ def touch(simulation: Simulation, device: Device, hand: str) -> Touch:
     held = [hold(device, HANDS[hand], path(simulation, tool, DEPTHS[hand])) for tool in range(len(tools))]
     period = 1 / simulation.scene.device.rate
     motion = emulate(simulation, held, period, round(TIMES[-1] / period), reach=REACH)
-    return judged(simulation.scene.name, device, hand, simulation.scene.device.max_stiffness, motion, period)
+    return judge(simulation.scene.name, device, hand, simulation.scene.device.max_stiffness, motion, period)
 
 
 def hold(device: Device, hand: Hand, waypoints: Sequence[tuple[float, np.ndarray]]) -> Held:
@@ -134,8 +134,8 @@ def strokes(touching: np.ndarray, depth: float, way: float) -> list[tuple[float,
     return [(time, touching + offset) for time, offset in zip(TIMES, offsets, strict=False)]
 
 
-def judged(scene: str, device: Device, hand: str, max_stiffness: float, motion: Motion, period: float) -> Touch:
-    """Tell of a motion whether it is stable."""
+def judge(scene: str, device: Device, hand: str, max_stiffness: float, motion: Motion, period: float) -> Touch:
+    """Classify a motion as stable or not."""
     whole = len(motion) == round(TIMES[-1] / period)
     unrest = max(unrest_before(motion, end, period) for end in (TIMES[3], TIMES[-1])) if whole else np.inf
     force = float(np.linalg.norm(motion.forces, axis=-1).max())
@@ -158,7 +158,7 @@ def touch_of_spring(spring: Spring, device: Device, hand: str, stiffness: float,
     simulation = spring.pressed(stiffness, most)
     held = hold(device, HANDS[hand], strokes(spring.place + [0, 0, spring.radius], HARD_DEPTHS[hand], 0.0))
     motion = emulate(simulation, [held], 1e-3, round(TIMES[-1] / 1e-3), reach=REACH)
-    return judged(f"{stiffness:g} N/m", device, hand, most, motion, 1e-3)
+    return judge(f"{stiffness:g} N/m", device, hand, most, motion, 1e-3)
 
 
 # Stiffness of the blocks on which a Touch is tried: beyond what it holds, and beyond what anybody does, N/m.

@@ -33,7 +33,7 @@ from palpate.viewer.server import ViewerServer
 SETTINGS_HZ, PRESSES_HZ = 25.0, 100.0
 # Between two beats of the event loop, and between two looks at the threads, s.
 BEAT, LOOK = 2e-3, 50e-3
-# Threads of this process, where the system tells of them.
+# Threads of this process, on Linux.
 TASKS = "/proc/self/task"
 # A model that is not there after this time is not awaited any longer, s.
 LONGEST_SWITCH = 600.0
@@ -64,7 +64,7 @@ class Row:
     settings
         Settings that the server confirmed.
     most_loops
-        Most threads of force loops at a time; None where the system does not tell.
+        Most threads of force loops at a time; None where the system does not list threads.
 
     """
 
@@ -246,7 +246,7 @@ def _watched_threads(loops: list[tuple[float, int]]) -> Iterator[None]:
 
 
 def servo_threads() -> int | None:
-    """Threads of force loops in this process; None where the system does not tell (only Linux does)."""
+    """Threads of force loops in this process; None on other systems than Linux."""
     if not os.path.isdir(TASKS):
         return None
     count = 0
@@ -263,7 +263,7 @@ def _page(sender: Any, port: int, token: str, names: list[str], seconds: float) 
 
 
 def _idle(connection: Any) -> None:
-    """Beat until told to end: process of its own."""
+    """Beat until a message comes: process of its own."""
 
     async def beat() -> list[tuple[float, float]]:
         stalls: list[tuple[float, float]] = []

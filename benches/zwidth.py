@@ -25,9 +25,9 @@ from benches.emulation import (
     Mechanics,
     emulate,
     known_devices,
-    tireless,
+    unlimited_device,
 )
-from benches.output import Json, Out, Table, made, show, wrote
+from benches.output import Json, Out, Table, make_folder, print_written, show
 from benches.sampled_loop import bound_for_any_hand, largest_stable
 from palpate.atomic import written_beside
 from palpate.figures import empty_figure, write_figure
@@ -138,7 +138,7 @@ class Spring:
         """Whether a tip that is struck along the stiffest direction ends with less energy than it began with."""
         scale = stiffness / self.largest
         self._loop.set_youngs_modulus(self._modulus * scale)
-        held = Held(tireless(device), self.place, speed * self.direction, hand, grab=True)
+        held = Held(unlimited_device(device), self.place, speed * self.direction, hand, grab=True)
         mass, damping = device.mechanics.mass, device.mechanics.damping
         matrix = scale * self.matrix
         if hand is not None:
@@ -168,22 +168,22 @@ class Spring:
 
 
 def run(report: Callable[[int, int], None] | None = None) -> tuple[list[Row], list[DeviceRow]]:
-    """Measure the map, and the known devices; ``report`` is told how many of all are done."""
+    """Measure the map, and the known devices; ``report`` is called with how many are done, and of all."""
     spring, devices = Spring(), known_devices().values()
     of_map = [Mechanics(mass, DAMPING, delay=delay) for mass in MASSES for delay in DELAYS]
     rows: list[Row] = []
     of_devices: list[DeviceRow] = []
     for device in (*of_map, *devices):
         if isinstance(device, Device):
-            of_devices.append(measured_device(spring, device))
+            of_devices.append(measure_device(spring, device))
         else:
-            rows.append(measured(spring, device))
+            rows.append(measure(spring, device))
         if report is not None:
             report(len(rows) + len(of_devices), len(of_map) + len(devices))
     return rows, of_devices
 
 
-def measured(spring: Spring, mechanics: Mechanics) -> Row:
+def measure(spring: Spring, mechanics: Mechanics) -> Row:
     """Measure one device of the map."""
     device = Device("emulated", mechanics)
     theory = (bound_for_any_hand(mechanics.damping, PERIOD, mechanics.delay), largest_stable(mechanics, PERIOD))
@@ -191,7 +191,7 @@ def measured(spring: Spring, mechanics: Mechanics) -> Row:
     return Row(mechanics.mass, mechanics.delay, *theory, *found)
 
 
-def measured_device(spring: Spring, device: Device) -> DeviceRow:
+def measure_device(spring: Spring, device: Device) -> DeviceRow:
     """Measure one known device in both hands."""
     mechanics = device.mechanics
     hands = (LOOSE, FIRM)
@@ -264,8 +264,8 @@ def zwidth(out: Out = None, as_json: Json = False) -> None:
     with progress_reporter("measuring the largest stable stiffness", True) as report:
         rows, devices = run(report)
     show(as_json, rows, *as_tables(rows, devices), devices=[asdict(row) for row in devices])
-    if folder := made(out):
+    if folder := make_folder(out):
         write(rows, folder / "zwidth.csv")
         write(devices, folder / "devices.csv")
         plot(rows, folder / "zwidth.png")
-        wrote(folder / "zwidth.csv", folder / "devices.csv", folder / "zwidth.png")
+        print_written(folder / "zwidth.csv", folder / "devices.csv", folder / "zwidth.png")

@@ -100,8 +100,10 @@ def script(middles: np.ndarray, places: int, seed: int = 1) -> tuple[np.ndarray,
     return np.ascontiguousarray(path), np.tile(RANKS, places)
 
 
-def played(simulation: Simulation, path: np.ndarray, plays: int, orientation: Sequence[float] = UPRIGHT) -> np.ndarray:
-    """Play a path (t, tools, 3), m, several times: computing time of each tick, (plays, t) us.
+def tick_times(
+    simulation: Simulation, path: np.ndarray, plays: int, orientation: Sequence[float] = UPRIGHT
+) -> np.ndarray:
+    """Time each tick of a path (t, tools, 3), m, that is run several times offline: (plays, t) us of its thread.
 
     Raises
     ------
@@ -120,7 +122,7 @@ def played(simulation: Simulation, path: np.ndarray, plays: int, orientation: Se
     return np.array(times)
 
 
-def by_kind(times: np.ndarray, kinds: np.ndarray) -> dict[str, Times]:
+def times_by_kind(times: np.ndarray, kinds: np.ndarray) -> dict[str, Times]:
     """Sum up times (plays, t), us, by the kind of tick."""
     return {name: Times.of(times[:, kinds == rank]) for rank, name in enumerate(KINDS) if (kinds == rank).any()}
 
@@ -148,10 +150,10 @@ class LoopTimes:
     locked_memory: bool
 
 
-def running(simulation: Simulation, path: np.ndarray | None, seconds: float, report=None) -> LoopTimes:
+def time_loop(simulation: Simulation, path: np.ndarray | None, seconds: float, report=None) -> LoopTimes:
     """Run the loop for so many seconds, its tools along a path (t, tools, 3), m, over and over; None leaves them out.
 
-    ``report`` is told the seconds that have passed, ten times a second.
+    ``report`` is called with the seconds that have passed, ten times a second.
     """
     rows, period = [], 1.0 / simulation.scene.device.rate
     with simulation:

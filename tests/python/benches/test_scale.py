@@ -9,7 +9,7 @@ import pytest
 
 import palpate
 from benches import scale
-from benches.scale_row import Job, Row, Stages, even_places, meshed, region, script
+from benches.scale_row import Job, Row, Stages, even_places, make_mesh, script, touch_region
 from palpate.validation.verify.contact.loop import loop_of, sphere
 
 STAGES = ["meshing", "surface", "body", "assembling", "ordering", "factorising", "measuring accuracy", "columns"]
@@ -73,9 +73,9 @@ def test_a_size_that_cannot_be_measured_says_why():
 
 
 def test_every_place_is_pressed_and_slid_over():
-    mesh = meshed(Job(2000), Stages(lambda _: None))
+    mesh = make_mesh(Job(2000), Stages(lambda _: None))
     body = palpate.Body(mesh, material=palpate.Material("10kPa", 0.45), fixed=mesh.nodes[:, 2] < 1e-9)
-    touch = region(mesh, 150)
+    touch = touch_region(mesh, 150)
     places, normals = even_places(mesh, touch)
     top = mesh.bounds[1, 2]
     np.testing.assert_allclose(places[:, 2], top, rtol=1e-9)

@@ -38,7 +38,7 @@ def devices():
 
 @pytest.mark.parametrize(("mass", "delay"), [(0.05, 0.0), (0.05, 1.3e-3), (0.002, 0.25e-3)])
 def test_the_loop_holds_what_the_eigenvalues_say_and_the_stage_changes_nothing(spring, tmp_path, mass, delay):
-    row = zwidth.measured(spring, Mechanics(mass, 1.0, delay=delay))
+    row = zwidth.measure(spring, Mechanics(mass, 1.0, delay=delay))
     assert row.bare == pytest.approx(row.eigenvalue, rel=0.01)
     assert row.controlled == pytest.approx(row.eigenvalue, rel=0.01)
     assert row.whole == pytest.approx(row.eigenvalue, rel=0.01)

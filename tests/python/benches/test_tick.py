@@ -12,7 +12,7 @@ import palpate
 from benches import output, tick
 from benches.tick_case import Play, Row, _times
 from benches.tick_plot import plot_envelope
-from palpate.validation.ticks import KINDS, by_kind, plate, played, press_centres, running, script
+from palpate.validation.ticks import KINDS, plate, press_centres, script, tick_times, time_loop, times_by_kind
 
 SMALL, LARGE = (14, 14, 3), (24, 24, 3)
 SHORT = tick.Settings((SMALL,), (1, 4), ("node",), places=2, plays=2, seconds=0.0)
@@ -51,8 +51,8 @@ def test_a_tick_costs_the_same_on_a_larger_body_and_more_for_more_contacts(plate
         body, green = plates[cells]
         simulation = tick.envelope_simulation(body, green, contacts, "local")
         path, kinds = script(tick.envelope_centres(body, contacts), 6)
-        shortest = played(simulation, path, 5).min(axis=0)
-        return {kind: times.median for kind, times in by_kind(shortest[None], kinds).items()}
+        shortest = tick_times(simulation, path, 5).min(axis=0)
+        return {kind: times.median for kind, times in times_by_kind(shortest[None], kinds).items()}
 
     small, large, many = medians(SMALL, 1), medians(LARGE, 1), medians(SMALL, 4)
     assert list(small) == list(KINDS)
@@ -76,7 +76,7 @@ def test_the_running_loop_is_timed_tick_by_tick(plates):
     body, green = plates[SMALL]
     simulation = tick.envelope_simulation(body, green, 1, "patch")
     path, _ = script(tick.envelope_centres(body, 1), 2)
-    times = running(simulation, path, 0.5)
+    times = time_loop(simulation, path, 0.5)
     assert len(times.compute_us) == len(times.wakeup_us)
     assert 400 <= len(times.wakeup_us) + times.missed_waking + times.missed_computing <= 1500
     assert (times.compute_us > 0).all()
@@ -101,7 +101,7 @@ def test_places_that_are_played_at_once_are_told_apart(monkeypatch, plates):
         order.append(path[:, 0, 0].tolist())
         return np.arange(float(len(path)))[None]
 
-    monkeypatch.setattr("benches.tick_case.played", numbered)
+    monkeypatch.setattr("benches.tick_case.tick_times", numbered)
     loop = tick.envelope_simulation(body, green, 1, "node")
     times = _times(Play(loop, path, ["a", "b"] * 2, plays=3, places=2, at_once=True))
     # Ticks 0 and 1 three times, then 2 and 3.

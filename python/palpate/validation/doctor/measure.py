@@ -20,12 +20,12 @@ from palpate.validation.ticks import (
     RADIUS,
     LoopTimes,
     Times,
-    by_kind,
     plate,
-    played,
     press_centres,
-    running,
     script,
+    tick_times,
+    time_loop,
+    times_by_kind,
 )
 from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.viewer import messages
@@ -60,8 +60,8 @@ def loop_times(seconds: float, report: Callable[[float], None] | None = None) ->
     body, green = plate(CELLS)
     simulation = loop_of(body, green, [sphere(RADIUS, FRICTION)])
     path, kinds = script(press_centres(body, [PLACE]), PLACES)
-    ticks = by_kind(played(simulation, path, PLAYS), kinds)
-    return running(simulation, path, seconds, report), ticks
+    ticks = times_by_kind(tick_times(simulation, path, PLAYS), kinds)
+    return time_loop(simulation, path, seconds, report), ticks
 
 
 def page_rate() -> PageRate:
