@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 import tomllib
 
 from import_circles import Graph, Names, circles_of_siblings, is_within
-from python_imports import imports_of_own_package, python_imports
+from python_imports import imported_names, imports_of_own_package, python_imports
 from rust_imports import rust_imports, rust_modules
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -38,7 +39,7 @@ FORBIDDEN = {
 PYTHON_ORDER = (
     *("mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation", "palpation"),
     *("sessions", "study"),
-    *("viewer", "validation/plots", "exam", "validation/verify", "validation/bench", "validation/doctor"),
+    *("viewer", "validation/plots", "exam", "validation/verify", "validation/ticks", "validation/doctor"),
     "cli",
 )
 
@@ -164,9 +165,16 @@ def python_import_problems() -> list[str]:
         f"{dotted(module)} imports {dotted(folder)}, the __init__.py of a folder in which it lies"
         for module, folder in sorted(own_package)
     ]
-    for circle in circles_of_siblings(graph):
-        steps = ", ".join(f"{dotted(module)} -> {dotted(other)}" for module, other in circle)
-        problems.append(f"python/palpate has a circle of imports: {steps}")
+    for folder, imports in (("python/palpate", graph), ("benches", python_imports(ROOT, "benches"))):
+        for circle in circles_of_siblings(imports):
+            steps = ", ".join(f"{dotted(module)} -> {dotted(other)}" for module, other in circle)
+            problems.append(f"{folder} has a circle of imports: {steps}")
+    problems += [
+        f"{path.relative_to(ROOT)} imports {dotted(source)}, which is not installed with the package"
+        for path in sorted((ROOT / "python").rglob("*.py"))
+        for source, _ in imported_names(ast.parse(path.read_text()), ())
+        if source[:1] == ("benches",)
+    ]
     return problems
 
 
@@ -222,7 +230,7 @@ def dead_name_problems() -> list[str]:
 
 def length_problems() -> list[str]:
     """Source files too long to be read in one go."""
-    patterns = ("crates/**/src/**/*.rs", "python/**/*.py", "tests/**/*.py", "viewer/src/**/*.ts")
+    patterns = ("crates/**/src/**/*.rs", "python/**/*.py", "benches/**/*.py", "tests/**/*.py", "viewer/src/**/*.ts")
     sources = [p for pattern in patterns for p in ROOT.glob(pattern)]
     return [
         f"{p.relative_to(ROOT)} has more than {MAX_FILE_LINES} lines"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+from typer.testing import CliRunner
+
 
 def run(*arguments, cwd, **kwargs):
     command = [sys.executable, "-c", "from palpate.cli import main; main()", *map(str, arguments)]
@@ -17,3 +19,10 @@ def refused(result, *words):
     assert len(lines) == 1, result.stderr
     for word in words:
         assert word in lines[0], lines[0]
+
+
+def run_bench(*arguments):
+    """`python -m benches`, in this process."""
+    from benches.__main__ import app
+
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)

@@ -209,6 +209,12 @@ def test_imports_against_the_order_are_found(python):
     assert problem == "palpate.units imports palpate.cli: cli comes after top"
 
 
+@pytest.mark.parametrize("text", ["import benches\n", "def run():\n    from benches.tick import rows\n"])
+def test_imports_of_what_is_not_installed_are_found(python, text):
+    (problem,) = python(**{"units.py": text})
+    assert "units.py imports benches" in problem and "not installed" in problem
+
+
 def test_long_files_are_found_in_crates_below_another_crate(check, tmp_path):
     write(tmp_path / "crates/emulators/vendor/src/lib.rs", "\n" * 501)
     assert check.length_problems() == ["crates/emulators/vendor/src/lib.rs has more than 500 lines"]

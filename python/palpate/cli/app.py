@@ -40,7 +40,12 @@ def options(
 
 
 def main() -> None:
-    """Run the command line; a user's mistake is one line and exit code 2, Ctrl-C is 130, SIGTERM 143."""
+    """Run the command line."""
+    run_commands(app)
+
+
+def run_commands(commands: typer.Typer) -> None:
+    """Run commands; a user's mistake is one line and exit code 2, Ctrl-C is 130, SIGTERM 143."""
     from palpate.errors import Error, MeshWarning, StoreWarning
 
     def show(message: Warning | str, category: type[Warning], *_args: object, **_kwargs: object) -> None:
@@ -51,7 +56,7 @@ def main() -> None:
     try:
         signal.signal(signal.SIGTERM, _terminate)
         restore_interrupts()
-        app(standalone_mode=True)
+        commands(standalone_mode=True)
     except Error as error:
         sys.exit(_complain(str(error)))
     except OSError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from pathlib import Path
@@ -176,17 +175,6 @@ def test_wrong_words_are_explained(tmp_path):
         assert result.returncode == 2
         assert word in result.stderr
         assert "Traceback" not in result.stderr
-
-
-@pytest.mark.slow
-def test_bench_of_the_paper(tmp_path):
-    """Both methods answer the same contact: the dense inverse is the outside value."""
-    result = run("bench", "paper", "--json", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    rows = json.loads(result.stdout)
-    rows = rows["rows"] if isinstance(rows, dict) else rows
-    assert [row["model"] for row in rows] == ["doll", "kidney", "liver"]
-    assert all(row["difference"] < 1e-5 for row in rows)
 
 
 def test_precompute_with_gravity_and_a_locking_material(ball, tmp_path):

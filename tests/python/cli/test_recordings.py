@@ -12,7 +12,7 @@ import pytest
 from command_line import refused, run
 
 import palpate
-from palpate.validation.bench.record import run_session
+from benches.record import run_session
 
 ROOT = Path(__file__).parents[3]
 # The nodule is the largest; its store is shared with the tests of its forces.

@@ -187,10 +187,9 @@ def test_version():
         ("mesh a.stl b.vtu --unit ", ("m", "cm", "mm", "um", "in")),
         ("run a.stl --unit c", ("cm",)),
         ("precompute a.vtu --precision ", ("f16", "f32", "f64")),
-        ("bench ", ("paper", "contact", "tick")),
     ],
 )
-def test_the_shell_completes_models_benchmarks_and_units(words, offered):
+def test_the_shell_completes_models_checks_and_units(words, offered):
     given = f"palpate {words}"
     count = len(given.split()) - (0 if given.endswith(" ") else 1)
     environment = {"_PALPATE_COMPLETE": "complete_bash", "COMP_WORDS": given, "COMP_CWORD": str(count)}

@@ -192,7 +192,7 @@ def test_in_a_corner_a_tool_presses_both_walls(loops, tool):
     assert abs(both[0, 0] / alone - 1) > 0.15 and abs(above[-1, 2] / both[0, 2] - 1) > 0.15
 
 
-# Where some tool's force jumps, or is lost: on blades, in the narrowest hollow, and bridging a wide one (docs/accuracy.md).
+# Where some tool's force jumps, or is lost: on blades, and in two of the hollows (docs/accuracy.md).
 OPEN = {("ridge", 30), ("ridge", 60), ("valley", 30), ("valley", 120)}
 
 

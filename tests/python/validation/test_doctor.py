@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from command_line import refused, run
 
+from benches.viewer import servo_threads
 from palpate import DeviceLimits
 from palpate.devices import FoundDevice, Listing, Obstacle
 from palpate.validation import doctor
-from palpate.validation.bench.loop_ticks import LoopTimes, Times
-from palpate.validation.bench.viewer import servo_threads
+from palpate.validation.ticks import LoopTimes, Times
 
 CPU, CLOCK = "sys/devices/system/cpu", "sys/devices/system/clocksource/clocksource0"
 # A desktop as its owner finds it: no limits set, a dynamic governor, two threads a core.

@@ -69,18 +69,3 @@ def test_an_unknown_benchmark_is_refused_with_the_known_ones(monkeypatch, capsys
 def test_plots_of_what_was_run(monkeypatch, tmp_path):
     assert run_cli(monkeypatch, "verify", "convergence", "--out", str(tmp_path / "plots")) == 0
     assert [p.name for p in Path(tmp_path / "plots").iterdir()] == ["convergence.png"]
-
-
-@pytest.mark.slow
-def test_at_equal_nodes_quadratic_elements_are_closer(monkeypatch, capsys, tmp_path):
-    from palpate.validation.bench import elements
-
-    monkeypatch.setattr(elements, "CELLS", {False: (8,), True: (4,)})
-    monkeypatch.setattr(elements, "_livers", lambda report: [])
-    assert run_cli(monkeypatch, "bench", "elements", "--json", "--out", str(tmp_path)) == 0
-    linear, quadratic = json.loads(capsys.readouterr().out)
-    assert linear["nodes"] == quadratic["nodes"]
-    assert abs(linear["store_bytes"] / quadratic["store_bytes"] - 1) < 0.01
-    for nu, error in linear["errors"].items():
-        assert 0 < quadratic["errors"][nu] < 0.5 * error
-    assert (tmp_path / "elements.png").exists()

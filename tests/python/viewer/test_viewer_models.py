@@ -9,8 +9,8 @@ import pytest
 from viewer_client import page, serving
 
 import palpate
+from benches.viewer import servo_threads
 from palpate.scene import BuiltScene
-from palpate.validation.bench.viewer import servo_threads
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ import pytest
 from browser import MARKS, PATIENCE, drawn, opened, until
 
 import palpate
+from benches.surfaces import Dome, DomeSession
 from palpate.scene import BuiltScene
-from palpate.validation.bench.surfaces import Dome, DomeSession
 from palpate.viewer.computing import Computing, mask_text
 from palpate.viewer.server import ViewerServer
 

@@ -14,14 +14,25 @@ import numpy as np
 
 from palpate.errors import ViewerError
 from palpate.scene import model_scene
-from palpate.validation.bench import servo
-from palpate.validation.bench.chromium import browser_page
-from palpate.validation.bench.loop_ticks import LoopTimes, Times, by_kind, played, running, script
+from palpate.validation.doctor.chromium import browser_page
+from palpate.validation.ticks import (
+    FRICTION,
+    RADIUS,
+    LoopTimes,
+    Times,
+    plate,
+    press_centres,
+    script,
+    tick_times,
+    time_loop,
+    times_by_kind,
+)
+from palpate.validation.verify.contact.loop import loop_of, sphere
 from palpate.viewer import messages
 from palpate.viewer.server import ViewerServer
 
-# The scene of the loop and of the ticks: a sphere that slides on the smallest plate.
-CELLS, CONTACTS, LAW = servo.PLATES[0], 1, "local"
+# The scene of the loop and of the ticks: cells of a plate, and where a sphere slides, from the middle of its top, m.
+CELLS, PLACE = (18, 18, 6), (-0.012, -0.012)
 PLACES, PLAYS = 40, 25
 # How long the page is watched, s, and how long it may take to show itself.
 PAGE_SECONDS, PAGE_LIMIT = 4.0, 60.0
@@ -46,11 +57,11 @@ class PageRate:
 
 def loop_times(seconds: float, report: Callable[[float], None] | None = None) -> tuple[LoopTimes, dict[str, Times]]:
     """Return times of the running loop, its tool pressing and sliding, and of every kind of tick played offline."""
-    body, green = servo.plate(CELLS)
-    simulation, middles = servo.simulation_of(body, green, CONTACTS, LAW), servo.middles(body, CONTACTS)
-    path, kinds = script(middles, PLACES)
-    ticks = {kind: times for kind, (times, _) in by_kind(played(simulation, path, PLAYS), kinds).items()}
-    return running(simulation, path, seconds, report), ticks
+    body, green = plate(CELLS)
+    simulation = loop_of(body, green, [sphere(RADIUS, FRICTION)])
+    path, kinds = script(press_centres(body, [PLACE]), PLACES)
+    ticks = times_by_kind(tick_times(simulation, path, PLAYS), kinds)
+    return time_loop(simulation, path, seconds, report), ticks
 
 
 def page_rate() -> PageRate:

@@ -10,10 +10,10 @@ import numpy as np
 
 from palpate.devices import Listing
 from palpate.simulation.scheduling import cpu_ranges
-from palpate.validation.bench.loop_ticks import LoopTimes, Times
 from palpate.validation.doctor.advice import Advice
 from palpate.validation.doctor.machine import UNLIMITED, Machine
 from palpate.validation.doctor.measure import PageRate, histogram
+from palpate.validation.ticks import LoopTimes, Times
 
 SCHEMA = 1
 PERIOD_US = 1000.0

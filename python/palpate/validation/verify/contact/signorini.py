@@ -110,44 +110,6 @@ class ContactProblem:
         return found
 
 
-def at_the_meshs_points(
-    green: GreensFunction, mesh: TetMesh, gap: Gap, depths: Sequence[float], penalty: float = 1e8
-) -> list[float]:
-    """Press a tool that is kept out at the quadrature points of the mesh's own faces, as most programs do; forces, N.
-
-    The points of a face can only move as its nodes do, so a contact smaller than a face locks. Minimum over `p >= 0` of
-    `p.(B^T Psi B + diag(1/(kappa w))) p/2 - p.(d - g)`, B the shape functions at the points, w their areas.
-
-    Parameters
-    ----------
-    green, mesh
-        The body, with the top touchable.
-    gap, depths
-        As of :meth:`ContactProblem.press`.
-    penalty
-        kappa, Pa/m: as good as rigid, and there may be more points than a face has freedoms.
-
-    """
-    up = np.array([0.0, 0.0, 1.0])
-    faces = faces_on(green, mesh, mesh.nodes[mesh.nodes[:, 2].argmax()], up)
-    nodes, local = np.unique(faces, return_inverse=True)
-    at, weight = _triangle_rule()
-    corners = mesh.nodes[faces[:, :3], :2]
-    shapes = _shapes(at, faces.shape[1])
-    points = np.einsum("qk,fkx->fqx", at, corners).reshape(-1, 2)
-    areas = np.outer(_areas(corners), weight).ravel()
-    near = np.flatnonzero(gap(points) < 2 * max(depths))
-    rows = np.zeros((len(near), len(nodes)))
-    local = local.reshape(faces.shape)
-    for row, point in zip(rows, near, strict=True):
-        row[local[point // len(at)]] = shapes[point % len(at)]
-    compliance = rows @ compliance_along(green, nodes, up) @ rows.T + np.diag(1 / (penalty * areas[near]))
-    factor = scipy.linalg.cholesky(compliance, lower=True)
-    gaps = gap(points[near])
-    solved = [scipy.linalg.solve_triangular(factor, depth - gaps, lower=True) for depth in depths]
-    return [float(nnls(factor.T, right, maxiter=5000)[0].sum()) for right in solved]
-
-
 def faces_on(green: GreensFunction, mesh: TetMesh, origin: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Faces on a plane whose nodes may all be touched, (k, 3 or 6)."""
     off = np.abs((mesh.nodes - origin) @ normal) > 1e-9 * np.ptp(mesh.nodes, axis=0).max()
@@ -161,7 +123,7 @@ def compliance_along(green: GreensFunction, nodes: np.ndarray, direction: np.nda
     return np.array([green.solve(forces={int(node): force}).displacements[rows] @ direction for node in nodes])
 
 
-def _areas(corners: np.ndarray) -> np.ndarray:
+def triangle_areas(corners: np.ndarray) -> np.ndarray:
     """Areas (f,), m^2, of triangles of the plane (f, 3, 2)."""
     (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     return np.abs(a * d - b * c) / 2
@@ -170,14 +132,14 @@ def _areas(corners: np.ndarray) -> np.ndarray:
 def _integrals(places: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """`M` (n, n), and quadrature points (q, 2) with hats times area (q, n), on straight-edged faces of a plane."""
     width = faces.shape[1]
-    at, weight = _triangle_rule()
+    at, weight = triangle_rule()
     load = np.zeros((len(places),) * 2)
     points, hats = [], []
     corners = places[faces[:, :3]]
-    areas = _areas(corners)
+    areas = triangle_areas(corners)
     for part in PARTS[width]:
         barycentric = at @ PLACES[part]
-        shapes = _shapes(barycentric, width)
+        shapes = face_shapes(barycentric, width)
         share = areas / len(PARTS[width])
         for q, hat in enumerate(at):
             points.append(np.einsum("k,fkx->fx", barycentric[q], corners))
@@ -191,7 +153,7 @@ def _integrals(places: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, tuple
     return load, (np.concatenate(points), np.concatenate(hats))
 
 
-def _shapes(barycentric: np.ndarray, width: int) -> np.ndarray:
+def face_shapes(barycentric: np.ndarray, width: int) -> np.ndarray:
     """Shape functions (q, width) of a 3-node or 6-node face."""
     if width == 3:
         return barycentric
@@ -199,7 +161,7 @@ def _shapes(barycentric: np.ndarray, width: int) -> np.ndarray:
     return np.column_stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
 
 
-def _triangle_rule() -> tuple[np.ndarray, np.ndarray]:
+def triangle_rule() -> tuple[np.ndarray, np.ndarray]:
     """Six points of degree four (Dunavant 1985): barycentric coordinates (6, 3), and parts of the area (6,)."""
     points, weights = [], []
     for a, w in ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)):

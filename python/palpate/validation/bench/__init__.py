@@ -1,1 +1,0 @@
-"""Measurements that a user can repeat; every figure is compared with another of the same run."""
