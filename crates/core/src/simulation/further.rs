@@ -6,15 +6,14 @@
 //! tool can have come since counts from there. So a force begins at zero whatever the surface does, and no place makes energy.
 //!
 //! A tool that is no sphere presses all that lies under one plane at once. Another place is a wall that stands on that plane: it is
-//! found among the pieces next to the tool.
+//! found among the pieces next to the tool when that has been pressed.
 //!
 //! A place is on the side of the surface that the tool has come from: its normal faces the tool's middle. The far side of a thin
 //! part never does.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::contacts::{Contact, Mode};
-use super::covering::Covering;
 use super::law::{ASKED, LocalContact};
 use super::model::Model;
 use super::scratch::Scratch;
@@ -23,7 +22,6 @@ use super::state::State;
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, MAX_PLACES};
 use crate::contact::Hollows;
-use crate::contact::footprint::{PosedShape, PressedSurface};
 use crate::contact::smooth::FootPoint;
 
 /// A place waits from where the tool is as near as this, over the tool's radius.
@@ -43,9 +41,6 @@ pub fn find(model: &Model, state: &mut State, scratch: &mut Scratch, (tool, body
             places[count] = slot;
             count += 1;
         }
-    }
-    if let (Some(pressed), Some(&slot)) = (model.pressed[tool][body].as_deref(), places[..count].first()) {
-        return find_wall(model, state, scratch, pressed, (slot, &places[..count]));
     }
     scratch.covering.near.forget();
     for &slot in &places[..count] {
@@ -95,48 +90,36 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
     }
 }
 
-/// Looks for a wall that stands on the planes that a tool presses on, which it has come near to.
-fn find_wall(
-    model: &Model,
-    state: &mut State,
-    scratch: &mut Scratch,
-    pressed: &PressedSurface,
-    (slot, places): (usize, &[usize]),
-) {
-    let Contact { tool, body, local, .. } = state.contacts.slots[slot];
-    let (fixed, shape) = (&model.bodies[body], &model.tools[tool].shape);
-    let Some(own) = &fixed.local else { return };
-    if places.len() >= MAX_PLACES {
+/// Takes up a wall that stands on the planes that a tool presses on, where the tool has come near to it. The pieces are those
+/// next to the tool that has been pressed last.
+pub fn find_wall(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize) {
+    let Some(slot) = scratch.local.pressed.take() else { return };
+    let Contact { mode, tool, local, .. } = state.contacts.slots[slot];
+    let (Some(pressed), Some(own)) = (model.pressed[tool][body].as_deref(), &model.bodies[body].local) else { return };
+    let mut planes = [local.plane(); MAX_PLACES];
+    let mut count = 0;
+    for place in state.contacts.of(tool, body) {
+        if count == MAX_PLACES {
+            return;
+        }
+        planes[count] = state.contacts.slots[place].local.plane();
+        count += 1;
+    }
+    if mode == Mode::Free || count == MAX_PLACES {
         return;
     }
-    let mut planes = [local.plane(); MAX_CONTACTS];
-    for (plane, &slot) in planes.iter_mut().zip(places) {
-        *plane = state.contacts.slots[slot].local.plane();
-    }
-    let Covering { footprint, weights, .. } = &mut scratch.covering;
-    let at = PosedShape {
-        shape,
-        place: local.relative + local.advance,
-        rotation: DMat3::from_quat(local.orientation),
-        facing: DVec3::ZERO,
-        sunk: 0.0,
-    };
-    footprint.near.gather(pressed, &fixed.query, &at);
-    let Some((plane, distance)) = footprint.wall_beside(&planes[..places.len()]) else { return };
+    let footprint = &mut scratch.local.footprint;
+    let Some((plane, distance)) = footprint.wall_beside(&planes[..count]) else { return };
+    let weights = &mut scratch.covering.weights;
     let Some(found) = footprint.find(&pressed.fine, &own.smooth, plane, weights) else { return };
     if weights.is_outside() {
         return;
     }
-    let before = state.tools[tool].before.map(|before| fixed.placement.point_to_body(before.position));
+    let before = state.tools[tool].before.map(|before| model.bodies[body].placement.point_to_body(before.position));
     let came = 2.0 * local.tool.distance(before.unwrap_or(local.tool));
-    let local = LocalContact {
-        relative: at.place,
-        entry: (-distance - came).max(0.0),
-        foot: found.foot(at.place),
-        ..begun(&local)
-    };
-    let begun = further_contact((tool, body), local);
-    add_contact(model, state, begun, &scratch.covering);
+    let entry = (-distance - came).max(0.0);
+    let local = LocalContact { relative: local.relative, entry, foot: found.foot(local.relative), ..begun(&local) };
+    add_contact(model, state, further_contact((tool, body), local), &scratch.covering);
 }
 
 /// What a further place of a tool begins with.

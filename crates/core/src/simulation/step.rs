@@ -24,6 +24,7 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Inp
             follow_tools(model, state, scratch, body, input);
             limit::apply(model, state, scratch, body, input.controls.strain_limit[body]);
             push(model, state, scratch, body, &input.controls);
+            further::find_wall(model, state, scratch, body);
 
             // 3. Their forces go into the motion.
             if !time::end_step(model, state, body) {
@@ -69,7 +70,10 @@ fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: u
         }
         if count > 0 {
             if lasts {
-                further::find(model, state, scratch, (tool, body));
+                // Walls beside a tool that is no sphere show when it has been pressed.
+                if approach.pressed.is_none() {
+                    further::find(model, state, scratch, (tool, body));
+                }
                 continue;
             }
             if places.iter().any(|&slot| state.contacts.slots[slot].mode == Mode::Free) {

@@ -80,7 +80,7 @@ pub struct Footprint {
 }
 
 /// A contact's plane as it is known before.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// A point of it, m.
     pub point: DVec3,
@@ -157,8 +157,7 @@ impl FootprintScratch {
         known: Plane,
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
-        let margin = self.near.margin;
-        self.near.pieces.iter_mut().for_each(|near| near.take_down(&known, margin));
+        self.take_down(fine, known);
         let sums = self.sum()?;
         let Facing { normal, by: normal_by } = sums.facing(known.normal);
         let inverse = 1.0 / sums.weight;
@@ -178,6 +177,20 @@ impl FootprintScratch {
             origin: middle + normal * level,
             origin_by: [raised(0), raised(1)],
         })
+    }
+
+    /// Takes walls down to a plane.
+    fn take_down(&mut self, fine: &Tessellation, plane: Plane) {
+        let before = self.near.taken_down.replace(plane);
+        if before == Some(plane) {
+            return;
+        }
+        for near in &mut self.near.pieces {
+            if before.is_some() {
+                near.corners = fine.corners(near.piece);
+            }
+            near.take_down(&plane, self.near.margin);
+        }
     }
 
     fn sum(&self) -> Option<Sums> {

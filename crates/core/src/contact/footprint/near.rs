@@ -2,10 +2,12 @@
 
 use glam::{DMat3, DVec3};
 
-use super::PressedSurface;
+use super::{Plane, PressedSurface};
 use crate::contact::shape::ToolShape;
 use crate::contact::{SurfaceQuery, Tessellation};
 
+/// A tool that has moved by less than this, over its thickness, is next to the same pieces.
+const MOVED: f64 = 1e-3;
 /// Most pieces that are looked at: their memory is there before a tick.
 const MOST_PIECES: usize = 8192;
 /// A piece farther above the middle of the tool than it can be is pushed away by this many times the difference.
@@ -67,12 +69,35 @@ pub struct NearPieces {
     pub centre: DVec3,
     /// Distance from which pieces count, m.
     pub margin: f64,
+    /// The plane to which walls have been taken down.
+    pub(super) taken_down: Option<Plane>,
+    /// What they have been looked for with, and the tool's place then, m.
+    key: Option<Key>,
+    place: DVec3,
+}
+
+/// All but the place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    /// Address of the surface.
+    surface: usize,
+    rotation: DMat3,
+    facing: DVec3,
+    sunk: f64,
+    looked_for_at: DVec3,
 }
 
 impl Default for NearPieces {
     /// With the memory for any tool.
     fn default() -> Self {
-        Self { pieces: Vec::with_capacity(MOST_PIECES), centre: DVec3::ZERO, margin: 0.0 }
+        Self {
+            pieces: Vec::with_capacity(MOST_PIECES),
+            centre: DVec3::ZERO,
+            margin: 0.0,
+            taken_down: None,
+            key: None,
+            place: DVec3::ZERO,
+        }
     }
 }
 
@@ -130,9 +155,39 @@ impl PosedShape<'_> {
 }
 
 impl NearPieces {
-    /// Finds the pieces of a surface that lie next to the tool.
+    /// Finds the pieces of a surface that lie next to the tool. A tool that has hardly moved since, as in most steps of Newton's
+    /// method, has the same ones: their distances follow from their derivatives, with an error of a millionth of its thickness.
     pub fn gather(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PosedShape<'_>) {
+        let key = |looked_for_at| Key {
+            surface: std::ptr::from_ref(pressed) as usize,
+            rotation: tool.rotation,
+            facing: tool.facing,
+            sunk: tool.sunk,
+            looked_for_at,
+        };
+        if let Some(known) = self.key
+            && known == key(known.looked_for_at)
+            && tool.place.distance(known.looked_for_at) < MOVED * tool.shape.thickness()
+        {
+            return self.shift(tool.place - self.place);
+        }
+        (self.key, self.place) = (Some(key(tool.place)), tool.place);
+        self.look_for(pressed, query, tool);
+    }
+
+    /// Moves the tool by so much, m.
+    fn shift(&mut self, way: DVec3) {
+        self.place += way;
+        self.centre += way;
+        for near in &mut self.pieces {
+            near.distance += near.by_pose[0].dot(way);
+            near.facing += near.facing_by[0].dot(way);
+        }
+    }
+
+    fn look_for(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PosedShape<'_>) {
         let (fine, margin) = (&pressed.fine, pressed.margin);
+        self.taken_down = None;
         self.pieces.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
         let (centre, headroom) = (self.centre, tool.headroom(margin));
@@ -145,11 +200,17 @@ impl NearPieces {
         }
         query.for_each_within(low, high, |triangle| {
             let (ball, radius) = fine.ball(triangle);
-            if tool.distance(ball, centre, headroom).0 > radius + margin {
+            let away = tool.distance(ball, centre, headroom).0 - margin;
+            if away > radius {
                 return;
             }
             let count = fine.pieces_of_triangle() as u32;
+            // A distance changes by no more than the way: most pieces need none of their own.
+            let farthest = (away - fine.largest_piece(triangle)).max(0.0).powi(2);
             for piece in triangle * count..(triangle + 1) * count {
+                if fine.middle(piece).distance_squared(ball) < farthest {
+                    continue;
+                }
                 let near = measured(fine, tool, piece, (centre, headroom, eye));
                 if near.distance < near.size + margin && self.pieces.len() < MOST_PIECES {
                     self.pieces.push(near);

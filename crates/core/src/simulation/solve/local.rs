@@ -102,6 +102,7 @@ enum Outcome {
 /// more, with what takes its place. Where that finds nothing either they stay as they were a tick ago.
 pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, body: usize, controls: &Controls) {
     let mut last = false;
+    memory.local.pressed = None;
     loop {
         let mut slots = [0; MAX_CONTACTS];
         let mut count = 0;
@@ -320,6 +321,7 @@ fn meet(
                 let change = (answer.force - local.responses[a].force).length();
                 local.changed = local.changed.max(change / answer.force.length().max(f64::MIN_POSITIVE));
                 local.responses[a] = answer;
+                local.pressed = takes_pressures(model, state, slot).then_some(slot);
             }
             None => {
                 if local.weights[a].is_outside() {

@@ -36,7 +36,9 @@ pub struct LocalScratch {
     /// Steps that the last body took.
     pub(in crate::simulation) taken: usize,
     pub(super) cells: Box<CellScratch>,
-    pub(super) footprint: FootprintScratch,
+    /// The pieces next to the tool that was asked for last, and the slot of its contact.
+    pub(in crate::simulation) footprint: FootprintScratch,
+    pub(in crate::simulation) pressed: Option<usize>,
     /// For contacts without cells.
     pub(super) unused: PressureState,
 }
@@ -152,6 +154,7 @@ impl LocalScratch {
             taken: 0,
             cells: Box::default(),
             footprint: FootprintScratch::default(),
+            pressed: None,
             unused: PressureState::default(),
         }
     }
