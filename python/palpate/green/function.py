@@ -134,6 +134,10 @@ class GreensFunction:
         triangles = np.searchsorted(self.surface_nodes, self.surface_triangles)
         return _native.SurfaceSearch(self.surface_positions, triangles.astype(np.uint32))
 
+    def closest_on_surface(self, points: np.ndarray) -> np.ndarray:
+        """Find the closest points (n, 3), m, of the untouched surface to points (n, 3), m."""
+        return self._surface_search.closest(np.asarray(points, dtype=float)).reshape(-1, 3)
+
     @cached_property
     def strain_measure(self) -> StrainMeasure:
         """Measure of the largest strain of answers: by elements; of a bare store or a large body, by the surface."""
@@ -312,7 +316,7 @@ class GreensFunction:
         self._require_size(reach)
         target = three_numbers(point, "the touch point", BodyError, units.length)
         wanted = three_components(displacement, "displacement", BodyError, units.length)
-        landed = self._surface_search.closest(np.array([target]))
+        landed = self.closest_on_surface(np.array([target]))[0]
         distance = float(np.linalg.norm(landed - target))
         if on_surface and distance > max(reach, BESIDE * self.extents.max()):
             raise BodyError(

@@ -33,6 +33,7 @@ from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
 from palpate.simulation.scheduling import scheduled, start_loop
 from palpate.simulation.script import for_all_tools, grabs_of, orientations_of, positions_of, strike_of
+from palpate.simulation.thin import thin_places
 from palpate.vectors import three_numbers
 
 # A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
@@ -324,7 +325,9 @@ class Simulation(Adjustable, Changing):
         failed = self._given.get(raw["failed_program"])
         if failed is not None and failed.failure is not None:
             raw["fault"] = f"tool {raw['failed_program']}: {failed.failure}; forces are off until a reset"
-        return frame_of(raw, bodies, scales)
+        frame = frame_of(raw, bodies, scales)
+        frame.statistics["thin"] = thin_places(frame.contacts, self.scene.tools, bodies)
+        return frame
 
     def contacts(self) -> list[Contact]:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""

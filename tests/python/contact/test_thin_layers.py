@@ -6,6 +6,8 @@ half-space: docs/accuracy.md has the figures that are held here.
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -39,3 +41,27 @@ def test_a_layer_feels_as_far_from_the_direct_solution_as_documented(thickness):
     # What is checked can fail: 5 % more are seen where the law is right.
     if thickness > 6e-3:
         assert not (np.abs(1.05 * (off + 1) - 1) <= LAYERS[thickness]).all()
+
+
+@pytest.mark.parametrize(("thickness", "thin"), [(6e-3, True), (25e-3, False)])
+def test_a_frame_flags_a_place_that_is_thinner_than_the_tool(thickness, thin):
+    block = Block((SIDE, SIDE, thickness))
+    body = body_on_table(block, CELLS[thickness], quadratic=True)
+    loop = loop_of(body, green_of(body, touch=top_nodes(body), precision="f32"), [sphere(RADIUS)])
+    above = np.array([SIDE / 2, SIDE / 2, thickness + RADIUS])
+    with loop:
+        loop.move((above + [0, 0, 1e-3]).tolist())
+        wait_until(lambda: loop.frame().active[0])
+        assert loop.frame().statistics["thin"] == [False]
+        loop.move((above - [0, 0, 1e-3]).tolist())
+        wait_until(lambda: loop.frame().contacts)
+        assert loop.frame().statistics["thin"] == [thin]
+
+
+def wait_until(holds) -> None:
+    """Wait for the loop, 10 s at the most."""
+    for _ in range(1000):
+        if holds():
+            return
+        time.sleep(0.01)
+    raise AssertionError("the loop did not get there")
