@@ -111,7 +111,7 @@ def run(
     element: ElementChoice = None,
     repair: Repair = False,
     surface_map: Annotated[
-        Path | None, typer.Option("--map", help="Map of 'palpate palpate' to show: stiffness.vtu or detection.vtu.")
+        Path | None, typer.Option("--map", help="Map of 'palpate map' to show: stiffness.vtu or detection.vtu.")
     ] = None,
     device: Devices = None,
     cpus: Cpus = None,

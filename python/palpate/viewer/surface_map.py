@@ -52,7 +52,7 @@ def read_map(path: Path, built: BuiltScene) -> list[SurfaceMap | None]:
             f"{path}: not a map that can be read: {str(error).splitlines()[0] if str(error) else 'damaged'}"
         ) from None
     if "stiffness" not in mesh.point_data:
-        raise ViewerError(f"{path}: no map: it has no point data 'stiffness'; 'palpate palpate' writes stiffness.vtu")
+        raise ViewerError(f"{path}: no map: it has no point data 'stiffness'; 'palpate map' writes stiffness.vtu")
     maps = [_of_body(body, np.asarray(mesh.points), mesh.point_data) for body in built.bodies]
     if not any(maps):
         raise ViewerError(f"{path}: a map of another body: its points are not the nodes of this surface")

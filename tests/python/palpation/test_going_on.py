@@ -69,7 +69,7 @@ def test_presses_of_another_palpation_are_not_used(block, store, tmp_path, chang
 
 def test_a_command_that_is_interrupted_leaves_the_same_files(store, tmp_path):
     # So many presses that most are still to be made when the signal comes.
-    words = ["palpate", str(store), "--grid", "10mm", "--depth", "0.5mm", "--speed", "1mm/s", "--radius", "4mm"]
+    words = ["map", str(store), "--grid", "10mm", "--depth", "0.5mm", "--speed", "1mm/s", "--radius", "4mm"]
     command = [sys.executable, "-m", "palpate", *words, "--on", TOP, "--out"]
     # A shell's background job is born with Ctrl-C ignored.
     heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}

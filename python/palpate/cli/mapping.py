@@ -1,4 +1,4 @@
-"""The command that palpates by a protocol."""
+"""The command that palpates a body by a protocol and maps its stiffness."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 PARTIAL, PLAIN_PARTIAL = "palpation.partial", "palpation-plain.partial"
 
 
-@app.command("palpate")
-def palpate_command(
+@app.command("map")
+def map_command(
     file: Annotated[
         Path, typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, surface, or a model's name.")
     ],
@@ -60,11 +60,11 @@ def palpate_command(
     The tool is the scene's first. Curves, the map and pictures are written into a folder; Ctrl-C keeps what is
     finished, and the same command goes on from there. 'palpate run FILE --map DIR/stiffness.vtu' shows the map.
 
-    Example: palpate palpate scene.toml --grid 10mm --depth 3mm --speed 10mm/s
+    Example: palpate map scene.toml --grid 10mm --depth 3mm --speed 10mm/s
 
-    Example: palpate palpate nodule.toml --grid 8mm --depth 1.5mm --on "z > max - 1mm" --out found
+    Example: palpate map nodule.toml --grid 8mm --depth 1.5mm --on "z > max - 1mm" --out found
 
-    Example: palpate palpate liver --grid 15mm --depth 2mm --strokes
+    Example: palpate map liver --grid 15mm --depth 2mm --strokes
     """
     from palpate.cli.run_file import RunOptions
 

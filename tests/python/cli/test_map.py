@@ -1,4 +1,4 @@
-"""`palpate palpate` as a user types it: results, and mistakes told in one line."""
+"""`palpate map` as a user types it: results, and mistakes told in one line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
 
 
 def test_a_grid_is_pressed_and_written(folder):
-    words = ("palpate", "block.palpate", "--grid", "20mm", "--depth", "1mm", "--radius", "4mm", "--on", TOP)
+    words = ("map", "block.palpate", "--grid", "20mm", "--depth", "1mm", "--radius", "4mm", "--on", TOP)
     result = run(*words, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "9 points" in result.stdout and "stiffness at 1 mm: from" in result.stdout
@@ -46,16 +46,16 @@ def test_a_grid_is_pressed_and_written(folder):
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_line(folder, words, told, monkeypatch, capsys):
-    complaint(["palpate", "block.palpate", *words, "--out", "refused"], told, folder, monkeypatch, capsys)
+    complaint(["map", "block.palpate", *words, "--out", "refused"], told, folder, monkeypatch, capsys)
     assert not (folder / "refused").exists()
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("palpate", "no.stl"), ("no.stl: no such file",)),
-        (("palpate", "lung"), ("lung: no such file", "models are doll, kidney, liver, beam")),
-        (("palpate", "liver", "--unit", "mm"), ("--unit is not for this file",)),
+        (("map", "no.stl"), ("no.stl: no such file",)),
+        (("map", "lung"), ("lung: no such file", "models are doll, kidney, liver, beam")),
+        (("map", "liver", "--unit", "mm"), ("--unit is not for this file",)),
     ],
 )
 def test_what_is_not_there_is_refused(folder, words, told, monkeypatch, capsys):
