@@ -24,7 +24,7 @@ SHARP_RIM = 0.15
 DEPTHS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 CLEAR = 1e-3
 # From this depth on, over its radius, a tool carried over the edge of a block gives out more (docs/accuracy.md).
-OPEN_FROM = {"sphere": np.inf, "ellipsoid": 0.5, "capsule": 1.0, "file": 1.0, "punch": 3.0}
+OPEN_FROM = {"sphere": np.inf, "ellipsoid": 0.5, "capsule": 1.0, "file": 1.0, "punch": np.inf}
 
 
 def share(found: Played) -> float:

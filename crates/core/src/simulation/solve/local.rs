@@ -47,6 +47,8 @@ const DEPTH_BY_FORCE: f64 = 2.0 / 3.0;
 /// Where more of the equation than this, over the tool's thickness, is left of it, the tool may have come away: its last answer is
 /// asked for where no force has moved the body.
 const AWAY: f64 = 1e-2;
+/// Cosine of the angle to the inward normal from which a tool has gone through the body, not beside it.
+const THROUGH: f64 = 0.5;
 /// A step of this length, over the tool's radius, is none.
 const SETTLED: f64 = 1e-7;
 /// A force that differs by less than this part from what was expected is found.
@@ -213,14 +215,15 @@ fn settle(
     Outcome::Settled
 }
 
-/// Whether all tools are outside of the planes that they touched, where no force moves the body.
+/// Whether all tools are outside of the body, before or beside the places that they touched, where no force moves the body.
 fn all_away(model: &Model, state: &State, local: &LocalScratch, slots: &[usize]) -> bool {
     slots.iter().zip(&local.from).all(|(&slot, &from)| {
         let contact = &state.contacts.slots[slot];
         let (tool, foot) = (&model.tools[contact.tool], &contact.local.foot);
         let centre = from + contact.local.orientation * tool.shape.centre();
         let outside = model.bodies[contact.body].closest(centre).is_some_and(|closest| closest.signed_distance > 0.0);
-        outside && (centre - foot.position).dot(foot.normal) > 0.0
+        let offset = centre - foot.position;
+        outside && offset.dot(foot.normal) > -THROUGH * offset.length()
     })
 }
 
