@@ -64,6 +64,33 @@ fn sliding_ticks_never_allocate_and_repeat_to_the_bit() {
     }
 }
 
+/// Within steps as short as these the pieces next to a tool are not looked for again.
+#[test]
+fn a_tick_is_the_same_with_fresh_memory() {
+    let capsule = || ToolShape::capsule(0.005, 0.005).expect("a capsule");
+    let model = sliding(false, [capsule(), ToolShape::sphere(0.01).expect("a sphere")]);
+    let wrenches = |fresh: bool| -> Vec<Wrench> {
+        let (mut state, mut scratch, mut input) = (State::new(&model), Scratch::new(&model), Input::default());
+        let ticks = 0..400;
+        let of_tick = |tick| {
+            let height = 0.1053 - 1e-6 * f64::from(tick);
+            let pose = Pose {
+                position: DVec3::new(0.05 + 1e-6 * f64::from(tick), 0.05, height),
+                orientation: DQuat::from_rotation_y(1.5),
+            };
+            input.tools[0] = ToolInput { pose, active: true, ..ToolInput::default() };
+            if fresh {
+                scratch = Scratch::new(&model);
+            }
+            step(&model, &mut state, &mut scratch, &input).wrench_on_device[0]
+        };
+        ticks.map(of_tick).collect()
+    };
+    let kept = wrenches(false);
+    assert!(kept.iter().any(|wrench| wrench.force.z > 1e-3));
+    assert!(kept == wrenches(true), "other bits");
+}
+
 /// Sixteen are the most that a tick may take, eight where a tool takes pressure cells.
 #[test]
 fn newtons_method_takes_few_steps() {

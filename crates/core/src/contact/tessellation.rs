@@ -16,9 +16,6 @@ const MOST_DIVISIONS: usize = 6;
 /// A vertex that would move farther than this from the drawn surface, over the edge of its triangle, stays on it.
 const FARTHEST: f64 = 0.3;
 
-/// Size of a piece, over its share of the triangle's, that none is larger than.
-const LARGEST: f64 = 1.5;
-
 /// A surface in pieces.
 pub struct Tessellation {
     divisions: usize,
@@ -86,17 +83,6 @@ impl Tessellation {
     /// A ball around the pieces of a triangle: its centre and radius, m.
     pub fn ball(&self, triangle: u32) -> (DVec3, f64) {
         self.balls[triangle as usize]
-    }
-
-    /// Farthest that a corner of a triangle's pieces is from the middle of its piece, m: they are much like the triangle.
-    pub fn largest_piece(&self, triangle: u32) -> f64 {
-        LARGEST * self.balls[triangle as usize].1 / self.divisions as f64
-    }
-
-    /// Middle of a piece's corners, m.
-    pub fn middle(&self, piece: u32) -> DVec3 {
-        let [a, b, c] = self.corners(piece);
-        (a + b + c) / 3.0
     }
 
     /// Corners of a piece, m; the pieces of triangle `t` begin at `t` times [`Self::pieces_of_triangle`].

@@ -53,10 +53,7 @@ fn find_beside(model: &Model, state: &mut State, scratch: &mut Scratch, hollows:
     let Contact { tool, body, local, .. } = state.contacts.slots[slot];
     let (fixed, radius) = (&model.bodies[body], model.tools[tool].radius);
     let Some(own) = &fixed.local else { return };
-    // The first place of a tool is known from the tick after it has begun.
-    let before = state.tools[tool].before.map(|before| fixed.placement.point_to_body(before.position));
-    let before = before.unwrap_or(local.tool);
-    let came = 2.0 * local.tool.distance(before);
+    let came = most_come(model, state, (tool, body), &local);
     for &start in hollows.starts(local.foot.triangle) {
         let lasting = state.contacts.of(tool, body).filter(|&slot| !state.contacts.slots[slot].local.held).count();
         if lasting >= MAX_PLACES {
@@ -115,11 +112,16 @@ pub fn find_wall(model: &Model, state: &mut State, scratch: &mut Scratch, body: 
     if weights.is_outside() {
         return;
     }
-    let before = state.tools[tool].before.map(|before| model.bodies[body].placement.point_to_body(before.position));
-    let came = 2.0 * local.tool.distance(before.unwrap_or(local.tool));
-    let entry = (-distance - came).max(0.0);
+    let entry = (-distance - most_come(model, state, (tool, body), &local)).max(0.0);
     let local = LocalContact { relative: local.relative, entry, foot: found.foot(local.relative), ..begun(&local) };
     add_contact(model, state, further_contact((tool, body), local), &scratch.covering);
+}
+
+/// How deep a tool can have come into a place since the tick before, m.
+fn most_come(model: &Model, state: &State, (tool, body): (usize, usize), local: &LocalContact) -> f64 {
+    // The first place of a tool is known from the tick after it has begun.
+    let before = state.tools[tool].before.map(|before| model.bodies[body].placement.point_to_body(before.position));
+    2.0 * local.tool.distance(before.unwrap_or(local.tool))
 }
 
 /// What a further place of a tool begins with.

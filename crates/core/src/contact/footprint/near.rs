@@ -12,9 +12,9 @@ const MOVED: f64 = 1e-3;
 const MOST_PIECES: usize = 8192;
 /// A piece farther above the middle of the tool than it can be is pushed away by this many times the difference.
 const BEYOND: f64 = 2.0;
-/// A tool that has sunk in deeper than this part of its half height sees from where its middle would be then.
-const EYE: f64 = 0.5;
-/// Next to the eye directions are blurred over this part of the tool's thickness.
+/// The viewpoint of a tool that has sunk in deeper than this part of its half height is lifted by the rest of the depth.
+const UNLIFTED: f64 = 0.5;
+/// Next to the viewpoint directions are blurred over this part of the tool's thickness.
 const BLUR: f64 = 0.1;
 
 /// A tool over a surface.
@@ -54,7 +54,7 @@ pub struct NearPiece {
     pub distance: f64,
     /// Its derivatives by the tool's place, and by its rotation about its origin, m.
     pub by_pose: [DVec3; 2],
-    /// Cosine between the normal and the direction to the tool's eye.
+    /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing: f64,
     /// Its derivatives by the tool's place and rotation.
     pub facing_by: [DVec3; 2],
@@ -118,20 +118,20 @@ impl PosedShape<'_> {
         (self.sunk - half).max(0.0) + margin
     }
 
-    /// The point from which the tool sees the pieces that it may press on: its middle, or above it as far as that has sunk in.
-    fn eye(&self, centre: DVec3) -> DVec3 {
+    /// The point that pieces must face for the tool to press on them: its middle, lifted along the contact's normal if it has sunk in.
+    fn viewpoint(&self, centre: DVec3) -> DVec3 {
         let half = (centre - self.support(-self.facing)).dot(self.facing);
-        centre + self.facing * (self.sunk - EYE * half).max(0.0)
+        centre + self.facing * (self.sunk - UNLIFTED * half).max(0.0)
     }
 
-    /// Cosine between a normal and the direction to the eye, and its derivatives by place and rotation.
-    fn sight(&self, (point, normal): (DVec3, DVec3), eye: DVec3) -> (f64, [DVec3; 2]) {
-        let towards = eye - point;
+    /// Cosine between a normal and the direction to the viewpoint, and its derivatives by place and rotation.
+    fn sight(&self, (point, normal): (DVec3, DVec3), viewpoint: DVec3) -> (f64, [DVec3; 2]) {
+        let towards = viewpoint - point;
         let blur = BLUR * self.shape.thickness();
         let inverse = 1.0 / (towards.length_squared() + blur * blur).sqrt();
         let cosine = normal.dot(towards) * inverse;
         let gradient = (normal - towards * (cosine * inverse)) * inverse;
-        (cosine, [gradient, (eye - self.place).cross(gradient)])
+        (cosine, [gradient, (viewpoint - self.place).cross(gradient)])
     }
 
     /// Distance of a point from the tool, and its derivatives by place and rotation.
@@ -175,6 +175,12 @@ impl NearPieces {
         self.look_for(pressed, query, tool);
     }
 
+    /// Forgets where the pieces were looked for. What a tick computes must not depend on the ticks before, and the surface may be
+    /// another one at the same address.
+    pub fn forget(&mut self) {
+        self.key = None;
+    }
+
     /// Moves the tool by so much, m.
     fn shift(&mut self, way: DVec3) {
         self.place += way;
@@ -191,7 +197,7 @@ impl NearPieces {
         self.pieces.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
         let (centre, headroom) = (self.centre, tool.headroom(margin));
-        let eye = tool.eye(centre);
+        let viewpoint = tool.viewpoint(centre);
         let reach = |axis: DVec3| tool.support(axis).dot(axis) + margin + (headroom * tool.facing.dot(axis)).max(0.0);
         let high = DVec3::from_array(DVec3::AXES.map(reach));
         let low = -DVec3::from_array(DVec3::AXES.map(|axis| reach(-axis)));
@@ -200,18 +206,12 @@ impl NearPieces {
         }
         query.for_each_within(low, high, |triangle| {
             let (ball, radius) = fine.ball(triangle);
-            let away = tool.distance(ball, centre, headroom).0 - margin;
-            if away > radius {
+            if tool.distance(ball, centre, headroom).0 > radius + margin {
                 return;
             }
             let count = fine.pieces_of_triangle() as u32;
-            // A distance changes by no more than the way: most pieces need none of their own.
-            let farthest = (away - fine.largest_piece(triangle)).max(0.0).powi(2);
             for piece in triangle * count..(triangle + 1) * count {
-                if fine.middle(piece).distance_squared(ball) < farthest {
-                    continue;
-                }
-                let near = measured(fine, tool, piece, (centre, headroom, eye));
+                let near = measured(fine, tool, piece, (centre, headroom, viewpoint));
                 if near.distance < near.size + margin && self.pieces.len() < MOST_PIECES {
                     self.pieces.push(near);
                 }
@@ -224,7 +224,7 @@ fn measured(
     fine: &Tessellation,
     tool: &PosedShape<'_>,
     piece: u32,
-    (centre, headroom, eye): (DVec3, f64, DVec3),
+    (centre, headroom, viewpoint): (DVec3, f64, DVec3),
 ) -> NearPiece {
     let corners = fine.corners(piece);
     let [a, b, c] = corners;
@@ -233,6 +233,6 @@ fn measured(
     let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
     let (distance, by_pose) = tool.distance(middle, centre, headroom);
     let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
-    let (facing, facing_by) = tool.sight((middle, normal), eye);
+    let (facing, facing_by) = tool.sight((middle, normal), viewpoint);
     NearPiece { piece, corners, middle, normal, area, size, joined: 1.0, distance, by_pose, facing, facing_by }
 }

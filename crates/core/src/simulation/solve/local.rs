@@ -105,6 +105,7 @@ enum Outcome {
 pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, body: usize, controls: &Controls) {
     let mut last = false;
     memory.local.pressed = None;
+    memory.local.footprint.near.forget();
     loop {
         let mut slots = [0; MAX_CONTACTS];
         let mut count = 0;

@@ -139,6 +139,7 @@ fn shape_arrival(
     let gone = if jumped { DVec3::ZERO } else { approach.gone };
     let strides = (gone.length() / (STRIDE * thickness)).ceil().clamp(1.0, MOST_STRIDES);
     let mut at = PosedShape { shape, place, rotation, facing: DVec3::ZERO, sunk: 0.0 };
+    footprint.near.forget();
     let mut met = None;
     for left in (0..strides as u32).rev() {
         at.place = place - gone * (f64::from(left) / strides);
