@@ -22,14 +22,10 @@ REAL_TIME = {"crtk_udp_device"}
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
 def test_example(example, tmp_path, shared_cache):
-    for _ in range(3 if example.stem in REAL_TIME else 1):
-        result = subprocess.run(
-            [sys.executable, example],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=280 if example.stem not in REAL_TIME else 60,
-        )
+    tries, timeout = (3, 60) if example.stem in REAL_TIME else (1, 280)
+    for _ in range(tries):
+        command = [sys.executable, example]
+        result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=timeout)
         if result.returncode == 0:
             break
     assert result.returncode == 0, result.stderr
