@@ -193,7 +193,7 @@ def test_a_tool_crosses_an_edge_without_a_jump_and_keeps_its_contact(loops, cros
     assert wrong is None, wrong
 
 
-@pytest.mark.parametrize("tool", ["capsule", "ellipsoid", "file"])
+@pytest.mark.parametrize("tool", ["capsule", "ellipsoid", pytest.param("file", marks=pytest.mark.slow)])
 def test_in_a_corner_a_tool_presses_both_walls(loops, tool):
     """Along the floor into a wall: what each does is nearly what it does alone."""
     path, lead = Crossing("concave", 90, tool, "across", 1e-3).path()

@@ -8,7 +8,7 @@ use super::input::Pose;
 use super::law::takes_cells;
 use super::model::Model;
 use super::motion::Motion;
-use super::solve::Passivity;
+use super::passivity::Passivity;
 use super::strain_watch::{LimitShare, StrainWatch};
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 use crate::contact::Refusal;

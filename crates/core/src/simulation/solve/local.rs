@@ -24,8 +24,8 @@ use crate::simulation::solve::handover::{
     Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join,
 };
 use crate::simulation::solve::local_scratch::{LocalScratch, local_body};
-use crate::simulation::solve::passivity::take_back;
-use crate::simulation::state::{BodyState, Entry, State};
+use crate::simulation::solve::surplus::{book, take_back_surplus};
+use crate::simulation::state::{Entry, State};
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
 use crate::tensor::outer;
@@ -136,8 +136,8 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         }
         let (responses, places) = (&memory.local.responses, &memory.local.places);
         let found = Found { responses, places, covering: memory.covering };
-        let done =
-            last || !(hand_over(model, state, found, slots) || gives_out(model, state, memory.local, slots, body));
+        let done = last
+            || !(hand_over(model, state, found, slots) || take_back_surplus(model, state, memory.local, slots, body));
         if done {
             book(state, memory.local, slots, body);
             take_up(model, state, memory.local, slots, body);
@@ -145,27 +145,6 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         }
         last = true;
     }
-}
-
-/// Whether contacts hold more than tools have put in; then they have been taken back.
-fn gives_out(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) -> bool {
-    let State { bodies, contacts, .. } = state;
-    let fixed = &bodies[body];
-    if fixed.motion.is_some() {
-        return false;
-    }
-    let held = fixed.passivity.observe(contacts, local, slots, fixed.stiffness_scale);
-    let Some(part) = held.part_to_keep() else { return false };
-    take_back(model, contacts, local, slots, part);
-    true
-}
-
-/// Books what contacts of a body at rest hold.
-fn book(state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
-    let State { bodies, contacts, .. } = state;
-    let BodyState { motion: None, passivity, stiffness_scale, .. } = &mut bodies[body] else { return };
-    let held = passivity.observe(contacts, local, slots, *stiffness_scale);
-    passivity.book(held, contacts, local, slots, *stiffness_scale);
 }
 
 /// Newton's method.

@@ -6,11 +6,10 @@ mod forces;
 mod handover;
 mod local;
 mod local_scratch;
-mod passivity;
+mod surplus;
 
 pub use compliance::add_contact;
 pub use forces::{contact_forces, dent_at, gather, own_compliance, solve_with};
 pub use handover::DEEPEST;
 pub use local::{Memory, local_forces};
 pub use local_scratch::LocalScratch;
-pub use passivity::Passivity;

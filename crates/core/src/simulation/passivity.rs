@@ -13,12 +13,8 @@
 
 use glam::{DQuat, DVec3};
 
-use super::handover::approach;
-use super::local_scratch::LocalScratch;
-use crate::simulation::contacts::{Contact, Contacts, REVISIONS};
-use crate::simulation::model::Model;
-use crate::simulation::rotation::rotation_vector;
-use crate::simulation::{MAX_CONTACTS, law::takes_cells};
+use super::MAX_CONTACTS;
+use super::rotation::rotation_vector;
 
 /// Part of the most energy that has been held which may be given out beyond what was put in, and to which it is taken back.
 const TOLERANCE: f64 = 9e-4;
@@ -30,24 +26,29 @@ const GENTLY: f64 = 0.01;
 /// Ticks over which a surplus is forgotten: a tool that goes round for minutes would add up rounding.
 const FORGOTTEN: f64 = 1000.0;
 
-/// A contact as it was booked last.
+/// A contact in a tick.
 #[derive(Clone, Copy, Debug, Default)]
-struct Booked {
-    /// Which one.
-    begun: Option<u64>,
-    /// Where its tool was, less what other laws move the body by, m, and how it was turned.
-    from: DVec3,
-    orientation: DQuat,
+pub struct Press {
+    /// Its slot, and its number among all since the start.
+    pub slot: usize,
+    pub number: Option<u64>,
+    /// Where its tool is, less what other laws move the body by, m, and how it is turned.
+    pub from: DVec3,
+    pub orientation: DQuat,
     /// Force on the body, N.
-    force: DVec3,
+    pub force: DVec3,
     /// Torque on the tool, N m.
-    torque: DVec3,
+    pub torque: DVec3,
+    /// What it holds: indentation, springs, and its part of `f^T C f / 2`, J.
+    pub stored: f64,
+    /// What friction took out in the tick, J.
+    pub dissipated: f64,
 }
 
 /// The account of a body.
 #[derive(Clone, Debug, Default)]
 pub struct Passivity {
-    last: [Booked; MAX_CONTACTS],
+    last: [Press; MAX_CONTACTS],
     held: Held,
     /// Young's modulus over the Green's function's.
     scale: f64,
@@ -81,22 +82,19 @@ impl Passivity {
         }
     }
 
-    /// What contacts hold with the answers that have been found.
-    pub fn observe(&self, contacts: &Contacts, local: &LocalScratch, slots: &[usize], scale: f64) -> Held {
+    /// What contacts hold with the answers that have been found. A contact that begins has put in what it holds.
+    pub fn observe(&self, presses: impl Iterator<Item = Press>, scale: f64) -> Held {
         let (mut stored, mut put_in) = (0.0, 0.0);
-        for (a, &slot) in slots.iter().enumerate() {
-            let response = &local.responses[a];
-            let moved: DVec3 = (0..slots.len()).map(|b| local.between[a][b] * local.responses[b].force).sum();
-            let own = response.indentation.energy + response.springs().energy() + 0.5 * response.force.dot(moved);
-            stored += own;
-            let (now, before) = (booked(&contacts.slots[slot], local, a), &self.last[slot]);
-            put_in += if now.begun == before.begun {
+        for now in presses {
+            let before = &self.last[now.slot];
+            stored += now.stored;
+            put_in += if now.number == before.number {
                 let turned = rotation_vector(before.orientation, now.orientation);
                 0.5 * (before.force + now.force).dot(now.from - before.from)
                     - 0.5 * (before.torque + now.torque).dot(turned)
-                    - response.friction.dissipated
+                    - now.dissipated
             } else {
-                own
+                now.stored
             };
         }
         // Another stiffness is not the tool's work.
@@ -106,37 +104,61 @@ impl Passivity {
     }
 
     /// Books what has been observed.
-    pub fn book(&mut self, held: Held, contacts: &Contacts, local: &LocalScratch, slots: &[usize], scale: f64) {
+    pub fn book(&mut self, held: Held, presses: impl Iterator<Item = Press>, scale: f64) {
         (self.held, self.scale) = (held, scale);
         self.last = Default::default();
-        for (a, &slot) in slots.iter().enumerate() {
-            self.last[slot] = booked(&contacts.slots[slot], local, a);
+        for press in presses {
+            self.last[press.slot] = press;
         }
     }
 }
 
-fn booked(contact: &Contact, local: &LocalScratch, a: usize) -> Booked {
-    Booked {
-        begun: Some(contact.serial >> REVISIONS),
-        from: local.from[a],
-        orientation: contact.local.orientation,
-        force: local.responses[a].force,
-        torque: local.responses[a].torque,
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Lets contacts keep a part of their approach.
-pub fn take_back(model: &Model, contacts: &mut Contacts, local: &LocalScratch, slots: &[usize], part: f64) {
-    for (a, &slot) in slots.iter().enumerate() {
-        let contact = &mut contacts.slots[slot];
-        let tool = &model.tools[contact.tool];
-        let mut there = *contact;
-        there.local.foot = local.responses[a].foot;
-        let deep = approach(tool, &there, local.from[a]) - contact.local.entry;
-        if takes_cells(&tool.shape) {
-            // The approach counts along the normal that has been found.
-            contact.local.foot = there.local.foot;
+    /// A spring of 100 N/m along z that is pressed to a depth, m, and holds so many times its energy.
+    fn spring(depth: f64, times: f64) -> Press {
+        let (force, stored) = (DVec3::NEG_Z * 100.0 * depth, times * 50.0 * depth * depth);
+        Press { number: Some(1), from: DVec3::NEG_Z * depth, force, stored, ..Press::default() }
+    }
+
+    /// What is kept of a spring that is pressed by 10 mm in `count` ticks, and holds `times` its energy from half the way on.
+    fn kept(count: usize, times: f64) -> f64 {
+        let mut account = Passivity::default();
+        let mut least = 1.0f64;
+        for tick in 1..=count {
+            let part = tick as f64 / count as f64;
+            let press = spring(0.01 * part, if part > 0.5 { times } else { 1.0 });
+            let held = account.observe(std::iter::once(press), 1.0);
+            least = least.min(held.part_to_keep().unwrap_or(1.0));
+            account.book(held, std::iter::once(press), 1.0);
         }
-        contact.local.entry += (1.0 - part) * deep.max(0.0);
+        least
+    }
+
+    #[test]
+    fn a_spring_holds_what_was_put_in() {
+        assert_eq!(kept(1000, 1.0), 1.0);
+    }
+
+    #[test]
+    fn a_surplus_is_taken_back_and_a_loss_is_not() {
+        assert_eq!(kept(1000, 0.8), 1.0);
+        // A tenth more at once, of which half a thousandth may stay.
+        let part = kept(1000, 1.1);
+        assert!((0.89..0.93).contains(&part), "{part}");
+        let gently = kept(1000, 1.02);
+        assert_eq!(gently, 1.0 - GENTLY);
+    }
+
+    #[test]
+    fn another_stiffness_is_no_surplus() {
+        let mut account = Passivity::default();
+        let [soft, hard] = [1.0, 3.0].map(|times| spring(0.01, times));
+        let held = account.observe(std::iter::once(soft), 1.0);
+        account.book(held, std::iter::once(soft), 1.0);
+        assert_eq!(account.observe(std::iter::once(hard), 3.0).part_to_keep(), None);
+        assert!(account.observe(std::iter::once(hard), 1.0).part_to_keep().is_some());
     }
 }
