@@ -25,6 +25,9 @@ const SMALL: f64 = 0.05;
 const GENTLY: f64 = 0.01;
 /// Ticks over which a surplus is forgotten: a tool that goes round for minutes would add up rounding.
 const FORGOTTEN: f64 = 1000.0;
+/// The work of a tick is known to half the change of the force times the way, where that is this part of the tool's radius; over
+/// longer ways it is not known.
+const COARSE: f64 = 0.1;
 
 /// A contact in a tick.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,6 +38,9 @@ pub struct Press {
     /// Where its tool is, less what other laws move the body by, m, and how it is turned.
     pub from: DVec3,
     pub orientation: DQuat,
+    /// How far any point of the tool has gone at most in the tick, m, and the tool's radius.
+    pub way: f64,
+    pub radius: f64,
     /// Force on the body, N.
     pub force: DVec3,
     /// Torque on the tool, N m.
@@ -82,10 +88,13 @@ impl Passivity {
         }
     }
 
-    /// What contacts hold with the answers that have been found. A contact that begins has put in what it holds.
+    /// What contacts hold with the answers that have been found. A contact that begins has taken up no more than its force does over
+    /// the way of the tick.
     pub fn observe(&self, presses: impl Iterator<Item = Press>, scale: f64) -> Held {
-        let (mut stored, mut put_in) = (0.0, 0.0);
+        let (mut stored, mut put_in, mut known) = (0.0, 0.0, true);
         for now in presses {
+            let coarse = now.way / (COARSE * now.radius);
+            known &= coarse < 1.0;
             let before = &self.last[now.slot];
             stored += now.stored;
             put_in += if now.number == before.number {
@@ -93,13 +102,15 @@ impl Passivity {
                 0.5 * (before.force + now.force).dot(now.from - before.from)
                     - 0.5 * (before.torque + now.torque).dot(turned)
                     - now.dissipated
+                    + 0.5 * (now.force - before.force).length() * now.way * coarse
             } else {
-                now.stored
+                now.stored.min(now.force.length() * now.way)
             };
         }
         // Another stiffness is not the tool's work.
-        let made = if scale == self.scale { stored - self.held.stored - put_in } else { 0.0 };
-        let surplus = self.held.surplus * (1.0 - 1.0 / FORGOTTEN) + made;
+        let made =
+            if scale == self.scale || self.held.stored == 0.0 { stored - self.held.stored - put_in } else { 0.0 };
+        let surplus = self.held.surplus * (1.0 - 1.0 / FORGOTTEN) + if known { made } else { made.min(0.0) };
         Held { stored, most: self.held.most.max(stored), surplus }
     }
 
@@ -120,7 +131,7 @@ mod tests {
     /// A spring of 100 N/m along z that is pressed to a depth, m, and holds so many times its energy.
     fn spring(depth: f64, times: f64) -> Press {
         let (force, stored) = (DVec3::NEG_Z * 100.0 * depth, times * 50.0 * depth * depth);
-        Press { number: Some(1), from: DVec3::NEG_Z * depth, force, stored, ..Press::default() }
+        Press { number: Some(1), from: DVec3::NEG_Z * depth, way: 1e-5, radius: 1.0, force, stored, ..Press::default() }
     }
 
     /// What is kept of a spring that is pressed by 10 mm in `count` ticks, and holds `times` its energy from half the way on.
@@ -153,9 +164,18 @@ mod tests {
     }
 
     #[test]
+    fn a_first_touch_holds_no_more_than_its_way_allows() {
+        let account = Passivity::default();
+        let [light, heavy] = [1e-5, 2e-3].map(|depth| account.observe(std::iter::once(spring(depth, 1.0)), 1.0));
+        assert_eq!(light.part_to_keep(), None);
+        let part = heavy.part_to_keep().expect("a part");
+        assert!((part - 1e-5 / 1e-3).abs() < 1e-3, "{part}");
+    }
+
+    #[test]
     fn another_stiffness_is_no_surplus() {
         let mut account = Passivity::default();
-        let [soft, hard] = [1.0, 3.0].map(|times| spring(0.01, times));
+        let [soft, hard] = [1.0, 3.0].map(|times| Press { way: 0.01, ..spring(0.01, times) });
         let held = account.observe(std::iter::once(soft), 1.0);
         account.book(held, std::iter::once(soft), 1.0);
         assert_eq!(account.observe(std::iter::once(hard), 3.0).part_to_keep(), None);

@@ -139,7 +139,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         let done = last
             || !(hand_over(model, state, found, slots) || take_back_surplus(model, state, memory.local, slots, body));
         if done {
-            book(state, memory.local, slots, body);
+            book(model, state, memory.local, slots, body);
             take_up(model, state, memory.local, slots, body);
             return;
         }
