@@ -95,19 +95,23 @@ def test_chapters_that_are_numbered_alike_are_no_problem(numbered):
     assert numbered() == []
 
 
-@pytest.mark.parametrize("page", ["docs/theory.md", "ARCHITECTURE.md"])
 @pytest.mark.parametrize(
-    ("old", "new"),
-    [("4", "5"), ("/solver/", "/sparse/"), ("4. Title", "Title"), ("4 `", "`")],
-    ids=["number", "folder", "heading without a number", "row without a number"],
+    ("page", "old", "new"),
+    [
+        ("docs/theory.md", "## 4.", "## 5."),
+        ("docs/theory.md", "## 4. ", "## "),
+        ("docs/theory.md", "/solver/", "/sparse/"),
+        ("ARCHITECTURE.md", "4 `", "5 `"),
+        ("ARCHITECTURE.md", "4 `", "`"),
+        ("ARCHITECTURE.md", "/solver/", "/sparse/"),
+    ],
 )
 def test_a_page_that_numbers_a_chapter_differently_is_found(numbered, page, old, new):
-    changed = {"4. Title": "docs/theory.md", "4 `": "ARCHITECTURE.md"}.get(old, page)
-    (problem,) = numbered(changed, old, new)
-    assert problem.startswith(f"{changed} has the chapters 1 element, 2 mesh, 3 fem, ")
+    (problem,) = numbered(page, old, new)
+    assert problem.startswith(f"{page} has the chapters 1 element, 2 mesh, 3 fem, ")
 
 
-def test_a_folder_that_numbers_its_chapter_differently_is_found(numbered, tmp_path):
+def test_a_folder_that_numbers_its_chapter_differently_is_found(numbered):
     expected = ["crates/core/src/strain/mod.rs does not begin with '//! Chapter 8 of docs/theory.md:'"]
     assert numbered("crates/core/src/strain/mod.rs", "Chapter 8", "Chapter 9") == expected
     assert numbered("crates/core/src/strain/mod.rs", "//! Chapter 8 of docs/theory.md: t", "//! T") == expected
