@@ -114,7 +114,7 @@ struct Sums {
 }
 
 impl PressedSurface {
-    /// Divides the smooth surface into pieces for tools of a `thickness`, m: a third of it long, so that several lie under a tool.
+    /// Divides the smooth surface into pieces for tools of a `thickness`, m: so small that several lie under a tool.
     /// `fields` are those of each fan (compliance, moduli); they are smoothed over neighbouring fans.
     pub fn new(
         surface: &crate::mesh::Surface,
