@@ -105,7 +105,8 @@ def chapter_number_problems() -> list[str]:
     chapters = [(str(number), name) for number, name in enumerate(CHAPTERS, 1)]
     core = ROOT / "crates/core/src"
     folders = {path.name for path in core.iterdir() if path.is_dir()}
-    problems = [f"crates/core/src/{name}/ is no chapter: name it in CHAPTERS" for name in sorted(folders - set(CHAPTERS))]
+    unnumbered = sorted(folders - set(CHAPTERS))
+    problems = [f"crates/core/src/{name}/ is no chapter: name it in CHAPTERS" for name in unnumbered]
     pages = {
         "docs/theory.md": r"^## (\d+)\. .+\n\n`crates/core/src/(\w+)/`",
         "ARCHITECTURE.md": r"(\d+) `crates/core/src/(\w+)/`",
@@ -114,7 +115,7 @@ def chapter_number_problems() -> list[str]:
         found = re.findall(pattern, (ROOT / page).read_text(), re.MULTILINE)
         if found != chapters:
             numbered = ", ".join(f"{number} {name}" for number, name in found)
-            problems.append(f"{page} has the chapters {numbered or 'of no folder'} instead of those of CHAPTERS, in order")
+            problems.append(f"{page} has the chapters {numbered or 'none'}, not those of CHAPTERS in their order")
     for number, name in chapters:
         start, module = f"//! Chapter {number} of docs/theory.md", core / name / "mod.rs"
         if not module.exists() or not module.read_text().startswith(f"{start}:"):
