@@ -33,7 +33,7 @@ poissons_ratio = 0.45
 radius = "8mm"
 """
 PLATE, BLOCK = 0, 1
-WORDS = "Body thinner than 1.5 tool radii: the force is up to 60 % too small"
+WORDS = "Thinner than 1.5 tool radii: force up to 60 % too small"
 
 
 @pytest.fixture(scope="module")
