@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test install other-build sanitize lint viewer check-tools clean
+.PHONY: demo test campaigns install other-build sanitize lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -49,11 +49,16 @@ install:
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)
 
-# Two processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py says what
+# Two processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
 # each of them takes on, and in which order.
+PYTEST := $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
 test: $(VENV)/.installed $(PAGE) lint
 	cargo test --release --quiet --workspace
-	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder $(ARGS)
+	$(PYTEST) -m "not slow" $(ARGS)
+
+# Long campaigns: hundreds of random touches, presses, writers, answers, and whole builds. CI runs them after `make test`.
+campaigns: $(VENV)/.installed $(PAGE)
+	$(PYTEST) -m slow $(ARGS)
 
 # After `make test`: what the release build has recorded, a build that is not optimised makes again bit for bit.
 OTHER_BUILD := -p palpate-servo --no-default-features --test across_builds

@@ -35,9 +35,14 @@ def convex(degrees: float, tilt: float = 0.0) -> palpate.Body:
 
 
 def concave(degrees: float, tilt: float = 0.0) -> palpate.Body:
-    """A level floor, x < 0, and a wall that rises from it, with so many degrees of air between; turned by ``tilt``."""
-    across = np.concatenate([np.linspace(-0.045, 0, 6), np.linspace(0, 0.03, 5)[1:]])
-    up = np.concatenate([np.linspace(-THICK, 0, 4), np.linspace(0, 0.02, 4)[1:]])
+    """A level floor, x < 0, and a wall that rises from it, with so many degrees of air between; turned by ``tilt``.
+
+    Both are longer than a tool 24 mm long that lies across them reaches.
+    """
+    reach = 0.016 / np.sin(np.radians(degrees / 2))
+    floor, wall = max(0.045, reach), max(0.02, reach * np.sin(np.radians(degrees)))
+    across = np.concatenate([np.linspace(-floor, 0, round(floor / 0.009) + 1), np.linspace(0, 0.03, 5)[1:]])
+    up = np.concatenate([np.linspace(-THICK, 0, 4), np.linspace(0, wall, round(wall / 0.007) + 1)[1:]])
     mesh = mapped(lattice(across, np.linspace(0, EDGE_LENGTH, 7), up), quadratic=True)
     centres = mesh.nodes[mesh.tets[:, :4]].mean(axis=1)
     tets = mesh.tets[~((centres[:, 0] < 0) & (centres[:, 2] > 0))]

@@ -27,13 +27,13 @@ pytestmark = [
 ]
 
 
-def run(*command: object, **environment: str) -> str:
+def run(*command: object, timeout: float = 280, **environment: str) -> str:
     done = subprocess.run(
         [os.fspath(word) if isinstance(word, Path) else str(word) for word in command],
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=timeout,
     )
     assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
     return done.stdout + done.stderr
@@ -267,12 +267,14 @@ def grown_library(folder: Path) -> Path:
         source.write_text(text.replace("//!", "#![allow(missing_docs)]\n//!", 1) if source.name == "lib.rs" else text)
     assert len(grown) == 6
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    run("cargo", "build", "--release", "--quiet", "--manifest-path", copy / "Cargo.toml", "--target-dir", target)
+    build = ("cargo", "build", "--release", "--quiet", "--manifest-path", copy / "Cargo.toml", "--target-dir", target)
+    run(*build, timeout=900)
     (folder / "lib").mkdir()
     shutil.copy(target / "release/libpalpate_grown.so", folder / "lib/libpalpate.so.1")
     return folder / "lib"
 
 
+@pytest.mark.timeout(1000)
 def test_programs_of_the_first_header_run_with_a_library_whose_structs_have_grown(prefix, block_green, tmp_path):
     store, program = tmp_path / "block.palpate", tmp_path / "sizes"
     block_green.save(store)

@@ -16,9 +16,18 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
+# A loop that gets no measurement for 50 ms stops: on a machine that computes beside it that can happen.
+REAL_TIME = {"crtk_udp_device"}
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
 def test_example(example, tmp_path, shared_cache):
-    result = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, timeout=280)
+    tries, timeout = (3, 60) if example.stem in REAL_TIME else (1, 280)
+    for _ in range(tries):
+        command = [sys.executable, example]
+        result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=timeout)
+        if result.returncode == 0:
+            break
     assert result.returncode == 0, result.stderr
 
 

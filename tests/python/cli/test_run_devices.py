@@ -64,6 +64,7 @@ def test_a_library_moves_the_first_tool(scene, kind, variable, emulated):
     assert ("holds contacts up to 400 N/m in this scene, which asks for 5000" in done.stderr) == (kind == "touch")
 
 
+@pytest.mark.slow
 def test_two_devices_at_once(scene):
     with inverse_service() as (address, _):
         hand = {"PALPATE_FORCEDIMENSION_LIBRARY": library("dhd"), "PALPATE_EMULATED_HAND": PRESS}

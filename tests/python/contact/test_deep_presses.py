@@ -104,7 +104,7 @@ def press(
     return path, rotation * Rotation.from_rotvec(part[:, None] * random.uniform(0, 0.5) * random.normal(size=3))
 
 
-@pytest.mark.parametrize("tool", ["sphere", "capsule", "punch", "file"])
+@pytest.mark.parametrize("tool", ["sphere", "capsule", "punch", pytest.param("file", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["star", "cup", "torus"])
 def test_places_of_deep_presses_stay_on_the_body_and_forces_finite(loops, name, tool):
     wrong = presses(loops, name, tool, range(10))

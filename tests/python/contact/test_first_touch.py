@@ -62,7 +62,7 @@ def worst(loops: Loops, name: str, tool: str, count: int, seed: int) -> str | No
     return f"{tool} on {name}: {len(bad)} of {len(found)} touches, worst {part:.3g} times the force at 1 mm, at {foot}"
 
 
-@pytest.mark.parametrize("tool", HELD)
+@pytest.mark.parametrize("tool", [pytest.param(tool, marks=[pytest.mark.slow] * (tool == "file")) for tool in HELD])
 @pytest.mark.parametrize("name", ["kidney", "liver", "star"])
 def test_no_first_touch_computes_more_than_three_times_the_force_at_a_millimetre(loops, name, tool):
     wrong = worst(loops, name, tool, 30, seed=len(name) + len(tool))

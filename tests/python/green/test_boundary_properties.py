@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 from conftest import box_mesh, direct_solve, relative
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
@@ -124,6 +125,7 @@ def reference(body: palpate.Body, change: dict):
     return direct_solve(body, prescribed, forces)
 
 
+@pytest.mark.slow
 @MANY
 @given(st.data())
 def test_any_change_equals_a_direct_solve(data):

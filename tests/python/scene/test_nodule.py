@@ -48,6 +48,7 @@ def patch_weights(mesh, point, radius, split=24):
     return weights / weights.sum()
 
 
+@pytest.mark.slow
 def test_stiffness_over_the_nodule_equals_a_direct_solve(nodule):
     body = nodule.bodies[0].body
     assert len(np.unique(body.mesh.regions)) == 2

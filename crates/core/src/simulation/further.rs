@@ -14,7 +14,7 @@
 use glam::DVec3;
 
 use super::contacts::{Contact, Mode};
-use super::law::{ASKED, LocalContact};
+use super::law::{ASKED, LocalContact, posed};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::solve::{DEEPEST, add_contact, dent_at};
@@ -22,6 +22,7 @@ use super::state::State;
 use super::tool::LawKind;
 use super::{MAX_CONTACTS, MAX_PLACES};
 use crate::contact::Hollows;
+use crate::contact::footprint::PosedShape;
 use crate::contact::smooth::FootPoint;
 
 /// A place waits from where the tool is as near as this, over the tool's radius.
@@ -107,6 +108,9 @@ pub fn find_wall(model: &Model, state: &mut State, scratch: &mut Scratch, body: 
     }
     let footprint = &mut scratch.local.footprint;
     let Some((plane, distance)) = footprint.wall_beside(&planes[..count]) else { return };
+    let contact = posed(&model.tools[tool].shape, &local, local.relative);
+    let at = PosedShape { place: local.relative, facing: plane.normal, sunk: 0.0, ..contact };
+    footprint.near.gather(pressed, &model.bodies[body].query, &at);
     let weights = &mut scratch.covering.weights;
     let Some(found) = footprint.find(&pressed.fine, &own.smooth, plane, weights) else { return };
     if weights.is_outside() {

@@ -4,7 +4,8 @@
 //! `input` is what comes from outside, `model` what is fixed, `state` what evolves. `law` says when a contact begins, how it
 //! follows its tool and when it ends; `limit` keeps strain within what linear elasticity can say; `solve` finds the forces of
 //! all contacts of a body together. A body that moves has a
-//! `motion`, which a `strike` may set going, and an `energy` that is accounted for. `snapshot` is what is drawn.
+//! `motion`, which a `strike` may set going, and an `energy` that is accounted for; on one at rest `passivity` keeps contacts from
+//! giving out more than was put in. `snapshot` is what is drawn.
 
 mod admissible;
 mod body;
@@ -18,6 +19,7 @@ mod law;
 mod limit;
 mod model;
 mod motion;
+mod passivity;
 mod rotation;
 mod scratch;
 mod slip;

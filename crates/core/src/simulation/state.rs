@@ -8,6 +8,7 @@ use super::input::Pose;
 use super::law::takes_cells;
 use super::model::Model;
 use super::motion::Motion;
+use super::passivity::Passivity;
 use super::strain_watch::{LimitShare, StrainWatch};
 use super::{MAX_BODIES, MAX_CONTACTS, MAX_TOOLS};
 use crate::contact::Refusal;
@@ -49,6 +50,8 @@ pub struct BodyState {
     pub strain: Option<Box<StrainWatch>>,
     /// What the limit of strain let through of contacts that slide.
     pub(super) limit_share: LimitShare,
+    /// What contacts of a body at rest hold, and what tools have put into it.
+    pub(super) passivity: Passivity,
 }
 
 /// State of a simulation.
@@ -74,6 +77,7 @@ impl State {
             motion: body.dynamics.as_ref().map(|dynamics| Motion::new(&dynamics.modes)),
             strain: None,
             limit_share: LimitShare::default(),
+            passivity: Passivity::default(),
         };
         Self {
             bodies: model.bodies.iter().map(body).collect(),

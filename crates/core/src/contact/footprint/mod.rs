@@ -139,13 +139,14 @@ impl FootprintScratch {
         first.map(|near| Plane { point: near.middle, normal: near.normal })
     }
 
-    /// Plane of a wall that stands on all planes that a tool is known to press on, where the tool is nearest to it, and how far it is
-    /// from it, m.
+    /// Plane of a wall that stands on all planes that a tool is known to press on, or faces them across the tool, where the tool is
+    /// nearest to it, and how far it is from it, m.
     pub fn wall_beside(&self, known: &[Plane]) -> Option<(Plane, f64)> {
         let is_wall = |near: &&NearPiece| {
             near.facing > MET && known.iter().all(|plane| near.share_of_wall(plane, self.near.margin) > WALL)
         };
-        let nearest = self.near.pieces.iter().filter(is_wall).min_by(|a, b| a.distance.total_cmp(&b.distance))?;
+        let pieces = self.near.pieces.iter().chain(&self.near.opposite);
+        let nearest = pieces.filter(is_wall).min_by(|a, b| a.distance.total_cmp(&b.distance))?;
         Some((Plane { point: nearest.middle, normal: nearest.normal }, nearest.distance))
     }
 

@@ -10,6 +10,7 @@ use crate::contact::{SurfaceQuery, Tessellation};
 const MOVED: f64 = 1e-3;
 /// Most pieces that are looked at: their memory is there before a tick.
 const MOST_PIECES: usize = 8192;
+const MOST_OPPOSITE: usize = 1024;
 /// A piece farther above the middle of the tool than it can be is pushed away by this many times the difference.
 const BEYOND: f64 = 2.0;
 /// The viewpoint of a tool that has sunk in deeper than this part of its half height is lifted by the rest of the depth.
@@ -65,6 +66,8 @@ pub struct NearPiece {
 pub struct NearPieces {
     /// In the order of the search.
     pub pieces: Vec<NearPiece>,
+    /// Those that the tool's other side is near to, beyond what the contact's plane can reach.
+    pub opposite: Vec<NearPiece>,
     /// Middle of the tool, m.
     pub centre: DVec3,
     /// Distance from which pieces count, m.
@@ -92,6 +95,7 @@ impl Default for NearPieces {
     fn default() -> Self {
         Self {
             pieces: Vec::with_capacity(MOST_PIECES),
+            opposite: Vec::with_capacity(MOST_OPPOSITE),
             centre: DVec3::ZERO,
             margin: 0.0,
             taken_down: None,
@@ -185,7 +189,7 @@ impl NearPieces {
     fn shift(&mut self, way: DVec3) {
         self.place += way;
         self.centre += way;
-        for near in &mut self.pieces {
+        for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(way);
             near.facing += near.facing_by[0].dot(way);
         }
@@ -195,9 +199,11 @@ impl NearPieces {
         let (fine, margin) = (&pressed.fine, pressed.margin);
         self.taken_down = None;
         self.pieces.clear();
+        self.opposite.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
         let (centre, headroom) = (self.centre, tool.headroom(margin));
         let viewpoint = tool.viewpoint(centre);
+        let whole = PosedShape { facing: DVec3::ZERO, sunk: 0.0, ..*tool };
         let reach = |axis: DVec3| tool.support(axis).dot(axis) + margin + (headroom * tool.facing.dot(axis)).max(0.0);
         let high = DVec3::from_array(DVec3::AXES.map(reach));
         let low = -DVec3::from_array(DVec3::AXES.map(|axis| reach(-axis)));
@@ -206,14 +212,21 @@ impl NearPieces {
         }
         query.for_each_within(low, high, |triangle| {
             let (ball, radius) = fine.ball(triangle);
-            if tool.distance(ball, centre, headroom).0 > radius + margin {
+            let count = fine.pieces_of_triangle() as u32;
+            let close = tool.distance(ball, centre, headroom).0 < radius + margin;
+            let beyond = whole.distance(ball, centre, 0.0).0 < radius + margin;
+            if !close && !beyond {
                 return;
             }
-            let count = fine.pieces_of_triangle() as u32;
             for piece in triangle * count..(triangle + 1) * count {
                 let near = measured(fine, tool, piece, (centre, headroom, viewpoint));
                 if near.distance < near.size + margin && self.pieces.len() < MOST_PIECES {
                     self.pieces.push(near);
+                } else if beyond {
+                    let near = measured(fine, &whole, piece, (centre, 0.0, centre));
+                    if near.distance < near.size + margin && self.opposite.len() < MOST_OPPOSITE {
+                        self.opposite.push(near);
+                    }
                 }
             }
         });

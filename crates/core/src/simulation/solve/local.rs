@@ -24,6 +24,7 @@ use crate::simulation::solve::handover::{
     Found, approach, change_parts, go_on, hand_over, has_jumped, hold_lost, join,
 };
 use crate::simulation::solve::local_scratch::{LocalScratch, local_body};
+use crate::simulation::solve::surplus::{book, take_back_surplus};
 use crate::simulation::state::{Entry, State};
 use crate::simulation::system::System;
 use crate::simulation::tool::LawKind;
@@ -115,7 +116,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         }
         let slots = &slots[..count];
         if count == 0 {
-            return;
+            return state.bodies[body].passivity.end();
         }
         match settle(model, state, &mut memory, slots, body, controls) {
             Outcome::Settled => {}
@@ -135,7 +136,10 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: Memory<'_>, bo
         }
         let (responses, places) = (&memory.local.responses, &memory.local.places);
         let found = Found { responses, places, covering: memory.covering };
-        if last || !hand_over(model, state, found, slots) {
+        let done = last
+            || !(hand_over(model, state, found, slots) || take_back_surplus(model, state, memory.local, slots, body));
+        if done {
+            book(state, memory.local, slots, body);
             take_up(model, state, memory.local, slots, body);
             return;
         }

@@ -6,6 +6,7 @@ mod forces;
 mod handover;
 mod local;
 mod local_scratch;
+mod surplus;
 
 pub use compliance::add_contact;
 pub use forces::{contact_forces, dent_at, gather, own_compliance, solve_with};
