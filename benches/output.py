@@ -20,7 +20,7 @@ Out = Annotated[Path | None, typer.Option(help="Folder for plots and files.")]
 # Children of a benchmark start here, to find the package of benchmarks.
 ROOT = Path(__file__).resolve().parents[1]
 MULTIPLES = {"k": 1_000, "M": 1_000_000}
-# Columns of a table that nobody watches on a terminal.
+# Width of a table that does not go to a terminal, characters.
 WIDTH = 150
 
 

@@ -178,7 +178,7 @@ def as_table(results: Sequence[SessionResult]) -> Table:
         figures = (f"{r.longest_us:.0f} us", f"{r.mb_per_minute:.2f}", "yes" if r.same else "NO")
         lines.append([r.scene, *map(str, counts), *figures])
     notes = [
-        "computing, waking: deadlines missed while a tick computed, and because one began late; by other programs too",
+        "computing, waking: deadlines missed by ticks that took too long, and by late ones; other programs cause both",
         "longest: what the longest tick takes of its own thread's time when the session is made again",
     ]
     return Table("Recorded sessions", headings, lines, notes=notes)

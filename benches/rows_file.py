@@ -1,4 +1,4 @@
-"""A file of rows: a run that was interrupted goes on where it stopped."""
+"""Rows of a long measurement in a file, from which an interrupted run continues."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 MAX_FILE_LINES = 500
 MAX_PAGE_LINES = 100
 
-# The chapters of core; each may import earlier ones.
+# The chapters of core, numbered from 1; each may import earlier ones.
 CHAPTERS = ("element", "mesh", "fem", "solver", "green", "capacitance", "contact", "strain", "dynamics", "simulation")
 
 # What the online part of core builds without.
@@ -64,6 +64,7 @@ def main() -> int:
     """Print every broken rule; the exit status is 1 if there is one."""
     problems = [
         *page_problems(),
+        *chapter_number_problems(),
         *dependency_problems(),
         *length_problems(),
         *python_import_problems(),
@@ -77,7 +78,7 @@ def main() -> int:
 
 
 def page_problems() -> list[str]:
-    """Folders that the page names and nobody has."""
+    """Folders that ARCHITECTURE.md names and that do not exist, or that it leaves out."""
     page = (ROOT / "ARCHITECTURE.md").read_text()
     problems = []
     if len(page.splitlines()) > MAX_PAGE_LINES:
@@ -96,6 +97,29 @@ def page_problems() -> list[str]:
         tracked = any(name == folder or name.startswith(f"{folder}/") for name in kept)
         if tracked and not folder.startswith(".") and f"`{folder}/" not in page:
             problems.append(f"ARCHITECTURE.md does not mention {folder}/")
+    return problems
+
+
+def chapter_number_problems() -> list[str]:
+    """Chapters that docs/theory.md, ARCHITECTURE.md and the folders of core do not number alike."""
+    chapters = [(str(number), name) for number, name in enumerate(CHAPTERS, 1)]
+    core = ROOT / "crates/core/src"
+    folders = {path.name for path in core.iterdir() if path.is_dir()}
+    unnumbered = sorted(folders - set(CHAPTERS))
+    problems = [f"crates/core/src/{name}/ is no chapter: name it in CHAPTERS" for name in unnumbered]
+    pages = {
+        "docs/theory.md": r"^## (\d+)\. .+\n\n`crates/core/src/(\w+)/`",
+        "ARCHITECTURE.md": r"(\d+) `crates/core/src/(\w+)/`",
+    }
+    for page, pattern in pages.items():
+        found = re.findall(pattern, (ROOT / page).read_text(), re.MULTILINE)
+        if found != chapters:
+            numbered = ", ".join(f"{number} {name}" for number, name in found)
+            problems.append(f"{page} has the chapters {numbered or 'none'}, not those of CHAPTERS in their order")
+    for number, name in chapters:
+        start, module = f"//! Chapter {number} of docs/theory.md", core / name / "mod.rs"
+        if not module.exists() or not module.read_text().startswith(f"{start}:"):
+            problems.append(f"crates/core/src/{name}/mod.rs does not begin with '{start}:'")
     return problems
 
 

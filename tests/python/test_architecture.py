@@ -73,6 +73,55 @@ def write(path, text):
     path.write_text(text)
 
 
+@pytest.fixture
+def numbered(check, tmp_path):
+    """Problems with the numbers of the chapters, all of them right but for a replacement in one of the files."""
+    chapters = list(enumerate(check.CHAPTERS, 1))
+    files = {
+        "docs/theory.md": "".join(f"## {n}. Title\n\n`crates/core/src/{name}/`: text\n\n" for n, name in chapters),
+        "ARCHITECTURE.md": "".join(f"| {n} `crates/core/src/{name}/` | text |\n" for n, name in chapters),
+    }
+    modules = {f"crates/core/src/{name}/mod.rs": f"//! Chapter {n} of docs/theory.md: text.\n" for n, name in chapters}
+
+    def problems(name="", old="", new=""):
+        for file, text in (files | modules).items():
+            write(tmp_path / file, text.replace(old, new) if file == name else text)
+        return check.chapter_number_problems()
+
+    return problems
+
+
+def test_chapters_that_are_numbered_alike_are_no_problem(numbered):
+    assert numbered() == []
+
+
+@pytest.mark.parametrize(
+    ("page", "old", "new"),
+    [
+        ("docs/theory.md", "## 4.", "## 5."),
+        ("docs/theory.md", "## 4. ", "## "),
+        ("docs/theory.md", "/solver/", "/sparse/"),
+        ("ARCHITECTURE.md", "4 `", "5 `"),
+        ("ARCHITECTURE.md", "4 `", "`"),
+        ("ARCHITECTURE.md", "/solver/", "/sparse/"),
+    ],
+)
+def test_a_page_that_numbers_a_chapter_differently_is_found(numbered, page, old, new):
+    (problem,) = numbered(page, old, new)
+    assert problem.startswith(f"{page} has the chapters 1 element, 2 mesh, 3 fem, ")
+
+
+def test_a_folder_that_numbers_its_chapter_differently_is_found(numbered):
+    expected = ["crates/core/src/strain/mod.rs does not begin with '//! Chapter 8 of docs/theory.md:'"]
+    assert numbered("crates/core/src/strain/mod.rs", "Chapter 8", "Chapter 9") == expected
+    assert numbered("crates/core/src/strain/mod.rs", "//! Chapter 8 of docs/theory.md: t", "//! T") == expected
+
+
+def test_a_folder_without_a_chapter_is_found(numbered, tmp_path):
+    write(tmp_path / "crates/core/src/plasticity/mod.rs", "")
+    assert numbered() == ["crates/core/src/plasticity/ is no chapter: name it in CHAPTERS"]
+
+
 def test_sound_imports_are_no_problem(rust, python):
     assert rust() == []
     assert python() == []

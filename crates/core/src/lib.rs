@@ -1,6 +1,6 @@
 //! Finite elements, Green's functions, capacitance and contact: the numerics and physics of Palpate.
 //!
-//! The folders are the chapters of the theory, in order: `element`, `mesh`, `fem`, `solver`, `green`, `capacitance`,
+//! The folders are the ten chapters of docs/theory.md, in order: `element`, `mesh`, `fem`, `solver`, `green`, `capacitance`,
 //! `contact`, `strain`, `dynamics`, `simulation`. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
 //!
 //! The feature `offline` brings what is computed before anyone touches: assembly, factorisation, precomputation, changes of

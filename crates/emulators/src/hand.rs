@@ -5,17 +5,17 @@ use std::env;
 use glam::DVec3;
 use palpate_devices::emulated::{Hand, Wanted, Waypoint};
 
-/// Environment variable that leads the hand: `time x y z; ...` in s and mm, right, away and up from the middle of the workspace.
+/// Environment variable with the path of the hand: `time x y z; ...` in s and mm, right, away and up from the middle of the workspace.
 /// At the end it begins anew. A single place is held loosely.
 const HAND_VARIABLE: &str = "PALPATE_EMULATED_HAND";
 
-/// What the hand does when nobody leads it: it comes down, presses, slides to the right and goes up again.
+/// Path of the hand where the variable is not set: it comes down, presses, slides to the right and goes up again.
 const PRESS_AND_SLIDE: &str = "0 0 0 20; 1 0 0 20; 2 0 0 -10; 3 20 0 -10; 4 20 0 20; 5 0 0 20";
 
 /// Time for which the waypoints of the hand are laid out, s.
 const DURATION: f64 = 3600.0;
 
-/// The hand that `HAND_VARIABLE` leads, or the usual one. Text that is not a path is reported on the error stream.
+/// The hand on the path of `HAND_VARIABLE`, or on the usual one. Text that is not a path is reported on the error stream.
 pub fn hand_from_environment() -> Hand {
     let asked = env::var(HAND_VARIABLE).unwrap_or_else(|_| PRESS_AND_SLIDE.to_owned());
     let waypoints = parse(&asked).unwrap_or_else(|wrong| {

@@ -26,7 +26,7 @@ NOTHING = {
     **{"gaps": False, "min": 0.0, "max": 1.0, "largest": 0.0},
 }
 # What a page is not told of a tool.
-SILENT = {"limited": False, "wanted": None, "force": [0.0, 0.0, 0.0], "refused": None}
+SILENT = {"limited": False, "wanted": None, "force": [0.0, 0.0, 0.0], "refused": None, "thin": False}
 # Messages of a client that this session takes; settings would change what is felt.
 TAKEN = ("press", "release", "reset")
 

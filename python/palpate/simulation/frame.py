@@ -136,8 +136,8 @@ class Frame(ComparedByValue, Exported):
         ``missed_computing`` (by ticks that took longer than a period, the others by waking up late), ``refused``
         (for each tool None or why no contact began), ``fault`` (None or what is wrong), ``realtime`` (priority
         granted, memory locked) and ``port_energy`` (for each tool J given to the hand, owed by the safety stage, and
-        never paid back). Of a running loop also ``thin``: for each tool whether it touches a part that is thinner than
-        one and a half of its radii, where the local law is too soft by up to a half.
+        never paid back). Also ``thin``: for each tool whether it touches a part that is thinner than one and a half of
+        its radii. There the force of the local law is too small, by up to 60 % (docs/accuracy.md).
 
     """
 

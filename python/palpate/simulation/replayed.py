@@ -123,7 +123,7 @@ class ReplayedSimulation(Simulation):
         """Read the latest tick that was made; its timing is that of the recording."""
         if self._frame is None:
             raw = {**self._again.frame(), "ticks": self.made, **self._timing}
-            self._frame = frame_of(raw, self.bodies, self._scales)
+            self._frame = self._flagged(frame_of(raw, self.bodies, self._scales), self.bodies)
         return self._frame
 
     def _read_frame(self) -> Frame:

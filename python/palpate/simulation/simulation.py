@@ -325,7 +325,10 @@ class Simulation(Adjustable, Changing):
         failed = self._given.get(raw["failed_program"])
         if failed is not None and failed.failure is not None:
             raw["fault"] = f"tool {raw['failed_program']}: {failed.failure}; forces are off until a reset"
-        frame = frame_of(raw, bodies, scales)
+        return self._flagged(frame_of(raw, bodies, scales), bodies)
+
+    def _flagged(self, frame: Frame, bodies: Sequence[BuiltBody]) -> Frame:
+        """Add to a frame which tools touch a thin part of these bodies."""
         frame.statistics["thin"] = thin_places(frame.contacts, self.scene.tools, bodies)
         return frame
 

@@ -357,6 +357,7 @@ class Session:
             "wanted": device.tolist() if limited else None,
             "force": frame.forces[tool].tolist(),
             "refused": frame.statistics["refused"][tool],
+            "thin": frame.statistics["thin"][tool],
         }
 
     def _press(self, message: Mapping[str, Any]) -> bool:

@@ -1,4 +1,4 @@
-"""`palpate map` as a user types it: results, and mistakes told in one line."""
+"""`palpate map` as a user types it: its results, and error messages of one line."""
 
 from __future__ import annotations
 

@@ -154,6 +154,8 @@ export interface ToolFrame {
   force: Vec3;
   /** Why there is no contact, where one was refused. */
   refused: string | null;
+  /** Whether the body below the contact is thinner than 1.5 radii of the tool: the force is then too small. */
+  thin: boolean;
 }
 
 export interface ContactMessage {

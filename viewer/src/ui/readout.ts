@@ -24,6 +24,7 @@ export class Readout {
   private readonly warning = byId("strain-warning");
   private readonly limit = byId("limit-notice");
   private readonly refused = byId("refused-notice");
+  private readonly thin = byId("thin-notice");
 
   constructor(store: Store) {
     store.subscribe(["frame", "pinned", "pressing"], (state) => this.showForces(state));
@@ -46,6 +47,7 @@ export class Readout {
     setText(this.pinned, `${others.join(" · ")} N`);
     this.refused.hidden = !driven?.active || driven.refused === null;
     if (driven?.refused) setText(this.refused, driven.refused);
+    this.thin.hidden = !driven?.thin;
   }
 
   /**

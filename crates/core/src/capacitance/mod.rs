@@ -1,4 +1,4 @@
-//! Chapter 5: the capacitance matrix algorithm: any change of boundary conditions by one small dense solve.
+//! Chapter 6 of docs/theory.md: the capacitance matrix, any change of boundary conditions by one small dense solve.
 //!
 //! Dofs `S` whose condition changes type have new knowns `vb_S`. With all other knowns in `vb` (and zero on `S`),
 //!

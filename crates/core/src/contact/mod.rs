@@ -1,4 +1,4 @@
-//! Chapter 6: where a tool touches, and which nodes carry it.
+//! Chapter 7 of docs/theory.md: where a tool touches, and which nodes carry it.
 
 mod closest;
 mod compliance;

@@ -1,4 +1,4 @@
-//! Chapter 7: motion by Newmark's scheme (Jun, Choi and Cho, section 4, with equation 4.4 corrected).
+//! Chapter 9 of docs/theory.md: motion by Newmark's scheme (Jun, Choi and Cho, section 4, equation 4.4 corrected).
 //!
 //! ```text
 //! M a + B v + K u = F,   B = rayleigh.mass M + rayleigh.stiffness K

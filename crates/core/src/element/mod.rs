@@ -1,4 +1,4 @@
-//! Chapter 1: isoparametric elements: shape functions, their derivatives, and the rules that integrate them.
+//! Chapter 1 of docs/theory.md: isoparametric elements, their shape functions, derivatives and rules of quadrature.
 //!
 //! An element maps the reference tetrahedron with corners `0, e_1, e_2, e_3` to `x(xi) = sum_a N_a(xi) x_a`; its faces
 //! map the triangle of barycentric coordinates in the same way. Node order is VTK's: corners, then the middles of the

@@ -1,4 +1,4 @@
-//! Chapter 3: linear elasticity: element matrices and their assembly, for any [`crate::element`].
+//! Chapter 3 of docs/theory.md: linear elasticity, element matrices and their assembly, for any [`crate::element`].
 //!
 //! Isotropic Hooke: `sigma = lambda tr(eps) I + 2 mu eps` (paper 2.7, 2.8).
 

@@ -1,4 +1,4 @@
-//! Chapter 4: the Green's function of the reference problem, and its store.
+//! Chapter 5 of docs/theory.md: the Green's function of the reference problem, and its store.
 //!
 //! With `D` the supported dofs and `N` the free ones, `f = K u` is solved for the unknowns `v` (`u` on `N`, `f` on `D`)
 //! given the knowns `vb` (`f` on `N`, `u` on `D`): `v = Psi vb` with

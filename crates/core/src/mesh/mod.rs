@@ -1,4 +1,4 @@
-//! Chapter 2: the discretised body: tetrahedra, and the surface that can be touched.
+//! Chapter 2 of docs/theory.md: the discretised body: tetrahedra, and the surface that can be touched.
 
 mod surface;
 #[cfg(feature = "offline")]

@@ -1,5 +1,5 @@
-//! Chapter 8: the tick. `step(&Model, &mut State, &mut Scratch, &Input) -> Output` never allocates, locks, reads a clock
-//! or panics on bad numbers; the same input gives the same bits.
+//! Chapter 10 of docs/theory.md: the tick. `step(&Model, &mut State, &mut Scratch, &Input) -> Output` never allocates,
+//! locks, reads a clock or panics on bad numbers; the same input gives the same bits.
 //!
 //! `input` is what comes from outside, `model` what is fixed, `state` what evolves. `law` says when a contact begins, how it
 //! follows its tool and when it ends; `limit` keeps strain within what linear elasticity can say; `solve` finds the forces of

@@ -37,7 +37,7 @@ pub fn is_sound(model: &Model, contact: &Contact, stiffness_scale: f64) -> bool 
     .max(0.0);
     let [low, high] = own.bounds.map(|corner| corner - contact.point);
     let on_body = low.max_element() <= BESIDE * size && high.min_element() >= -BESIDE * size;
-    // One that fades stays where it was while its tool goes on.
+    // A contact that fades (`solve/handover.rs`) stays at its place while its tool moves on.
     let at_tool = local.held || contact.point.distance(local.relative) <= (2.0 + BESIDE) * size + depth;
     let most = MARGIN * 2.0 * own.largest_modulus * stiffness_scale * size * (depth + LEAST_DEPTH * size);
     on_body && at_tool && contact.force.length() <= most

@@ -1,4 +1,8 @@
-//! The sparse Cholesky factor that Green's functions and motion are computed with.
+//! Chapter 4 of docs/theory.md: the sparse Cholesky factor of `K_NN`, for Green's functions and motion.
+//!
+//! `ordering` finds the order of elimination and `factor` the structure. `multifrontal` eliminates front by front (`front`,
+//! stored in `block_columns`, with memory from `buffers`) and hands the finished columns to its caller; [`Factor`] is held as a
+//! whole. `condition` estimates how far rounding spoils an answer.
 
 pub mod block_columns;
 mod buffers;

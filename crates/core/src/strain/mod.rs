@@ -1,4 +1,4 @@
-//! The strain of a pose, and how much of a contact's force keeps it within a limit.
+//! Chapter 8 of docs/theory.md: the strain of a pose, and the share of a contact's force that is within a limit.
 //!
 //! Linear elasticity is honest to about 10 % strain. While a contact sticks, the displacements are affine in the forces on
 //! the patches, `u = u_free + sum_c Psi W_c f_c`, and so is the displacement gradient at any place of the body: a place is

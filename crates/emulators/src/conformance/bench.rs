@@ -55,9 +55,9 @@ pub enum Disturbance {
     Nonsense,
     /// The device has not been calibrated since it was switched on.
     Uncalibrated,
-    /// The motors are off: too warm, or by a button that somebody holds down.
+    /// The motors are off, because they are too warm or a button on the device is held down.
     MotorsOff,
-    /// Measuring fails as if the device were unplugged. It is not: its motors keep what they have been told.
+    /// Readings fail as if the device were unplugged. It is not: its motors keep the last wrench that was written.
     ReadsFail,
     /// The scheduler of the vendor's software does not start.
     SchedulerFails,

@@ -114,7 +114,8 @@ struct Sums {
 }
 
 impl PressedSurface {
-    /// For tools of a thickness, m, in pieces of which some fit into their width; the fields at the fans are evened.
+    /// Divides the smooth surface into pieces for tools of a `thickness`, m: so small that several lie under a tool.
+    /// `fields` are those of each fan (compliance, moduli); they are smoothed over neighbouring fans.
     pub fn new(
         surface: &crate::mesh::Surface,
         query: &SurfaceQuery,
