@@ -48,7 +48,9 @@ mod _native {
     #[pymodule_export]
     use crate::drawing::simplified;
     #[pymodule_export]
-    use crate::dynamics::{DirectMotion, ModalMotion, SparseFactor, basis_key, largest_stable_dt, load_basis, require_stable, save_basis};
+    use crate::dynamics::{
+        DirectMotion, ModalMotion, SparseFactor, basis_key, largest_stable_dt, load_basis, require_stable, save_basis,
+    };
     #[pymodule_export]
     use crate::emulated::{emulate, known_devices};
     #[pymodule_export]

@@ -41,10 +41,8 @@ impl Basis {
     pub fn save(&self, path: &Path) -> Result<()> {
         let modes = self.eigenvalues.len();
         let rows = self.shapes.len() / modes.max(1);
-        let arrays = [
-            ("eigenvalues", vec![modes], &self.eigenvalues[..]),
-            ("shapes", vec![rows, modes], &self.shapes[..]),
-        ];
+        let arrays =
+            [("eigenvalues", vec![modes], &self.eigenvalues[..]), ("shapes", vec![rows, modes], &self.shapes[..])];
         KIND.write(path, &[("key", &self.key), ("description", &self.description)], &arrays)
     }
 
