@@ -1,6 +1,6 @@
 //! Arguments of a simulation, as Python gives them, and what it reads back.
 
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::ToolShape;

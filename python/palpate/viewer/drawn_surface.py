@@ -57,7 +57,7 @@ def drawn_surface(built: BuiltBody, of_element: np.ndarray, most: int | None = N
     ``of_element`` tells the region of each element.
     """
     green, most = built.green, MOST_TRIANGLES if most is None else most
-    triangles = green.surface_corners
+    triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
     regions = _regions(built, of_element, len(triangles))
     if len(triangles) <= most:
         return DrawnSurface(np.arange(len(green.surface_nodes)), triangles, regions)
