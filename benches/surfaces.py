@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from types import SimpleNamespace
@@ -25,7 +24,6 @@ from palpate.viewer import drawn_surface as drawing
 from palpate.viewer import messages
 from palpate.viewer.drawn_surface import drawn_surface
 from palpate.viewer.fields import DISPLACEMENT, Picture
-from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.server import ViewerServer
 from palpate.viewer.session import Session
 from palpate.viewer.shown_body import ShownBody
@@ -51,17 +49,14 @@ class Row:
         Time to find what is drawn.
     scene_mb
         Length of the message with the geometry.
-    float_kb, whole_kb, pressed_kb, still_kb
-        Length of a frame's poses: in 32 bits, in 16 bits as a whole, as differences while the dent goes in and out, and
-        while nothing moves.
-    deflated_kb
-        The differences while the dent moves, by zlib's first level.
-    code_ms, deflate_ms
-        Time to code a frame that moves, and to deflate it.
+    frame_kb
+        Length of a frame's poses.
+    code_ms
+        Time to write a frame.
     frames_per_second
         That the page draws; None without Chromium.
-    read_ms, move_ms
-        Of a frame, in the page: to read its poses, and to move what is drawn; the rest is drawing.
+    move_ms
+        Of a frame, in the page: to move what is drawn; the rest is drawing.
 
     """
 
@@ -69,15 +64,9 @@ class Row:
     drawn: int
     simplify_s: float
     scene_mb: float
-    float_kb: float
-    whole_kb: float
-    pressed_kb: float
-    still_kb: float
-    deflated_kb: float
+    frame_kb: float
     code_ms: float
-    deflate_ms: float
     frames_per_second: float | None = None
-    read_ms: float | None = None
     move_ms: float | None = None
 
 
@@ -95,24 +84,19 @@ def run(
 
 def as_table(rows: Sequence[Row]) -> Table:
     """Return one line per dome and number of triangles drawn."""
-    sizes = ["triangles", "drawn", "scene MB", "32 bits kB", "whole", "moves", "deflated", "still"]
     lines = []
     for row in rows:
-        lengths = (row.float_kb, row.whole_kb, row.pressed_kb, row.deflated_kb, row.still_kb)
-        page = (row.frames_per_second, row.read_ms, row.move_ms)
         cells = [
             f"{row.triangles:,}",
             f"{row.drawn:,}",
             f"{row.scene_mb:.1f}",
-            *(f"{length:.0f}" for length in lengths),
+            f"{row.frame_kb:.0f}",
+            f"{row.code_ms:.1f}",
         ]
-        cells += [f"{row.code_ms:.1f}", f"{row.deflate_ms:.1f}"]
+        page = (row.frames_per_second, row.move_ms)
         lines.append([*cells, *("-" if value is None else f"{value:.1f}" for value in page)])
-    headings = [*sizes, "code ms", "deflate", "frames/s", "read ms", "move ms"]
-    note = (
-        "frames in kB: 32 bits a number; 16 bits, whole; differences of a dent that moves, and deflated; nothing moves"
-    )
-    return Table("Large surfaces in the page", headings, lines, words=0, notes=[note])
+    headings = ["triangles", "drawn", "scene MB", "frame kB", "code ms", "frames/s", "move ms"]
+    return Table("Large surfaces in the page", headings, lines, words=0)
 
 
 class Dome:
@@ -180,39 +164,23 @@ class DomeSession(Session):
 
 
 def _measure(dome: Dome, page: bool) -> Row:
-    coder, sizes, times = PoseCoder(), [], []
-    deflated, deflating = [], []
+    times = []
     for frame in range(FRAMES):
         picture = dome.shown.picture("", dome.displacements(frame / 60), False, None)
         started = time.perf_counter()
-        message = _message(coder, frame, picture, dome)
+        message = messages.encode({}, messages.numbered([picture.arrays]))
         times.append(time.perf_counter() - started)
-        sizes.append(len(message))
-        started = time.perf_counter()
-        deflated.append(len(zlib.compress(message, 1)))
-        deflating.append(time.perf_counter() - started)
-    still = len(_message(coder, FRAMES, picture, dome))
-    scene = messages.encode({}, messages.by_body([dome.shown.arrays()]))
+    scene = messages.encode({}, messages.numbered([dome.shown.arrays()]))
     row = Row(
         triangles=len(dome.shown.built.green.surface_triangles),
         drawn=len(dome.drawn.triangles),
         simplify_s=dome.simplify_s,
         scene_mb=1e-6 * len(scene),
-        float_kb=1e-3 * 13 * len(dome.drawn.nodes),
-        whole_kb=1e-3 * sizes[0],
-        pressed_kb=1e-3 * float(np.mean(sizes[1:])),
-        still_kb=1e-3 * still,
-        deflated_kb=1e-3 * float(np.mean(deflated[1:])),
+        frame_kb=1e-3 * len(message),
         code_ms=1e3 * float(np.median(times[1:])),
-        deflate_ms=1e3 * float(np.median(deflating[1:])),
     )
     drawn = asyncio.run(_on_a_page(dome)) if page else None
     return row if drawn is None else Row(**{**asdict(row), **drawn})
-
-
-def _message(coder: PoseCoder, frame: int, picture: Picture, dome: Dome) -> bytes:
-    coded = coder.code(frame, [(picture.displacements, picture.scalar, dome.shown.extent)])
-    return messages.encode({"poses": coded.headers}, messages.by_body(coded.arrays))
 
 
 async def _on_a_page(dome: Dome) -> dict[str, float] | None:
@@ -232,8 +200,7 @@ async def _on_a_page(dome: Dome) -> dict[str, float] | None:
     finally:
         await server.stop()
     frames = last["frames"] - first["frames"]
-    took = {part: (last["tookMs"][part] - first["tookMs"][part]) / frames for part in ("read", "move")}
-    return {"frames_per_second": frames / seconds, "read_ms": took["read"], "move_ms": took["move"]}
+    return {"frames_per_second": frames / seconds, "move_ms": (last["tookMs"] - first["tookMs"]) / frames}
 
 
 async def _state(page: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import shutil
 import weakref
@@ -14,13 +15,6 @@ from typing import NamedTuple
 from palpate.cache import CachedFile, cache_directory, cached_files
 from palpate.errors import StoreError
 from palpate.units import memory
-
-try:
-    import fcntl
-except (
-    ImportError
-):  # a system without locks: what is open cannot be told from the rest, and can be deleted all the same
-    fcntl = None  # type: ignore[assignment]
 
 # Without a limit of their own: so many bytes, or this part of the disk where that is less.
 DEFAULT_LIMIT, DEFAULT_PART = 10e9, 0.1
@@ -105,8 +99,7 @@ def hold(path: Path | None, user: object) -> None:
     with contextlib.suppress(OSError):
         stream = os.open(path, os.O_RDONLY)
         weakref.finalize(user, os.close, stream)
-        if fcntl is not None:
-            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
 
 
 def kept_by_this_process() -> int:
@@ -148,8 +141,7 @@ def _locked(path: Path, locks: contextlib.ExitStack) -> bool:
     """Lock a file until the stack ends; False where a process holds it."""
     try:
         stream = locks.enter_context(path.open("rb"))
-        if fcntl is not None:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except FileNotFoundError:
         return True
     except OSError:

@@ -24,7 +24,7 @@ def restore_interrupts() -> None:
 def _is_command_line() -> bool:
     arguments = sys.orig_argv[1:]
     program = os.path.basename(arguments[0]) if arguments else ""
-    return program in ("palpate", "palpate.exe") or arguments[:2] == ["-m", "palpate"]
+    return program == "palpate" or arguments[:2] == ["-m", "palpate"]
 
 
 def _end(*_signal: object) -> None:

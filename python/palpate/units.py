@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from numbers import Real
 
 import numpy as np
@@ -63,49 +64,25 @@ def brief_repr(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
-def length(value: str | float) -> float:
-    """Length in m."""
-    return quantity(value, LENGTH_UNITS, "length")
+def _reader(units: dict[str, float], kind: str, told: str) -> Callable[[str | float], float]:
+    """Make the reader of one kind of quantity."""
+
+    def read(value: str | float) -> float:
+        return quantity(value, units, kind)
+
+    read.__doc__ = told
+    return read
 
 
-def pressure(value: str | float) -> float:
-    """Pressure or modulus in Pa."""
-    return quantity(value, PRESSURE_UNITS, "pressure")
-
-
-def density(value: str | float) -> float:
-    """Density in kg/m^3."""
-    return quantity(value, DENSITY_UNITS, "density")
-
-
-def stiffness(value: str | float) -> float:
-    """Stiffness in N/m."""
-    return quantity(value, STIFFNESS_UNITS, "stiffness")
-
-
-def force(value: str | float) -> float:
-    """Force in N."""
-    return quantity(value, FORCE_UNITS, "force")
-
-
-def acceleration(value: str | float) -> float:
-    """Acceleration in m/s^2."""
-    return quantity(value, ACCELERATION_UNITS, "acceleration")
-
-
-def time(value: str | float) -> float:
-    """Time in s."""
-    return quantity(value, TIME_UNITS, "time")
-
-
-def speed(value: str | float) -> float:
-    """Speed in m/s."""
-    return quantity(value, SPEED_UNITS, "speed")
-
-
-def memory(value: str | float) -> float:
-    """Memory in bytes."""
-    return quantity(value, MEMORY_UNITS, "memory size")
+length = _reader(LENGTH_UNITS, "length", "Length in m.")
+pressure = _reader(PRESSURE_UNITS, "pressure", "Pressure or modulus in Pa.")
+density = _reader(DENSITY_UNITS, "density", "Density in kg/m^3.")
+stiffness = _reader(STIFFNESS_UNITS, "stiffness", "Stiffness in N/m.")
+force = _reader(FORCE_UNITS, "force", "Force in N.")
+acceleration = _reader(ACCELERATION_UNITS, "acceleration", "Acceleration in m/s^2.")
+time = _reader(TIME_UNITS, "time", "Time in s.")
+speed = _reader(SPEED_UNITS, "speed", "Speed in m/s.")
+memory = _reader(MEMORY_UNITS, "memory size", "Memory in bytes.")
 
 
 def length_scale(unit: str) -> float:

@@ -159,7 +159,7 @@ def test_a_packed_scene_is_whole_or_refused(prefix, packed, tmp_path):
     program = compiled(prefix, ROOT / "examples/cpp/render_loop.cpp")
     copy = tmp_path / "copy.pack"
     for name, change, words in (
-        ("scene.json", lambda data: data.replace(b'"version": 1', b'"version": 9'), "version 9"),
+        ("scene.json", lambda data: data.replace(b'"version": 2', b'"version": 9'), "version 9"),
         ("scene.json", lambda data: data.replace(b"body-0.palpate", b"../../b.palpate"), "outside of itself"),
         ("scene.json", lambda data: data.replace(b'"key": "', b'"key": "0'), "another body"),
         ("body-0.arrays.safetensors", lambda data: data[:-1] + bytes([data[-1] ^ 1]), "checksum differs"),

@@ -185,7 +185,7 @@ def test_mistakes_of_a_cluster_are_told_in_a_line(workers, body, tmp_path, monke
 
 def test_a_worker_of_another_version_that_joins_is_refused(monkeypatch):
     monkeypatch.setattr(worker, "_address", lambda: "tcp://10.0.0.7:1234")
-    job = worker.Job("key", "0.0.1", "f32", None)
+    job = worker.FactorRequest("key", "0.0.1", "f32", None)
     with pytest.raises(palpate.ClusterError, match=r"the worker at tcp://10\.0\.0\.7:1234 has Palpate"):
         worker.measure((), job)
 

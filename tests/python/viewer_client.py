@@ -11,7 +11,6 @@ import numpy as np
 from websockets.asyncio.client import connect
 
 from palpate.viewer import messages
-from palpate.viewer.pose_code import PoseCoder, PoseReader
 from palpate.viewer.server import ViewerServer
 from palpate.viewer.session import Session, Wants
 
@@ -23,8 +22,7 @@ TICKS_APART = 15
 
 def frame_of(session: Session, wants: Wants) -> tuple[dict, dict[str, np.ndarray]]:
     """Header and arrays of a frame that a new client gets."""
-    header, arrays = messages.decode(session.frame_message(1, (0, 0), wants, PoseCoder())[0])
-    return header, PoseReader().read(header, arrays)
+    return messages.decode(session.frame_message(1, (0, 0), wants)[0])
 
 
 class Page:
@@ -33,7 +31,6 @@ class Page:
     def __init__(self, server: ViewerServer, socket):
         self.server, self.socket = server, socket
         self.texts: list[dict] = []
-        self.poses = PoseReader()
 
     async def say(self, **message):
         await self.socket.send(json.dumps(message))
@@ -47,7 +44,6 @@ class Page:
                 if isinstance(raw, bytes):
                     header, arrays = messages.decode(raw)
                     if header["type"] == "frame":
-                        arrays = self.poses.read(header, arrays)
                         await self.say(type="ack", frame=header["frame"])
                 else:
                     header, arrays = json.loads(raw), {}

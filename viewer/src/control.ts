@@ -269,40 +269,37 @@ export class Control {
   // Settings and long work.
 
   setStiffness(modulus: number): void {
-    const { settings, body } = this.store.get();
-    if (!settings) return;
-    this.changedMs = performance.now();
-    this.store.update({ settings: { ...settings, youngs_modulus: settings.youngs_modulus.with(body, modulus) } });
-    this.sendLimited(`stiffness ${body}`, { type: "set", youngs_modulus: modulus, body });
+    const { body } = this.store.get();
+    const message: ClientMessage = { type: "set", youngs_modulus: modulus, body };
+    this.set(`stiffness ${body}`, message, (now) => ({ youngs_modulus: now.youngs_modulus.with(body, modulus) }));
   }
 
   /** Of the tool that is driven, or that the next press drives. */
   setContactRadius(radius: number): void {
-    const { settings } = this.store.get();
     const tool = shownTool(this.store.get()) ?? 0;
-    if (!settings) return;
-    this.changedMs = performance.now();
-    this.store.update({ settings: { ...settings, contact_radius: settings.contact_radius.with(tool, radius) } });
-    this.sendLimited(`radius ${tool}`, { type: "set", contact_radius: radius, tool });
+    const message: ClientMessage = { type: "set", contact_radius: radius, tool };
+    this.set(`radius ${tool}`, message, (now) => ({ contact_radius: now.contact_radius.with(tool, radius) }));
   }
 
   /** Of the tool that is driven, or that the next press drives. */
   setFriction(friction: number): void {
-    const { settings } = this.store.get();
     const tool = shownTool(this.store.get()) ?? 0;
-    if (!settings) return;
-    this.changedMs = performance.now();
-    this.store.update({ settings: { ...settings, friction: settings.friction.with(tool, friction) } });
-    this.sendLimited(`friction ${tool}`, { type: "set", friction, tool });
+    const message: ClientMessage = { type: "set", friction, tool };
+    this.set(`friction ${tool}`, message, (now) => ({ friction: now.friction.with(tool, friction) }));
   }
 
   /** The strain at which tools are held; 0 never holds them. */
   setStrainLimit(limit: number): void {
+    this.set("strain limit", { type: "set", strain_limit: limit }, () => ({ strain_limit: limit }));
+  }
+
+  /** Shows a setting as it will be, and sends it, as often as the server takes messages of its kind. */
+  private set(kind: string, message: ClientMessage, changed: (now: SettingsMessage) => Partial<SettingsMessage>): void {
     const { settings } = this.store.get();
     if (!settings) return;
     this.changedMs = performance.now();
-    this.store.update({ settings: { ...settings, strain_limit: limit } });
-    this.sendLimited("strain limit", { type: "set", strain_limit: limit });
+    this.store.update({ settings: { ...settings, ...changed(settings) } });
+    this.sendLimited(kind, message);
   }
 
   /** Of the tool that the next press drives. */

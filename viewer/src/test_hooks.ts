@@ -31,8 +31,8 @@ export interface ViewerState {
   frames: number;
   frameNumber: number;
   framesPerSecond: number;
-  /** Spent on all frames so far, by part, ms. */
-  tookMs: { read: number; move: number };
+  /** Spent on moving what is drawn, for all frames so far, ms. */
+  tookMs: number;
   pointerEvents: number;
   ticks: number;
   strain: number;

@@ -8,8 +8,7 @@ import { TouchPan } from "./input/touch_pan";
 import { Connection } from "./net/connection";
 import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
-import { PoseReader } from "./net/poses";
-import type { FrameData, PosedFrame, SceneData } from "./net/protocol";
+import type { SceneData } from "./net/protocol";
 import { Painting } from "./painting";
 import { Stage } from "./scene/stage";
 import { sidesOf } from "./scene/surface";
@@ -43,7 +42,6 @@ export class Viewer {
   private readonly store = new Store();
   private readonly connection: Connection;
   private readonly frames = new FrameQueue((frame) => this.connection.send({ type: "ack", frame }));
-  private readonly poses = new PoseReader();
   private readonly control = new Control(this.store, (message) => this.connection.send(message));
   private readonly stage: Stage;
   private readonly pointer: Pointer;
@@ -58,7 +56,7 @@ export class Viewer {
       onState: (state) => this.takeConnection(state),
       onText: (message) => control.takeText(message),
       onScene: (scene) => this.takeScene(scene),
-      onFrame: (frame) => this.takeFrame(frame),
+      onFrame: (frame) => this.frames.push(frame),
       onUnreadable: (reason) => control.notice(`A message could not be read: ${reason}`),
     });
     const viewport = new Viewport(
@@ -125,21 +123,13 @@ export class Viewer {
     this.firstStrike = window.setTimeout(() => this.control.repeatStrike(), FIRST_STRIKE_MS);
   }
 
-  /** A frame that differs from one that is not known is left out, and the next one asked for as a whole. */
-  private takeFrame(frame: FrameData): void {
-    const { frame: number, poses } = frame.header;
-    const bodies = this.statistics.timed("read", () => this.poses.read(number, poses, frame.bodies));
-    if (bodies) this.frames.push({ ...frame, bodies });
-    else this.connection.send({ type: "ack", frame: number, whole: true });
-  }
-
   /** Takes in what has arrived since the last drawing: all of the log, and the newest frame. Tells whether the picture changes. */
   private takeFrames(): boolean {
-    const frames: PosedFrame[] = this.frames.take();
+    const frames = this.frames.take();
     const newest = frames.at(-1);
     if (!newest) return false;
     for (const frame of frames) this.plots.append(frame);
-    const changed = this.statistics.timed("move", () => this.stage.update(newest));
+    const changed = this.statistics.timed(() => this.stage.update(newest));
     this.control.takeFrame(newest.header);
     return changed;
   }

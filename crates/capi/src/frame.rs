@@ -12,7 +12,7 @@ use palpate_servo::{Published, Summary};
 use crate::arguments::{array_mut, exclusive, require_count, shared};
 use crate::force_loop::Loop;
 use crate::sized::{self, Sized};
-use crate::status::{Status, guarded};
+use crate::status::{Outcome, Status, guarded};
 
 /// Most tools of a scene.
 pub const PALPATE_MAX_TOOLS: usize = 4;
@@ -89,27 +89,7 @@ pub struct Frame {
 
 impl Default for Frame {
     fn default() -> Self {
-        Self {
-            struct_size: size_of::<Self>() as u32,
-            tools: 0,
-            contacts: 0,
-            faulty: 0,
-            fault: [0; PALPATE_FAULT_BYTES],
-            ticks: 0,
-            time: 0.0,
-            forces: [[0.0; 3]; PALPATE_MAX_TOOLS],
-            torques: [[0.0; 3]; PALPATE_MAX_TOOLS],
-            positions: [[0.0; 3]; PALPATE_MAX_TOOLS],
-            orientations: [[0.0; 4]; PALPATE_MAX_TOOLS],
-            active: [0; PALPATE_MAX_TOOLS],
-            limited: [0; PALPATE_MAX_TOOLS],
-            compute_us: Times::default(),
-            wakeup_us: Times::default(),
-            missed_computing: 0,
-            missed_waking: 0,
-            realtime: 0,
-            locked_memory: 0,
-        }
+        sized::zeroed()
     }
 }
 
@@ -293,19 +273,8 @@ pub unsafe extern "C" fn palpate_loop_get_rest_positions(
     positions: *mut f64,
     nodes: usize,
 ) -> Status {
-    guarded(|| {
-        // SAFETY: the caller's pointer.
-        let own = unsafe { shared(force_loop, "loop") }?;
-        let side = own.frame();
-        let model = &side.prepared.model.bodies[side.body(body)?];
-        let rest = &model.green().surface.positions;
-        require_count("nodes", nodes, rest.len())?;
-        // SAFETY: the caller's pointer, to `nodes` of three numbers.
-        let out = unsafe { array_mut(positions.cast::<[f64; 3]>(), nodes, "positions") }?;
-        let placed = |p: &DVec3| model.placement.point_to_world(*p).to_array();
-        out.iter_mut().zip(rest).for_each(|(to, p)| *to = placed(p));
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointers.
+    guarded(|| unsafe { put_positions(force_loop, body, positions, nodes, false) })
 }
 
 /// Positions of the surface nodes of a body in the tick of the last palpate_loop_get_frame, x y z of each, m, in the world.
@@ -317,21 +286,30 @@ pub unsafe extern "C" fn palpate_loop_get_positions(
     positions: *mut f64,
     nodes: usize,
 ) -> Status {
-    guarded(|| {
-        // SAFETY: the caller's pointer.
-        let own = unsafe { shared(force_loop, "loop") }?;
-        let side = own.frame();
-        let (rank, model) = (side.body(body)?, &side.prepared.model);
-        let body = &model.bodies[rank];
-        let rest = &body.green().surface.positions;
-        require_count("nodes", nodes, rest.len())?;
-        // SAFETY: the caller's pointer, to `nodes` of three numbers.
-        let out = unsafe { array_mut(positions.cast::<[f64; 3]>(), nodes, "positions") }?;
+    // SAFETY: the caller's pointers.
+    guarded(|| unsafe { put_positions(force_loop, body, positions, nodes, true) })
+}
+
+/// Positions of surface nodes in the world, at rest or where the latest tick has moved them.
+///
+/// # Safety
+/// The pointers are null, or point to a loop and to `nodes` of three numbers.
+unsafe fn put_positions(own: *const Loop, body: u32, positions: *mut f64, nodes: usize, moved: bool) -> Outcome {
+    // SAFETY: the caller's pointer.
+    let own = unsafe { shared(own, "loop") }?;
+    let side = own.frame();
+    let (rank, model) = (side.body(body)?, &side.prepared.model);
+    let body = &model.bodies[rank];
+    let rest = &body.green().surface.positions;
+    require_count("nodes", nodes, rest.len())?;
+    // SAFETY: the caller's pointer.
+    let out = unsafe { array_mut(positions.cast::<[f64; 3]>(), nodes, "positions") }?;
+    let mut places = rest.clone();
+    if moved {
         body.green().require_intact()?;
-        let moved = side.latest.state.displacements(model, rank);
-        for ((to, p), u) in out.iter_mut().zip(rest).zip(moved.chunks_exact(3)) {
-            *to = body.placement.point_to_world(*p + DVec3::from_slice(u)).to_array();
-        }
-        Ok(Status::PalpateOk)
-    })
+        let displacements = side.latest.state.displacements(model, rank);
+        places.iter_mut().zip(displacements.chunks_exact(3)).for_each(|(p, u)| *p += DVec3::from_slice(u));
+    }
+    out.iter_mut().zip(places).for_each(|(to, p)| *to = body.placement.point_to_world(p).to_array());
+    Ok(Status::PalpateOk)
 }

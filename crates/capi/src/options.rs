@@ -3,10 +3,8 @@
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
 use std::ffi::c_char;
-use std::ptr::null;
 
-use glam::DVec3;
-use palpate_core::contact::shape::{SurfaceShape, ToolShape};
+use palpate_core::contact::shape::ToolShape;
 use palpate_core::simulation::LawKind;
 use palpate_devices::{DeviceLimits, known};
 use palpate_scene::{DEFAULT_FRICTION, DEFAULT_MAX_STIFFNESS, Scene, Tool};
@@ -55,14 +53,7 @@ pub struct BodyOptions {
 
 impl Default for BodyOptions {
     fn default() -> Self {
-        Self {
-            struct_size: size_of::<Self>() as u32,
-            reserved: 0,
-            position: [0.0; 3],
-            orientation: [1.0, 0.0, 0.0, 0.0],
-            youngs_modulus: 0.0,
-            poissons_ratio: 0.0,
-        }
+        Self { orientation: [1.0, 0.0, 0.0, 0.0], ..sized::zeroed() }
     }
 }
 
@@ -112,24 +103,8 @@ pub struct ToolOptions {
 
 impl Default for ToolOptions {
     fn default() -> Self {
-        Self {
-            struct_size: size_of::<Self>() as u32,
-            shape: PALPATE_SHAPE_SPHERE,
-            radius: 0.0,
-            length: 0.0,
-            rounding: 0.0,
-            semi_axes: [0.0; 3],
-            vertices: null(),
-            vertex_count: 0,
-            triangles: null(),
-            triangle_count: 0,
-            law: PALPATE_LAW_DEFAULT,
-            reserved: 0,
-            contact_radius: 0.0,
-            friction: DEFAULT_FRICTION,
-            pad_youngs_modulus: 0.0,
-            max_stiffness: DEFAULT_MAX_STIFFNESS,
-        }
+        // A sphere under the law that suits the bodies: both are zero.
+        Self { friction: DEFAULT_FRICTION, max_stiffness: DEFAULT_MAX_STIFFNESS, ..sized::zeroed() }
     }
 }
 
@@ -145,12 +120,13 @@ impl ToolOptions {
     /// # Safety
     /// Vertices and triangles are null or as many as stated.
     pub unsafe fn tool(&self) -> Outcome<Tool> {
+        let of = ToolShape::of_lengths;
         let shape = match self.shape {
             PALPATE_SHAPE_SPHERE if self.radius == 0.0 => None,
-            PALPATE_SHAPE_SPHERE => Some(ToolShape::sphere(self.radius)?),
-            PALPATE_SHAPE_ELLIPSOID => Some(ToolShape::ellipsoid(self.semi_axes.into())?),
-            PALPATE_SHAPE_CAPSULE => Some(ToolShape::capsule(self.radius, 0.5 * self.length)?),
-            PALPATE_SHAPE_PUNCH => Some(ToolShape::punch(self.radius, self.rounding)?),
+            PALPATE_SHAPE_SPHERE => Some(of("sphere", [self.radius, 0.0, 0.0])?),
+            PALPATE_SHAPE_ELLIPSOID => Some(of("ellipsoid", self.semi_axes)?),
+            PALPATE_SHAPE_CAPSULE => Some(of("capsule", [self.radius, self.length, 0.0])?),
+            PALPATE_SHAPE_PUNCH => Some(of("punch", [self.radius, self.rounding, 0.0])?),
             // SAFETY: the caller's.
             PALPATE_SHAPE_SURFACE => Some(unsafe { self.surface() }?),
             other => return Err(Refusal::argument(format!("there is no shape {other}"))),
@@ -196,8 +172,7 @@ impl ToolOptions {
         if let Some(beyond) = triangles.as_flattened().iter().find(|&&v| v as usize >= vertices.len()) {
             return Err(Refusal::argument(format!("triangles: there is no vertex {beyond}, of {}", vertices.len())));
         }
-        let vertices: Vec<DVec3> = vertices.iter().map(|&v| v.into()).collect();
-        Ok(ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, triangles)?)))
+        Ok(ToolShape::surface(vertices, triangles)?)
     }
 }
 

@@ -20,6 +20,15 @@ pub unsafe trait Sized: Copy + Default {
     const FIRST_SIZE: usize;
 }
 
+/// All of it zero, but for its own size.
+pub fn zeroed<T: Sized>() -> T {
+    // SAFETY: every bit pattern is a valid `T`.
+    let mut value: T = unsafe { std::mem::zeroed() };
+    // SAFETY: its first member.
+    unsafe { (&raw mut value).cast::<u32>().write(size_of::<T>() as u32) };
+    value
+}
+
 fn check<T: Sized>(size: usize) -> Outcome<usize> {
     const { assert!(T::FIRST_SIZE <= size_of::<T>(), "a struct may grow, not shrink") };
     let own = size_of::<T>();

@@ -2,17 +2,14 @@
 #![allow(unsafe_code)] // called from C with raw pointers
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
-use std::collections::{BTreeMap, BTreeSet};
-
+use palpate_core::capacitance::{self, Change, Sorted};
+use palpate_core::contact;
 use palpate_core::green::GreensFunction;
-use palpate_core::{Error, capacitance, contact};
+use palpate_core::green::accuracy::require_right;
 
 use crate::arguments::{array, exclusive, optional_mut, require_count, shared};
 use crate::status::{Outcome, Refusal, Status, guarded};
 use crate::store::Store;
-
-/// Answers that may be wrong by more than this are refused.
-const REFUSED_ERROR: f64 = 0.1;
 
 /// A condition on a surface node displaces it, m; components that are not numbers stay as they are.
 pub const PALPATE_CONDITION_DISPLACEMENT: u32 = 0;
@@ -67,7 +64,7 @@ pub unsafe extern "C" fn palpate_store_touch(
             return Err(Refusal::argument("displacement is not finite"));
         }
         let touch = contact::touch(&store.green, (*point).into(), wanted, radius)?;
-        require_right(touch.error)?;
+        require_right("the answer", touch.error)?;
         *force = touch.force.to_array();
         all.into_iter().for_each(|all| all.copy_from_slice(&touch.displacements));
         told.into_iter().for_each(|told| *told = touch.error);
@@ -95,7 +92,7 @@ pub unsafe extern "C" fn palpate_store_solve(
             unsafe { (answers(store, displacements, nodes)?, answers(store, forces, nodes)?, error.as_mut()) };
         let (known, switched) = sorted(&store.green, conditions)?;
         let answer = capacitance::solve(&store.green, &known, &switched)?;
-        require_right(answer.error)?;
+        require_right("the answer", answer.error)?;
         u.into_iter().for_each(|u| u.copy_from_slice(&answer.displacements));
         f.into_iter().for_each(|f| f.copy_from_slice(&answer.forces));
         told.into_iter().for_each(|told| *told = answer.error);
@@ -115,64 +112,27 @@ unsafe fn answers<'a>(store: &Store, place: *mut f64, nodes: usize) -> Outcome<O
     Ok(unsafe { optional_mut(place, 3 * nodes) })
 }
 
-fn require_right(error: f64) -> Outcome<()> {
-    // Not a number is refused, too.
-    match error <= REFUSED_ERROR {
-        true => Ok(()),
-        false => Err(Error::Precision(format!(
-            "the answer may be wrong by {:.2} %, more than the {} % allowed: compute the store with more digits \
-             (--precision), or prescribe fewer neighbouring nodes",
-            100.0 * error,
-            100.0 * REFUSED_ERROR
-        ))
-        .into()),
-    }
-}
-
-/// Columns with the values of conditions that keep their type, and of those that change it.
-type Sorted = (Vec<(usize, f64)>, Vec<(usize, f64)>);
-
 /// Conditions by column of the operator, in ascending order.
 fn sorted(green: &GreensFunction, conditions: &[Condition]) -> Outcome<Sorted> {
-    let (mut forced, mut placed, mut freed) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+    let mut change = Change::default();
     for (rank, &Condition { node, kind, value }) in conditions.iter().enumerate() {
         let touchable = green.touch.binary_search(&node);
         let unknown = |_| Refusal::argument(format!("condition {rank}: surface node {node} is not touchable"));
         let first = 3 * touchable.map_err(unknown)?;
         let columns = first..first + 3;
-        let given = || columns.clone().zip(value).filter(|(_, value)| !value.is_nan());
+        let given = columns.clone().zip(value).filter(|(_, value)| !value.is_nan());
         if kind != PALPATE_CONDITION_RELEASE && value.iter().any(|value| value.is_infinite()) {
             return Err(Refusal::argument(format!("condition {rank}: a value is not finite")));
         }
         match kind {
-            PALPATE_CONDITION_DISPLACEMENT => placed.extend(given()),
-            PALPATE_CONDITION_FORCE => forced.extend(given()),
-            PALPATE_CONDITION_RELEASE => freed.extend(columns.clone().filter(|&column| is_fixed(green, column))),
+            PALPATE_CONDITION_DISPLACEMENT => change.displacements.extend(given),
+            PALPATE_CONDITION_FORCE => change.forces.extend(given),
+            PALPATE_CONDITION_RELEASE => change.released.extend(columns),
             _ => return Err(Refusal::argument(format!("condition {rank}: there is no kind {kind}"))),
         }
     }
-    let columns: BTreeSet<usize> = forced.keys().chain(placed.keys()).chain(&freed).copied().collect();
-    let (mut known, mut switched) = (Vec::new(), Vec::new());
-    for column in columns {
-        let fixed = is_fixed(green, column);
-        let force: f64 = forced.get(&column).copied().unwrap_or(0.0);
-        if let Some(&displacement) = placed.get(&column) {
-            if force != 0.0 && (freed.contains(&column) || !fixed) {
-                let (node, axis) = (green.touch[column / 3], ["x", "y", "z"][column % 3]);
-                let message = format!("surface node {node} has both a force and a displacement along {axis}");
-                return Err(Refusal::argument(message));
-            }
-            if fixed { &mut known } else { &mut switched }.push((column, displacement));
-        } else if freed.contains(&column) {
-            switched.push((column, force));
-        } else if !fixed {
-            // A force on a support goes straight into it and moves nothing.
-            known.push((column, force));
-        }
-    }
-    Ok((known, switched))
-}
-
-fn is_fixed(green: &GreensFunction, column: usize) -> bool {
-    green.row_is_fixed[green.row_of_column(column)]
+    change.sorted(green).map_err(|column| {
+        let (node, axis) = (green.touch[column / 3], ["x", "y", "z"][column % 3]);
+        Refusal::argument(format!("surface node {node} has both a force and a displacement along {axis}"))
+    })
 }

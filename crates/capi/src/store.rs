@@ -45,18 +45,7 @@ pub struct StoreInfo {
 
 impl Default for StoreInfo {
     fn default() -> Self {
-        Self {
-            struct_size: size_of::<Self>() as u32,
-            nodes: 0,
-            triangles: 0,
-            touchable_nodes: 0,
-            lowest: [0.0; 3],
-            highest: [0.0; 3],
-            youngs_modulus: 0.0,
-            touch_error: 0.0,
-            knows_surface: 0,
-            reserved: 0,
-        }
+        sized::zeroed()
     }
 }
 

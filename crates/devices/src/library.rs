@@ -65,6 +65,35 @@ impl Search {
     }
 }
 
+/// Declares the functions of a vendor's library by their symbols: those that it must have, and those that it may.
+macro_rules! api {
+    (
+        needed { $($(#[$doc:meta])* $field:ident = $symbol:literal: $signature:ty;)* }
+        optional { $($extra:ident = $name:literal: $kind:ty;)* }
+    ) => {
+        /// The functions, as they lie in a library that is never unloaded.
+        pub struct Api {
+            $($(#[$doc])* pub $field: $signature,)*
+            $(pub $extra: Option<$kind>,)*
+        }
+
+        impl Api {
+            /// Finds them.
+            pub fn bind(library: &'static libloading::Library) -> Result<Self, libloading::Error> {
+                // SAFETY: the types are those of the vendor's header for these names. The pointers stay valid, for the
+                // library is never unloaded.
+                unsafe {
+                    Ok(Self {
+                        $($field: *library.get::<$signature>($symbol)?,)*
+                        $($extra: library.get::<$kind>($name).ok().map(|symbol| *symbol),)*
+                    })
+                }
+            }
+        }
+    };
+}
+pub(crate) use api;
+
 /// Functions of a library that is loaded, `A`, and its file.
 pub(crate) struct Loaded<A: 'static> {
     pub path: PathBuf,

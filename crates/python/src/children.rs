@@ -3,14 +3,13 @@
 
 use pyo3::prelude::*;
 
-/// Ends this process when its parent ends, whatever ends that: the system kills it (Linux), and a thread watches standard
+/// Ends this process when its parent ends, whatever ends that: the system kills it, and a thread watches standard
 /// input, whose other end closes with the parent. The thread needs nothing of Python: a mesher holds the interpreter's
 /// lock for minutes.
 #[pyfunction]
 #[pyo3(signature = (watch_input=true))]
 pub(crate) fn end_with_parent(watch_input: bool) {
     // SAFETY: prctl and getppid take and return numbers only.
-    #[cfg(target_os = "linux")]
     unsafe {
         let parent = libc::getppid();
         libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL);

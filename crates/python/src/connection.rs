@@ -8,6 +8,7 @@ use palpate_devices::simulated::Handle;
 use palpate_devices::{Connection, Device, DeviceLimits, Mounted, OpenError, Opened, Scheduler, Workspace};
 use pyo3::prelude::*;
 
+use crate::errors::raised;
 use crate::scene::quaternion;
 
 /// Largest force (N), torque (N m), stiffness (N/m), damping (N s/m), damping of rotation (N m s/rad), own damping (N s/m)
@@ -43,11 +44,7 @@ pub fn limits_tuple(limits: &DeviceLimits) -> LimitsArguments {
 
 /// The package's own exception for a device that cannot be opened.
 pub fn device_error(py: Python<'_>, error: &OpenError) -> PyErr {
-    let message = error.to_string();
-    match py.import("palpate.errors").and_then(|m| m.getattr("DeviceError")).and_then(|c| c.call1((message,))) {
-        Ok(exception) => PyErr::from_value(exception),
-        Err(import_error) => import_error,
-    }
+    raised(py, "DeviceError", error.to_string())
 }
 
 /// A device that has been opened, until a loop takes it.

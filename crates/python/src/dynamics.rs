@@ -60,6 +60,29 @@ fn repeat(py: Python<'_>, count: usize, mut step: impl FnMut(usize) + Send) -> P
     Ok(())
 }
 
+/// Rows that are pushed (k), their forces (steps, k), and rows that are watched (w).
+type Played<'py> = (Vec<u32>, PyReadonlyArray2<'py, f64>, Vec<usize>);
+
+/// Makes a step for each row of forces on a body of so many rows; displacements (steps, w). `step` is given the forces, and
+/// where what is watched goes.
+fn played<'py>(
+    py: Python<'py>,
+    count: usize,
+    (rows, forces, watch): Played<'py>,
+    mut step: impl FnMut(&[(u32, f64)], &[usize], &mut [f64]) + Send,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let forces = forces.as_array();
+    if forces.ncols() != rows.len() || watch.iter().any(|&r| r >= count) {
+        return Err(to_python(py, Error::Invalid("the rows do not fit the forces or the body".into())));
+    }
+    let mut seen = vec![0.0; forces.nrows() * watch.len()];
+    repeat(py, forces.nrows(), |i| {
+        let now: Vec<(u32, f64)> = rows.iter().copied().zip(forces.row(i).iter().copied()).collect();
+        step(&now, &watch, &mut seen[i * watch.len()..(i + 1) * watch.len()]);
+    })?;
+    seen.into_pyarray(py).reshape([forces.nrows(), watch.len()])
+}
+
 /// Largest stable time step, s, for a largest eigenvalue (1/s^2); infinite where every step is stable.
 #[pyfunction]
 pub fn largest_stable_dt(py: Python<'_>, arguments: SchemeArguments, eigenvalue: f64) -> PyResult<f64> {
@@ -189,19 +212,11 @@ impl ModalMotion {
         forces: PyReadonlyArray2<'py, f64>,
         watch: Vec<usize>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let forces = forces.as_array();
-        if forces.ncols() != rows.len() || watch.iter().any(|&r| r >= self.model.rows()) {
-            return Err(to_python(py, Error::Invalid("the rows do not fit the forces or the body".into())));
-        }
-        let mut seen = vec![0.0; forces.nrows() * watch.len()];
-        repeat(py, forces.nrows(), |i| {
-            let now: Vec<(u32, f64)> = rows.iter().copied().zip(forces.row(i).iter().copied()).collect();
-            self.model.step(&mut self.state, &mut self.scratch, &now);
+        played(py, self.model.rows(), (rows, forces, watch), |now, watch, out| {
+            self.model.step(&mut self.state, &mut self.scratch, now);
             self.account.book(&self.model, &self.state);
-            let out = &mut seen[i * watch.len()..(i + 1) * watch.len()];
             self.model.read(&self.state.q, watch.iter().copied(), out);
-        })?;
-        seen.into_pyarray(py).reshape([forces.nrows(), watch.len()])
+        })
     }
 
     /// Displacements, velocities or accelerations (`order` 0, 1, 2) at rows; None: at all.
@@ -293,18 +308,11 @@ impl DirectMotion {
         forces: PyReadonlyArray2<'py, f64>,
         watch: Vec<usize>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let forces = forces.as_array();
-        if forces.ncols() != rows.len() || watch.iter().any(|&r| r >= self.state.u.len()) {
-            return Err(to_python(py, Error::Invalid("the rows do not fit the forces or the body".into())));
-        }
-        let mut seen = Vec::with_capacity(forces.nrows() * watch.len());
-        repeat(py, forces.nrows(), |i| {
-            let now: Vec<(u32, f64)> = rows.iter().copied().zip(forces.row(i).iter().copied()).collect();
-            let force = self.spread(&now);
+        played(py, self.state.u.len(), (rows, forces, watch), |now, watch, out| {
+            let force = self.spread(now);
             self.direct.step(&mut self.state, &mut self.scratch, &force);
-            seen.extend(watch.iter().map(|&row| self.state.u[row]));
-        })?;
-        seen.into_pyarray(py).reshape([forces.nrows(), watch.len()])
+            out.iter_mut().zip(watch).for_each(|(out, &row)| *out = self.state.u[row]);
+        })
     }
 
     /// Displacements, velocities or accelerations (`order` 0, 1, 2) at dofs; None: at all.

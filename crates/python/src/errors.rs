@@ -16,7 +16,11 @@ pub fn to_python(py: Python<'_>, error: Error) -> PyErr {
         Error::Precision(_) => "PrecisionError",
         Error::Singular(_) | Error::Invalid(_) | Error::Memory(_) => "BodyError",
     };
-    let message = error.to_string();
+    raised(py, class, error.to_string())
+}
+
+/// One of the package's own exceptions.
+pub fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
     match py.import("palpate.errors").and_then(|m| m.getattr(class)).and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),
         Err(import_error) => import_error,

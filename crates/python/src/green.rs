@@ -1,18 +1,20 @@
 //! The Green's function: precompute, store, answers.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use palpate_core::capacitance::{self, Change};
 use palpate_core::fem::Supports;
 use palpate_core::green::{
     Found, GreensFunction, Growth, Phase, Plan, Precision, Problem, Progress, Target, Wanted, plan, precompute,
     precompute_to,
 };
 use palpate_core::mesh::TetMesh;
-use palpate_core::{Error, Result, capacitance, contact};
+use palpate_core::{Error, Result, contact};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
@@ -27,6 +29,8 @@ use crate::watched::{run_watched, run_watched_and};
 pub struct GreenCore {
     pub(crate) green: Arc<GreensFunction>,
 }
+
+type SurfaceModuli<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, bool);
 
 /// The reference problem from `(nodes, tets, material, fixed_dofs, surface_nodes, surface_faces, touch, loads)`;
 /// `loads` (3n) in N, empty for none.
@@ -230,19 +234,35 @@ impl GreenCore {
         Ok(Self { green: Arc::new(green) })
     }
 
-    /// Answers a change of boundary conditions: displacements (3s), forces (3s), reactions at the fixed dofs, and the
-    /// estimated relative error.
+    /// Answers a change of boundary conditions, forces (N), displacements (m) and released supports by their columns:
+    /// displacements (3s), forces (3s), reactions at the fixed dofs, and the estimated relative error.
     #[allow(clippy::type_complexity)] // three arrays and a number; naming them would need a class nobody else uses
     fn solve<'py>(
         &self,
         py: Python<'py>,
-        known: Vec<(usize, f64)>,
-        switched: Vec<(usize, f64)>,
+        forces: BTreeMap<usize, f64>,
+        displacements: BTreeMap<usize, f64>,
+        released: BTreeSet<usize>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64)> {
-        let solve = || require_scratch_of_products().and_then(|()| capacitance::solve(&self.green, &known, &switched));
+        let green = &self.green;
+        let solve = || {
+            let (known, switched) = Change { forces, displacements, released }.sorted(green).map_err(|column| {
+                let (node, axis) = (green.surface_nodes[green.touch[column / 3] as usize], ["x", "y", "z"][column % 3]);
+                Error::Invalid(format!("node {node} has both a force and a displacement along {axis}"))
+            })?;
+            require_scratch_of_products()?;
+            capacitance::solve(green, &known, &switched)
+        };
         let answer = py.detach(solve).map_err(|e| to_python(py, e))?;
         let (u, f) = (answer.displacements.into_pyarray(py), answer.forces.into_pyarray(py));
         Ok((u, f, answer.reactions.into_pyarray(py), answer.error))
+    }
+
+    /// Young's modulus (s), Pa, and Poisson's ratio (s) at the surface nodes, and whether all of the body is of one material;
+    /// `None` of a store that does not say it.
+    fn surface_moduli<'py>(&self, py: Python<'py>) -> PyResult<Option<SurfaceModuli<'py>>> {
+        let known = palpate_scene::moduli_of_store(&self.green).map_err(|e| to_python(py, e))?;
+        Ok(known.map(|m| (m.youngs.into_pyarray(py), m.poissons.into_pyarray(py), m.homogeneous)))
     }
 
     /// Shortest of `repeats` times of a plain copy of the entries between touchable nodes (ranks), us: what benchmarks of the

@@ -26,57 +26,58 @@ mod strain;
 mod surface;
 mod watched;
 
-use pyo3::prelude::*;
-
 /// The module `palpate._native`.
-#[pymodule]
-fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
-    module.add_function(wrap_pyfunction!(green::products, module)?)?;
-    module.add_function(wrap_pyfunction!(body::mass, module)?)?;
-    module.add_function(wrap_pyfunction!(body::determinant_ranges, module)?)?;
-    module.add_function(wrap_pyfunction!(body::volumes, module)?)?;
-    module.add_function(wrap_pyfunction!(dynamics::largest_stable_dt, module)?)?;
-    module.add_function(wrap_pyfunction!(dynamics::require_stable, module)?)?;
-    module.add_function(wrap_pyfunction!(dynamics::basis_key, module)?)?;
-    module.add_function(wrap_pyfunction!(dynamics::save_basis, module)?)?;
-    module.add_function(wrap_pyfunction!(dynamics::load_basis, module)?)?;
-    module.add_class::<dynamics::SparseFactor>()?;
-    module.add_class::<dynamics::ModalMotion>()?;
-    module.add_class::<dynamics::DirectMotion>()?;
-    module.add_class::<green::GreenCore>()?;
-    module.add_class::<green::Interior>()?;
-    module.add_function(wrap_pyfunction!(children::end_with_parent, module)?)?;
-    module.add_function(wrap_pyfunction!(exchange::exchange, module)?)?;
-    module.add_function(wrap_pyfunction!(green::forget_contacts, module)?)?;
-    module.add_class::<columns::ColumnJob>()?;
-    module.add_class::<columns::ColumnLayout>()?;
-    module.add_class::<columns::ColumnStore>()?;
-    module.add_class::<claim::StoreClaim>()?;
-    module.add_class::<simulation::SimulationCore>()?;
-    module.add_function(wrap_pyfunction!(emulated::known_devices, module)?)?;
-    module.add_function(wrap_pyfunction!(emulated::emulate, module)?)?;
-    module.add_class::<connection::OpenedDevice>()?;
-    module.add_class::<programmed::ProgrammedDevice>()?;
-    module.add_class::<devices::DeviceCheck>()?;
-    module.add_function(wrap_pyfunction!(devices::device_kinds, module)?)?;
-    module.add_function(wrap_pyfunction!(devices::list_devices, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::connect, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::disconnect, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::device_limits, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::tool_stiffness, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::assume_devices, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::change, module)?)?;
-    module.add_class::<replay::Replay>()?;
-    module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
-    module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;
-    module.add_class::<surface::SurfaceSearch>()?;
-    module.add_function(wrap_pyfunction!(drawing::simplified, module)?)?;
-    module.add_class::<strain::StrainMeasure>()?;
-    module.add_class::<strain::StrainResponse>()?;
-    module.add_function(wrap_pyfunction!(scene::checksum, module)?)?;
-    module.add_function(wrap_pyfunction!(strain::contact_patch, module)?)?;
-    module.add_function(wrap_pyfunction!(strain::provisional_displacement, module)?)?;
-    Ok(())
+#[pyo3::pymodule]
+mod _native {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::body::{determinant_ranges, mass, stiffness, volumes};
+    #[pymodule_export]
+    use crate::changes::{assume_devices, change, connect, device_limits, disconnect, tool_stiffness};
+    #[pymodule_export]
+    use crate::children::end_with_parent;
+    #[pymodule_export]
+    use crate::claim::StoreClaim;
+    #[pymodule_export]
+    use crate::columns::{ColumnJob, ColumnLayout, ColumnStore};
+    #[pymodule_export]
+    use crate::connection::OpenedDevice;
+    #[pymodule_export]
+    use crate::devices::{DeviceCheck, device_kinds, list_devices};
+    #[pymodule_export]
+    use crate::drawing::simplified;
+    #[pymodule_export]
+    use crate::dynamics::{
+        DirectMotion, ModalMotion, SparseFactor, basis_key, largest_stable_dt, load_basis, require_stable, save_basis,
+    };
+    #[pymodule_export]
+    use crate::emulated::{emulate, known_devices};
+    #[pymodule_export]
+    use crate::exchange::exchange;
+    #[pymodule_export]
+    use crate::green::{GreenCore, Interior, forget_contacts, products};
+    #[pymodule_export]
+    use crate::programmed::ProgrammedDevice;
+    #[pymodule_export]
+    use crate::replay::{Replay, read_recording};
+    #[pymodule_export]
+    use crate::rerun::rerun;
+    #[pymodule_export]
+    use crate::scene::checksum;
+    #[pymodule_export]
+    use crate::simulation::SimulationCore;
+    #[pymodule_export]
+    use crate::strain::{StrainMeasure, StrainResponse, contact_patch, provisional_displacement};
+    #[pymodule_export]
+    use crate::surface::SurfaceSearch;
+
+    /// Answers that may be wrong by more than this are refused.
+    #[pymodule_export]
+    const REFUSED_ERROR: f64 = palpate_core::green::accuracy::REFUSED_ERROR;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

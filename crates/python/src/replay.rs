@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{IntoPyArray, PyArray1};
 use palpate_core::simulation::{MAX_BODIES, Mode, Strike};
@@ -233,6 +233,12 @@ pub struct Replay {
     tools: usize,
 }
 
+impl Replay {
+    fn lock(&self) -> MutexGuard<'_, (AnyTicks, palpate_servo::Replay)> {
+        self.parts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 #[pymethods]
 impl Replay {
     /// Of a recording, with the simulation that it was made with.
@@ -254,7 +260,7 @@ impl Replay {
         while made < count {
             let ticks = INTERRUPT_TICKS.min(count - made);
             let now = py.detach(|| -> Result<usize> {
-                let mut parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                let mut parts = self.lock();
                 let (recorded, replay) = &mut *parts;
                 let mut now = 0;
                 for record in recorded.take(ticks) {
@@ -282,13 +288,13 @@ impl Replay {
     /// What the longest tick so far took of the thread's own time, us.
     #[getter]
     fn longest_us(&self) -> f64 {
-        1e-3 * self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner).1.longest_ns() as f64
+        1e-3 * self.lock().1.longest_ns() as f64
     }
 
     /// The latest tick made again, as a dictionary.
     fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let published = {
-            let mut parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut parts = self.lock();
             parts.1.latest().clone()
         };
         frame(py, &self.model, self.tools, published)
@@ -297,7 +303,7 @@ impl Replay {
     /// Rows of the log since the last call, as of a running loop; their computing times are not those of the recording.
     fn drain_log<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
-        let mut parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut parts = self.lock();
         let replay = &mut parts.1;
         let body = replay.settings().watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
         replay.drain_log(|row| push_row(&mut rows, &row, body));
@@ -307,7 +313,7 @@ impl Replay {
     /// Settings of the latest tick: contact radius, m, and friction of each tool, stiffness of each body over that of its
     /// Green's function, limit of strain, how much slower bodies move, and the body and rank of the watched node.
     fn settings(&self) -> SettingsRecord {
-        let parts = self.parts.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let parts = self.lock();
         let settings = parts.1.settings();
         let Settings { contact_radius, friction, stiffness_scale, .. } = settings;
         let bodies = self.model.bodies.len();

@@ -1,9 +1,9 @@
 //! Arguments of a simulation, as Python gives them, and what it reads back.
 
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
-use palpate_core::contact::shape::{SurfaceShape, ToolShape};
+use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot, ToolModel, contact_size};
 use palpate_core::{Error, Result};
@@ -69,16 +69,10 @@ pub fn tool(arguments: ToolArguments) -> Result<(ToolModel, f64, f64)> {
     Ok((ToolModel { shape, radius, law, pad_youngs_modulus, max_stiffness }, contact_radius, friction))
 }
 
-fn tool_shape((kind, [a, b, c], vertices, triangles): ShapeArguments) -> Result<ToolShape> {
+fn tool_shape((kind, lengths, vertices, triangles): ShapeArguments) -> Result<ToolShape> {
     match kind.as_str() {
-        "sphere" => ToolShape::sphere(a),
-        "ellipsoid" => ToolShape::ellipsoid(DVec3::new(a, b, c)),
-        "capsule" => ToolShape::capsule(a, 0.5 * b),
-        "punch" => ToolShape::punch(a, b),
-        _ => {
-            let vertices: Vec<DVec3> = vertices.into_iter().map(DVec3::from).collect();
-            Ok(ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles)?)))
-        }
+        "surface" => ToolShape::surface(&vertices, &triangles),
+        _ => ToolShape::of_lengths(&kind, lengths),
     }
 }
 

@@ -27,8 +27,6 @@ pub struct Ticks<R = BufReader<File>> {
     settings: Option<(Settings, Strike)>,
     /// How the file ended; `None` while it has not, and for one that was cut short.
     pub ending: Option<Ending>,
-    /// Whether the texts have a checksum; those of the first format have none.
-    sealed: bool,
     /// Ticks so far.
     count: u64,
 }
@@ -65,9 +63,9 @@ impl<R: Read> Ticks<R> {
                 Some(Ok(Record::Header(_))) => {}
                 Some(Ok(Record::Metadata(metadata))) if metadata.name == ABOUT => {
                     let damaged = |reason| format!("the recording is damaged: {reason}");
-                    let (about, sealed) = opened(metadata.metadata).map_err(damaged)?;
+                    let about = opened(metadata.metadata).map_err(damaged)?;
                     let topics = BTreeMap::new();
-                    return Ok(Self { records, about, topics, settings: None, ending: None, sealed, count: 0 });
+                    return Ok(Self { records, about, topics, settings: None, ending: None, count: 0 });
                 }
                 Some(Err(error)) => return Err(format!("this is no recording: {error}")),
                 _ => return Err("this MCAP file was not recorded by Palpate: it does not say what".into()),
@@ -77,7 +75,7 @@ impl<R: Read> Ticks<R> {
 
     /// The end of a file that has all of its ticks: a chunk whose kind is damaged would be passed over.
     fn ending_of(&self, texts: BTreeMap<String, String>) -> std::result::Result<Ending, String> {
-        let numbers = if self.sealed { opened(texts)?.0 } else { texts };
+        let numbers = opened(texts)?;
         let number = |name: &str| numbers.get(name).and_then(|number| number.parse::<u64>().ok());
         match number("ticks") {
             Some(ticks) if ticks != self.count => Err(format!("{} of {ticks} ticks are there", self.count)),

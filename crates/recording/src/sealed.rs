@@ -7,9 +7,6 @@ use std::collections::BTreeMap;
 
 /// Name of the sum among the texts.
 const SUM: &str = "checksum";
-/// Key of the format of the texts; recordings of the first had no sum.
-const FORMAT: &str = "format";
-const WITHOUT_SUM: &str = "1";
 
 /// Adds the sum of all texts.
 pub(crate) fn sealed(mut texts: BTreeMap<String, String>) -> BTreeMap<String, String> {
@@ -18,14 +15,13 @@ pub(crate) fn sealed(mut texts: BTreeMap<String, String>) -> BTreeMap<String, St
     texts
 }
 
-/// The texts without their sum, and whether they have one.
+/// The texts without their sum.
 ///
 /// # Errors
 /// Texts that are not as they were written.
-pub(crate) fn opened(mut texts: BTreeMap<String, String>) -> Result<(BTreeMap<String, String>, bool), String> {
+pub(crate) fn opened(mut texts: BTreeMap<String, String>) -> Result<BTreeMap<String, String>, String> {
     match texts.remove(SUM) {
-        Some(written) if written == sum(&texts) => Ok((texts, true)),
-        None if texts.get(FORMAT).is_some_and(|format| format == WITHOUT_SUM) => Ok((texts, false)),
+        Some(written) if written == sum(&texts) => Ok(texts),
         _ => Err("the checksum of what was recorded differs".into()),
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use palpate_core::contact::{Moduli, PatchGeometry};
 use palpate_core::green::GreensFunction;
+use palpate_core::green::accuracy::require_right;
 use palpate_core::{Error, Result};
 use serde_json::Value;
 
@@ -11,11 +12,9 @@ use serde_json::Value;
 const PART_OF_BODY: f64 = 1.0 / 16.0;
 /// How closely the largest contact radius is found, over the radius asked for.
 const RADIUS_STEP: f64 = 0.01;
-/// Touches that may be wrong by more than this are no basis for a force loop.
-const REFUSED_ERROR: f64 = 0.1;
 
 /// Elastic constants at the surface, as far as the store has them: the two of a body of one material, or those of every
-/// surface node. An older store of several materials has none.
+/// surface node. A store of several materials that does not say where they are has none.
 ///
 /// # Errors
 /// Constants of another number of nodes.
@@ -74,14 +73,5 @@ pub fn largest_contact_radius(green: &GreensFunction, limit: f64) -> f64 {
 /// # Errors
 /// [`Error::Precision`], with what it may be wrong by.
 pub fn require_precise(green: &GreensFunction, name: &str) -> Result<()> {
-    let error = green.accuracy.touch;
-    // Not a number is refused, too.
-    if error <= REFUSED_ERROR {
-        return Ok(());
-    }
-    let (wrong, most) = (100.0 * error, 100.0 * REFUSED_ERROR);
-    Err(Error::Precision(format!(
-        "forces on {name} may be wrong by {wrong:.2} %, more than the {most} % allowed: compute the store with more digits \
-         (--precision)"
-    )))
+    require_right(&format!("forces on {name}"), green.accuracy.touch)
 }

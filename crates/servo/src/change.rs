@@ -1,13 +1,12 @@
 //! How something that a tick must not make comes into a running loop, and what it replaces goes out.
 //!
-//! It comes in through a ring and is taken in one tick; it goes back through another ring, for memory must not be freed in a
-//! tick. Whoever offers it waits for that tick, or takes the offer back if none comes.
+//! It is exchanged in one tick. Whoever offers it waits for that tick, or takes the offer back if none comes.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use crate::exchange::{ExchangeEnd, ExchangeHandle, exchange_ends};
 
 /// How long, and how often at most, a tick is waited for.
 const WAIT: Duration = Duration::from_micros(500);
@@ -24,40 +23,28 @@ struct Offer<T> {
 }
 
 /// The loop's end.
-pub(crate) struct ChangeEnd<T> {
-    incoming: Consumer<Box<Offer<T>>>,
-    outgoing: Producer<Box<Offer<T>>>,
-}
+pub(crate) struct ChangeEnd<T>(ExchangeEnd<Box<Offer<T>>>);
 
 /// Everybody else's end.
-pub(crate) struct ChangeHandle<T> {
-    incoming: Producer<Box<Offer<T>>>,
-    outgoing: Consumer<Box<Offer<T>>>,
-}
+pub(crate) struct ChangeHandle<T>(ExchangeHandle<Box<Offer<T>>>);
 
 /// What has come in, on its way out.
 pub(crate) struct Taken<T>(Box<Offer<T>>);
 
 /// Both ends.
 pub(crate) fn change_ends<T>() -> (ChangeEnd<T>, ChangeHandle<T>) {
-    let (incoming_in, incoming_out) = RingBuffer::new(1);
-    let (outgoing_in, outgoing_out) = RingBuffer::new(1);
-    let end = ChangeEnd { incoming: incoming_out, outgoing: outgoing_in };
-    (end, ChangeHandle { incoming: incoming_in, outgoing: outgoing_out })
+    let (end, handle) = exchange_ends(1);
+    (ChangeEnd(end), ChangeHandle(handle))
 }
 
 impl<T> ChangeEnd<T> {
     /// What was offered, if it still is; never allocates or frees.
     pub fn take(&mut self) -> Option<Taken<T>> {
-        // What comes out must find room, or it would be freed here.
-        if self.outgoing.is_full() {
-            return None;
-        }
-        let offer = self.incoming.pop().ok()?;
+        let offer = self.0.take()?;
         match offer.decided.compare_exchange(OPEN, TAKEN, Ordering::AcqRel, Ordering::Acquire) {
             Ok(_) => Some(Taken(offer)),
             Err(_) => {
-                let _ = self.outgoing.push(offer);
+                self.0.give_back(offer);
                 None
             }
         }
@@ -65,7 +52,7 @@ impl<T> ChangeEnd<T> {
 
     /// Sends out what was taken.
     pub fn give_back(&mut self, taken: Taken<T>) {
-        let _ = self.outgoing.push(taken.0);
+        self.0.give_back(taken.0);
     }
 }
 
@@ -79,9 +66,8 @@ impl<T> Taken<T> {
 impl<T> ChangeHandle<T> {
     /// Offers something and waits until a tick has taken it, which it gives back: whether one did.
     pub fn offer(&mut self, item: T) -> bool {
-        while self.outgoing.pop().is_ok() {}
         let decided = Arc::new(AtomicU8::new(OPEN));
-        if self.incoming.push(Box::new(Offer { item, decided: decided.clone() })).is_err() {
+        if !self.0.offer(Box::new(Offer { item, decided: decided.clone() })) {
             return false;
         }
         if self.comes_back() {
@@ -98,7 +84,7 @@ impl<T> ChangeHandle<T> {
     /// Waits for what a tick gives back.
     fn comes_back(&mut self) -> bool {
         for _ in 0..MOST_WAITS {
-            if self.outgoing.pop().is_ok() {
+            if self.0.free() {
                 return true;
             }
             std::thread::sleep(WAIT);

@@ -7,6 +7,7 @@
 mod change;
 mod clock;
 mod emulated;
+mod exchange;
 mod force_loop;
 mod handoff;
 mod locking;

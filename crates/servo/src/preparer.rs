@@ -82,7 +82,7 @@ impl PreparerEnd {
     /// Answers one request, if there is one: of those for one body that wait behind each other the latest, for a contact that
     /// slides asks again and again.
     pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<StrainAnswer>> {
-        while self.replaced.pop().is_ok() {}
+        self.responses.free();
         let mut request = self.requests.pop().ok()?;
         while self.requests.peek().is_ok_and(|next| next.asked.body == request.asked.body) {
             request = self.requests.pop().ok()?;
@@ -92,7 +92,7 @@ impl PreparerEnd {
 
     /// Hands a response to the loop. One that finds no room is lost; the tick keeps its own bound then.
     pub fn hand_over(&mut self, response: StrainAnswer) {
-        let _ = self.responses.push(response);
+        self.responses.offer(response);
     }
 }
 

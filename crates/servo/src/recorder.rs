@@ -1,14 +1,14 @@
 //! How a recording begins and ends within a running loop.
 //!
 //! A recording can be made again bit for bit if it begins from a known state: at rest, nothing touched, at the start of the
-//! safety ramp. That state is made beside the loop, handed in through a ring, and exchanged for the loop's own within one
-//! tick; what it replaces goes back through another ring, for memory must not be freed in a tick. The same way the ring of
-//! records comes in and goes out.
+//! safety ramp. That state is made beside the loop, and exchanged for the loop's own within one tick. The same way the ring
+//! of records comes in and goes out.
 
 use palpate_core::simulation::{Model, State};
 use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use crate::exchange::{ExchangeEnd, ExchangeHandle, exchange_ends};
 use crate::record::{RecordedContacts, RecordedInput, RecordedTool, TickRecord, recorded_bodies};
 use crate::safety::{FaultReason, SafetyStage};
 
@@ -25,7 +25,7 @@ pub(crate) struct Beginning {
 }
 
 /// What comes in, and goes back.
-pub(crate) enum Exchange {
+pub(crate) enum Request {
     Begin(Box<Beginning>),
     End,
     /// On its way to where its memory may be freed.
@@ -34,8 +34,7 @@ pub(crate) enum Exchange {
 
 /// The loop's end.
 pub(crate) struct RecorderEnd {
-    incoming: Consumer<Exchange>,
-    outgoing: Producer<Exchange>,
+    exchange: ExchangeEnd<Request>,
     records: Option<Producer<TickRecord>>,
     /// The record of the tick under way.
     record: TickRecord,
@@ -58,8 +57,7 @@ pub struct RecordingProgress {
 
 /// Everybody else's end.
 pub(crate) struct RecorderHandle {
-    incoming: Producer<Exchange>,
-    outgoing: Consumer<Exchange>,
+    exchange: ExchangeHandle<Request>,
     /// As at the start of a loop.
     stages: Vec<SafetyStage>,
     begun: bool,
@@ -67,18 +65,16 @@ pub(crate) struct RecorderHandle {
 
 /// Both ends.
 pub(crate) fn recorder_ends(stages: &[SafetyStage]) -> (RecorderEnd, RecorderHandle) {
-    let (incoming_in, incoming_out) = RingBuffer::new(EXCHANGES);
-    let (outgoing_in, outgoing_out) = RingBuffer::new(EXCHANGES);
+    let (end, exchange) = exchange_ends(EXCHANGES);
     let end = RecorderEnd {
-        incoming: incoming_out,
-        outgoing: outgoing_in,
+        exchange: end,
         records: None,
         record: TickRecord::empty(),
         number: 0,
         first: 0,
         progress: RecordingProgress::default(),
     };
-    (end, RecorderHandle { incoming: incoming_in, outgoing: outgoing_out, stages: stages.to_vec(), begun: false })
+    (end, RecorderHandle { exchange, stages: stages.to_vec(), begun: false })
 }
 
 impl RecorderHandle {
@@ -87,16 +83,11 @@ impl RecorderHandle {
         if std::mem::replace(&mut self.begun, true) {
             return Err(Error::Invalid("the loop is being recorded already".into()));
         }
-        while self.outgoing.pop().is_ok() {}
         let (producer, consumer) = RingBuffer::new(RECORDS);
         let beginning = Beginning { state: State::new(model), stages: self.stages.clone(), records: Some(producer) };
-        match self.incoming.push(Exchange::Begin(Box::new(beginning))) {
-            Ok(()) => Ok(consumer),
-            Err(_) => {
-                self.begun = false;
-                Err(Error::Invalid("the loop has not yet ended the last recording: try again".into()))
-            }
-        }
+        self.begun = self.exchange.offer(Request::Begin(Box::new(beginning)));
+        let busy = || Error::Invalid("the loop has not yet ended the last recording: try again".into());
+        self.begun.then_some(consumer).ok_or_else(busy)
     }
 
     /// Whether a recording has begun, and not been ended.
@@ -107,8 +98,7 @@ impl RecorderHandle {
     /// Has the loop stop recording.
     pub fn end(&mut self) {
         if std::mem::replace(&mut self.begun, false) {
-            while self.outgoing.pop().is_ok() {}
-            let _ = self.incoming.push(Exchange::End);
+            self.exchange.offer(Request::End);
         }
     }
 }
@@ -118,27 +108,26 @@ impl RecorderEnd {
     /// frees.
     pub fn exchange(&mut self, state: &mut State, stages: &mut Vec<SafetyStage>) -> bool {
         let mut began = false;
-        // What comes out must find room, or it would be freed here.
-        while self.outgoing.slots() > 0 {
-            match self.incoming.pop() {
-                Ok(Exchange::Begin(mut beginning)) => {
+        while let Some(request) = self.exchange.take() {
+            match request {
+                Request::Begin(mut beginning) => {
                     for (new, old) in beginning.stages.iter_mut().zip(&*stages) {
                         old.fault().into_iter().for_each(|fault| new.latch(fault));
                     }
                     std::mem::swap(state, &mut beginning.state);
                     std::mem::swap(stages, &mut beginning.stages);
                     std::mem::swap(&mut self.records, &mut beginning.records);
-                    let _ = self.outgoing.push(Exchange::Begin(beginning));
+                    self.exchange.give_back(Request::Begin(beginning));
                     self.progress = RecordingProgress { records: true, ..RecordingProgress::default() };
                     (self.first, began) = (self.number, true);
                 }
-                Ok(Exchange::End) => {
+                Request::End => {
                     self.progress.records = false;
                     if let Some(records) = self.records.take() {
-                        let _ = self.outgoing.push(Exchange::Ended(records));
+                        self.exchange.give_back(Request::Ended(records));
                     }
                 }
-                Ok(Exchange::Ended(_)) | Err(_) => break,
+                Request::Ended(_) => break,
             }
         }
         began

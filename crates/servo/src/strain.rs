@@ -1,8 +1,8 @@
 //! Strain responses prepared beside the loop: what the limit of strain in the tick needs of every set of contacts.
 //!
 //! The tick notices that the contacts of a body have changed and puts a request into a ring; somebody who is not in a hurry
-//! prepares a response, in milliseconds, and puts it into another; the one it replaces goes back through a third, for
-//! memory must not be freed in a tick. Until a response has come, the tick bounds what has just begun by itself.
+//! prepares a response, in milliseconds, and exchanges it for the one that it replaces. Until a response has come, the tick
+//! bounds what has just begun by itself.
 
 use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
@@ -12,6 +12,7 @@ use palpate_core::simulation::{MAX_BODIES, State, StrainWatch};
 use palpate_core::strain::MAX_CONTACTS_WATCHED;
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use crate::exchange::{ExchangeEnd, ExchangeHandle, exchange_ends};
 use crate::record::{IN_FLIGHT, StrainArrivals, StrainAsked};
 
 /// The contacts of one body, for which strain is to be prepared.
@@ -31,8 +32,7 @@ pub(crate) type StrainAnswer = (StrainAsked, Box<StrainWatch>);
 /// The loop's end.
 pub(crate) struct StrainEnd {
     requests: Producer<StrainRequest>,
-    responses: Consumer<StrainAnswer>,
-    replaced: Producer<Box<StrainWatch>>,
+    responses: ExchangeEnd<StrainAnswer, Box<StrainWatch>>,
     /// What was asked for last: contacts and limit of each body.
     asked: [Asked; MAX_BODIES],
     /// Requests from before this tick are of no use any more: their contacts are gone.
@@ -46,43 +46,36 @@ type Asked = ([u64; MAX_CONTACTS_WATCHED], f64);
 /// The end of whoever prepares.
 pub(crate) struct PreparerEnd {
     pub requests: Consumer<StrainRequest>,
-    pub responses: Producer<StrainAnswer>,
-    pub replaced: Consumer<Box<StrainWatch>>,
+    pub responses: ExchangeHandle<StrainAnswer, Box<StrainWatch>>,
     pub worker: Arc<OnceLock<Thread>>,
 }
 
 /// Both ends.
 pub(crate) fn strain_ends() -> (StrainEnd, PreparerEnd) {
     let (requests_in, requests_out) = RingBuffer::new(IN_FLIGHT);
-    let (responses_in, responses_out) = RingBuffer::new(IN_FLIGHT);
-    let (replaced_in, replaced_out) = RingBuffer::new(IN_FLIGHT);
+    let (responses_out, responses_in) = exchange_ends(IN_FLIGHT);
     let worker = Arc::new(OnceLock::new());
     let end = StrainEnd {
         requests: requests_in,
         responses: responses_out,
-        replaced: replaced_in,
         asked: Default::default(),
         since: 0,
         worker: worker.clone(),
     };
-    (end, PreparerEnd { requests: requests_out, responses: responses_in, replaced: replaced_out, worker })
+    (end, PreparerEnd { requests: requests_out, responses: responses_in, worker })
 }
 
 impl StrainEnd {
     /// Takes up what has come and says what that was; never allocates or frees.
     pub fn receive(&mut self, state: &mut State, arrivals: &mut StrainArrivals) {
-        while self.replaced.slots() > 0 {
-            let Ok((asked, watch)) = self.responses.pop() else { return };
+        while let Some((asked, watch)) = self.responses.take() {
             let replaced = if asked.tick < self.since {
                 Some(watch)
             } else {
                 arrivals.push(asked);
                 state.watch_strain(asked.body, watch)
             };
-            if let Some(replaced) = replaced {
-                // There is a slot, and nobody else fills it.
-                let _ = self.replaced.push(replaced);
-            }
+            replaced.into_iter().for_each(|replaced| self.responses.give_back(replaced));
         }
     }
 

@@ -4,7 +4,7 @@ from palpate.body.body import Body
 from palpate.body.free_end import free_end
 from palpate.body.loads import Loads, gravity_mistake
 from palpate.body.material import Material
-from palpate.body.moduli import moduli_of_store, surface_moduli
+from palpate.body.moduli import surface_moduli
 from palpate.body.predicate import parse
 from palpate.body.problem import description, problem_arrays
 from palpate.body.supports import Fixed
@@ -19,7 +19,6 @@ __all__ = [
     "description",
     "free_end",
     "gravity_mistake",
-    "moduli_of_store",
     "parse",
     "problem_arrays",
     "surface_moduli",

@@ -41,6 +41,16 @@ ElementChoice = Annotated[
     typer.Option(help="Tetrahedra with 4 or 10 nodes; default: quadratic for a surface, a volume mesh as it is."),
 ]
 
+ToolRadius = Annotated[str | None, typer.Option(help="Radius of the tools; default: a sixteenth of the body.")]
+Fix = Annotated[
+    str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest tenth.")
+]
+YoungsModulus = Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")]
+PoissonsRatio = Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")]
+MeshUnit = Annotated[
+    str | None,
+    typer.Option(help="Unit of length of a mesh; default: the one that fits its size.", autocompletion=units),
+]
 Dask = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Let the workers of a Dask scheduler compute, such as tcp://10.0.0.1:8786."),

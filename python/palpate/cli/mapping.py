@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.app import app
-from palpate.cli.bodies import ElementChoice, MaxSize, Repair
-from palpate.cli.completion import units
+from palpate.cli.bodies import (
+    ElementChoice,
+    Fix,
+    MaxSize,
+    MeshUnit,
+    PoissonsRatio,
+    Repair,
+    ToolRadius,
+    YoungsModulus,
+)
 
 if TYPE_CHECKING:
     from palpate.palpation import Detection, StiffnessMap
@@ -41,16 +49,11 @@ def map_command(
         typer.Option(help="Scene to compare with; default, where a body has regions: the same without them."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; default: <name>-palpation.")] = None,
-    radius: Annotated[str | None, typer.Option(help="Radius of the tool; default: a sixteenth of the body.")] = None,
-    fix: Annotated[
-        str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest tenth.")
-    ] = None,
-    youngs_modulus: Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")] = None,
-    poissons_ratio: Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")] = None,
-    unit: Annotated[
-        str | None,
-        typer.Option(help="Unit of length of a mesh; default: the one that fits its size.", autocompletion=units),
-    ] = None,
+    radius: ToolRadius = None,
+    fix: Fix = None,
+    youngs_modulus: YoungsModulus = None,
+    poissons_ratio: PoissonsRatio = None,
+    unit: MeshUnit = None,
     max_size: MaxSize = None,
     element: ElementChoice = None,
     repair: Repair = False,

@@ -11,8 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from palpate.cli.app import app
-from palpate.cli.bodies import ElementChoice, MaxSize, Repair
-from palpate.cli.completion import devices, models, units
+from palpate.cli.bodies import (
+    ElementChoice,
+    Fix,
+    MaxSize,
+    MeshUnit,
+    PoissonsRatio,
+    Repair,
+    ToolRadius,
+    YoungsModulus,
+)
+from palpate.cli.completion import devices, models
 
 if TYPE_CHECKING:
     from palpate.cli.scripted import PressRecord
@@ -96,17 +105,12 @@ def demo(
 @app.command()
 def run(
     file: Annotated[Path, typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, or surface.")],
-    radius: Annotated[str | None, typer.Option(help="Radius of the tools; default: a sixteenth of the body.")] = None,
-    fix: Annotated[
-        str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest tenth.")
-    ] = None,
-    youngs_modulus: Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")] = None,
-    poissons_ratio: Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")] = None,
+    radius: ToolRadius = None,
+    fix: Fix = None,
+    youngs_modulus: YoungsModulus = None,
+    poissons_ratio: PoissonsRatio = None,
     density: Annotated[str | None, typer.Option(help="Density; of a mesh, default: 1000kg/m3.")] = None,
-    unit: Annotated[
-        str | None,
-        typer.Option(help="Unit of length of a mesh; default: the one that fits its size.", autocompletion=units),
-    ] = None,
+    unit: MeshUnit = None,
     max_size: MaxSize = None,
     element: ElementChoice = None,
     repair: Repair = False,

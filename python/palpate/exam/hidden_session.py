@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from palpate.scene import BuiltScene
-from palpate.simulation import Contact
-from palpate.viewer.messages import by_body, encode
-from palpate.viewer.pose_code import PoseCoder
+from palpate.simulation import Contact, Frame
+from palpate.viewer.fields import Picture
+from palpate.viewer.messages import numbered
 from palpate.viewer.session import Session, Wants
-from palpate.viewer.tool_shapes import by_tool, outline
 
 # The only field, always zero.
 NOTHING = {
@@ -56,56 +55,38 @@ class HiddenSession(Session):
         """Message with what the sliders show: no modulus, for nobody changes it."""
         return {**super().settings(), "youngs_modulus": [None]}
 
-    def scene_message(self) -> bytes:
-        """Geometry of the surface at rest, the same for every trial."""
-        scene = self.built.scene
-        shapes = [outline(tool, scene.folder) for tool in scene.tools]
-        view = scene.view
-        shown = self._bodies[0]
-        header = {
-            "type": "scene",
-            "name": scene.name,
-            "title": "Exam",
-            "size": self.size,
-            "strain_limit": 0.0,
-            "defaults": {**self._defaults(), "youngs_modulus": [None]},
-            "max_force": scene.device.max_force,
-            "bodies": [{**shown.header(None), "fields": [], "regions": [], "poissons_ratio": None}],
-            "tools": [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(shapes)],
-            "motion": None,
-            "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
-            "replay": None,
-        }
-        return encode(header, {**by_body([shown.arrays()]), **by_tool([arrays for _, arrays in shapes])})
+    def _scene_header(self) -> dict[str, Any]:
+        """Header of the scene message but for the tools: the same for every trial."""
+        body = {**self._bodies[0].header(None), "fields": [], "regions": [], "poissons_ratio": None}
+        hidden = {"title": "Exam", "strain_limit": 0.0, "bodies": [body], "motion": None, "replay": None}
+        return {**super()._scene_header(), **hidden, "defaults": {**self._defaults(), "youngs_modulus": [None]}}
 
-    def frame_message(
-        self, number: int, log_seen: tuple[int, int], wants: Wants, coder: PoseCoder
-    ) -> tuple[bytes, tuple[int, int]]:
-        """Where the tool is and the force on the device, over a body that does not deform."""
-        frame = self._latest()
+    def _tool_header(self, frame: Frame, tool: int) -> dict[str, Any]:
+        return {**super()._tool_header(frame, tool), **SILENT}
+
+    def _drawn(
+        self, frame: Frame, log_seen: tuple[int, int], wants: Wants
+    ) -> tuple[dict[str, Any], dict[str, tuple[str, np.ndarray]]]:
+        """Part of a frame message: the force on the device, over a body that does not deform."""
         self._follow(frame.contacts)
         rows = len(self._bodies[0].drawn.nodes)
-        coded = coder.code(number, [(np.zeros((rows, 3)), np.zeros(rows), self._bodies[0].extent)])
         header = {
-            "type": "frame",
-            "frame": number,
-            "time": frame.time,
-            "tools": [{**self._tool_header(frame, 0), **SILENT}],
             "contacts": [],
-            **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
-            "realtime": all(frame.statistics["realtime"]),
             "strain": 0.0,
             "bodies": [{"strain": 0.0}],
             "motion": None,
             "fields": [NOTHING],
             "interior": [False],
-            "poses": coded.headers,
             "recording": None,
             "replay": None,
             "loudness": min(float(np.linalg.norm(frame.forces[0])) / self._loud_force, 1.0),
         }
-        empty = {"log": ("f4", np.zeros((0, 3))), "history": ("f4", np.zeros((0, 8)))}
-        return encode(header, {**by_body(coded.arrays), **empty}), log_seen
+        still = Picture(NOTHING, np.zeros((rows, 3)), np.zeros(rows), False)
+        return header, {
+            **numbered([still.arrays]),
+            "log": ("f4", np.zeros((0, 3))),
+            "history": ("f4", np.zeros((0, 8))),
+        }
 
     @property
     def touched(self) -> list[float] | None:

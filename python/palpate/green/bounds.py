@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 
+from palpate import _native
 from palpate.errors import PrecisionError, PrecisionWarning
 
 # The cheapest format is taken whose typical contacts are right to this: a thirtieth of what is warned of, for answers
@@ -12,7 +13,7 @@ CHOSEN = 3e-4
 # An answer that may be wrong by more than this is warned of: a hand feels differences of force of 5 to 10 %.
 WARNED = 1e-2
 # One that may be wrong by more than this is refused.
-REFUSED = 0.1
+REFUSED = _native.REFUSED_ERROR
 
 
 def error_text(error: float) -> str:

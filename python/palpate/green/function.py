@@ -74,7 +74,6 @@ class GreensFunction:
         self.touchable_nodes = self.surface_nodes[ranks]
         self.fixed_dofs = core.fixed_dofs.astype(np.int64)
         self.fixed_nodes = np.unique(self.fixed_dofs // 3)
-        self._fixed = frozenset(self.fixed_dofs.tolist())
         self._first_column = {int(n): 3 * i for i, n in enumerate(self.touchable_nodes)}
         self._surface_rank = {int(n): i for i, n in enumerate(self.surface_nodes)}
 
@@ -130,9 +129,13 @@ class GreensFunction:
         return np.ptp(self.surface_positions, axis=0)
 
     @cached_property
+    def surface_corners(self) -> np.ndarray:
+        """Corners (t, 3) of the triangles as rows of what belongs to the surface nodes."""
+        return self._core.surface_triangles.astype(np.int64).reshape(-1, 3)
+
+    @cached_property
     def _surface_search(self) -> _native.SurfaceSearch:
-        triangles = np.searchsorted(self.surface_nodes, self.surface_triangles)
-        return _native.SurfaceSearch(self.surface_positions, triangles.astype(np.uint32))
+        return _native.SurfaceSearch(self.surface_positions, self.surface_corners.astype(np.uint32))
 
     def closest_on_surface(self, points: np.ndarray) -> np.ndarray:
         """Find the closest points (n, 3), m, of the untouched surface to points (n, 3), m."""
@@ -255,20 +258,7 @@ class GreensFunction:
         forced = self._by_column(forces, "forces", units.force)
         placed = self._by_column(displacements, "displacements", units.length)
         freed = {column for node in release for column in self._released_columns(node)}
-        known: dict[int, float] = {}
-        switched: dict[int, float] = {}
-        for column in {*forced, *placed, *freed}:
-            fixed = self._is_fixed(column)
-            if column in placed:
-                if forced.get(column) and (column in freed or not fixed):
-                    node, axis = self.touchable_nodes[column // 3], "xyz"[column % 3]
-                    raise BodyError(f"node {node} has both a force and a displacement along {axis}")
-                (known if fixed else switched)[column] = placed[column]
-            elif column in freed:
-                switched[column] = forced.get(column, 0.0)
-            elif not fixed:  # a force on a support goes straight into it and moves nothing
-                known[column] = forced[column]
-        u, f, reactions, error = self._core.solve(sorted(known.items()), sorted(switched.items()))
+        u, f, reactions, error = self._core.solve(forced, placed, freed)
         check_error(error, self.precision, "the answer", stacklevel=2)
         u, f = u.reshape(-1, 3), f.reshape(-1, 3)
         return Answer(u, f, self._reactions(f, reactions), error, self)
@@ -350,7 +340,7 @@ class GreensFunction:
     @cached_property
     def edge_length(self) -> float:
         """Median edge of the triangles of the surface, m."""
-        corners = self.surface_positions[np.searchsorted(self.surface_nodes, self.surface_triangles)]
+        corners = self.surface_positions[self.surface_corners]
         return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
     def _require_size(self, radius: float) -> None:
@@ -406,9 +396,6 @@ class GreensFunction:
         except (KeyError, TypeError):
             raise BodyError(f"{argument}: node {node} is not touchable") from None
 
-    def _is_fixed(self, column: int) -> bool:
-        return 3 * int(self.touchable_nodes[column // 3]) + column % 3 in self._fixed
-
     def _released_columns(self, node: int) -> list[int]:
         """Columns of the fixed components of a node whose support is taken away."""
         if not isinstance(node, (int, np.integer)) or not np.isin(node, self.fixed_nodes):
@@ -416,7 +403,7 @@ class GreensFunction:
         if int(node) not in self._surface_rank:
             raise BodyError(f"release: fixed node {node} lies inside the body; only surface nodes can be released")
         first = self._column(node, "release")
-        return [column for column in range(first, first + 3) if self._is_fixed(column)]
+        return list(range(first, first + 3))
 
 
 def require_precise(green: GreensFunction, what: str) -> None:

@@ -41,7 +41,7 @@ def precompute_on(
 
     """
     problem, precision = what.problem, what.precision
-    job = worker.Job(what.key, _native.__version__, precision, memory)
+    job = worker.FactorRequest(what.key, _native.__version__, precision, memory)
     held = submit(client, worker.received, problem)
     try:
         measuring = _measure(client, held, job)
@@ -63,7 +63,7 @@ def precompute_on(
         _release(client, job.key)
 
 
-def _measure(client: Client, held: Future, job: worker.Job) -> list[Future]:
+def _measure(client: Client, held: Future, job: worker.FactorRequest) -> list[Future]:
     """Have all workers factorise that are there."""
     return [submit(client, worker.measure, held, job, address=address) for address in threads_of_workers(client)]
 
@@ -79,7 +79,7 @@ def _first(client: Client, futures: list[Future]) -> tuple[tuple[Any, ...], byte
 
 def _gather(
     client: Client,
-    task: tuple[Future, worker.Job, bytes],
+    task: tuple[Future, worker.FactorRequest, bytes],
     width: int,
     store: _native.ColumnStore,
     report: Report,

@@ -21,8 +21,8 @@ Arrays = tuple[np.ndarray, ...]
 
 
 @dataclass(frozen=True)
-class Job:
-    """What is to be solved, beside the arrays of the problem.
+class FactorRequest:
+    """What a worker is to factorise, beside the arrays of the problem.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class _Factors:
     _making: dict[str, threading.Lock] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def get(self, job: Job, problem: Arrays) -> _native.ColumnJob:
+    def get(self, job: FactorRequest, problem: Arrays) -> _native.ColumnJob:
         """Factor of a job, made if need be; several tasks wait for one of them to make it."""
         with self._lock:
             making = self._making.setdefault(job.key, threading.Lock())
@@ -106,13 +106,13 @@ def received(problem: Arrays) -> Arrays:
     return problem
 
 
-def measure(problem: Arrays, job: Job) -> tuple[tuple[Any, ...], bytes]:
+def measure(problem: Arrays, job: FactorRequest) -> tuple[tuple[Any, ...], bytes]:
     """Factorise; what the store needs to know of that, and the hash of the order of rows and columns."""
     factor = _made(problem, job)
     return factor.measured, factor.order
 
 
-def solve(problem: Arrays, job: Job, order: bytes, block: int, width: int) -> tuple[bytes, bytes]:
+def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: int) -> tuple[bytes, bytes]:
     """Panel of a block of ``width`` columns, and its checksum.
 
     Raises
@@ -134,7 +134,7 @@ def release(key: str) -> None:
     _factors.release(key)
 
 
-def _made(problem: Arrays, job: Job) -> _native.ColumnJob:
+def _made(problem: Arrays, job: FactorRequest) -> _native.ColumnJob:
     require_version(job.version, _address())
     return _factors.get(job, problem)
 

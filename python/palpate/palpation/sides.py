@@ -73,7 +73,7 @@ class SurfaceShape:
 
     def __init__(self, green: GreensFunction):
         self.positions = green.surface_positions + green.free_displacements
-        self.triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
+        self.triangles = green.surface_corners
         self.fixed = np.isin(green.surface_nodes, green.fixed_nodes)
         self.touchable = np.isin(green.surface_nodes, green.touchable_nodes)
         a, b, c = np.moveaxis(self.positions[self.triangles], 1, 0)

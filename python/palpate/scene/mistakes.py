@@ -24,8 +24,6 @@ WORDS = {
     "string": "text in quotes",
     "tuple": "a list of numbers",
 }
-# Keys of former versions, and what they are called now.
-RENAMED = {"view.hold_strain": "strain_limit"}
 
 Place = Sequence[str | int]
 # A key, bare or in quotes, or several with dots between them.
@@ -51,7 +49,7 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
     at = located(path, text, place)
     if first["type"] == "extra_forbidden":
         known = _known_keys(model, keys[:-1])
-        near = [RENAMED[where]] if where in RENAMED else difflib.get_close_matches(keys[-1], known, 1)
+        near = difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
         return f"{at}: unknown key '{where}'; {hint}"
     if first["type"] == "missing" and isinstance(place[-1], int):

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate.body import moduli_of_store, surface_moduli
 from palpate.errors import BodyError, Error, SceneError
 from palpate.scene import BuiltBody
 from palpate.scene.mistakes import located
@@ -52,16 +51,10 @@ def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
 
 
 def _moduli(body: BuiltBody, needed: bool) -> tuple[np.ndarray, np.ndarray, bool] | None:
-    green = body.green
-    try:
-        young, poisson = (
-            surface_moduli(body.body)
-            if body.body is not None
-            else moduli_of_store(green.description, len(green.surface_nodes))
+    known = body.green._core.surface_moduli()
+    if known is None and needed:
+        raise BodyError(
+            "this store of several materials does not say which is at the surface: compute it again, or give the tool "
+            "contact = 'patch'"
         )
-    except BodyError:
-        if needed:
-            raise
-        return None
-    materials = green.description.get("materials", {}).values()
-    return young, poisson, len({tuple(values[:2]) for values in materials}) == 1
+    return known

@@ -27,7 +27,7 @@ from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import largest_force
 
 # Format of the folder; crates/scene reads it.
-FORMAT, VERSION = "palpate-scene", 1
+FORMAT, VERSION = "palpate-scene", 2
 SCENE_FILE = "scene.json"
 _TYPES = {"f8": "F64", "u4": "U32", "u8": "U64"}
 
@@ -140,20 +140,14 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
 
 
 def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Path) -> dict[str, Any]:
-    (kind, (a, b, c), vertices, triangles), contact_radius, law, max_stiffness, friction, pad = arguments
+    (kind, lengths, vertices, triangles), contact_radius, law, max_stiffness, friction, pad = arguments
     device = scene.device_of(rank)
-    shapes = {
-        "sphere": {"radius": a},
-        "ellipsoid": {"semi_axes": [a, b, c]},
-        "capsule": {"radius": a, "length": b},
-        "punch": {"radius": a, "rounding": b},
-    }
-    shape: dict[str, Any] = shapes.get(kind, {})
+    arrays = None
     if kind == "surface":
         surface = {"vertices": np.array(vertices, dtype=float), "triangles": np.array(triangles, dtype=np.uint32)}
-        shape = {"arrays": _written(folder / f"tool-{rank}.arrays.safetensors", surface)}
+        arrays = _written(folder / f"tool-{rank}.arrays.safetensors", surface)
     return {
-        "shape": {"kind": kind, **shape},
+        "shape": {"kind": kind, "lengths": lengths, "arrays": arrays},
         "law": law,
         "contact_radius": contact_radius,
         "friction": friction,

@@ -44,6 +44,23 @@ VECTORS = {
 }
 
 
+def _of_tools(columns: Mapping[str, Any], name: str) -> np.ndarray:
+    """Give a column of tools in the shape of the positions that were given."""
+    given, single = shown_of(columns["about"])
+    each = (VECTORS[name],) if name in VECTORS else ()
+    values = columns[name].reshape(-1, int(columns["about"]["tools"]), *each)
+    return values[:, 0] if single else values[:, :given]
+
+
+def _column(name: str, told: str) -> Any:
+    """Make the property that gives a column of tools."""
+
+    def read(recording: Recording) -> np.ndarray:
+        return _of_tools(recording._columns, name)
+
+    return property(read, doc=told)
+
+
 @dataclass(frozen=True)
 class RecordingStatus:
     """How the recording of a running loop is doing.
@@ -123,7 +140,6 @@ class Recording(ComparedByValue):
     def _of(cls, source: bytes | Path) -> Recording:
         columns = _columns_of(source)
         number = columns["number"]
-        shaped = _Shaped(columns)
         rate = float(columns["about"]["rate"])
         if columns["about"]["clock"] == "0":
             time = np.arange(1, len(number) + 1) / rate
@@ -131,9 +147,9 @@ class Recording(ComparedByValue):
             due = columns["due_ns"]
             time = 1e-9 * (due - due[:1]) + 1 / rate
         energies = _energies(columns, len(number))
-        forces, torques = shaped.vector("forces"), shaped.vector("torques")
+        forces, torques = _of_tools(columns, "forces"), _of_tools(columns, "torques")
         watched = np.zeros((len(number), 0, 3))
-        made = cls(time, forces, torques, watched, shaped.column("limited"), energies, columns["dropped"], source)
+        made = cls(time, forces, torques, watched, _of_tools(columns, "limited"), energies, columns["dropped"], source)
         made.__dict__["_columns"] = columns
         return made
 
@@ -180,50 +196,17 @@ class Recording(ComparedByValue):
         """(t,) number of each tick since the recording began; where some were dropped, they are missing."""
         return self._columns["number"]
 
-    @property
-    def positions(self) -> np.ndarray:
-        """Of the tips as the devices said, (t, 3) or (t, tools, 3), m."""
-        return _Shaped(self._columns).vector("positions")
-
-    @property
-    def orientations(self) -> np.ndarray:
-        """Of the tools, (t, 4) or (t, tools, 4), unit quaternions w x y z."""
-        return _Shaped(self._columns).vector("orientations")
-
-    @property
-    def velocities(self) -> np.ndarray:
-        """Of the tips as the devices said, (t, 3) or (t, tools, 3), m/s."""
-        return _Shaped(self._columns).vector("velocities")
-
-    @property
-    def angular_velocities(self) -> np.ndarray:
-        """Of the tools as the devices said, (t, 3) or (t, tools, 3), rad/s."""
-        return _Shaped(self._columns).vector("angular_velocities")
-
-    @property
-    def computed_forces(self) -> np.ndarray:
-        """Before the safety stage, (t, 3) or (t, tools, 3), N."""
-        return _Shaped(self._columns).vector("computed_forces")
-
-    @property
-    def computed_torques(self) -> np.ndarray:
-        """Before the safety stage, (t, 3) or (t, tools, 3), N m about the tips."""
-        return _Shaped(self._columns).vector("computed_torques")
-
-    @property
-    def port_energy(self) -> np.ndarray:
-        """Given to the hand, owed and never paid, (t, 3) or (t, tools, 3), J."""
-        return _Shaped(self._columns).vector("port_energy")
-
-    @property
-    def buttons(self) -> np.ndarray:
-        """(t,) or (t, tools): a bit for each button held."""
-        return _Shaped(self._columns).column("buttons")
-
-    @property
-    def active(self) -> np.ndarray:
-        """(t,) or (t, tools): whether a tool is in the scene."""
-        return _Shaped(self._columns).column("active")
+    positions = _column("positions", "Of the tips as the devices said, (t, 3) or (t, tools, 3), m.")
+    orientations = _column("orientations", "Of the tools, (t, 4) or (t, tools, 4), unit quaternions w x y z.")
+    velocities = _column("velocities", "Of the tips as the devices said, (t, 3) or (t, tools, 3), m/s.")
+    angular_velocities = _column("angular_velocities", "As the devices said, (t, 3) or (t, tools, 3), rad/s.")
+    computed_forces = _column("computed_forces", "Before the safety stage, (t, 3) or (t, tools, 3), N.")
+    computed_torques = _column(
+        "computed_torques", "Before the safety stage, (t, 3) or (t, tools, 3), N m about the tips."
+    )
+    port_energy = _column("port_energy", "Given to the hand, owed and never paid, (t, 3) or (t, tools, 3), J.")
+    buttons = _column("buttons", "(t,) or (t, tools): a bit for each button held.")
+    active = _column("active", "(t,) or (t, tools): whether a tool is in the scene.")
 
     @property
     def compute_us(self) -> np.ndarray:
@@ -267,23 +250,6 @@ def _columns_of(source: bytes | Path) -> dict[str, Any]:
     columns = _native.read_recording(source)
     require_readable(columns["about"], str(source) if isinstance(source, Path) else "the recording")
     return columns
-
-
-class _Shaped:
-    """Columns of tools in the shape of the positions that were given."""
-
-    def __init__(self, columns: dict[str, Any]):
-        self._columns, self._tools = columns, int(columns["about"]["tools"])
-        self._given, self._single = shown_of(columns["about"])
-
-    def vector(self, name: str) -> np.ndarray:
-        return self._of_tools(self._columns[name].reshape(-1, self._tools, VECTORS[name]))
-
-    def column(self, name: str) -> np.ndarray:
-        return self._of_tools(self._columns[name].reshape(-1, self._tools))
-
-    def _of_tools(self, values: np.ndarray) -> np.ndarray:
-        return values[:, 0] if self._single else values[:, : self._given]
 
 
 def _energies(columns: dict[str, Any], ticks: int) -> tuple[Energy | None, ...]:

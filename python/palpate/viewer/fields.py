@@ -66,6 +66,11 @@ class Picture:
     scalar: np.ndarray
     interior: bool
 
+    @property
+    def arrays(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Arrays of a body in a frame message."""
+        return {"displacements": ("f4", self.displacements), "scalar": ("u1", self.scalar)}
+
 
 class Fields:
     """Fields of one running body; each pose is recovered once for all clients.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import sys
 import webbrowser
 
 from palpate.scene import Scene
@@ -61,6 +60,4 @@ async def _serve(server: ViewerServer, browser: bool, hint: str) -> None:
 
 def _has_desktop() -> bool:
     """Whether a browser can show itself: elsewhere webbrowser would start a text browser in the terminal."""
-    if sys.platform.startswith(("win", "darwin")):
-        return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

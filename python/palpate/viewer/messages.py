@@ -19,10 +19,10 @@ from palpate.errors import ViewerError
 from palpate.units import to_float
 from palpate.vectors import three_numbers
 
-VERSION = 10
+VERSION = 11
 # Longest name in a client's message.
 LONGEST_WORD = 40
-DTYPES = {kind: np.dtype(f"<{kind}") for kind in ("f4", "u4", "u1", "i1", "i2")}
+DTYPES = {kind: np.dtype(f"<{kind}") for kind in ("f4", "u4", "u1")}
 
 
 def encode(header: Mapping[str, Any], arrays: Mapping[str, tuple[str, np.ndarray]]) -> bytes:
@@ -115,9 +115,11 @@ def quaternion(message: Mapping[str, Any], key: str) -> tuple[float, float, floa
     return (number({**message, key: value[0]}, key), *three_numbers(value[1:], what, ViewerError))
 
 
-def by_body(arrays: Sequence[Mapping[str, tuple[str, np.ndarray]]]) -> dict[str, tuple[str, np.ndarray]]:
-    """Arrays of several bodies under the names they have in a message."""
-    return {f"{body}/{name}": array for body, mine in enumerate(arrays) for name, array in mine.items()}
+def numbered(
+    arrays: Sequence[Mapping[str, tuple[str, np.ndarray]]], prefix: str = ""
+) -> dict[str, tuple[str, np.ndarray]]:
+    """Arrays of several bodies, or with the prefix ``tools/`` of tools, under the names they have in a message."""
+    return {f"{prefix}{rank}/{name}": array for rank, mine in enumerate(arrays) for name, array in mine.items()}
 
 
 def word(message: Mapping[str, Any], key: str) -> str:

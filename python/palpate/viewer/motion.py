@@ -12,6 +12,7 @@ from palpate.body import free_end
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
 from palpate.fields import HONEST_STRAIN
+from palpate.palpation.interpolation import node_normals
 from palpate.scene import StrikeTable
 from palpate.simulation import Contact, Simulation
 from palpate.viewer.messages import vector, whole
@@ -187,7 +188,8 @@ class MovingBody:
         then on it swings freely; a longer one is a row of short ones. The strain is proportional to the impulse.
         """
         basis, surface = self._motion.basis, self._green.surface_nodes
-        shapes, normals = basis.shapes[surface], self._normals()
+        shapes, green = basis.shapes[surface], self._green
+        normals = node_normals(green.surface_positions, green.surface_corners)
         follows = np.abs(np.einsum("ij,ij->i", shapes[:, :, 0], normals))
         node = int(np.argsort(follows)[int(FOLLOWING * (len(surface) - 1))])
         modal_impulse = normals[node] @ np.tensordot(self._patch_around(node), shapes, axes=1)
@@ -209,16 +211,6 @@ class MovingBody:
         radius = max(self._patch_radius, 1.01 * np.partition(distance, NEIGHBOURS)[NEIGHBOURS])
         weights = np.where(distance < radius, (1 - (distance / radius) ** 2) ** 2, 0.0)
         return weights / weights.sum()
-
-    def _normals(self) -> np.ndarray:
-        """Average the unit normals (s, 3) at the surface nodes, each triangle by its area."""
-        positions = self._green.surface_positions
-        corners = np.searchsorted(self._green.surface_nodes, self._green.surface_triangles)
-        a, b, c = (positions[corners[:, k]] for k in range(3))
-        normals, areas = np.zeros_like(positions), np.cross(b - a, c - a)
-        for k in range(3):
-            np.add.at(normals, corners[:, k], areas)
-        return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 class _ShownMode:

@@ -29,7 +29,6 @@ from palpate.viewer.addresses import reachable
 from palpate.viewer.background import LongWork, Worker
 from palpate.viewer.computing import Computing
 from palpate.viewer.pages import headers, host_is_ours, load_pages
-from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.session import Session, Wants, choices
 from palpate.viewer.surface_map import SurfaceMap
 
@@ -60,7 +59,6 @@ class Client:
     # Of which it was told that its loop does not run.
     refused: Session | None = None
     wants: Wants = field(default_factory=Wants)
-    poses: PoseCoder = field(default_factory=PoseCoder)
     sent: int = 0
     log_seen: tuple[int, int] = (0, 0)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
@@ -274,8 +272,6 @@ class ViewerServer:
             message = messages.parse(text)
             if message["type"] == "ack":
                 if message.get("frame") == client.sent:
-                    if message.get("whole") is True:
-                        client.poses.forget()
                     client.may_send.set()
             elif message["type"] == "cutaway":
                 client.wants = replace(client.wants, cutaway=message.get("on") is True)
@@ -317,14 +313,13 @@ class ViewerServer:
                 session = self._session
                 if client.shown is not session:
                     client.shown, client.log_seen = session, (0, 0)
-                    client.poses.forget()
                     await client.connection.send(await self._worker.call(session.scene_message))
                     client.may_send.set()
                     continue
                 client.sent += 1
                 try:
                     message, client.log_seen = await self._worker.call(
-                        session.frame_message, client.sent, client.log_seen, client.wants, client.poses
+                        session.frame_message, client.sent, client.log_seen, client.wants
                     )
                 except SimulationError as error:
                     # Another model may have taken the place of this one meanwhile.

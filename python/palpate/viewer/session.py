@@ -18,13 +18,12 @@ from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
 from palpate.viewer.log_rows import Tail, thinned
-from palpate.viewer.messages import by_body, encode, index, number, quaternion, vector, word
+from palpate.viewer.messages import encode, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
-from palpate.viewer.pose_code import PoseCoder
 from palpate.viewer.recorder import SessionRecorder
 from palpate.viewer.shown_body import ShownBody, titled
 from palpate.viewer.surface_map import SurfaceMap, maps_or_none
-from palpate.viewer.tool_shapes import by_tool, kind_of, outline, shape_choices, with_shape
+from palpate.viewer.tool_shapes import kind_of, outline, shape_choices, with_shape
 
 # The contact radius slider ends at this part of the body's longest side.
 LARGEST_RADIUS = 0.12
@@ -241,10 +240,17 @@ class Session:
     def scene_message(self) -> bytes:
         """Geometry and numbers of the scene."""
         scene = self.built.scene
-        view = scene.view
         outlines = [outline(tool, scene.folder) for tool in scene.tools]
-        header = {
-            "type": "scene",
+        tools = [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(outlines)]
+        header = {"type": "scene", "tools": tools, **self._scene_header()}
+        bodies = numbered([body.arrays() for body in self._bodies])
+        return encode(header, {**bodies, **numbered([arrays for _, arrays in outlines], "tools/")})
+
+    def _scene_header(self) -> dict[str, Any]:
+        """Header of the scene message but for the tools."""
+        scene = self.built.scene
+        view = scene.view
+        return {
             "name": scene.name,
             "title": titled(scene.name),
             "size": self.size,
@@ -252,13 +258,10 @@ class Session:
             "defaults": self._defaults(),
             "max_force": scene.device.max_force,
             "bodies": [body.header(self.simulation.youngs_modulus_of(i)) for i, body in enumerate(self._bodies)],
-            "tools": [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(outlines)],
             "motion": None if self._moving is None else self._moving.header(),
             "view": {"position": view.position, "target": view.target} if view.position and view.target else None,
             "replay": self._replay_scene(),
         }
-        bodies, tools = by_body([body.arrays() for body in self._bodies]), by_tool([arrays for _, arrays in outlines])
-        return encode(header, {**bodies, **tools})
 
     def _tool_entry(self, tool: int) -> dict[str, Any]:
         """Entry of the scene message, but for what its shape looks like."""
@@ -271,37 +274,41 @@ class Session:
             "max_contact_radius": self._max_radii[tool],
         }
 
-    def frame_message(
-        self, number: int, log_seen: tuple[int, int], wants: Wants, coder: PoseCoder
-    ) -> tuple[bytes, tuple[int, int]]:
-        """Binary message of the latest tick for the client of a coder, and up to where it carries log and history."""
+    def frame_message(self, number: int, log_seen: tuple[int, int], wants: Wants) -> tuple[bytes, tuple[int, int]]:
+        """Binary message of the latest tick for a client, and up to where it carries log and history."""
         frame = self._latest()
-        poses = [self._pose(frame, body) for body in range(len(self._bodies))]
-        pairs = list(zip(self._bodies, poses, strict=True))
-        pictures = [body.picture(wants.field, pose, wants.cutaway, wants.full_scale) for body, pose in pairs]
-        strains = [body.fields.largest_strain(pose) for body, pose in pairs]
-        drawn = zip(pictures, self._bodies, strict=True)
-        coded = coder.code(number, [(picture.displacements, picture.scalar, body.extent) for picture, body in drawn])
-        log, moved = self._log.since(log_seen[0]), self._history.since(log_seen[1])
         header = {
             "type": "frame",
             "frame": number,
             "time": frame.time,
             "tools": [self._tool_header(frame, tool) for tool in range(len(self._active))],
-            "contacts": [self._contact_header(contact) for contact in frame.contacts],
             **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
             "realtime": all(frame.statistics["realtime"]),
+        }
+        told, arrays = self._drawn(frame, log_seen, wants)
+        return encode({**header, **told}, arrays), (self._log.end, self._history.end)
+
+    def _drawn(
+        self, frame: Frame, log_seen: tuple[int, int], wants: Wants
+    ) -> tuple[dict[str, Any], dict[str, tuple[str, np.ndarray]]]:
+        """Part of a frame message that tells of the bodies, and its arrays."""
+        poses = [self._pose(frame, body) for body in range(len(self._bodies))]
+        pairs = list(zip(self._bodies, poses, strict=True))
+        pictures = [body.picture(wants.field, pose, wants.cutaway, wants.full_scale) for body, pose in pairs]
+        strains = [body.fields.largest_strain(pose) for body, pose in pairs]
+        log, moved = self._log.since(log_seen[0]), self._history.since(log_seen[1])
+        header = {
+            "contacts": [self._contact_header(contact) for contact in frame.contacts],
             "strain": max(strains),
             "bodies": [{"strain": strain} for strain in strains],
             "motion": self._motion_header(),
             "fields": [picture.header for picture in pictures],
             "interior": [picture.interior for picture in pictures],
-            "poses": coded.headers,
             "recording": self.recorder.header(),
             "replay": self._replay_header(),
         }
         rows = {"log": ("f4", thinned(log, self.log_sent, 2)), "history": ("f4", thinned(moved, self.log_sent))}
-        return encode(header, {**by_body(coded.arrays), **rows}), (self._log.end, self._history.end)
+        return header, {**numbered([picture.arrays for picture in pictures]), **rows}
 
     def _motion_header(self) -> dict[str, Any] | None:
         """Part of a frame message that tells of the motion; the watched node as the vertex that is drawn for it."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +62,3 @@ def outline(tool: ShapeTable, folder: Path) -> tuple[dict[str, Any], dict[str, t
     header = {"shape": kind, "lengths": list(lengths), "radius": radius_of(tool, folder)}
     places, corners = np.array(vertices, dtype=float), np.array(triangles, dtype=np.uint32)
     return header, {"vertices": ("f4", places.reshape(-1, 3)), "triangles": ("u4", corners.reshape(-1, 3))}
-
-
-def by_tool(arrays: Sequence[dict[str, tuple[str, np.ndarray]]]) -> dict[str, tuple[str, np.ndarray]]:
-    """Arrays of several tools under the names they have in a message."""
-    return {f"tools/{tool}/{name}": array for tool, mine in enumerate(arrays) for name, array in mine.items()}

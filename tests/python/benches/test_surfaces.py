@@ -11,13 +11,9 @@ def test_frames_are_measured_whole_and_by_fewer_triangles():
     whole, fewer = surfaces.run([5000], most=(None, 1500), page=False)
     assert whole.triangles == whole.drawn == fewer.triangles == 5000
     assert 1350 < fewer.drawn <= 1500
-    # With the field 7 bytes a node in 16 bits, 13 in 32; where nothing moves two masks.
-    nodes = 51 * 51
-    assert whole.float_kb == pytest.approx(13e-3 * nodes)
-    assert whole.whole_kb == pytest.approx(7e-3 * nodes, abs=0.5)
-    assert whole.pressed_kb < whole.whole_kb
-    assert whole.still_kb == pytest.approx(2e-3 * nodes / 8, abs=0.5)
-    assert fewer.pressed_kb < 0.4 * whole.pressed_kb
+    # Three numbers of four bytes a node, and one byte of the field.
+    assert whole.frame_kb == pytest.approx(13e-3 * 51 * 51, abs=0.5)
+    assert fewer.frame_kb < 0.4 * whole.frame_kb
     assert whole.frames_per_second is None
 
 

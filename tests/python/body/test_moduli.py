@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from conftest import box_mesh
 
 import palpate
-from palpate.body import moduli_of_store, surface_moduli
+from palpate import _native
+from palpate.body import problem_arrays, surface_moduli
+from palpate.scene import BuiltBody
+from palpate.simulation.arguments import body_arguments
 
+UNPLACED = {"materials": {"0": [5e3, 0.45, 1000.0], "1": [40e3, 0.3, 1000.0]}}
 SOFT, STIFF = palpate.Material(5e3, 0.45), palpate.Material(40e3, 0.3)
 
 
@@ -36,9 +42,10 @@ def test_a_bare_store_of_two_materials_is_touched_as_its_body_is(tmp_path):
     body = two_halves()
     store = tmp_path / "halves.palpate"
     green = palpate.precompute(body, precision="f64", path=store, progress=False)
-    known = moduli_of_store(green.description, len(green.surface_nodes))
+    *known, of_one_material = green._core.surface_moduli()
     for found, expected in zip(known, surface_moduli(body), strict=True):
         assert np.array_equal(found, expected)
+    assert not of_one_material
     top = green.surface_positions[:, 2].max()
     path = np.array([0.07, 0.02, top + 0.005]) - np.linspace(-1e-4, 1e-3, 50)[:, None] * [0, 0, 1]
     limits = {"device": {"ramp": 0}, "view": {"strain_limit": 0}}
@@ -48,9 +55,10 @@ def test_a_bare_store_of_two_materials_is_touched_as_its_body_is(tmp_path):
     assert np.array_equal(bare, palpate.Simulation(whole).run(path))
 
 
-def test_an_older_store_of_several_materials_is_refused():
-    older = {"materials": {"0": [5e3, 0.45, 1000.0], "1": [40e3, 0.3, 1000.0]}}
+def test_a_store_that_does_not_say_where_its_materials_are_is_refused_under_the_local_law():
+    body = two_halves()
+    core = _native.GreenCore.precompute(problem_arrays(body, None), "f64", json.dumps(UNPLACED), None)
+    bare = BuiltBody(None, palpate.GreensFunction(core))
+    assert body_arguments(bare, local=False)[-1] is None
     with pytest.raises(palpate.BodyError, match="compute it again"):
-        moduli_of_store(older, 3)
-    young, poisson = moduli_of_store({"materials": {"all": [5e3, 0.45, 1000.0]}}, 3)
-    assert young.tolist() == [5e3] * 3 and poisson.tolist() == [0.45] * 3
+        body_arguments(bare, local=True)

@@ -162,9 +162,3 @@ def test_a_limit_out_of_range_is_refused_with_its_line(tmp_path, value):
     (tmp_path / "a.toml").write_text(f'[body]\nmodel = "beam"\n[view]\nstrain_limit = {value}\n')
     with pytest.raises(palpate.SceneError, match=r"a.toml:4: view.strain_limit"):
         palpate.Scene.read(tmp_path / "a.toml")
-
-
-def test_the_former_name_of_the_limit_is_refused_with_the_new_one(tmp_path):
-    (tmp_path / "a.toml").write_text('[body]\nmodel = "beam"\n[view]\nhold_strain = 0.1\n')
-    with pytest.raises(palpate.SceneError, match=r"a.toml:4: .*'view.hold_strain'; did you mean 'strain_limit'"):
-        palpate.Scene.read(tmp_path / "a.toml")

@@ -1,19 +1,19 @@
 // Frames between their arrival and the picture: each is acknowledged once it was taken in and shown.
 
-import type { PosedFrame } from "./protocol";
+import type { FrameData } from "./protocol";
 
 export class FrameQueue {
-  private pending: PosedFrame[] = [];
+  private pending: FrameData[] = [];
   private taken: number[] = [];
 
   constructor(private readonly acknowledge: (frame: number) => void) {}
 
-  push(frame: PosedFrame): void {
+  push(frame: FrameData): void {
     this.pending.push(frame);
   }
 
   /** What has arrived since the last call, oldest first. The server still counts on an answer to each. */
-  take(): PosedFrame[] {
+  take(): FrameData[] {
     const frames = this.pending.splice(0);
     this.taken.push(...frames.map((frame) => frame.header.frame));
     return frames;

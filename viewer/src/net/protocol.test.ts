@@ -79,11 +79,11 @@ describe("a malformed binary message", () => {
     ["with an array before its start", { ...frame, arrays: [{ ...entry, offset: -4 }] }, "goes beyond its message"],
     ["with an array of no place", { ...frame, arrays: [{ ...entry, offset: null, shape: [NaN] }] }, "goes beyond"],
     ["without the log", frame, "without the array 'log'"],
-    ["without a body's pose", { ...frame, bodies: [{}], arrays: [entry] }, "without the array '0/moved'"],
+    ["without a body's pose", { ...frame, bodies: [{}], arrays: [entry] }, "without the array '0/displacements'"],
     [
-      "with steps of another kind",
-      { ...frame, bodies: [{}], arrays: ["moved", "colored", "scalar", "steps"].map((name) => ({ ...entry, name: `0/${name}` })) },
-      "without the array '0/steps'",
+      "with displacements of another kind",
+      { ...frame, bodies: [{}], arrays: ["displacements", "scalar"].map((name) => ({ ...entry, name: `0/${name}` })) },
+      "without the array '0/displacements'",
     ],
   ])("%s is refused", (_what, header, reason) => {
     expect(() => decodeBinary(encoded(header, new Uint8Array(8)))).toThrow(reason);

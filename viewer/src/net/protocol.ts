@@ -5,10 +5,9 @@
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
 import type { ComputedMessage, PaintMessage } from "./computed_messages";
-import type { CodedArrays, PoseArrays, PoseMessage } from "./poses";
 import type { RecordedMessage, RecordingStatus, ReplayFrame, ReplayScene, SessionCommand } from "./session_messages";
 
-export const PROTOCOL_VERSION = 10;
+export const PROTOCOL_VERSION = 11;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -227,8 +226,6 @@ export interface FrameMessage {
   /** For each body, what its colours show and whether all of its nodes are sent. */
   fields: FieldMessage[];
   interior: boolean[];
-  /** How the pose of each body is coded. */
-  poses: PoseMessage[];
   recording: RecordingStatus | null;
   /** With the settings of the tick. */
   replay: (ReplayFrame & { settings: SettingsMessage }) | null;
@@ -236,25 +233,21 @@ export interface FrameMessage {
   loudness?: number;
 }
 
-
 export interface SceneData {
   header: SceneMessage;
   bodies: BodyArrays[];
   tools: ToolArrays[];
 }
 
-export interface FrameData extends FrameRows {
-  header: FrameMessage;
-  bodies: CodedArrays[];
+/** Of one body: a row of displacements, m, and scalar is a surface node, or any node if the inside is shown. */
+export interface PoseArrays {
+  displacements: Float32Array;
+  scalar: Uint8Array;
 }
 
-/** A frame whose poses are decoded. */
-export interface PosedFrame extends FrameRows {
+export interface FrameData {
   header: FrameMessage;
   bodies: PoseArrays[];
-}
-
-interface FrameRows {
   /** Rows of time, force of the first tool, computing time in us. */
   log: Float32Array;
   /** Body time, displacement of the watched node, kinetic, strain and total energy in J, work on the body since the start. */
@@ -323,7 +316,7 @@ export type ClientMessage =
   | { type: "cutaway"; on: boolean }
   | { type: "field"; name: string; max?: number }
   | { type: "answer"; found: boolean }
-  | { type: "ack"; frame: number; whole?: true }
+  | { type: "ack"; frame: number }
   | PaintMessage
   | SessionCommand;
 
@@ -340,7 +333,7 @@ const BODY_ARRAYS = {
   owners: Uint32Array,
 };
 const TOOL_ARRAYS = { vertices: Float32Array, triangles: Uint32Array };
-const CODED_ARRAYS = { moved: Uint8Array, colored: Uint8Array, scalar: Uint8Array };
+const POSE_ARRAYS = { displacements: Float32Array, scalar: Uint8Array };
 
 interface ArrayEntry {
   name: string;
@@ -349,14 +342,12 @@ interface ArrayEntry {
   offset: number;
 }
 
-type AnyArray = Float32Array | Uint32Array | Uint8Array | Int8Array | Int16Array;
+type AnyArray = Float32Array | Uint32Array | Uint8Array;
 type ArrayKind = new (buffer: ArrayBuffer, offset: number, length: number) => AnyArray;
 const KINDS: Record<string, ArrayKind & { BYTES_PER_ELEMENT: number }> = {
   f4: Float32Array,
   u4: Uint32Array,
   u1: Uint8Array,
-  i1: Int8Array,
-  i2: Int16Array,
 };
 
 /** Reads a text message; throws on anything else. */
@@ -387,7 +378,7 @@ export function decodeBinary(buffer: ArrayBuffer): SceneData | FrameData {
   }
   return {
     header: header as unknown as FrameMessage,
-    bodies: bodies.map((_, i) => ({ ...group(arrays, `${i}/`, CODED_ARRAYS), steps: stepsOf(arrays, `${i}/steps`) })),
+    bodies: bodies.map((_, i) => group(arrays, `${i}/`, POSE_ARRAYS)),
     ...group(arrays, "", { log: Float32Array, history: Float32Array }),
   };
 }
@@ -414,13 +405,6 @@ function viewArray(buffer: ArrayBuffer, start: number, { name, dtype, shape, off
   const end = start + offset + count * kind.BYTES_PER_ELEMENT;
   if (!whole || end > buffer.byteLength) throw new Error(`array '${name}' goes beyond its message`);
   return new kind(buffer, start + offset, count);
-}
-
-/** Steps of a pose, which come in as few bytes as they need. */
-function stepsOf(arrays: Map<string, AnyArray>, name: string): Int8Array | Int16Array {
-  const array = arrays.get(name);
-  if (!(array instanceof Int8Array || array instanceof Int16Array)) throw new Error(`a message without the array '${name}'`);
-  return array;
 }
 
 /** Arrays whose names have a prefix, each of the kind that it must have. */

@@ -2,8 +2,7 @@
 
 import * as THREE from "three";
 
-import type { PoseArrays } from "../net/poses";
-import type { BodyArrays, BodyMessage, Vec3 } from "../net/protocol";
+import type { BodyArrays, BodyMessage, PoseArrays, Vec3 } from "../net/protocol";
 import type { Layer, Theme } from "../store";
 import { ColorMap } from "./color_map";
 import { FIELD, REGION, tissueColor } from "./field_material";

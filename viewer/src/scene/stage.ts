@@ -2,7 +2,7 @@
 
 import * as THREE from "three";
 
-import type { PosedFrame, FrameMessage, SceneData } from "../net/protocol";
+import type { FrameData, FrameMessage, SceneData } from "../net/protocol";
 import { grouped } from "../regions";
 import { isGrowing, touchStates } from "../painting";
 import type { Store, Stroke, Theme } from "../store";
@@ -79,7 +79,7 @@ export class Stage {
   }
 
   /** Moves to a frame and tells whether the picture changes: bodies at rest are not drawn again and again. */
-  update({ header, bodies }: PosedFrame): boolean {
+  update({ header, bodies }: FrameData): boolean {
     const { motion } = header;
     let changed = false;
     this.bodies.forEach((body, i) => {

@@ -2,7 +2,7 @@
 
 import type uPlot from "uplot";
 
-import type { PosedFrame } from "../net/protocol";
+import type { FrameData } from "../net/protocol";
 import { shownTool } from "../store";
 import type { Store, Tab } from "../store";
 import { byId } from "./dom";
@@ -73,7 +73,7 @@ export class Plots {
   }
 
   /** Takes in what a frame carries, drawn or not. */
-  append({ header, log, history }: PosedFrame): void {
+  append({ header, log, history }: FrameData): void {
     // A replay that went back makes rows again that were shown before.
     const restarts = header.replay?.restarts ?? 0;
     if (restarts !== this.restarts) {

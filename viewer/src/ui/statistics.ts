@@ -11,8 +11,8 @@ export class Statistics {
   /** Frames that were drawn. */
   frames = 0;
   framesPerSecond = 0;
-  /** What the page itself took for all frames so far: to read their poses, and to move what is drawn; ms. */
-  readonly tookMs = { read: 0, move: 0 };
+  /** What the page itself took to move what is drawn, for all frames so far, ms. */
+  tookMs = 0;
   private readonly compute = cells("stat-compute");
   private readonly wakeup = cells("stat-wakeup");
   private shownMs = 0;
@@ -25,11 +25,11 @@ export class Statistics {
     });
   }
 
-  /** Does a part of the work on a frame, and adds what it took. */
-  timed<Result>(part: "read" | "move", work: () => Result): Result {
+  /** Does the work on a frame, and adds what it took. */
+  timed<Result>(work: () => Result): Result {
     const startMs = performance.now();
     const result = work();
-    this.tookMs[part] += performance.now() - startMs;
+    this.tookMs += performance.now() - startMs;
     return result;
   }
 

@@ -10,9 +10,11 @@
 //! and a released one is pushed by its own share of `F`. Without loads this
 //! is equations 3.8-3.10 of Jun, Choi and Cho with `C = -E^T Psi E`, written without the term that cancels on `S`.
 
+mod change;
 mod error;
 mod rigid;
 
+pub use change::{Change, Sorted};
 use error::{Noise, relative_error};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};

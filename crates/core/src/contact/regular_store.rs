@@ -1,19 +1,15 @@
 //! The regular compliance in a file beside the body's store: safetensors, found by content key, replaced only by rename.
 
-use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
-
-use super::regular::{CompliantBody, FIELDS, FanFields, RegularCompliance};
-use crate::files::{unwritten, write_whole};
-use crate::header::{head_of, is_sealed, seal_file, unsealed};
-use crate::{Error, Result};
+use super::regular::{CompliantBody, FIELDS, RegularCompliance};
+use crate::Result;
+use crate::arrays_file::ArraysKind;
 
 /// Version of what is computed and of the file's layout; part of the key.
-const VERSION: u32 = 5;
-const FORMAT: &str = "palpate-contact";
+const VERSION: u32 = 6;
+const KIND: ArraysKind = ArraysKind { format: "palpate-contact", name: "file of contacts", version: VERSION };
 /// Ending of the files, behind the beginning of the key.
 const ENDING: &str = "contact.palpate";
 /// Digits of the key in the name of a file.
@@ -88,41 +84,16 @@ fn key(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> String {
 }
 
 fn save(computed: &RegularCompliance, path: &Path, key: &str) -> Result<()> {
-    let bytes: &[u8] = bytemuck::cast_slice(&computed.fields);
-    let metadata = HashMap::from([
-        ("format".to_string(), FORMAT.to_string()),
-        ("key".to_string(), key.to_string()),
-        ("checksum".to_string(), checksum(bytes)),
-        unsealed(),
-    ]);
-    let failed = |e| unwritten(path, e);
     let shape = vec![computed.fields.len(), FIELDS];
-    let views = [("fields", TensorView::new(Dtype::F64, shape, bytes).map_err(failed)?)];
-    write_whole(path, |partial| {
-        safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed)?;
-        seal_file(partial).map_err(|source| Error::Io { path: path.to_owned(), source })
-    })
+    KIND.write(path, &[("key", key)], &[("fields", shape, computed.fields.as_flattened())])
 }
 
 /// None for a file that is not there, of another key, damaged, or of another surface.
 fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
-    let bytes = fs::read(path).ok()?;
-    let (_, header) = SafeTensors::read_metadata(&bytes).ok()?;
-    let metadata = header.metadata().clone()?;
-    let tensors = SafeTensors::deserialize(&bytes).ok()?;
-    let tensor = tensors.tensor("fields").ok()?;
-    let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
-    let entry = |bytes: &[u8]| -> FanFields { std::array::from_fn(|i| number(&bytes[8 * i..8 * (i + 1)])) };
-    let whole = tensor.dtype() == Dtype::F64 && tensor.shape() == [fans, FIELDS];
-    let right = whole
-        && is_sealed(head_of(&bytes)?)
-        && metadata.get("key")? == key
-        && metadata.get("checksum")? == &checksum(tensor.data());
-    right.then(|| RegularCompliance { fields: tensor.data().chunks_exact(8 * FIELDS).map(entry).collect() })
-}
-
-fn checksum(bytes: &[u8]) -> String {
-    blake3::hash(bytes).to_hex().to_string()
+    let mut file = KIND.read(path).ok()?;
+    let (shape, numbers) = file.take("fields").ok()?;
+    let right = shape == [fans, FIELDS] && file.text("key") == key;
+    right.then(|| RegularCompliance { fields: numbers.as_chunks().0.to_vec() })
 }
 
 #[cfg(test)]

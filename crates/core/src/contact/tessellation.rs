@@ -87,17 +87,20 @@ impl Tessellation {
 
     /// Corners of a piece, m; the pieces of triangle `t` begin at `t` times [`Self::pieces_of_triangle`].
     pub fn corners(&self, piece: u32) -> [DVec3; 3] {
+        self.ranks(piece).map(|rank| self.vertices[rank])
+    }
+
+    /// Ranks of the corners of a piece among the vertices.
+    fn ranks(&self, piece: u32) -> [usize; 3] {
         let (triangle, own) = (piece as usize / self.corners.len(), piece as usize % self.corners.len());
         let first = triangle * (self.divisions + 1) * (self.divisions + 2) / 2;
-        self.corners[own].map(|corner| self.vertices[first + usize::from(corner)])
+        self.corners[own].map(|corner| first + usize::from(corner))
     }
 
     /// For each edge `(k, k + 1)` of a piece how much the surface bulges over it, four times over its middle, m: with the normals
     /// at its ends `(n_1 - n_0).(x_1 - x_0) / 2`.
     pub fn bends(&self, piece: u32) -> [f64; 3] {
-        let (triangle, own) = (piece as usize / self.corners.len(), piece as usize % self.corners.len());
-        let first = triangle * (self.divisions + 1) * (self.divisions + 2) / 2;
-        let ranks = self.corners[own].map(|corner| first + usize::from(corner));
+        let ranks = self.ranks(piece);
         std::array::from_fn(|k| {
             let (from, to) = (ranks[k], ranks[(k + 1) % 3]);
             0.5 * (self.normals[to] - self.normals[from]).dot(self.vertices[to] - self.vertices[from])

@@ -1,18 +1,13 @@
 //! A modal basis in a file: safetensors, checked by content key and checksums, replaced only by rename.
 
-use std::collections::HashMap;
-use std::fs;
 use std::path::Path;
 
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
-
-use crate::files::{unwritten, write_whole};
-use crate::header::{head_of, is_sealed, seal_file, unsealed};
-use crate::{Error, Result};
+use crate::Result;
+use crate::arrays_file::ArraysKind;
 
 /// Version of the file's layout; part of the key.
-pub const BASIS_VERSION: u32 = 2;
-const FORMAT: &str = "palpate-modes";
+pub const BASIS_VERSION: u32 = 3;
+const KIND: ArraysKind = ArraysKind { format: "palpate-modes", name: "file of modes", version: BASIS_VERSION };
 
 /// Modes of a body.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,81 +39,21 @@ impl Basis {
     /// # Errors
     /// The operating system's, with nothing left behind.
     pub fn save(&self, path: &Path) -> Result<()> {
-        write_whole(path, |partial| self.write(partial, path))
-    }
-
-    fn write(&self, partial: &Path, path: &Path) -> Result<()> {
-        let metadata = HashMap::from([
-            ("format".to_string(), FORMAT.to_string()),
-            ("version".to_string(), BASIS_VERSION.to_string()),
-            ("key".to_string(), self.key.clone()),
-            ("description".to_string(), self.description.clone()),
-            ("checksum".to_string(), self.checksum()),
-            unsealed(),
-        ]);
-        let failed = |e| unwritten(path, e);
         let modes = self.eigenvalues.len();
         let rows = self.shapes.len() / modes.max(1);
-        let view = |shape: Vec<usize>, data| TensorView::new(Dtype::F64, shape, data).map_err(failed);
-        let views = [
-            ("eigenvalues", view(vec![modes], bytemuck::cast_slice(&self.eigenvalues))?),
-            ("shapes", view(vec![rows, modes], bytemuck::cast_slice(&self.shapes))?),
-        ];
-        safetensors::serialize_to_file(views, Some(metadata), partial).map_err(failed)?;
-        seal_file(partial).map_err(|source| Error::Io { path: path.to_owned(), source })
+        let arrays =
+            [("eigenvalues", vec![modes], &self.eigenvalues[..]), ("shapes", vec![rows, modes], &self.shapes[..])];
+        KIND.write(path, &[("key", &self.key), ("description", &self.description)], &arrays)
     }
 
     /// Reads and verifies a file.
     ///
     /// # Errors
-    /// [`Error::Store`] that says what is wrong, or the operating system's error.
+    /// [`crate::Error::Store`] that says what is wrong, or the operating system's error.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        let broken = |e| refused(path, format!("is not a file of modes, or is damaged or cut short ({e})"));
-        let (_, header) = SafeTensors::read_metadata(&bytes).map_err(broken)?;
-        let metadata = header.metadata().clone().unwrap_or_default();
-        let field = |name: &str| metadata.get(name).map_or("", String::as_str);
-        if field("format") != FORMAT {
-            return Err(refused(path, "is not a file of modes"));
-        }
-        if field("version") != BASIS_VERSION.to_string() {
-            let version = field("version");
-            return Err(refused(path, format!("has format version {version}, this program reads {BASIS_VERSION}")));
-        }
-        if !head_of(&bytes).is_some_and(is_sealed) {
-            return Err(refused(path, "is damaged: the checksum of its header differs; compute it again"));
-        }
-        let tensors = SafeTensors::deserialize(&bytes).map_err(broken)?;
-        let numbers = |name: &str| -> Result<Vec<f64>> {
-            let tensor = tensors.tensor(name).map_err(broken)?;
-            if tensor.dtype() != Dtype::F64 {
-                return Err(refused(path, format!("is damaged: the type of '{name}' is wrong")));
-            }
-            let number = |bytes: &[u8]| f64::from_le_bytes(std::array::from_fn(|i| bytes[i]));
-            Ok(tensor.data().chunks_exact(8).map(number).collect())
-        };
-        let basis = Self {
-            key: field("key").to_string(),
-            description: field("description").to_string(),
-            eigenvalues: numbers("eigenvalues")?,
-            shapes: numbers("shapes")?,
-        };
-        if basis.checksum() != field("checksum") {
-            return Err(refused(path, "is damaged: its checksum differs; compute it again"));
-        }
-        Ok(basis)
+        let mut file = KIND.read(path)?;
+        let (_, eigenvalues) = file.take("eigenvalues")?;
+        let (_, shapes) = file.take("shapes")?;
+        Ok(Self { key: file.text("key"), description: file.text("description"), eigenvalues, shapes })
     }
-
-    fn checksum(&self) -> String {
-        basis_key(&[
-            self.key.as_bytes(),
-            self.description.as_bytes(),
-            bytemuck::cast_slice(&self.eigenvalues),
-            bytemuck::cast_slice(&self.shapes),
-        ])
-    }
-}
-
-fn refused(path: &Path, reason: impl Into<String>) -> Error {
-    Error::Store { path: path.to_owned(), reason: reason.into() }
 }

@@ -31,6 +31,26 @@
 use glam::{DMat3, DVec3};
 
 use super::precision::Precision;
+use crate::{Error, Result};
+
+/// Answers that may be wrong by more than this are refused, and stores whose touches may be.
+pub const REFUSED_ERROR: f64 = 0.1;
+
+/// Refuses what may be wrong by more than [`REFUSED_ERROR`].
+///
+/// # Errors
+/// [`Error::Precision`], with what it may be wrong by.
+pub fn require_right(what: &str, error: f64) -> Result<()> {
+    // Not a number is refused, too.
+    if error <= REFUSED_ERROR {
+        return Ok(());
+    }
+    let (wrong, most) = (100.0 * error, 100.0 * REFUSED_ERROR);
+    Err(Error::Precision(format!(
+        "{what} may be wrong by {wrong:.2} %, more than the {most} % allowed: compute the store with more digits \
+         (--precision), or prescribe fewer neighbouring nodes"
+    )))
+}
 
 /// Standard deviations of the noise of rounding that are stated. Rounding is even within half a unit, whose largest
 /// value stands for the deviation: five true ones.

@@ -4,7 +4,7 @@
 
 use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
 
-use libloading::Library;
+use crate::library::api;
 
 /// A device's number. `c_char` has a sign on some systems and none on others.
 pub type Id = c_char;
@@ -54,33 +54,6 @@ pub mod force_off {
     pub const NONE: c_int = 0;
     pub const BUTTON: c_int = 1;
     pub const DEAD_MAN: c_int = 6;
-}
-
-macro_rules! api {
-    (
-        needed { $($(#[$doc:meta])* $field:ident = $symbol:literal: $signature:ty;)* }
-        optional { $($extra:ident = $name:literal: $kind:ty;)* }
-    ) => {
-        /// The functions, as they lie in a library that is never unloaded.
-        pub struct Api {
-            $($(#[$doc])* pub $field: $signature,)*
-            $(pub $extra: Option<$kind>,)*
-        }
-
-        impl Api {
-            /// Finds them.
-            pub fn bind(library: &'static Library) -> Result<Self, libloading::Error> {
-                // SAFETY: the types are those of the vendor's header for these names. The pointers stay valid, for the
-                // library is never unloaded.
-                unsafe {
-                    Ok(Self {
-                        $($field: *library.get::<$signature>($symbol)?,)*
-                        $($extra: library.get::<$kind>($name).ok().map(|symbol| *symbol),)*
-                    })
-                }
-            }
-        }
-    };
 }
 
 api! {

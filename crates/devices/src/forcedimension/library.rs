@@ -12,11 +12,7 @@ use crate::{Connection, DeviceFault, OpenError};
 const SEARCH: Search = Search {
     product: "Force Dimension's SDK",
     variable: "PALPATE_FORCEDIMENSION_LIBRARY",
-    names: if cfg!(target_os = "macos") {
-        &["libdrd.dylib", "libdhd.dylib"]
-    } else {
-        &["libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"]
-    },
+    names: &["libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"],
     // The first is what bindings of the SDK agree on.
     folders: &[("FDSDK", "lib"), ("FDSDK", "lib/release/lin-x86_64-gcc"), ("FDSDK", "bin")],
     advice: "install the Force Dimension SDK 3",

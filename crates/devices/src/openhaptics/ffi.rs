@@ -5,7 +5,7 @@
 use std::ffi::{c_char, c_double, c_int, c_uint, c_ulong, c_ushort, c_void};
 use std::mem::{offset_of, size_of};
 
-use libloading::Library;
+use crate::library::api;
 
 /// A device.
 pub type Handle = c_uint;
@@ -87,42 +87,27 @@ pub mod error {
     pub const COMMUNICATION: Enum = 0x0302;
 }
 
-macro_rules! api {
-    ($($(#[$doc:meta])* $field:ident = $symbol:literal: $signature:ty;)*) => {
-        /// The functions, as they lie in a library that is never unloaded.
-        pub struct Api {
-            $($(#[$doc])* pub $field: $signature,)*
-        }
-
-        impl Api {
-            /// Finds them.
-            pub fn bind(library: &'static Library) -> Result<Self, libloading::Error> {
-                // SAFETY: the types are those of the vendor's header for these names. The pointers stay valid, for the
-                // library is never unloaded.
-                unsafe { Ok(Self { $($field: *library.get::<$signature>($symbol)?,)* }) }
-            }
-        }
-    };
-}
-
 api! {
-    init_device = c"hdInitDevice": unsafe extern "system" fn(*const c_char) -> Handle;
-    disable_device = c"hdDisableDevice": unsafe extern "system" fn(Handle);
-    make_current = c"hdMakeCurrentDevice": unsafe extern "system" fn(Handle);
-    enable = c"hdEnable": unsafe extern "system" fn(Enum);
-    begin_frame = c"hdBeginFrame": unsafe extern "system" fn(Handle);
-    end_frame = c"hdEndFrame": unsafe extern "system" fn(Handle);
-    get_booleans = c"hdGetBooleanv": unsafe extern "system" fn(Enum, *mut u8);
-    get_integers = c"hdGetIntegerv": unsafe extern "system" fn(Enum, *mut c_int);
-    get_doubles = c"hdGetDoublev": unsafe extern "system" fn(Enum, *mut c_double);
-    get_string = c"hdGetString": unsafe extern "system" fn(Enum) -> *const c_char;
-    set_doubles = c"hdSetDoublev": unsafe extern "system" fn(Enum, *const c_double);
-    get_error = c"hdGetError": unsafe extern "system" fn() -> ErrorInfo;
-    error_string = c"hdGetErrorString": unsafe extern "system" fn(Enum) -> *const c_char;
-    check_calibration = c"hdCheckCalibration": unsafe extern "system" fn() -> Enum;
-    update_calibration = c"hdUpdateCalibration": unsafe extern "system" fn(Enum);
-    schedule = c"hdScheduleAsynchronous": unsafe extern "system" fn(Callback, *mut c_void, c_ushort) -> SchedulerHandle;
-    unschedule = c"hdUnschedule": unsafe extern "system" fn(SchedulerHandle);
-    start_scheduler = c"hdStartScheduler": unsafe extern "system" fn();
-    stop_scheduler = c"hdStopScheduler": unsafe extern "system" fn();
+    needed {
+        init_device = c"hdInitDevice": unsafe extern "system" fn(*const c_char) -> Handle;
+        disable_device = c"hdDisableDevice": unsafe extern "system" fn(Handle);
+        make_current = c"hdMakeCurrentDevice": unsafe extern "system" fn(Handle);
+        enable = c"hdEnable": unsafe extern "system" fn(Enum);
+        begin_frame = c"hdBeginFrame": unsafe extern "system" fn(Handle);
+        end_frame = c"hdEndFrame": unsafe extern "system" fn(Handle);
+        get_booleans = c"hdGetBooleanv": unsafe extern "system" fn(Enum, *mut u8);
+        get_integers = c"hdGetIntegerv": unsafe extern "system" fn(Enum, *mut c_int);
+        get_doubles = c"hdGetDoublev": unsafe extern "system" fn(Enum, *mut c_double);
+        get_string = c"hdGetString": unsafe extern "system" fn(Enum) -> *const c_char;
+        set_doubles = c"hdSetDoublev": unsafe extern "system" fn(Enum, *const c_double);
+        get_error = c"hdGetError": unsafe extern "system" fn() -> ErrorInfo;
+        error_string = c"hdGetErrorString": unsafe extern "system" fn(Enum) -> *const c_char;
+        check_calibration = c"hdCheckCalibration": unsafe extern "system" fn() -> Enum;
+        update_calibration = c"hdUpdateCalibration": unsafe extern "system" fn(Enum);
+        schedule = c"hdScheduleAsynchronous": unsafe extern "system" fn(Callback, *mut c_void, c_ushort) -> SchedulerHandle;
+        unschedule = c"hdUnschedule": unsafe extern "system" fn(SchedulerHandle);
+        start_scheduler = c"hdStartScheduler": unsafe extern "system" fn();
+        stop_scheduler = c"hdStopScheduler": unsafe extern "system" fn();
+    }
+    optional {}
 }

@@ -10,11 +10,7 @@ use crate::{Connection, OpenError};
 const SEARCH: Search = Search {
     product: "OpenHaptics (HD)",
     variable: "PALPATE_OPENHAPTICS_LIBRARY",
-    names: if cfg!(target_os = "macos") {
-        &["libHD.dylib"]
-    } else {
-        &["libHD.so", "libHD.so.3.5", "libHD.so.3.4", "libHD.so.3.0", "libHD.so.3"]
-    },
+    names: &["libHD.so", "libHD.so.3.5", "libHD.so.3.4", "libHD.so.3.0", "libHD.so.3"],
     folders: &[("GTDD_HOME", "lib"), ("OH_SDK_BASE", "lib")],
     advice: "install 3D Systems' device driver and OpenHaptics 3",
 };

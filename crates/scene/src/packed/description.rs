@@ -85,13 +85,13 @@ pub struct ToolDescription {
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(rename_all = "lowercase", tag = "kind", deny_unknown_fields)]
-pub enum ShapeDescription {
-    Sphere { radius: f64 },
-    Ellipsoid { semi_axes: [f64; 3] },
-    Capsule { radius: f64, length: f64 },
-    Punch { radius: f64, rounding: f64 },
-    Surface { arrays: ArrayFile },
+#[serde(deny_unknown_fields)]
+pub struct ShapeDescription {
+    pub kind: String,
+    /// As [`palpate_core::contact::shape::ToolShape::of_lengths`] takes them; zeros of a surface.
+    pub lengths: [f64; 3],
+    /// Vertices and triangles of a surface.
+    pub arrays: Option<ArrayFile>,
 }
 
 #[derive(Debug, Deserialize)]

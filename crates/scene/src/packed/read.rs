@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_core::contact::Moduli;
-use palpate_core::contact::shape::{SurfaceShape, ToolShape};
+use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::{Newmark, Rayleigh};
 use palpate_core::fem::{Isotropic, Supports, stiffness};
 use palpate_core::green::{GreensFunction, Interior};
@@ -29,7 +29,7 @@ use crate::tool::Tool;
 /// The file that describes the scene.
 pub const SCENE_FILE: &str = "scene.json";
 const FORMAT: &str = "palpate-scene";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Reads the scene of a folder.
 ///
@@ -136,17 +136,13 @@ fn strain(arrays: &Arrays, green: &GreensFunction) -> Result<StrainMeasure> {
 }
 
 fn tool(folder: &Path, described: ToolDescription) -> Result<Tool> {
-    let shape = match described.shape {
-        ShapeDescription::Sphere { radius } => ToolShape::sphere(radius)?,
-        ShapeDescription::Ellipsoid { semi_axes } => ToolShape::ellipsoid(semi_axes.into())?,
-        ShapeDescription::Capsule { radius, length } => ToolShape::capsule(radius, 0.5 * length)?,
-        ShapeDescription::Punch { radius, rounding } => ToolShape::punch(radius, rounding)?,
-        ShapeDescription::Surface { arrays } => {
+    let ShapeDescription { kind, lengths, arrays } = described.shape;
+    let shape = match arrays {
+        None => ToolShape::of_lengths(&kind, lengths)?,
+        Some(arrays) => {
             let arrays = Arrays::read(folder, &arrays)?;
             let vertices: Vec<[f64; 3]> = arrays.numbers("vertices", Dtype::F64, 3)?;
-            let vertices: Vec<DVec3> = vertices.into_iter().map(DVec3::from).collect();
-            let triangles: Vec<[u32; 3]> = arrays.numbers("triangles", Dtype::U32, 3)?;
-            ToolShape::Surface(Box::new(SurfaceShape::new(&vertices, &triangles)?))
+            ToolShape::surface(&vertices, &arrays.numbers::<[u32; 3]>("triangles", Dtype::U32, 3)?)?
         }
     };
     let unknown = || Error::Invalid(format!("there is no contact law '{}'", described.law));

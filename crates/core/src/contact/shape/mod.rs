@@ -55,6 +55,30 @@ pub struct LineEntry {
 }
 
 impl ToolShape {
+    /// A shape of a kind by its lengths, m: radius of a sphere, semi-axes of an ellipsoid, radius of a capsule and length of its
+    /// cylinder, radius of a punch and rounding of its rim.
+    ///
+    /// # Errors
+    /// A kind that has no lengths, or lengths that are not positive.
+    pub fn of_lengths(kind: &str, [a, b, c]: [f64; 3]) -> Result<Self> {
+        match kind {
+            "sphere" => Self::sphere(a),
+            "ellipsoid" => Self::ellipsoid(DVec3::new(a, b, c)),
+            "capsule" => Self::capsule(a, 0.5 * b),
+            "punch" => Self::punch(a, b),
+            other => Err(Error::Invalid(format!("there is no shape '{other}'"))),
+        }
+    }
+
+    /// A closed surface of vertices, m, and triangles.
+    ///
+    /// # Errors
+    /// See [`SurfaceShape::new`].
+    pub fn surface(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<Self> {
+        let vertices: Vec<DVec3> = vertices.iter().map(|&v| v.into()).collect();
+        Ok(Self::Surface(Box::new(SurfaceShape::new(&vertices, triangles)?)))
+    }
+
     /// A sphere.
     ///
     /// # Errors

@@ -11,6 +11,8 @@ from palpate.body import Body
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation import Simulation
+from palpate.validation.verify.contact.reference import top_nodes
+from palpate.validation.verify.solution import green_of
 
 # A device that renders anything at once: what is measured is the law, not the safety stage.
 UNLIMITED = {"max_force": 1e6, "max_slew": 1e12, "ramp": 0.0, "max_stiffness": 1e9}
@@ -77,3 +79,15 @@ def straight(start: Sequence[float], end: Sequence[float], step: float) -> np.nd
     start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     count = max(2, round(np.linalg.norm(end - start) / step) + 1)
     return start + np.linspace(0, 1, count)[:, None] * (end - start)
+
+
+def pressed(body: Body, tool: Mapping[str, Any], height: float, depths: np.ndarray, reach: float) -> np.ndarray:
+    """Return forces (n,), N, along z on a device that presses a tool into the middle of the top, ever deeper.
+
+    The tool's origin is ``height`` over its lowest point, m; nodes within a ``reach`` of the middle may be touched.
+    """
+    simulation = loop_of(body, green_of(body, touch=top_nodes(body, reach)), [tool])
+    low, high = body.mesh.bounds
+    top = np.array([*(low + high)[:2] / 2, high[2] + height])
+    lead = straight(top + (0, 0, 1e-3), top, 5e-5)
+    return simulation.run(np.vstack([lead, top - np.outer(depths, (0, 0, 1))]))[len(lead) :, 2]

@@ -10,15 +10,14 @@ from palpate.body import Body
 from palpate.validation.plots import plot_pressing
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import closed_forms, measures
-from palpate.validation.verify.contact.loop import loop_of, sphere, straight
+from palpate.validation.verify.contact.loop import pressed as pressed_tool
+from palpate.validation.verify.contact.loop import sphere
 from palpate.validation.verify.contact.reference import (
     Block,
     body_on_table,
     finer_in_the_middle,
     sphere_press,
-    top_nodes,
 )
-from palpate.validation.verify.solution import green_of
 
 BLOCK, DEEP = Block(), Block((0.4, 0.4, 0.2))
 RADIUS = 0.01
@@ -45,12 +44,7 @@ def meshes() -> dict[tuple[str, float], Body]:
 
 def pressed(body: Body, depths: np.ndarray, radius: float = RADIUS) -> np.ndarray:
     """Return forces (n,), N, along z on a device that presses a sphere into the middle of the top, ever deeper."""
-    simulation = loop_of(body, green_of(body, touch=top_nodes(body, REACH)), [sphere(radius)])
-    low, high = body.mesh.bounds
-    top = np.array([*(low + high)[:2] / 2, high[2] + radius])
-    lead = straight(top + (0, 0, 1e-3), top, 5e-5)
-    path = top - np.outer(depths, (0, 0, 1))
-    return simulation.run(np.vstack([lead, path]))[len(lead) :, 2]
+    return pressed_tool(body, sphere(radius), radius, depths, REACH)
 
 
 def hertz() -> Outcome:

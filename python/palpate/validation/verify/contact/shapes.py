@@ -11,10 +11,9 @@ import numpy as np
 from palpate.body import Body
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import closed_forms, tools
-from palpate.validation.verify.contact.loop import loop_of, straight
-from palpate.validation.verify.contact.reference import Block, body_on_table, finer_in_the_middle, top_nodes
+from palpate.validation.verify.contact.loop import pressed as pressed_tool
+from palpate.validation.verify.contact.reference import Block, body_on_table, finer_in_the_middle
 from palpate.validation.verify.contact.signorini import Gap
-from palpate.validation.verify.solution import green_of
 
 BLOCK, DEEP = Block(), Block((0.4, 0.4, 0.2))
 DEPTHS = (5e-4, 1e-3, 2e-3)
@@ -68,11 +67,7 @@ def flat_punch(radius: float = 0.006, rounding: float = 0.002) -> Shape:
 
 def pressed(body: Body, shape: Shape, depths: np.ndarray) -> np.ndarray:
     """Return forces (n,), N, along z on a device that presses the tool into the middle of the top, ever deeper."""
-    simulation = loop_of(body, green_of(body, touch=top_nodes(body, REACH)), [shape.table])
-    low, high = body.mesh.bounds
-    top = np.array([*(low + high)[:2] / 2, high[2] + shape.height])
-    lead = straight(top + (0, 0, 1e-3), top, 5e-5)
-    return simulation.run(np.vstack([lead, top - np.outer(depths, (0, 0, 1))]))[len(lead) :, 2]
+    return pressed_tool(body, shape.table, shape.height, depths, REACH)
 
 
 def direct(block: Block, shape: Shape, depth: float) -> float:

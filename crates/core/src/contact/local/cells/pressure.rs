@@ -130,6 +130,11 @@ impl PressureScratch {
             }
         }
         let step = self.step_along_direction(influence, cells);
+        self.go(cells, q, step);
+    }
+
+    /// A step along the direction.
+    fn go(&mut self, cells: usize, q: &mut Grid, step: f64) {
         for j in 0..cells {
             for i in 0..cells {
                 q[j][i] -= step * self.direction[j][i];
@@ -173,12 +178,7 @@ impl PressureScratch {
         if !(0..cells).all(|j| (0..cells).all(|i| stays(j, i))) {
             return false;
         }
-        for j in 0..cells {
-            for i in 0..cells {
-                q[j][i] -= step * self.direction[j][i];
-                self.residual[j][i] -= step * self.image[j][i];
-            }
-        }
+        self.go(cells, q, step);
         true
     }
 
@@ -256,12 +256,7 @@ impl PressureScratch {
         let mut scaled_before = f64::INFINITY;
         for _ in 0..PUNCH_STEPS {
             let step = self.search(influence, cells, q, &mut scaled_before);
-            for j in 0..cells {
-                for i in 0..cells {
-                    p[j][i] -= step * self.direction[j][i];
-                    self.residual[j][i] -= step * self.image[j][i];
-                }
-            }
+            self.go(cells, p, step);
         }
         // 2 sum(p) - p.(residual + 1)
         sum(p) - dot(p, &self.residual)
