@@ -32,6 +32,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("TOOL_SETTINGS", scene::tool_settings())?;
     module.add_function(wrap_pyfunction!(body::stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(green::products, module)?)?;
     module.add_function(wrap_pyfunction!(body::mass, module)?)?;
@@ -67,7 +68,13 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(changes::device_limits, module)?)?;
     module.add_function(wrap_pyfunction!(changes::tool_stiffness, module)?)?;
     module.add_function(wrap_pyfunction!(changes::assume_devices, module)?)?;
-    module.add_function(wrap_pyfunction!(changes::change, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::set_strain_measures, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::add_body, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::replace_body, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::remove_body, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::place_body, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::add_tool, module)?)?;
+    module.add_function(wrap_pyfunction!(changes::remove_tool, module)?)?;
     module.add_class::<replay::Replay>()?;
     module.add_function(wrap_pyfunction!(replay::read_recording, module)?)?;
     module.add_function(wrap_pyfunction!(rerun::rerun, module)?)?;

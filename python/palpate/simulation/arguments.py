@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate import _native
 from palpate.body import moduli_of_store, surface_moduli
 from palpate.errors import BodyError, Error, SceneError
 from palpate.scene import BuiltBody
@@ -29,7 +30,9 @@ def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
     except Error as error:
         path, text = scene.source
         raise SceneError(f"{located(path, text, ['tool', rank, 'shape'])}: tool.shape: {error}") from None
-    return shape, tool.contact_radius, tool.contact, most, tool.friction, tool.pad_youngs_modulus
+    # Settings have the names of their keys in the table.
+    settings = {name: getattr(tool, name) for name in _native.TOOL_SETTINGS}
+    return shape, tool.contact, most, tool.pad_youngs_modulus, settings
 
 
 def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:

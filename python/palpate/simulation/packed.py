@@ -140,7 +140,7 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
 
 
 def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Path) -> dict[str, Any]:
-    (kind, (a, b, c), vertices, triangles), contact_radius, law, max_stiffness, friction, pad = arguments
+    (kind, (a, b, c), vertices, triangles), law, max_stiffness, pad, settings = arguments
     device = scene.device_of(rank)
     shapes = {
         "sphere": {"radius": a},
@@ -155,8 +155,7 @@ def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Pat
     return {
         "shape": {"kind": kind, **shape},
         "law": law,
-        "contact_radius": contact_radius,
-        "friction": friction,
+        **settings,
         "pad_youngs_modulus": pad,
         "max_stiffness": max_stiffness,
         "max_force": device.max_force / device.force_scale,
