@@ -49,7 +49,7 @@ fn measure(scene: &str, positions: &str, passes: usize) -> Result<f64, Box<dyn s
     let positions = numbers.as_chunks::<3>().0.to_vec();
     let (ticks, prepared) = (positions.len(), Scene::load(Path::new(scene))?.prepare()?);
     let device = Path3 { positions, next: 0, latest: Reading::default() };
-    let (model, limits, mut settings) = (prepared.model, prepared.limits, prepared.settings);
+    let (model, limits, settings) = (prepared.model, prepared.limits, prepared.settings);
     let (mut force_loop, mut handle) = ForceLoop::new(model, vec![Box::new(device)], limits, settings)?;
     let _worker = force_loop.limit_strain(&mut handle, prepared.strain)?;
     let mut shortest = f64::INFINITY;
@@ -63,10 +63,7 @@ fn measure(scene: &str, positions: &str, passes: usize) -> Result<f64, Box<dyn s
         let took = begun.elapsed().as_nanos() as f64 / ticks as f64;
         // Another program has kept the processor for a tenth of a second: this pass does not count.
         match handle.latest().status.fault {
-            Some(_) => {
-                settings.resets += 1;
-                handle.set(settings)?;
-            }
+            Some(_) => handle.reset()?,
             None => shortest = shortest.min(took),
         }
     }

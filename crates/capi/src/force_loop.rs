@@ -8,11 +8,11 @@
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use glam::DVec3;
-use palpate_core::simulation::{Pose, Strike};
+use palpate_core::simulation::Pose;
 use palpate_devices::Device;
 use palpate_devices::simulated::{self, simulated};
-use palpate_scene::{BodyId, Prepared, ToolId, unit_quaternion};
-use palpate_servo::{ForceLoop, LoopHandle, Published, SceneChange, Servo, Settings, StrainWorker, check_period};
+use palpate_scene::{BodyId, Prepared, ToolId, carried_over, unit_quaternion};
+use palpate_servo::{ForceLoop, LoopHandle, Published, Servo, StrainWorker, check_period};
 
 use crate::arguments::{hand_out, shared, take_back};
 use crate::device::{DeviceEnd, program_device};
@@ -48,7 +48,6 @@ pub(crate) struct TickSide {
 pub(crate) struct FrameSide {
     pub prepared: Prepared,
     runner: Runner,
-    pub settings: Settings,
     /// The tick that was read last.
     pub latest: Published,
 }
@@ -62,11 +61,7 @@ enum Runner {
 impl FrameSide {
     /// The latest tick.
     pub fn refresh(&mut self) -> &Published {
-        let latest = match &mut self.runner {
-            Runner::Program { handle, .. } => handle.latest(),
-            Runner::Thread { servo, .. } => servo.latest(),
-        };
-        self.latest.clone_from(latest);
+        self.latest.clone_from(self.runner.handle().latest());
         &self.latest
     }
 
@@ -80,13 +75,9 @@ impl FrameSide {
         self.prepared.rank_of_tool(ToolId(handle)).ok_or_else(|| unknown("tool", handle))
     }
 
-    /// Strikes a body in motion.
-    pub fn strike(&mut self, strike: Strike) -> Outcome<()> {
-        match &mut self.runner {
-            Runner::Program { handle, .. } => handle.strike(strike)?,
-            Runner::Thread { servo, .. } => servo.strike(strike)?,
-        }
-        Ok(())
+    /// The end to which changes are sent.
+    pub fn handle(&mut self) -> &mut LoopHandle {
+        self.runner.handle()
     }
 
     /// Refuses devices of the program that cannot be ticked with a time between two ticks, s.
@@ -97,19 +88,27 @@ impl FrameSide {
         Ok(check_period(&self.prepared.model, &self.prepared.devices, period)?)
     }
 
-    /// Changes the settings; one that is refused changes nothing.
-    pub fn set(&mut self, settings: Settings) -> Outcome<()> {
-        match &mut self.runner {
-            Runner::Program { handle, .. } => handle.set(settings)?,
-            Runner::Thread { servo, .. } => servo.set(settings)?,
-        }
-        self.settings = settings;
+    /// Changes a setting of a tool or body, or of the scene (rank 0); one that is refused changes nothing.
+    pub fn set(&mut self, name: &str, rank: usize, value: f64) -> Outcome<()> {
+        let mut settings = self.prepared.settings;
+        settings.set(name, rank, value)?;
+        self.runner.handle().set(settings)?;
+        self.prepared.settings = settings;
         Ok(())
     }
 }
 
+impl Runner {
+    fn handle(&mut self) -> &mut LoopHandle {
+        match self {
+            Self::Program { handle, .. } => handle,
+            Self::Thread { servo, .. } => servo,
+        }
+    }
+}
+
 /// A loop for the program to tick, at rest.
-fn to_be_ticked(prepared: &Prepared, settings: Settings) -> Outcome<(TickSide, Runner)> {
+fn to_be_ticked(prepared: &Prepared) -> Outcome<(TickSide, Runner)> {
     let (ends, devices): (Vec<_>, Vec<_>) = prepared
         .devices
         .iter()
@@ -118,7 +117,8 @@ fn to_be_ticked(prepared: &Prepared, settings: Settings) -> Outcome<(TickSide, R
             (end, Box::new(device) as Box<dyn Device>)
         })
         .unzip();
-    let (mut force_loop, mut handle) = ForceLoop::new(prepared.model.clone(), devices, prepared.limits, settings)?;
+    let (mut force_loop, mut handle) =
+        ForceLoop::new(prepared.model.clone(), devices, prepared.limits, prepared.settings)?;
     let worker = force_loop.limit_strain(&mut handle, prepared.strain.clone())?;
     let side = TickSide { force_loop: Some(force_loop), ends };
     Ok((side, Runner::Program { handle: Box::new(handle), _worker: worker }))
@@ -127,12 +127,9 @@ fn to_be_ticked(prepared: &Prepared, settings: Settings) -> Outcome<(TickSide, R
 impl Loop {
     fn new(graph: &SceneGraph) -> Outcome<Self> {
         let prepared = graph.scene.prepare()?;
-        let (tick, mut runner) = to_be_ticked(&prepared, prepared.settings)?;
-        let latest = match &mut runner {
-            Runner::Program { handle, .. } => handle.latest().clone(),
-            Runner::Thread { servo, .. } => servo.latest().clone(),
-        };
-        let frame = FrameSide { runner, settings: prepared.settings, latest, prepared };
+        let (tick, mut runner) = to_be_ticked(&prepared)?;
+        let latest = runner.handle().latest().clone();
+        let frame = FrameSide { runner, latest, prepared };
         Ok(Self { tick: Mutex::new(tick), frame: Mutex::new(frame), changing: Mutex::new(()), scene: graph.number })
     }
 
@@ -159,9 +156,8 @@ impl Loop {
             return Err(Refusal::state("the loop's own thread runs already"));
         }
         let (targets, devices) = frame.prepared.tools.iter().map(|_| simulated_device()).unzip();
-        let Prepared { model, limits, scheduling, strain, .. } = &frame.prepared;
-        let (model, scheduling, strain) = (model.clone(), scheduling.clone(), strain.clone());
-        let servo = Servo::start(model, devices, *limits, frame.settings, scheduling, strain, None)?;
+        let Prepared { model, limits, settings, scheduling, strain, .. } = frame.prepared.clone();
+        let servo = Servo::start(model, devices, limits, settings, scheduling, strain, None)?;
         // Not before: a start that is refused must not have kept the program from ticking.
         self.try_tick()?.force_loop = None;
         frame.runner = Runner::Thread { servo: Box::new(servo), targets };
@@ -173,7 +169,7 @@ impl Loop {
         if let Runner::Program { .. } = frame.runner {
             return Ok(());
         }
-        let (side, runner) = to_be_ticked(&frame.prepared, frame.settings)?;
+        let (side, runner) = to_be_ticked(&frame.prepared)?;
         // Dropping the servo ends its thread and leaves the devices without a wrench.
         frame.runner = runner;
         *self.tick.lock().unwrap_or_else(PoisonError::into_inner) = side;
@@ -188,34 +184,18 @@ impl Loop {
         let _one_at_a_time = self.changing.lock().unwrap_or_else(PoisonError::into_inner);
         // Beside the loop, frames and settings.
         let before = self.frame().prepared.clone();
-        let (mut next, kept) = graph.scene.prepare_change(&before)?;
+        let (next, kept) = graph.scene.prepare_change(&before)?;
         let mut frame = self.frame();
-        let FrameSide { prepared, runner, settings, latest } = &mut *frame;
+        let FrameSide { prepared, runner, latest } = &mut *frame;
         let Runner::Thread { servo, targets } = runner else {
             return Err(Refusal::state(
                 "the scene changes under the loop's own thread only: call palpate_loop_start first, or make a new loop",
             ));
         };
-        next.settings = settings.carried_over(&next.settings, &kept);
-        // Those of the scene are for loops that are made from now on.
-        (next.limits, next.scheduling) = (before.limits, before.scheduling);
-        let (mut moved, mut devices) = (Vec::new(), Vec::new());
-        for old in &kept.tools[..next.tools.len()] {
-            let (handle, device) = match old {
-                Some(_) => (None, None),
-                None => Some(simulated_device()).unzip(),
-            };
-            moved.push(handle);
-            devices.push(device);
-        }
-        let (model, strain) = (next.model.clone(), next.strain.clone());
-        servo.change(SceneChange { model, kept, devices, settings: next.settings, strain })?;
-        let mut before: Vec<_> = targets.drain(..).map(Some).collect();
-        for (rank, handle) in moved.into_iter().enumerate() {
-            let known = || kept.tools[rank].and_then(|old| before.get_mut(old)).and_then(Option::take);
-            targets.extend(handle.or_else(known));
-        }
-        (*settings, *prepared) = (next.settings, next);
+        let new = |old: &Option<usize>| old.is_none().then(simulated_device).unzip();
+        let (fresh, devices) = kept.tools[..next.tools.len()].iter().map(new).unzip();
+        prepared.go_on_with(next, kept, Some(servo.as_mut()), devices)?;
+        *targets = carried_over(std::mem::take(targets), fresh, &kept);
         *latest = servo.latest().clone();
         Ok(())
     }

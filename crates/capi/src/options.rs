@@ -2,6 +2,7 @@
 #![allow(unsafe_code)] // structs of callers are filled
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
+use std::collections::BTreeMap;
 use std::ffi::c_char;
 
 use palpate_core::contact::shape::ToolShape;
@@ -148,11 +149,12 @@ impl ToolOptions {
                 "patches and nodes are for spheres: a tool of another shape takes the local law",
             ));
         }
+        let mut settings = BTreeMap::from([("friction".into(), self.friction)]);
+        settings.extend(given("contact_radius", self.contact_radius)?.map(|radius| ("contact_radius".into(), radius)));
         Ok(Tool {
             shape,
             law,
-            contact_radius: given("contact_radius", self.contact_radius)?,
-            friction: self.friction,
+            settings,
             pad_youngs_modulus: given("pad_youngs_modulus", self.pad_youngs_modulus)?,
             max_stiffness: self.max_stiffness,
             ..Tool::default()

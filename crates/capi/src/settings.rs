@@ -3,22 +3,26 @@
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
 use palpate_core::simulation::Strike;
-use palpate_servo::Settings;
 
 use crate::arguments::shared;
 use crate::force_loop::{FrameSide, Loop};
 use crate::status::{Outcome, Refusal, Status, guarded};
 
+/// Changes a setting of what `rank` finds in the loop.
+///
 /// # Safety
 /// The pointer is null or points to a loop.
-unsafe fn change(force_loop: *const Loop, change: impl FnOnce(&FrameSide, &mut Settings) -> Outcome<()>) -> Status {
+unsafe fn set(
+    force_loop: *const Loop,
+    name: &str,
+    rank: impl FnOnce(&FrameSide) -> Outcome<usize>,
+    value: f64,
+) -> Status {
     guarded(|| {
         // SAFETY: the caller's.
-        let own = unsafe { shared(force_loop, "loop") }?;
-        let mut frame = own.frame();
-        let mut settings = frame.settings;
-        change(&frame, &mut settings)?;
-        frame.set(settings)?;
+        let mut side = unsafe { shared(force_loop, "loop") }?.frame();
+        let rank = rank(&side)?;
+        side.set(name, rank, value)?;
         Ok(Status::PalpateOk)
     })
 }
@@ -27,73 +31,50 @@ unsafe fn change(force_loop: *const Loop, change: impl FnOnce(&FrameSide, &mut S
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_set_friction(force_loop: *mut Loop, tool: u32, friction: f64) -> Status {
     // SAFETY: the caller's pointer.
-    unsafe {
-        change(force_loop, |side, settings| {
-            settings.friction[side.tool(tool)?] = friction;
-            Ok(())
-        })
-    }
+    unsafe { set(force_loop, "friction", |side| side.tool(tool), friction) }
 }
 
 /// Changes the radius of contacts of a tool that begin from now on, m: of patches, and of what a grab holds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_set_contact_radius(force_loop: *mut Loop, tool: u32, radius: f64) -> Status {
+    let rank = |side: &FrameSide| {
+        side.prepared.model.check_contact_radius(radius)?;
+        side.tool(tool)
+    };
     // SAFETY: the caller's pointer.
-    unsafe {
-        change(force_loop, |side, settings| {
-            side.prepared.model.check_contact_radius(radius)?;
-            settings.contact_radius[side.tool(tool)?] = radius;
-            Ok(())
-        })
-    }
+    unsafe { set(force_loop, "contact_radius", rank, radius) }
 }
 
 /// Changes Young's modulus of a body to so many times that of its store: of a body of one material at rest, without loads.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_set_stiffness_scale(force_loop: *mut Loop, body: u32, scale: f64) -> Status {
+    let rank = |side: &FrameSide| {
+        let rank = side.body(body)?;
+        let model = &side.prepared.model.bodies[rank];
+        if model.green().youngs_modulus.is_none() || model.moves() {
+            let why = "the body has several materials, or loads, or moves: its stiffness cannot be changed";
+            return Err(Refusal::argument(why));
+        }
+        Ok(rank)
+    };
     // SAFETY: the caller's pointer.
-    unsafe {
-        change(force_loop, |side, settings| {
-            let rank = side.body(body)?;
-            let model = &side.prepared.model.bodies[rank];
-            if model.green().youngs_modulus.is_none() || model.moves() {
-                let why = "the body has several materials, or loads, or moves: its stiffness cannot be changed";
-                return Err(Refusal::argument(why));
-            }
-            settings.stiffness_scale[rank] = scale;
-            Ok(())
-        })
-    }
+    unsafe { set(force_loop, "stiffness_scale", rank, scale) }
 }
 
 /// Changes the largest strain to which tools may take the bodies; 0 for any.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_set_strain_limit(force_loop: *mut Loop, limit: f64) -> Status {
+    let refused = || Refusal::argument(format!("limit is {limit}, it must lie in [0, 1]"));
     // SAFETY: the caller's pointer.
-    unsafe {
-        change(force_loop, |_, settings| {
-            if !(0.0..=1.0).contains(&limit) {
-                return Err(Refusal::argument(format!("limit is {limit}, it must lie in [0, 1]")));
-            }
-            settings.strain_limit = limit;
-            Ok(())
-        })
-    }
+    unsafe { set(force_loop, "strain_limit", |_| (0.0..=1.0).contains(&limit).then_some(0).ok_or_else(refused), limit) }
 }
 
 /// Changes how many seconds bodies in motion advance in a second: below one is slow motion.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_set_time_scale(force_loop: *mut Loop, scale: f64) -> Status {
+    let refused = || Refusal::argument(format!("scale is {scale}, it must lie in (0, 1]"));
     // SAFETY: the caller's pointer.
-    unsafe {
-        change(force_loop, |_, settings| {
-            if !(scale > 0.0 && scale <= 1.0) {
-                return Err(Refusal::argument(format!("scale is {scale}, it must lie in (0, 1]")));
-            }
-            settings.time_scale = scale;
-            Ok(())
-        })
-    }
+    unsafe { set(force_loop, "time_scale", |_| (scale > 0.0 && scale <= 1.0).then_some(0).ok_or_else(refused), scale) }
 }
 
 /// Strikes a body in motion: an impulse, N s, on the patch of `radius`, m, around the surface point closest to `point`, m, in the
@@ -126,7 +107,13 @@ pub unsafe extern "C" fn palpate_loop_strike(
         if !side.prepared.model.bodies[rank].moves() {
             return Err(Refusal::argument("the body does not move: a strike does nothing to it"));
         }
-        side.strike(Strike { body: rank, point: (*point).into(), impulse: (*impulse).into(), radius, duration })?;
+        side.handle().strike(Strike {
+            body: rank,
+            point: (*point).into(),
+            impulse: (*impulse).into(),
+            radius,
+            duration,
+        })?;
         Ok(Status::PalpateOk)
     })
 }
@@ -134,11 +121,9 @@ pub unsafe extern "C" fn palpate_loop_strike(
 /// Lets go of everything, brings bodies in motion to rest and clears a fault; forces ramp in anew.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_reset(force_loop: *mut Loop) -> Status {
-    // SAFETY: the caller's pointer.
-    unsafe {
-        change(force_loop, |_, settings| {
-            settings.resets = settings.resets.wrapping_add(1);
-            Ok(())
-        })
-    }
+    guarded(|| {
+        // SAFETY: the caller's pointer.
+        unsafe { shared(force_loop, "loop") }?.frame().handle().reset()?;
+        Ok(Status::PalpateOk)
+    })
 }

@@ -11,8 +11,9 @@ use crate::errors::to_python;
 use crate::scene::{contact_records, energy_array, wxyz};
 
 /// A tick as a dictionary.
-pub fn frame<'py>(py: Python<'py>, model: &Model, tools: usize, published: Published) -> PyResult<Bound<'py, PyDict>> {
+pub fn frame<'py>(py: Python<'py>, model: &Model, published: Published) -> PyResult<Bound<'py, PyDict>> {
     let Published { status, state } = published;
+    let tools = model.tools.len();
     let surfaces = py.detach(|| {
         let intact = model.bodies.iter().try_for_each(|body| body.green().require_intact());
         intact.map(|()| (0..model.bodies.len()).map(|body| state.displacements(model, body)).collect::<Vec<_>>())
@@ -21,7 +22,8 @@ pub fn frame<'py>(py: Python<'py>, model: &Model, tools: usize, published: Publi
     let frame = PyDict::new(py);
     let bodies = PyList::empty(py);
     for (body, displacements) in surfaces.into_iter().enumerate() {
-        bodies.append((displacements.into_pyarray(py), state.energy(body).as_ref().map(energy_array)))?;
+        let scale = status.settings.stiffness_scale[body];
+        bodies.append((displacements.into_pyarray(py), state.energy(body).as_ref().map(energy_array), scale))?;
     }
     frame.set_item("bodies", bodies)?;
     frame.set_item("time", status.time)?;

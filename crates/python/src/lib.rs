@@ -34,7 +34,10 @@ mod _native {
     #[pymodule_export]
     use crate::body::{determinant_ranges, mass, stiffness, volumes};
     #[pymodule_export]
-    use crate::changes::{assume_devices, change, connect, device_limits, disconnect, tool_stiffness};
+    use crate::changes::{
+        add_body, add_tool, assume_devices, connect, device_limits, disconnect, place_body, remove_body, remove_tool,
+        replace_body, set_strain_measures, tool_stiffness,
+    };
     #[pymodule_export]
     use crate::children::end_with_parent;
     #[pymodule_export]
@@ -78,6 +81,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("TOOL_SETTINGS", crate::scene::tool_settings())?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

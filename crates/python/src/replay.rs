@@ -9,13 +9,14 @@ use numpy::{IntoPyArray, PyArray1};
 use palpate_core::simulation::{MAX_BODIES, Mode, Strike};
 use palpate_core::{Error, Result};
 use palpate_recording::{Ticks, same_settings};
+use palpate_scene::Prepared;
 use palpate_servo::{Owner, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::to_python;
 use crate::frame::{frame, push_row};
-use crate::scene::{energy_array, wxyz};
+use crate::scene::{energy_array, settings_dict, wxyz};
 use crate::simulation::SimulationCore;
 
 /// Ticks between two looks for an interrupt.
@@ -189,7 +190,7 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
     answer.set_item("delay_us", columns.delay_us.into_pyarray(py))?;
     answer.set_item("compute_us", columns.compute_us.into_pyarray(py))?;
     answer.set_item("events", columns.events)?;
-    let settings = columns.settings.iter().map(|settings| settings_dict(py, settings, tools));
+    let settings = columns.settings.iter().map(|settings| settings_from(py, settings, tools));
     answer.set_item("settings", settings.collect::<PyResult<Vec<_>>>()?)?;
     answer.set_item("contact_state", columns.contact_state.into_pyarray(py))?;
     answer.set_item("contact_numbers", columns.contact_numbers.into_pyarray(py))?;
@@ -197,40 +198,30 @@ pub fn read_recording(py: Python<'_>, source: Source) -> PyResult<Bound<'_, PyDi
     Ok(answer)
 }
 
-/// Settings from a tick on, with a stiffness scale for each body there could be.
-fn settings_dict<'py>(
+/// Settings from a tick on, with a stiffness scale for each body there could be, and the latest strike.
+fn settings_from<'py>(
     py: Python<'py>,
     (tick, settings, strike): &(u64, Settings, Strike),
     tools: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let tools = tools.min(settings.friction.len());
-    let said = PyDict::new(py);
-    said.set_item("tick", tick)?;
-    said.set_item("contact_radius", settings.contact_radius[..tools].to_vec())?;
-    said.set_item("friction", settings.friction[..tools].to_vec())?;
-    said.set_item("stiffness_scale", settings.stiffness_scale.to_vec())?;
-    said.set_item("strain_limit", settings.strain_limit)?;
-    said.set_item("time_scale", settings.time_scale)?;
-    said.set_item("strike_body", strike.body)?;
-    said.set_item("strike_point", strike.point.to_array())?;
-    said.set_item("strike_impulse", strike.impulse.to_array())?;
-    said.set_item("strike_radius", strike.radius)?;
-    said.set_item("strike_duration", strike.duration)?;
-    Ok(said)
+    let answer = settings_dict(py, settings, tools, MAX_BODIES)?;
+    answer.set_item("tick", tick)?;
+    answer.set_item("strike_body", strike.body)?;
+    answer.set_item("strike_point", strike.point.to_array())?;
+    answer.set_item("strike_impulse", strike.impulse.to_array())?;
+    answer.set_item("strike_radius", strike.radius)?;
+    answer.set_item("strike_duration", strike.duration)?;
+    Ok(answer)
 }
 
 /// Tick, whose, quantity, numbers recorded and now.
 type DifferenceRecord = (u64, String, &'static str, Vec<f64>, Vec<f64>);
-
-/// Contact radii, coefficients of friction, stiffness scales, limit of strain, time scale, body and rank of a node.
-type SettingsRecord = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64, Option<(usize, u32)>);
 
 /// A recording made again, tick by tick.
 #[pyclass(module = "palpate._native")]
 pub struct Replay {
     parts: Mutex<(AnyTicks, palpate_servo::Replay)>,
     model: std::sync::Arc<palpate_core::simulation::Model>,
-    tools: usize,
 }
 
 impl Replay {
@@ -245,13 +236,10 @@ impl Replay {
     #[new]
     fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> PyResult<Self> {
         let ticks = open(source).map_err(|e| to_python(py, e))?;
-        let parts = core.parts(py);
-        let (model, devices, tools) = (parts.model.clone(), parts.device_limits.clone(), parts.model.tools.len());
-        let (limits, settings, strain) = (parts.limits, parts.settings, parts.strain.clone());
-        drop(parts);
+        let Prepared { model, limits, settings, strain, devices, .. } = core.prepared(py);
         let replay = palpate_servo::Replay::new(&model, &devices, limits, settings, strain);
         let replay = replay.map_err(|e| to_python(py, e))?;
-        Ok(Self { parts: Mutex::new((ticks, replay)), model, tools })
+        Ok(Self { parts: Mutex::new((ticks, replay)), model })
     }
 
     /// Makes up to so many ticks again: how many there were, and what is not as recorded.
@@ -297,7 +285,7 @@ impl Replay {
             let mut parts = self.lock();
             parts.1.latest().clone()
         };
-        frame(py, &self.model, self.tools, published)
+        frame(py, &self.model, published)
     }
 
     /// Rows of the log since the last call, as of a running loop; their computing times are not those of the recording.
@@ -305,20 +293,17 @@ impl Replay {
         let mut rows = Vec::new();
         let mut parts = self.lock();
         let replay = &mut parts.1;
-        let body = replay.settings().watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
+        let body = replay.latest().status.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
         replay.drain_log(|row| push_row(&mut rows, &row, body));
         rows.into_pyarray(py)
     }
 
-    /// Settings of the latest tick: contact radius, m, and friction of each tool, stiffness of each body over that of its
-    /// Green's function, limit of strain, how much slower bodies move, and the body and rank of the watched node.
-    fn settings(&self) -> SettingsRecord {
-        let parts = self.lock();
-        let settings = parts.1.settings();
-        let Settings { contact_radius, friction, stiffness_scale, .. } = settings;
-        let bodies = self.model.bodies.len();
-        let (radii, friction) = (contact_radius[..self.tools].to_vec(), friction[..self.tools].to_vec());
-        let Settings { strain_limit, time_scale, watch, .. } = settings;
-        (radii, friction, stiffness_scale[..bodies].to_vec(), strain_limit, time_scale, watch)
+    /// Settings of the latest tick, and the body and rank of the node that was watched.
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let mut parts = self.lock();
+        let settings = parts.1.latest().status.settings;
+        let answer = settings_dict(py, &settings, self.model.tools.len(), self.model.bodies.len())?;
+        answer.set_item("watched", settings.watch)?;
+        Ok(answer)
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use palpate_core::{Error, Result};
+use palpate_scene::Prepared;
 use palpate_servo::{RecordedInput, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -23,12 +24,10 @@ pub fn rerun<'py>(
     told: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let ticks = open(source).map_err(|e| to_python(py, e))?;
-    let parts = core.parts(py);
-    let settings = Settings { resets: 0, watch: None, ..parts.settings };
-    let (model, limits, strain) = (parts.model.clone(), parts.limits, parts.strain.clone());
-    let (rate, devices) = (parts.scheduling.rate, parts.device_limits.clone());
-    drop(parts);
-    let mut file = Recorded::new(header(about, &model, rate, false)).map_err(|e| to_python(py, e))?;
+    let Prepared { model, limits, settings, strain, devices, scheduling, .. } = core.prepared(py);
+    let settings = Settings { watch: None, ..settings };
+    let header = header(about, &model, scheduling.rate, false);
+    let mut file = Recorded::new(header).map_err(|e| to_python(py, e))?;
     let mut stopped = None;
     let inputs = ticks.enumerate().map_while(|(rank, record)| match record {
         Ok(record) if record.tick != rank as u64 => None,

@@ -1,15 +1,20 @@
 //! Arguments of a simulation, as Python gives them, and what it reads back.
 
+use std::collections::BTreeMap;
+
 use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::Energy;
-use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot, ToolModel, contact_size};
+use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot};
 use palpate_core::{Error, Result};
+use palpate_devices::DeviceLimits;
 pub use palpate_scene::unit_quaternion as quaternion;
-use palpate_scene::{Body, Motion, placement};
+use palpate_scene::{Body, Motion, Tool, placement};
+use palpate_servo::{Per, Setting, Settings};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::dynamics::{SchemeArguments, scheme};
 use crate::errors::to_python;
@@ -25,8 +30,8 @@ pub type BodyArguments<'py> =
     (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>, Option<ModuliArguments<'py>>);
 /// What a tool looks like: a kind and its lengths in m, three at most; of a surface vertices and triangles.
 pub type ShapeArguments = (String, [f64; 3], Vec<[f64; 3]>, Vec<[u32; 3]>);
-/// Shape, contact radius (m), contact law, largest stiffness (N/m), friction, Young's modulus of the pad (Pa).
-pub type ToolArguments = (ShapeArguments, f64, String, f64, f64, Option<f64>);
+/// Shape, contact law, largest stiffness (N/m), Young's modulus of the pad (Pa), settings by their names.
+pub type ToolArguments = (ShapeArguments, String, f64, Option<f64>, BTreeMap<String, f64>);
 
 /// Tool, body, mode, (point, normal, force, torque, anchor, displacement) in the world, whether it is limited and slips,
 /// contact radius (m), depth (m) and stiffness (N/m) under the local law, nodes and weights of a contact.
@@ -60,13 +65,13 @@ pub fn checksum(data: &[u8]) -> String {
     palpate_scene::checksum(data)
 }
 
-/// A tool, the contact radius (m) and the friction that it starts with.
-pub fn tool(arguments: ToolArguments) -> Result<(ToolModel, f64, f64)> {
-    let (shape, contact_radius, law, max_stiffness, friction, pad_youngs_modulus) = arguments;
-    let shape = tool_shape(shape)?;
-    let law = LawKind::parse(&law).ok_or_else(|| Error::Invalid(format!("there is no contact law '{law}'")))?;
-    let radius = contact_size(&shape);
-    Ok((ToolModel { shape, radius, law, pad_youngs_modulus, max_stiffness }, contact_radius, friction))
+/// A tool that is rendered as soft as its device needs.
+pub fn scene_tool(arguments: ToolArguments) -> Result<Tool> {
+    let (shape, law, max_stiffness, pad_youngs_modulus, settings) = arguments;
+    let shape = Some(tool_shape(shape)?);
+    let unknown = || Error::Invalid(format!("there is no contact law '{law}'"));
+    let (law, device) = (Some(LawKind::parse(&law).ok_or_else(unknown)?), DeviceLimits::UNLIMITED);
+    Ok(Tool { shape, law, settings, pad_youngs_modulus, max_stiffness, device, softened: true })
 }
 
 fn tool_shape((kind, lengths, vertices, triangles): ShapeArguments) -> Result<ToolShape> {
@@ -74,6 +79,30 @@ fn tool_shape((kind, lengths, vertices, triangles): ShapeArguments) -> Result<To
         "surface" => ToolShape::surface(&vertices, &triangles),
         _ => ToolShape::of_lengths(&kind, lengths),
     }
+}
+
+/// Names of what is set for each tool.
+pub fn tool_settings() -> Vec<&'static str> {
+    Setting::ALL.iter().filter(|setting| setting.per == Per::Tool).map(|setting| setting.name).collect()
+}
+
+/// Settings by their names: a number, or a list with one for each tool or body.
+pub fn settings_dict<'py>(
+    py: Python<'py>,
+    settings: &Settings,
+    tools: usize,
+    bodies: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let answer = PyDict::new(py);
+    for setting in &Setting::ALL {
+        let values = setting.values(settings);
+        match setting.per {
+            Per::Tool => answer.set_item(setting.name, values[..tools.min(values.len())].to_vec())?,
+            Per::Body => answer.set_item(setting.name, values[..bodies.min(values.len())].to_vec())?,
+            Per::Scene => answer.set_item(setting.name, values[0])?,
+        }
+    }
+    Ok(answer)
 }
 
 /// As w x y z.

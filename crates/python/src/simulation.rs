@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use palpate_core::simulation::{MAX_BODIES, Model, Pose, Strike, ToolModel};
-use palpate_devices::DeviceLimits;
+use palpate_core::simulation::{MAX_BODIES, Strike};
 use palpate_devices::simulated::{Handle, Target};
-use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, StrainPreparer, TickRecord};
+use palpate_scene::{Prepared, Scene};
+use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyDict};
@@ -19,12 +19,12 @@ use crate::errors::to_python;
 use crate::frame::{frame, push_row};
 use crate::recording::{Recorded, Recording, RecordingStatus, header};
 use crate::scene::{
-    BodyArguments, ContactRecord, ToolArguments, contact_records, energy_array, poses, quaternion, scene_body, tool,
+    BodyArguments, ContactRecord, ToolArguments, contact_records, energy_array, poses, quaternion, scene_body,
+    scene_tool, settings_dict,
 };
-use crate::strain::StrainMeasure;
 
-/// Tick, body, point (m), impulse (N s), duration (s) and radius of the patch (m) of a strike.
-type StrikeArguments = (usize, usize, [f64; 3], [f64; 3], f64, f64);
+/// Tick, body, point (m), impulse (N s) and duration (s) of a strike on a patch of the first tool's contact radius.
+type StrikeArguments = (usize, usize, [f64; 3], [f64; 3], f64);
 
 /// A simulation, and its loop while it runs. Any threads may call at the same time: they wait for each other, for moments.
 #[pyclass(frozen, module = "palpate._native")]
@@ -35,24 +35,17 @@ pub struct SimulationCore {
     changing: Mutex<()>,
 }
 
-/// Model, limits and settings of a simulation.
+/// What is in a simulation, what its loop reads of that, and the loop.
 pub(crate) struct Parts {
-    pub model: Arc<Model>,
-    pub limits: SafetyLimits,
-    pub settings: Settings,
-    pub scheduling: Scheduling,
-    pub strain: StrainPreparer,
-    /// What the device of each tool can render, in the scene.
-    pub device_limits: Vec<DeviceLimits>,
-    /// As the scene asks for them, whatever devices hold.
-    pub asked: Vec<ToolModel>,
+    pub scene: Scene,
+    pub prepared: Prepared,
     /// Devices for the next start; a tool without one is moved by its target.
     pub connected: Vec<Option<Connected>>,
     /// Of tools that a target moves.
     pub handles: Vec<Option<Handle>>,
     pub targets: Vec<Target>,
     /// Raised whenever bodies or tools change: a frame states of which it is.
-    pub scene: u64,
+    pub number: u64,
     pub servo: Option<Servo>,
     recording: Option<Recording>,
 }
@@ -70,61 +63,48 @@ impl SimulationCore {
         strain_limit: f64,
         scheduling: (f64, Vec<usize>, u8),
     ) -> PyResult<Self> {
-        let parts = bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
+        let bodies = bodies.iter().map(scene_body).collect::<PyResult<Vec<_>>>()?;
+        let mut scene = Scene::default();
+        scene.limits = SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..scene.limits };
+        scene.scheduling = Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 };
+        scene.strain_limit = strain_limit;
         let prepare = || {
-            let bodies = parts.iter().map(|part| part.model()).collect::<palpate_core::Result<Vec<_>>>()?;
-            let tools = tools.into_iter().map(tool).collect::<palpate_core::Result<Vec<_>>>()?;
-            let mut settings = Settings { strain_limit, ..Settings::default() };
-            settings.contact_radius.iter_mut().zip(&tools).for_each(|(to, (_, radius, _))| *to = *radius);
-            settings.friction.iter_mut().zip(&tools).for_each(|(to, (_, _, friction))| *to = *friction);
-            let model = Model::new(bodies, tools.into_iter().map(|(tool, _, _)| tool).collect())?;
-            settings.contact_radius[..model.tools.len()].iter().try_for_each(|&r| model.check_contact_radius(r))?;
-            Ok((Arc::new(model), settings))
+            bodies.into_iter().try_for_each(|body| scene.add_body(body).map(|_| ()))?;
+            tools.into_iter().try_for_each(|tool| scene.add_tool(scene_tool(tool)?).map(|_| ()))?;
+            scene.prepare()
         };
-        let (model, settings) = py.detach(prepare).map_err(|e| to_python(py, e))?;
+        let prepared = py.detach(prepare).map_err(|e| to_python(py, e))?;
         let parts = Parts {
-            limits: SafetyLimits { max_force: limits.0, max_slew: limits.1, ramp: limits.2, ..SafetyLimits::default() },
-            settings,
-            scheduling: Scheduling { rate: scheduling.0, cpus: scheduling.1, priority: scheduling.2 },
-            strain: StrainPreparer::new(&model),
-            device_limits: vec![DeviceLimits::UNLIMITED; model.tools.len()],
-            asked: model.tools.clone(),
-            connected: model.tools.iter().map(|_| None).collect(),
-            handles: Vec::new(),
-            targets: vec![Target::default(); model.tools.len()],
-            scene: 0,
+            connected: prepared.tools.iter().map(|_| None).collect(),
+            handles: prepared.tools.iter().map(|_| None).collect(),
+            targets: vec![Target::default(); prepared.tools.len()],
+            number: 0,
             servo: None,
             recording: None,
-            model,
+            scene,
+            prepared,
         };
         Ok(Self { parts: Mutex::new(parts), changing: Mutex::new(()) })
-    }
-
-    /// What measures the strain of a body; before the loop starts.
-    fn set_strain_measure(&self, py: Python<'_>, body: usize, measure: &StrainMeasure) {
-        self.parts(py).strain.set_measure(body, measure.measure.clone());
     }
 
     /// Starts the loop; whether the system granted its priority, and locked memory.
     fn start(&self, py: Python<'_>) -> PyResult<(bool, bool)> {
         let _alone = self.changing(py);
         let mut parts = self.parts(py);
-        let none = parts.asked.iter().map(|_| None).collect();
-        let connected = std::mem::replace(&mut parts.connected, none);
+        let connected: Vec<_> = parts.connected.iter_mut().map(Option::take).collect();
         let devices = connected.into_iter().enumerate().map(|(tool, device)| parts.device_of(tool, device));
         let devices: Vec<_> = devices.collect();
-        let scheduler = common_scheduler(&devices, parts.scheduling.rate).map_err(|e| to_python(py, e))?;
+        let scheduler = common_scheduler(&devices, parts.prepared.scheduling.rate).map_err(|e| to_python(py, e))?;
         let (handles, devices): (Vec<_>, Vec<_>) = devices.into_iter().map(|part| (part.handle, part.device)).unzip();
         parts.handles = handles;
-        let (model, limits, settings) = (parts.model.clone(), parts.limits, parts.settings);
-        let (scheduling, strain) = (parts.scheduling.clone(), parts.strain.clone());
         drop(parts);
+        let Prepared { model, limits, settings, scheduling, strain, .. } = self.prepared(py);
         let start = || Servo::start(model, devices, limits, settings, scheduling, strain, scheduler);
         let mut servo = py.detach(start).map_err(|e| to_python(py, e))?;
         let realtime = servo.realtime();
         let mut parts = self.parts(py);
         // Others may have changed them meanwhile.
-        servo.set(parts.settings).map_err(|e| to_python(py, e))?;
+        servo.set(parts.prepared.settings).map_err(|e| to_python(py, e))?;
         parts.servo = Some(servo);
         Ok((realtime.priority, realtime.locked_memory))
     }
@@ -143,40 +123,39 @@ impl SimulationCore {
         }
     }
 
-    /// Sets where a simulated tool should go, and its velocity there; `active` false takes it out of the scene.
+    /// Sends a simulated tool to a position (m) that moves on with a velocity (m/s), and an orientation (w x y z); what is None
+    /// stays as it is. `active` false takes it out of the scene.
     fn set_target(
         &self,
         py: Python<'_>,
         tool: usize,
-        place: ([f64; 3], [f64; 4]),
+        place: (Option<[f64; 3]>, Option<[f64; 4]>),
         velocity: [f64; 3],
         active: bool,
-        grab: bool,
+        grab: Option<bool>,
     ) {
-        let pose = Pose { position: place.0.into(), orientation: quaternion(place.1) };
-        let target = Target { pose, velocity: velocity.into(), active, grab };
         let mut parts = self.parts(py);
-        let Some(before) = parts.targets.get_mut(tool) else { return };
-        *before = target;
-        if let Some(Some(handle)) = parts.handles.get_mut(tool) {
-            handle.set(target);
+        let Parts { targets, handles, .. } = &mut *parts;
+        let Some(target) = targets.get_mut(tool) else { return };
+        place.0.into_iter().for_each(|position| target.pose.position = position.into());
+        place.1.into_iter().for_each(|turned| target.pose.orientation = quaternion(turned));
+        (target.velocity, target.active, target.grab) = (velocity.into(), active, grab.unwrap_or(target.grab));
+        handles[tool].iter_mut().for_each(|handle| handle.set(*target));
+    }
+
+    /// Changes a setting of a tool or a body, or of the scene (rank 0).
+    fn set(&self, py: Python<'_>, name: &str, rank: usize, value: f64) -> PyResult<()> {
+        if name == "contact_radius" {
+            let model = self.parts(py).prepared.model.clone();
+            py.detach(|| model.check_contact_radius(value)).map_err(|e| to_python(py, e))?;
         }
+        self.change_settings(py, |settings| settings.set(name, rank, value))
     }
 
-    /// Changes the contact radius (m) of a tool.
-    fn set_contact_radius(&self, py: Python<'_>, tool: usize, radius: f64) -> PyResult<()> {
-        let model = self.parts(py).model.clone();
-        py.detach(|| model.check_contact_radius(radius)).map_err(|e| to_python(py, e))?;
-        self.change(py, |settings| {
-            settings.contact_radius.iter_mut().skip(tool).take(1).for_each(|to| *to = radius);
-        })
-    }
-
-    /// Changes the coefficient of friction of a tool.
-    fn set_friction(&self, py: Python<'_>, tool: usize, friction: f64) -> PyResult<()> {
-        self.change(py, |settings| {
-            settings.friction.iter_mut().skip(tool).take(1).for_each(|to| *to = friction);
-        })
+    /// The settings by their names: a number, or a list with one for each tool or body.
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Prepared { settings, tools, bodies, .. } = &self.parts(py).prepared;
+        settings_dict(py, settings, tools.len(), bodies.len())
     }
 
     /// Closest points of the smooth surface of a body (n, 7): position (m), outward normal, signed distance (m), in the
@@ -188,7 +167,7 @@ impl SimulationCore {
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = points.as_slice()?.to_vec();
-        let model = self.parts(py).model.clone();
+        let model = self.parts(py).prepared.model.clone();
         let feet = py.detach(|| {
             let of_point = |&point: &[f64; 3]| match model.bodies.get(body).and_then(|body| body.foot(point.into())) {
                 Some(foot) => {
@@ -202,69 +181,48 @@ impl SimulationCore {
         Ok(feet.into_pyarray(py))
     }
 
-    /// Young's modulus of a body over that of its Green's function.
-    fn set_stiffness_scale(&self, py: Python<'_>, body: usize, scale: f64) -> PyResult<()> {
-        self.change(py, |settings| {
-            settings.stiffness_scale.iter_mut().skip(body).take(1).for_each(|to| *to = scale);
-        })
-    }
-
-    /// Largest strain to which tools may take the bodies; zero for any.
-    fn set_strain_limit(&self, py: Python<'_>, limit: f64) -> PyResult<()> {
-        self.change(py, |settings| settings.strain_limit = limit)
-    }
-
     /// Lets go of everything and clears faults.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        self.change(py, |settings| settings.resets = settings.resets.wrapping_add(1))
+        let reset = self.parts(py).servo.as_mut().map_or(Ok(()), Servo::reset);
+        reset.map_err(|e| to_python(py, e))
     }
 
-    /// Seconds that a body in motion advances in a second.
-    fn set_time_scale(&self, py: Python<'_>, time_scale: f64) -> PyResult<()> {
-        self.change(py, |settings| settings.time_scale = time_scale)
-    }
-
-    /// Gives the surface point of a body closest to `point` (m) an impulse, N s, within a duration, s, on a patch of a
-    /// radius, m.
-    fn strike(
-        &self,
-        py: Python<'_>,
-        body: usize,
-        point: [f64; 3],
-        impulse: [f64; 3],
-        duration: f64,
-        radius: f64,
-    ) -> PyResult<()> {
+    /// Gives the surface point of a body closest to `point` (m) an impulse, N s, within a duration, s, on a patch of the
+    /// contact radius of the first tool.
+    fn strike(&self, py: Python<'_>, body: usize, point: [f64; 3], impulse: [f64; 3], duration: f64) -> PyResult<()> {
+        let mut parts = self.parts(py);
+        let radius = parts.prepared.settings.contact_radius[0];
         let strike = Strike { body, point: point.into(), impulse: impulse.into(), radius, duration };
-        match &mut self.parts(py).servo {
-            Some(servo) => servo.strike(strike).map_err(|e| to_python(py, e)),
-            None => Ok(()),
-        }
+        let struck = parts.servo.as_mut().map_or(Ok(()), |servo| servo.strike(strike));
+        struck.map_err(|e| to_python(py, e))
     }
 
     /// A body and its surface node (rank) whose displacement is logged.
     fn watch(&self, py: Python<'_>, body: usize, node: u32) -> PyResult<()> {
-        self.change(py, |settings| settings.watch = Some((body, node)))
+        self.change_settings(py, |settings| {
+            settings.watch = Some((body, node));
+            Ok(())
+        })
     }
 
     /// The latest tick as a dictionary; None if the loop does not run. It is worked out after the tick has been taken.
     fn frame<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let (model, (tools, scene), published) = {
+        let (model, number, published) = {
             let mut parts = self.parts(py);
-            let (model, numbers) = (parts.model.clone(), (parts.targets.len(), parts.scene));
+            let (model, number) = (parts.prepared.model.clone(), parts.number);
             let Some(servo) = &mut parts.servo else { return Ok(None) };
-            (model, numbers, servo.latest().clone())
+            (model, number, servo.latest().clone())
         };
-        let frame = frame(py, &model, tools, published)?;
-        frame.set_item("scene", scene)?;
+        let frame = frame(py, &model, published)?;
+        frame.set_item("scene", number)?;
         Ok(Some(frame))
     }
 
     /// Number of the scene, and contacts of the latest tick as in `frame`; None if the loop does not run.
     fn contacts(&self, py: Python<'_>) -> Option<(u64, Vec<ContactRecord>)> {
         let mut parts = self.parts(py);
-        let (model, scene) = (parts.model.clone(), parts.scene);
-        parts.servo.as_mut().map(|servo| (scene, contact_records(&model, &servo.latest().state)))
+        let (model, number) = (parts.prepared.model.clone(), parts.number);
+        parts.servo.as_mut().map(|servo| (number, contact_records(&model, &servo.latest().state)))
     }
 
     /// Rows (18 a tick) of the log since the last call: time, position and force of the first tool, computing time, wake-up
@@ -272,7 +230,7 @@ impl SimulationCore {
     fn drain_log<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut rows = Vec::new();
         let mut parts = self.parts(py);
-        let body = parts.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
+        let body = parts.prepared.settings.watch.map_or(0, |(body, _)| body).min(MAX_BODIES - 1);
         if let Some(servo) = &mut parts.servo {
             servo.drain_log(|row| push_row(&mut rows, &row, body));
         }
@@ -282,7 +240,7 @@ impl SimulationCore {
     /// Has the running loop begin anew and records it in a new file, with what is known of it.
     fn begin_recording(&self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> PyResult<()> {
         let mut parts = self.parts(py);
-        let header = header(about, &parts.model, parts.scheduling.rate, true);
+        let header = header(about, &parts.prepared.model, parts.prepared.scheduling.rate, true);
         let Parts { servo: Some(servo), recording, .. } = &mut *parts else { return Ok(()) };
         let begun = py.detach(|| Recording::begin(&path, header, servo));
         *recording = Some(begun.map_err(|e| to_python(py, e))?);
@@ -322,24 +280,20 @@ impl SimulationCore {
         let grabs = grabs.as_slice()?.to_vec();
         let ticks = positions.shape()[0];
         let (strikes, watch) = extras;
-        let parts = self.parts(py);
-        let (model, limits, strain) = (parts.model.clone(), parts.limits, parts.strain.clone());
-        let settings = Settings { resets: 0, watch: None, ..parts.settings };
-        let (rate, device_limits) = (parts.scheduling.rate, parts.device_limits.clone());
-        drop(parts);
-        let strikes: Vec<_> = strikes
-            .into_iter()
-            .map(|(tick, body, point, impulse, duration, radius)| {
-                (tick, Strike { body, point: point.into(), impulse: impulse.into(), radius, duration })
-            })
-            .collect();
+        let Prepared { model, limits, settings, strain, devices, scheduling, .. } = self.prepared(py);
+        let (settings, rate, radius) =
+            (Settings { watch: None, ..settings }, scheduling.rate, settings.contact_radius[0]);
+        let strike = |(tick, body, point, impulse, duration): StrikeArguments| {
+            (tick, Strike { body, point: point.into(), impulse: impulse.into(), radius, duration })
+        };
+        let strikes: Vec<_> = strikes.into_iter().map(strike).collect();
         let script = Script {
             period: 1.0 / rate,
             poses: &poses,
             grabs: &grabs,
             strikes: &strikes,
             watch: &watch,
-            devices: &device_limits,
+            devices: &devices,
         };
         let begin = |about| Recorded::new(header(about, &model, rate, false));
         let mut file = about.map(begin).transpose().map_err(|e| to_python(py, e))?;
@@ -377,16 +331,24 @@ impl SimulationCore {
         self.changing.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the settings, and hands them to the loop if it runs; a value that is refused changes nothing.
-    fn change(&self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> PyResult<()> {
+    /// What its loop reads.
+    pub(crate) fn prepared(&self, py: Python<'_>) -> Prepared {
+        self.parts(py).prepared.clone()
+    }
+
+    /// Changes the settings, of the running loop too; a value that is refused changes nothing.
+    fn change_settings(
+        &self,
+        py: Python<'_>,
+        change: impl FnOnce(&mut Settings) -> palpate_core::Result<()>,
+    ) -> PyResult<()> {
         let mut parts = self.parts(py);
-        let mut settings = parts.settings;
-        change(&mut settings);
-        settings.check(&parts.model).map_err(|e| to_python(py, e))?;
-        parts.settings = settings;
-        match &mut parts.servo {
-            Some(servo) => servo.set(settings).map_err(|e| to_python(py, e)),
-            None => Ok(()),
-        }
+        let Parts { prepared, servo, .. } = &mut *parts;
+        let mut settings = prepared.settings;
+        let changed = change(&mut settings).and_then(|()| settings.check(&prepared.model));
+        let taken = changed.and_then(|()| servo.as_mut().map_or(Ok(()), |servo| servo.set(settings)));
+        taken.map_err(|e| to_python(py, e))?;
+        prepared.settings = settings;
+        Ok(())
     }
 }

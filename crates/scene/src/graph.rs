@@ -1,6 +1,9 @@
 //! Bodies and tools as nodes that are added, found and removed by their handles.
 
+use std::sync::Arc;
+
 use palpate_core::simulation::{MAX_BODIES, MAX_TOOLS, Placement};
+use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
 use palpate_servo::{SafetyLimits, Scheduling};
@@ -98,10 +101,34 @@ impl Scene {
         self.tools.iter().map(|(id, tool)| (*id, tool))
     }
 
-    /// Moves a body; false if there is none of that handle. Nothing else of a body changes as long as it has its handle.
+    fn body_mut(&mut self, id: BodyId) -> Option<&mut Body> {
+        self.bodies.iter_mut().find(|(other, _)| *other == id).map(|(_, body)| body)
+    }
+
+    /// Exchanges a body for one with another store of the same surface. The measure of strain stays if the new one has none.
+    ///
+    /// # Errors
+    /// No body of that handle, or a store of another surface.
+    pub fn replace_body(&mut self, id: BodyId, body: Body) -> Result<()> {
+        let missing = || Error::Invalid(format!("the scene has no body {}", id.0));
+        let before = self.body_mut(id).ok_or_else(missing)?;
+        let (one, other) = (&before.green, &body.green);
+        if one.surface_nodes != other.surface_nodes || one.surface.positions != other.surface.positions {
+            return Err(Error::Invalid("the other store is not of the same body: its surface differs".into()));
+        }
+        let strain = body.strain.clone().or_else(|| before.strain.take());
+        *before = Body { strain, ..body };
+        Ok(())
+    }
+
+    /// Gives a body a measure of its strain; false if there is none of that handle.
+    pub fn set_strain_measure(&mut self, id: BodyId, measure: Arc<StrainMeasure>) -> bool {
+        self.body_mut(id).map(|body| body.strain = Some(measure)).is_some()
+    }
+
+    /// Moves a body; false if there is none of that handle.
     pub fn place_body(&mut self, id: BodyId, placement: Placement) -> bool {
-        let found = self.bodies.iter_mut().find(|(other, _)| *other == id);
-        found.map(|(_, body)| body.placement = placement).is_some()
+        self.body_mut(id).map(|body| body.placement = placement).is_some()
     }
 
     /// States what the device of a tool can render; false if there is none of that handle. Nothing else of a tool changes as

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use palpate_core::Result;
 use palpate_core::simulation::{BodyModel, Kept, Model, ToolModel};
-use palpate_devices::DeviceLimits;
-use palpate_servo::{SafetyLimits, Scheduling, Settings, StrainPreparer};
+use palpate_devices::{Device, DeviceLimits};
+use palpate_servo::{SafetyLimits, SceneChange, Scheduling, Servo, Settings, StrainPreparer};
 
 use crate::bare::require_precise;
 use crate::body::Body;
@@ -21,7 +21,7 @@ pub struct Prepared {
     pub bodies: Vec<BodyId>,
     /// Handles of the tools.
     pub tools: Vec<ToolId>,
-    /// Settings of the start.
+    /// Settings: at first those of the scene.
     pub settings: Settings,
     /// Limits kept by the safety stage.
     pub limits: SafetyLimits,
@@ -66,17 +66,18 @@ impl Scene {
         let mut tools = Vec::new();
         for (rank, (id, tool)) in self.tools().enumerate() {
             let (model, contact_radius) = self.tool_model(id, tool, before)?;
-            (settings.contact_radius[rank], settings.friction[rank]) = (contact_radius, tool.friction);
+            tool.settings.iter().try_for_each(|(name, value)| settings.set(name, rank, *value))?;
+            settings.contact_radius[rank] = contact_radius;
             tools.push(model);
         }
         let bodies = self.bodies().map(|(id, body)| body_model(id, body, before)).collect::<Result<Vec<_>>>()?;
         let model = match before {
-            Some(before) => before.model.changed(bodies, tools)?,
-            None => Model::new(bodies, tools)?,
+            Some(before) if self.is_as_in(before, &bodies, &tools) => before.model.clone(),
+            Some(before) => Arc::new(before.model.changed(bodies, tools)?),
+            None => Arc::new(Model::new(bodies, tools)?),
         };
         settings.contact_radius[..model.tools.len()].iter().try_for_each(|&r| model.check_contact_radius(r))?;
         settings.check(&model)?;
-        let model = Arc::new(model);
         let mut strain = StrainPreparer::new(&model);
         for (rank, (_, body)) in self.bodies().enumerate() {
             body.strain.iter().for_each(|measure| strain.set_measure(rank, measure.clone()));
@@ -93,11 +94,26 @@ impl Scene {
         })
     }
 
+    /// Whether bodies and tools are those of `before`, at the same places: devices and measures of strain may differ.
+    fn is_as_in(&self, before: &Prepared, bodies: &[BodyModel], tools: &[ToolModel]) -> bool {
+        let same_body = |(one, other): (&BodyModel, &BodyModel)| one.is_same(other) && one.placement == other.placement;
+        let same_tool = |(one, other): (&ToolModel, &ToolModel)| one.max_stiffness == other.max_stiffness;
+        self.tools().map(|(id, _)| id).eq(before.tools.iter().copied())
+            && bodies.len() == before.bodies.len()
+            && bodies.iter().zip(&before.model.bodies).all(same_body)
+            && tools.iter().zip(&before.model.tools).all(same_tool)
+    }
+
     /// A tool that stays keeps its size, though the bodies that it followed may be gone.
     fn tool_model(&self, id: ToolId, tool: &Tool, before: Option<&Prepared>) -> Result<(ToolModel, f64)> {
+        let period = 1.0 / before.map_or(&self.scheduling, |before| &before.scheduling).rate;
         match before.and_then(|before| Some((before, before.rank_of_tool(id)?))) {
-            Some((before, rank)) => Ok((before.model.tools[rank].clone(), before.settings.contact_radius[rank])),
-            None => tool.model(self.bodies().map(|(_, body)| body)),
+            Some((before, rank)) => {
+                let max_stiffness = tool.rendered_stiffness(period);
+                let known = before.model.tools[rank].clone();
+                Ok((ToolModel { max_stiffness, ..known }, before.settings.contact_radius[rank]))
+            }
+            None => tool.model(self.bodies().map(|(_, body)| body), period),
         }
     }
 }
@@ -112,14 +128,42 @@ impl Prepared {
     pub fn rank_of_tool(&self, id: ToolId) -> Option<usize> {
         self.tools.iter().position(|other| *other == id)
     }
+
+    /// Goes on with what has been prepared for a change, under a running loop too, with devices for tools that are new or get
+    /// another one. Settings of what stays are those of now; limits and scheduling are for loops that are made later.
+    ///
+    /// # Errors
+    /// See [`Servo::change`]; everything stays as it was.
+    pub fn go_on_with(
+        &mut self,
+        next: Prepared,
+        kept: Kept,
+        servo: Option<&mut Servo>,
+        devices: Vec<Option<Box<dyn Device>>>,
+    ) -> Result<()> {
+        let settings = self.settings.carried_over(&next.settings, &kept);
+        if let Some(servo) = servo {
+            let (model, strain) = (next.model.clone(), next.strain.clone());
+            servo.change(SceneChange { model, kept, devices, settings, strain })?;
+        }
+        let (limits, scheduling) = (self.limits, self.scheduling.clone());
+        *self = Prepared { settings, limits, scheduling, ..next };
+        Ok(())
+    }
 }
 
+/// What belongs to each tool after a change: `fresh` where there is one, else what it had.
+pub fn carried_over<T>(before: Vec<T>, fresh: Vec<Option<T>>, kept: &Kept) -> Vec<T> {
+    let mut before: Vec<_> = before.into_iter().map(Some).collect();
+    let mut stays = |old: Option<usize>| before.get_mut(old?)?.take();
+    fresh.into_iter().zip(kept.tools).filter_map(|(fresh, old)| fresh.or_else(|| stays(old))).collect()
+}
+
+/// A body of another store is made anew.
 fn body_model(id: BodyId, body: &Body, before: Option<&Prepared>) -> Result<BodyModel> {
-    match before.and_then(|before| Some(before.model.bodies[before.rank_of_body(id)?].clone())) {
-        Some(mut known) => {
-            known.placement = body.placement;
-            Ok(known)
-        }
+    let known = before.and_then(|before| before.model.bodies.get(before.rank_of_body(id)?));
+    match known.filter(|known| std::ptr::eq(known.green(), &*body.green)) {
+        Some(known) => Ok(known.placed(body.placement)),
         None => body.model(),
     }
 }

@@ -1,5 +1,7 @@
 //! A tool of a scene: what it looks like and how it touches.
 
+use std::collections::BTreeMap;
+
 use palpate_core::Result;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::simulation::{LawKind, ToolModel, contact_size};
@@ -20,16 +22,17 @@ pub struct Tool {
     pub shape: Option<ToolShape>,
     /// How it touches; by the local law where the elastic constants of every body are known, else by a patch.
     pub law: Option<LawKind>,
-    /// Radius of patches, and of what a grab holds, m; that of a sphere that suits the bodies, as far as they take it.
-    pub contact_radius: Option<f64>,
-    /// Coulomb's coefficient of friction.
-    pub friction: f64,
+    /// What its settings are at the start, by their names in [`Settings`](palpate_servo::Settings). A contact radius that is not
+    /// given is that of a sphere that suits the bodies, as far as they take it.
+    pub settings: BTreeMap<String, f64>,
     /// Young's modulus of its pad, Pa; a rigid tool has none.
     pub pad_youngs_modulus: Option<f64>,
     /// Stiffest contact rendered, N/m.
     pub max_stiffness: f64,
     /// What its device can render.
     pub device: DeviceLimits,
+    /// Whether contacts that are stiffer than its device holds are rendered softer; else such a tool is refused.
+    pub softened: bool,
 }
 
 impl Default for Tool {
@@ -37,21 +40,27 @@ impl Default for Tool {
         Self {
             shape: None,
             law: None,
-            contact_radius: None,
-            friction: DEFAULT_FRICTION,
+            settings: BTreeMap::from([("friction".into(), DEFAULT_FRICTION)]),
             pad_youngs_modulus: None,
             max_stiffness: DEFAULT_MAX_STIFFNESS,
             device: DeviceLimits::UNLIMITED,
+            softened: false,
         }
     }
 }
 
 impl Tool {
-    /// The tool as a tick sees it, and its contact radius, m.
+    /// Stiffest contact that it renders in a loop with a time `period` between two ticks, s; N/m.
+    pub fn rendered_stiffness(&self, period: f64) -> f64 {
+        let held = if self.softened { self.device.largest_stiffness(period) } else { f64::INFINITY };
+        self.max_stiffness.min(held)
+    }
+
+    /// The tool as a tick of a loop with such a `period` sees it, and its contact radius, m.
     ///
     /// # Errors
     /// Bodies so small that no tool suits them.
-    pub fn model<'a>(&self, bodies: impl Iterator<Item = &'a Body> + Clone) -> Result<(ToolModel, f64)> {
+    pub fn model<'a>(&self, bodies: impl Iterator<Item = &'a Body> + Clone, period: f64) -> Result<(ToolModel, f64)> {
         let smallest = |radius: fn(&Body) -> f64| bodies.clone().map(radius).fold(f64::INFINITY, f64::min);
         let shape = match &self.shape {
             Some(shape) => shape.clone(),
@@ -59,11 +68,10 @@ impl Tool {
         };
         let known = bodies.clone().all(|body| body.moduli.is_some());
         let law = self.law.unwrap_or(if known { LawKind::Local } else { LawKind::Patch });
-        let contact_radius = self
-            .contact_radius
-            .unwrap_or_else(|| smallest(|body| largest_contact_radius(&body.green, suiting_radius(&body.green))));
+        let suiting = || smallest(|body| largest_contact_radius(&body.green, suiting_radius(&body.green)));
+        let contact_radius = self.settings.get("contact_radius").copied().unwrap_or_else(suiting);
         let radius = contact_size(&shape);
-        let (pad_youngs_modulus, max_stiffness) = (self.pad_youngs_modulus, self.max_stiffness);
+        let (pad_youngs_modulus, max_stiffness) = (self.pad_youngs_modulus, self.rendered_stiffness(period));
         Ok((ToolModel { shape, radius, law, pad_youngs_modulus, max_stiffness }, contact_radius))
     }
 }

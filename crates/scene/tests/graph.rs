@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use palpate_core::green::{GreensFunction, Precision, precompute};
 use palpate_core::simulation::{LawKind, MAX_BODIES, Placement};
+use palpate_core::strain::StrainMeasure;
 use palpate_devices::DeviceLimits;
 use palpate_scene::{Body, Scene, Tool, largest_contact_radius, moduli_of_store};
 
@@ -20,6 +21,10 @@ fn green(description: &str) -> GreensFunction {
 
 fn body(description: &str) -> Body {
     Body::of_store(Arc::new(green(description))).expect("a body")
+}
+
+fn rubbing(friction: f64) -> Tool {
+    Tool { settings: [("friction".into(), friction)].into(), ..Tool::default() }
 }
 
 const ONE: &str = r#"{"materials": {"all": [12345.678901234567, 0.45, 1000.0]}}"#;
@@ -49,19 +54,51 @@ fn handles_are_never_given_again_and_ranks_follow_the_order() {
 fn a_change_keeps_bodies_tools_and_what_was_set_of_them() {
     let mut scene = Scene::default();
     let [first, second] = [(), ()].map(|()| scene.add_body(body(ONE)).expect("room"));
-    let old = scene.add_tool(Tool { friction: 0.1, ..Tool::default() }).expect("room");
+    let old = scene.add_tool(rubbing(0.1)).expect("room");
     let before = scene.prepare().expect("a scene");
     let mut settings = before.settings;
     (settings.friction[0], settings.stiffness_scale[1]) = (0.7, 2.0);
     scene.remove_body(first).expect("a body");
-    scene.add_tool(Tool { friction: 0.2, ..Tool::default() }).expect("room");
+    scene.add_tool(rubbing(0.2)).expect("room");
     let moved = Placement { position: glam::DVec3::X, ..Placement::default() };
     assert!(scene.place_body(second, moved));
-    let (next, kept) = scene.prepare_change(&before).expect("a scene");
+    let mut next = before.clone();
+    next.settings = settings;
+    let (changed, kept) = scene.prepare_change(&before).expect("a scene");
+    next.go_on_with(changed, kept, None, Vec::new()).expect("no loop");
     assert!(next.model.bodies[0].is_same(&before.model.bodies[1]) && next.model.bodies[0].placement == moved);
     assert_eq!((kept.bodies[0], kept.tools[0], kept.tools[1]), (Some(1), before.rank_of_tool(old), None));
-    let now = settings.carried_over(&next.settings, &kept);
+    let now = next.settings;
     assert_eq!((now.friction[..2].to_vec(), now.stiffness_scale[0]), (vec![0.7, 0.2], 2.0));
+    // What is not looked at in a tick changes without another model.
+    scene.set_strain_measure(second, Arc::new(StrainMeasure::of_surface(&green(ONE).surface)));
+    let (same, _) = scene.prepare_change(&next).expect("a scene");
+    assert!(Arc::ptr_eq(&same.model, &next.model));
+    // Another store of the same surface makes the body anew, one of another surface is refused.
+    assert!(scene.replace_body(second, body(ONE)).is_ok());
+    let (other, _) = scene.prepare_change(&next).expect("a scene");
+    assert!(!other.model.bodies[0].is_same(&next.model.bodies[0]));
+    let (mut surface, known) = (green(ONE), scene.bodies().count());
+    surface.surface_nodes[0] += 1;
+    let foreign = Body { green: Arc::new(surface), ..body(ONE) };
+    let refused = scene.replace_body(second, foreign).err().map(|error| error.to_string());
+    assert!(refused.is_some_and(|why| why.contains("its surface differs")) && scene.bodies().count() == known);
+}
+
+#[test]
+fn a_tool_is_rendered_as_soft_as_its_device_needs_only_if_it_may() {
+    let mut scene = Scene::default();
+    scene.add_body(body(ONE)).expect("room");
+    let device = DeviceLimits { max_stiffness: 400.0, ..DeviceLimits::UNLIMITED };
+    for softened in [true, false] {
+        scene.add_tool(Tool { device, softened, ..Tool::default() }).expect("room");
+    }
+    let prepared = scene.prepare().expect("a scene");
+    assert_eq!([0, 1].map(|tool| prepared.model.tools[tool].max_stiffness), [400.0, 5000.0]);
+    let unknown = Tool { settings: [("colour".into(), 1.0)].into(), ..Tool::default() };
+    scene.add_tool(unknown).expect("room");
+    let refused = scene.prepare().err().map(|error| error.to_string());
+    assert_eq!(refused.as_deref(), Some("there is no setting 'colour'"));
 }
 
 #[test]

@@ -115,6 +115,8 @@ impl ForceLoop {
     /// and never panics: a panic within becomes a latched fault.
     pub fn tick(&mut self, now_ns: u64, period: f64) {
         if self.fault == Some(FaultReason::Panic) {
+            // Nothing is taken up any more, and nobody is to find the ring full.
+            self.ends.commands.follow(&Kept::default());
             return self.release();
         }
         if catch_unwind(AssertUnwindSafe(|| self.guarded_tick(now_ns, period))).is_err() {
@@ -232,10 +234,8 @@ impl ForceLoop {
         for device in &mut before.devices {
             let _ = device.write(Wrench::default());
         }
-        // Asked for before the change, and not yet seen.
-        self.settings.resets = before.settings.resets;
-        std::mem::swap(&mut self.ends.strikes, &mut before.ends.strikes);
-        self.ends.strikes.follow(kept);
+        std::mem::swap(&mut self.ends.commands, &mut before.ends.commands);
+        self.ends.commands.follow(kept);
         self.status = Status {
             readings: by_new_rank(&before.status.readings, kept),
             wrenches: by_new_rank(&before.status.wrenches, kept),
@@ -258,18 +258,16 @@ impl ForceLoop {
 
     /// What has come in through the hand-offs since the last tick.
     fn receive(&mut self, period: f64) -> Input {
-        let strikes = self.ends.strikes.count();
-        let settings = *self.ends.settings.read();
-        let mut controls = settings.controls(&self.settings, period, &self.limited);
-        if !controls.reset {
+        let reset = self.ends.commands.receive(&mut self.settings);
+        let mut controls = self.settings.controls(reset, period, &self.limited);
+        if !reset {
             // A reset ends strikes, that of its tick included.
-            controls.strike = self.ends.strikes.next(strikes, settings.resets, &self.state);
+            controls.strike = self.ends.commands.next_strike(&self.state);
         }
         let record = self.ends.recorder.input();
-        (record.settings, record.reset, record.strike) = (settings, controls.reset, controls.strike);
+        (record.settings, record.reset, record.strike) = (self.settings, reset, controls.strike);
         record.strain = StrainArrivals::default();
         self.ends.strain.receive(&mut self.state, &mut record.strain);
-        self.settings = settings;
         if controls.reset {
             self.fault = self.fault.filter(|fault| fault.outlasts_reset());
             self.timing.reset();
@@ -334,7 +332,7 @@ impl ForceLoop {
         let start_ns = *self.start_ns.get_or_insert(now_ns);
         let status = &mut self.status;
         status.time = 1e-9 * now_ns.saturating_sub(start_ns) as f64;
-        status.limited = output.limited;
+        (status.settings, status.limited) = (self.settings, output.limited);
         status.fault = fault(self.fault, &self.stages);
         status.recording = self.ends.recorder.progress();
         let mut row = LogRow {

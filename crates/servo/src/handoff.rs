@@ -1,8 +1,9 @@
 //! Both ends of the wait-free hand-offs between a force loop and everybody else.
 //!
-//! The latest state goes out and the latest settings come in through triple buffers, strikes through a bounded ring;
-//! every tick goes into another, and is dropped and counted where nobody drains it. Nothing that another thread does can make the loop wait. What else
-//! comes in, prepared off the tick, gets a hand-off of its own here and is taken up in `ForceLoop::receive`.
+//! The latest state goes out through a triple buffer. Settings, resets and strikes come in through one bounded ring, in order.
+//! Every tick goes into another ring, and is dropped and counted if nobody drains it. Nothing that another thread does can
+//! make the loop wait. What else comes in, prepared off the tick, gets a hand-off of its own here and is taken up in
+//! `ForceLoop::receive`.
 
 use std::sync::Arc;
 
@@ -11,13 +12,13 @@ use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
 
+use crate::commands::{CommandEnd, CommandHandle, command_ends};
 use crate::log::{LogRow, Status};
 use crate::record::TickRecord;
 use crate::recorder::{RecorderEnd, RecorderHandle, recorder_ends};
 use crate::safety::SafetyStage;
 use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainEnd, strain_ends};
-use crate::strikes::{StrikeEnd, StrikeHandle, strike_ends};
 
 /// Rows of the log kept for a reader: 20 seconds at 1 kHz.
 const LOG_ROWS: usize = 20_000;
@@ -33,8 +34,7 @@ pub struct Published {
 
 /// The loop's ends.
 pub(crate) struct LoopEnds {
-    pub settings: Output<Settings>,
-    pub strikes: StrikeEnd,
+    pub commands: CommandEnd,
     pub published: Input<Published>,
     pub rows: Producer<LogRow>,
     pub strain: StrainEnd,
@@ -44,8 +44,7 @@ pub(crate) struct LoopEnds {
 /// Everybody else's ends.
 pub struct LoopHandle {
     model: Arc<Model>,
-    settings: Input<Settings>,
-    strikes: StrikeHandle,
+    commands: CommandHandle,
     published: Output<Published>,
     rows: Consumer<LogRow>,
     /// For whoever prepares strain responses.
@@ -55,25 +54,18 @@ pub struct LoopHandle {
 
 /// Both ends, with settings that have been checked and the safety stages of the start.
 pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings, stages: &[SafetyStage]) -> (LoopEnds, LoopHandle) {
-    let (settings_in, settings_out) = triple_buffer(settings);
-    let (strike_end, strikes) = strike_ends(settings.resets);
-    let first = Published { status: Status::default(), state: Snapshot::new(model) };
+    let (command_end, commands) = command_ends();
+    let status = Status { settings: *settings, ..Status::default() };
+    let first = Published { status, state: Snapshot::new(model) };
     let (published_in, published_out) = triple_buffer(&first);
     let (producer, consumer) = RingBuffer::new(LOG_ROWS);
     let (strain, preparer) = strain_ends();
     let (recorder_end, recorder) = recorder_ends(stages);
-    let ends = LoopEnds {
-        settings: settings_out,
-        strikes: strike_end,
-        published: published_in,
-        rows: producer,
-        strain,
-        recorder: recorder_end,
-    };
+    let ends =
+        LoopEnds { commands: command_end, published: published_in, rows: producer, strain, recorder: recorder_end };
     let handle = LoopHandle {
         model: model.clone(),
-        settings: settings_in,
-        strikes,
+        commands,
         published: published_out,
         rows: consumer,
         strain: Some(preparer),
@@ -86,12 +78,18 @@ impl LoopHandle {
     /// Changes the settings; wait-free.
     ///
     /// # Errors
-    /// See [`Settings::check`]; the loop then keeps those it has.
+    /// See [`Settings::check`]; so many changes that the loop cannot be ticking. The loop then keeps those it has.
     pub fn set(&mut self, settings: Settings) -> Result<()> {
         settings.check(&self.model)?;
-        self.strikes.count_resets(settings.resets);
-        self.settings.write(settings);
-        Ok(())
+        self.commands.set(settings)
+    }
+
+    /// Lets go of everything, brings moving bodies to rest and clears faults; wait-free.
+    ///
+    /// # Errors
+    /// So many changes that the loop cannot be ticking.
+    pub fn reset(&mut self) -> Result<()> {
+        self.commands.reset()
     }
 
     /// Strikes a body in motion; wait-free. Strikes are given in order, one a tick, after the settings that were set before;
@@ -100,7 +98,12 @@ impl LoopHandle {
     /// # Errors
     /// A body that the model does not have; so many strikes that the loop has not come to them.
     pub fn strike(&mut self, strike: Strike) -> Result<()> {
-        self.strikes.push(&self.model, strike)
+        self.commands.strike(&self.model, strike)
+    }
+
+    /// Whether settings and resets are refused until the loop ticks.
+    pub(crate) fn is_full(&self) -> bool {
+        self.commands.is_full()
     }
 
     /// The end of whoever prepares strain responses.
@@ -123,11 +126,10 @@ impl LoopHandle {
         self.recorder.is_begun()
     }
 
-    /// Belongs to the loop that has taken the place of this one's. Log and strikes go on in the same rings.
+    /// Belongs to the loop that has taken the place of this one's. Log and commands go on in the same rings.
     pub(crate) fn go_on_as(&mut self, next: LoopHandle) {
-        let Self { model, settings, published, strain, recorder, strikes, .. } = next;
-        self.strikes.count_resets(strikes.resets());
-        (self.model, self.settings, self.published) = (model, settings, published);
+        let Self { model, published, strain, recorder, .. } = next;
+        (self.model, self.published) = (model, published);
         (self.strain, self.recorder) = (strain, recorder);
     }
 

@@ -6,6 +6,7 @@
 
 mod change;
 mod clock;
+mod commands;
 mod emulated;
 mod exchange;
 mod force_loop;
@@ -24,7 +25,6 @@ mod servo;
 mod settings;
 mod statistics;
 mod strain;
-mod strikes;
 mod timing;
 
 pub use clock::now_ns;
@@ -44,5 +44,5 @@ pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyS
 pub use scheduling::Scheduling;
 pub use self_check::{LARGEST_FORCE, Seen, SelfCheck, Task};
 pub use servo::{SceneChange, Servo};
-pub use settings::Settings;
+pub use settings::{Per, Setting, Settings};
 pub use statistics::{Histogram, Summary};

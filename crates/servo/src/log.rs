@@ -7,6 +7,7 @@ use palpate_devices::{Reading, Wrench};
 
 use crate::recorder::RecordingProgress;
 use crate::safety::{Fault, PortEnergy};
+use crate::settings::Settings;
 use crate::statistics::Summary;
 
 /// What the operating system granted.
@@ -31,6 +32,8 @@ pub struct Status {
     pub missed_waking: u64,
     /// Log rows lost because nobody drained them.
     pub dropped_rows: u64,
+    /// Those in force.
+    pub settings: Settings,
     /// What went out to the devices.
     pub wrenches: [Wrench; MAX_TOOLS],
     /// What the devices said.

@@ -130,8 +130,10 @@ pub fn rerun(
     for (tick, input) in inputs.into_iter().enumerate() {
         let input = input?;
         settings.time_scale = input.settings.time_scale;
-        settings.resets = settings.resets.wrapping_add(u32::from(input.reset));
         handle.set(settings)?;
+        if input.reset {
+            handle.reset()?;
+        }
         input.strike.map_or(Ok(()), |strike| handle.strike(strike))?;
         for (readings, said) in readings.iter_mut().zip(&input.readings) {
             let _ = readings.push(*said);

@@ -57,7 +57,7 @@ pub struct RecordedInput {
     pub due_ns: u64,
     /// Time between two ticks, s.
     pub period: f64,
-    /// Settings of this tick; their counter counts for nothing here.
+    /// Settings of this tick.
     pub settings: Settings,
     /// Whether everything was let go of.
     pub reset: bool,

@@ -67,7 +67,6 @@ pub struct Replay {
     strain: StrainPreparer,
     end: PreparerEnd,
     requests: VecDeque<StrainRequest>,
-    settings: Settings,
     tools: usize,
     longest_ns: u64,
 }
@@ -84,7 +83,6 @@ impl Replay {
         settings: Settings,
         strain: StrainPreparer,
     ) -> Result<Self> {
-        let settings = Settings { resets: 0, ..settings };
         let (mut readings, mut replayed) = (Vec::new(), Vec::new());
         for &limits in devices {
             let (producer, device) = Replayed::new(limits);
@@ -95,18 +93,7 @@ impl Replay {
         force_loop.limit_strain_of(strain.known());
         let (records, end) = (handle.begin_recording()?, handle.take_strain()?);
         let tools = model.tools.len();
-        Ok(Self {
-            force_loop,
-            handle,
-            readings,
-            records,
-            strain,
-            end,
-            requests: VecDeque::new(),
-            settings,
-            tools,
-            longest_ns: 0,
-        })
+        Ok(Self { force_loop, handle, readings, records, strain, end, requests: VecDeque::new(), tools, longest_ns: 0 })
     }
 
     /// Makes a tick again, and says what is not as recorded: nothing, if every bit is.
@@ -131,20 +118,16 @@ impl Replay {
         self.handle.latest()
     }
 
-    /// Those of the latest tick.
-    pub fn settings(&self) -> Settings {
-        self.settings
-    }
-
     /// Hands out the rows of the log since the last call, as of a running loop.
     pub fn drain_log(&mut self, each: impl FnMut(LogRow)) {
         self.handle.drain_log(each);
     }
 
     fn tick_again(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {
-        let resets = self.settings.resets.wrapping_add(u32::from(input.reset));
-        self.settings = Settings { resets, ..input.settings };
-        self.handle.set(self.settings)?;
+        self.handle.set(input.settings)?;
+        if input.reset {
+            self.handle.reset()?;
+        }
         input.strike.map_or(Ok(()), |strike| self.handle.strike(strike))?;
         for (readings, said) in self.readings.iter_mut().zip(&input.readings) {
             let _ = readings.push(*said);

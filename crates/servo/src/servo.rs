@@ -1,30 +1,30 @@
 //! The loop's own thread.
 
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use palpate_core::simulation::{Kept, Model, Strike};
+use palpate_core::simulation::{Kept, Model};
 use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
-use rtrb::Consumer;
 
 use crate::change::ChangeHandle;
 use crate::clock::{next_deadline, now_ns, sleep_until_ns};
 use crate::force_loop::{ForceLoop, Successor};
-use crate::handoff::{LoopHandle, Published};
+use crate::handoff::LoopHandle;
 use crate::locking::lock;
-use crate::log::{LogRow, RealtimeStatus};
+use crate::log::RealtimeStatus;
 use crate::preparer::{StrainPreparer, StrainWorker};
-use crate::record::TickRecord;
 use crate::safety::SafetyLimits;
 use crate::scheduling::Scheduling;
 use crate::settings::Settings;
 
-/// How long, and how often at most, the end of a recording is waited for: a loop that ticks takes note within one.
+/// How long, and how often at most, a tick is waited for: for the end of a recording, and for room for another change.
 const WAIT: Duration = Duration::from_millis(1);
 const MOST_WAITS: u32 = 1000;
+const MOST_WAITS_FOR_ROOM: u32 = 100;
 
 /// A running loop.
 pub struct Servo {
@@ -124,38 +124,31 @@ impl Servo {
         self.realtime
     }
 
-    /// Changes the settings; wait-free.
+    /// Changes the settings. Waits for a tick where very many changes wait already.
     ///
     /// # Errors
-    /// See [`Settings::check`]; the loop then keeps those it has.
+    /// See [`LoopHandle::set`]; the loop then keeps those it has.
     pub fn set(&mut self, settings: Settings) -> Result<()> {
+        self.wait_for_room();
         self.handle.set(settings)
     }
 
-    /// See [`LoopHandle::strike`].
+    /// See [`LoopHandle::reset`].
     ///
     /// # Errors
-    /// A body that the model does not have; so many strikes that the loop has not come to them.
-    pub fn strike(&mut self, strike: Strike) -> Result<()> {
-        self.handle.strike(strike)
+    /// So many changes that the loop cannot be ticking.
+    pub fn reset(&mut self) -> Result<()> {
+        self.wait_for_room();
+        self.handle.reset()
     }
 
-    /// The latest tick; wait-free.
-    pub fn latest(&mut self) -> &Published {
-        self.handle.latest()
-    }
-
-    /// Hands out the rows of the log since the last call.
-    pub fn drain_log(&mut self, each: impl FnMut(LogRow)) {
-        self.handle.drain_log(each);
-    }
-
-    /// See [`LoopHandle::begin_recording`].
-    ///
-    /// # Errors
-    /// A loop that is being recorded already.
-    pub fn begin_recording(&mut self) -> Result<Consumer<TickRecord>> {
-        self.handle.begin_recording()
+    /// A loop that ticks makes room within one.
+    fn wait_for_room(&self) {
+        let mut left = MOST_WAITS_FOR_ROOM;
+        while self.handle.is_full() && left > 0 {
+            std::thread::sleep(WAIT);
+            left -= 1;
+        }
     }
 
     /// Ends the recording and waits until the loop has taken note of it: how many ticks it made meanwhile.
@@ -180,6 +173,21 @@ impl Servo {
             }
             Caller::Driver(scheduler) => scheduler.stop(),
         }
+    }
+}
+
+/// Changes are sent to it, and ticks are read there.
+impl Deref for Servo {
+    type Target = LoopHandle;
+
+    fn deref(&self) -> &LoopHandle {
+        &self.handle
+    }
+}
+
+impl DerefMut for Servo {
+    fn deref_mut(&mut self) -> &mut LoopHandle {
+        &mut self.handle
     }
 }
 

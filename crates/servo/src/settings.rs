@@ -1,9 +1,11 @@
-//! What may be changed while the loop runs.
+//! What may be changed while the loop runs: the one record of it, from the scene to the tick and the frame.
+
+use std::slice::{from_mut, from_ref};
 
 use palpate_core::simulation::{Controls, Kept, MAX_BODIES, MAX_TOOLS, Model};
 use palpate_core::{Error, Result};
 
-/// What the frame side may change while the loop runs.
+/// What may be changed while the loop runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Contact radius of each tool's contacts that begin from now on, m.
@@ -14,8 +16,6 @@ pub struct Settings {
     pub stiffness_scale: [f64; MAX_BODIES],
     /// Largest strain to which tools may take a body; zero for any.
     pub strain_limit: f64,
-    /// Each new value lets go of everything, brings moving bodies to rest and clears faults.
-    pub resets: u32,
     /// Seconds that a body in motion advances in a second: below one is slow motion.
     pub time_scale: f64,
     /// A body and the rank of one of its surface nodes, whose displacement is logged.
@@ -29,67 +29,123 @@ impl Default for Settings {
             friction: [0.0; MAX_TOOLS],
             stiffness_scale: [1.0; MAX_BODIES],
             strain_limit: 0.0,
-            resets: 0,
             time_scale: 1.0,
             watch: None,
         }
     }
 }
 
+/// What a setting has a value for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Per {
+    /// Each tool.
+    Tool,
+    /// Each body.
+    Body,
+    /// The scene as a whole.
+    Scene,
+}
+
+/// A number of the settings, or one for each tool or body.
+pub struct Setting {
+    /// Name of its field.
+    pub name: &'static str,
+    /// What it has a value for.
+    pub per: Per,
+    /// Whether zero is refused as negative numbers are.
+    positive: bool,
+    values: fn(&Settings) -> &[f64],
+    values_mut: fn(&mut Settings) -> &mut [f64],
+}
+
+const fn setting(
+    (name, per, positive): (&'static str, Per, bool),
+    values: fn(&Settings) -> &[f64],
+    values_mut: fn(&mut Settings) -> &mut [f64],
+) -> Setting {
+    Setting { name, per, positive, values, values_mut }
+}
+
+impl Setting {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        setting(("contact_radius", Per::Tool, false), |s| &s.contact_radius, |s| &mut s.contact_radius),
+        setting(("friction", Per::Tool, false), |s| &s.friction, |s| &mut s.friction),
+        setting(("stiffness_scale", Per::Body, true), |s| &s.stiffness_scale, |s| &mut s.stiffness_scale),
+        setting(("strain_limit", Per::Scene, false), |s| from_ref(&s.strain_limit), |s| from_mut(&mut s.strain_limit)),
+        setting(("time_scale", Per::Scene, false), |s| from_ref(&s.time_scale), |s| from_mut(&mut s.time_scale)),
+    ];
+
+    /// Its values: one, or one for each tool or body that there may be.
+    pub fn values<'a>(&self, settings: &'a Settings) -> &'a [f64] {
+        (self.values)(settings)
+    }
+
+    fn check(&self, settings: &Settings) -> Result<()> {
+        for (rank, &value) in self.values(settings).iter().enumerate() {
+            refuse_unless(value.is_finite() && if self.positive { value > 0.0 } else { value >= 0.0 }, || {
+                let (name, must) =
+                    (self.name.replace('_', " "), if self.positive { "be positive" } else { "not be negative" });
+                let of = match self.per {
+                    Per::Tool => format!(" of tool {rank}"),
+                    Per::Body => format!(" of body {rank}"),
+                    Per::Scene => String::new(),
+                };
+                format!("the {name}{of} must {must}, got {value}")
+            })?;
+        }
+        Ok(())
+    }
+}
+
 impl Settings {
+    /// Changes the value of a setting for a tool or body, or for the scene (0). A rank beyond all there may be changes nothing.
+    ///
+    /// # Errors
+    /// A name that no setting has.
+    pub fn set(&mut self, name: &str, rank: usize, value: f64) -> Result<()> {
+        let unknown = || Error::Invalid(format!("there is no setting '{name}'"));
+        let setting = Setting::ALL.iter().find(|setting| setting.name == name).ok_or_else(unknown)?;
+        (setting.values_mut)(self).get_mut(rank).into_iter().for_each(|to| *to = value);
+        Ok(())
+    }
+
     /// Refuses what does not belong to a model. Whether contacts of the radius can be weighed everywhere takes long to find
     /// out: see [`Model::check_contact_radius`].
     ///
     /// # Errors
     /// A number out of its range, or a body or node that the model does not have.
     pub fn check(&self, model: &Model) -> Result<()> {
-        let not_negative = |x: f64| x >= 0.0 && x.is_finite();
-        for (tool, &radius) in self.contact_radius.iter().enumerate() {
-            refuse_unless(not_negative(radius), || {
-                format!("the contact radius of tool {tool} must not be negative, got {radius} m")
-            })?;
-        }
-        for (tool, &friction) in self.friction.iter().enumerate() {
-            refuse_unless(not_negative(friction), || {
-                format!("the friction of tool {tool} must not be negative, got {friction}")
-            })?;
-        }
-        for (body, &scale) in self.stiffness_scale.iter().enumerate() {
-            refuse_unless(scale > 0.0 && scale.is_finite(), || {
-                format!("the stiffness scale of body {body} must be positive, got {scale}")
-            })?;
-        }
-        for (name, value) in [("strain limit", self.strain_limit), ("time scale", self.time_scale)] {
-            refuse_unless(not_negative(value), || format!("the {name} must not be negative, got {value}"))?;
-        }
+        Setting::ALL.iter().try_for_each(|setting| setting.check(self))?;
         self.watch.map_or(Ok(()), |(body, node)| check_node(model, body, node))
     }
 
     /// What goes on where a scene changes: of bodies and tools that stay what they have, of new ones that of `fresh`.
     pub fn carried_over(&self, fresh: &Settings, kept: &Kept) -> Settings {
         let mut now = *self;
-        for (rank, old) in kept.tools.iter().enumerate() {
-            let (of, old) = old.map_or((fresh, rank), |old| (self, old));
-            (now.contact_radius[rank], now.friction[rank]) = (of.contact_radius[old], of.friction[old]);
-        }
-        for (rank, old) in kept.bodies.iter().enumerate() {
-            let (of, old) = old.map_or((fresh, rank), |old| (self, old));
-            now.stiffness_scale[rank] = of.stiffness_scale[old];
+        for setting in &Setting::ALL {
+            let ranks: &[Option<usize>] = match setting.per {
+                Per::Tool => &kept.tools,
+                Per::Body => &kept.bodies,
+                Per::Scene => continue,
+            };
+            for (rank, (to, old)) in (setting.values_mut)(&mut now).iter_mut().zip(ranks).enumerate() {
+                *to = old.map_or(setting.values(fresh)[rank], |old| setting.values(self)[old]);
+            }
         }
         let new_rank = |old: usize| kept.bodies.iter().position(|&rank| rank == Some(old));
         now.watch = self.watch.and_then(|(body, node)| Some((new_rank(body)?, node)));
         now
     }
 
-    /// What a tick makes of them, given those of the tick before, without a strike; the strain of some bodies cannot be
-    /// limited.
-    pub(crate) fn controls(&self, before: &Settings, period: f64, limited: &[bool; MAX_BODIES]) -> Controls {
+    /// What a tick makes of them, without a strike; the strain of some bodies cannot be limited.
+    pub(crate) fn controls(&self, reset: bool, period: f64, limited: &[bool; MAX_BODIES]) -> Controls {
         Controls {
             contact_radius: self.contact_radius,
             friction: self.friction,
             stiffness_scale: self.stiffness_scale,
             strain_limit: limited.map(|limited| if limited { self.strain_limit } else { 0.0 }),
-            reset: self.resets != before.resets,
+            reset,
             advance: self.time_scale * period,
             strike: None,
         }

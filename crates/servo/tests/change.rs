@@ -197,9 +197,8 @@ fn another_device_lets_go_of_what_the_tool_held() {
     // The middle of the cube's top: nothing pushes sideways.
     assert!(pressed.z > 0.01 && pressed.x.abs() + pressed.y.abs() < 0.05 * pressed.z, "{pressed}");
     // A reset that the loop has not seen when a change comes is not lost: the force ramps in anew.
-    let reset = Settings { resets: 1, ..settings() };
-    servo.set(reset).expect("settings");
-    let same = SceneChange { settings: reset, ..change(&model, &[0, 1], &[Some(0), Some(1)], None) };
+    servo.reset().expect("room");
+    let same = change(&model, &[0, 1], &[Some(0), Some(1)], None);
     ticks_through(&mut tick, &mut servo, same).expect("changed");
     assert!(felt.lock().expect("no poison").z < 0.5 * pressed.z);
     servo.stop();

@@ -5,7 +5,7 @@ mod common;
 
 use glam::DVec3;
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Pose, Reading, Twist};
-use palpate_servo::{FaultReason, ForceLoop, Replay, SafetyLimits, Settings, StrainPreparer, TickRecord};
+use palpate_servo::{FaultReason, ForceLoop, Replay, SafetyLimits, StrainPreparer, TickRecord};
 
 use common::{PERIOD, PERIOD_NS, Scripted, scene, settings};
 
@@ -100,7 +100,9 @@ fn record(injected: Injected) -> Vec<TickRecord> {
         ForceLoop::new(scene(false, false), devices, limits(), settings()).expect("a valid loop");
     let mut records = handle.begin_recording().expect("no recording yet");
     for tick in 0..TICKS {
-        handle.set(Settings { resets: u32::from(tick >= RESET), ..settings() }).expect("valid settings");
+        if tick == RESET {
+            handle.reset().expect("room");
+        }
         force_loop.tick(tick * PERIOD_NS, PERIOD);
     }
     std::iter::from_fn(|| records.pop().ok()).collect()

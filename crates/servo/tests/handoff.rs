@@ -70,7 +70,8 @@ fn hand_offs() {
         changes += 1;
         let mut changed = settings();
         (changed.friction[0], changed.time_scale) = (0.1 + 1e-4 * f64::from(changes % 100), 1.0);
-        handle.set(changed).expect("valid settings");
+        // Refused only where the ring is full.
+        let _ = handle.set(changed);
         struck += u32::from(handle.strike(strike(struck + 1)).is_ok());
         match changes % 50 {
             10 => records = handle.begin_recording().ok(),

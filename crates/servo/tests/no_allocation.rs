@@ -53,9 +53,8 @@ fn second_tool(tick: u64) -> Reading {
 }
 
 fn settings_at(tick: u64) -> Settings {
-    let resets = u32::from(tick >= RESET);
     let watch = (tick / 200 % 2 == 1).then_some((0, 7));
-    Settings { resets, watch, strain_limit: STRAIN_LIMIT, ..settings() }
+    Settings { watch, strain_limit: STRAIN_LIMIT, ..settings() }
 }
 
 const STRIKES: [u64; 2] = [100, 1600];
@@ -70,7 +69,6 @@ fn kinds(tick: u64, before: &[(u64, usize)], published: &Published) -> Vec<&'sta
     let Published { status, state } = published;
     let now = contacts(state);
     let both = |holds: bool, name: &'static str| holds.then_some(name);
-    let (set, last) = (settings_at(tick), settings_at(tick.saturating_sub(1)));
     [
         both(now.is_empty(), "free"),
         both(now.iter().any(|contact| !before.contains(contact)), "begin"),
@@ -81,10 +79,10 @@ fn kinds(tick: u64, before: &[(u64, usize)], published: &Published) -> Vec<&'sta
         both([0, 1].iter().all(|body| now.iter().any(|contact| contact.1 == *body)), "two bodies"),
         both(state.energy(0).is_some_and(|energy| energy.kinetic > 0.0), "motion"),
         both(STRIKES.contains(&tick), "strike"),
-        both(set.resets != last.resets, "reset"),
+        both(tick == RESET, "reset"),
         both(status.fault.is_some(), "fault"),
         both(state.tools[0].refused[1].is_some(), "refused"),
-        both(set.watch.is_some(), "watch"),
+        both(settings_at(tick).watch.is_some(), "watch"),
         both(status.limited[0], "limited"),
         both(status.ports.iter().any(|port| port.owed > 0.0), "owed"),
         both(state.contacts.iter().any(|(contact, _)| is_steep(contact)), "steep"),
@@ -111,6 +109,9 @@ fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static
     let (mut before, mut records) = (Vec::new(), None);
     for tick in 0..TICKS {
         handle.set(settings_at(tick)).expect("valid settings");
+        if tick == RESET {
+            handle.reset().expect("room");
+        }
         if STRIKES.contains(&tick) {
             // One waits for the tick after.
             (0..2).for_each(|_| handle.strike(strike()).expect("room"));

@@ -50,12 +50,7 @@ fn sliding_readings(tool: usize, now_ns: u64) -> Result<Reading, DeviceFault> {
 }
 
 fn settings_at(tick: u64, strain_limit: f64) -> Settings {
-    Settings {
-        friction: [if tick < 1000 { 0.3 } else { 0.1 }; MAX_TOOLS],
-        strain_limit,
-        resets: u32::from(tick >= 1200),
-        ..settings()
-    }
+    Settings { friction: [if tick < 1000 { 0.3 } else { 0.1 }; MAX_TOOLS], strain_limit, ..settings() }
 }
 
 fn measured(model: &Arc<Model>) -> StrainPreparer {
@@ -92,6 +87,9 @@ fn record(model: &Arc<Model>, readings: Readings, strain_limit: f64, begin: u64)
             force_loop.latch(FaultReason::Overrun);
         }
         handle.set(settings_at(tick, strain_limit)).expect("valid settings");
+        if tick == 1200 {
+            handle.reset().expect("room");
+        }
         if tick == 700 {
             // One a tick from here on.
             [1.0, 0.5, -0.7].into_iter().for_each(|times| handle.strike(strike(times)).expect("room"));

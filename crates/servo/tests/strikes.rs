@@ -56,6 +56,52 @@ fn strikes_within_a_tick_are_given_one_after_the_other() {
     assert!(largest > 0.0);
 }
 
+/// Each strike is given under the settings that were sent before it, whatever was sent after it.
+#[test]
+fn settings_and_strikes_within_a_tick_keep_their_order() {
+    let (mut force_loop, mut handle) = new_loop();
+    let mut records = handle.begin_recording().expect("no recording yet");
+    force_loop.tick(0, PERIOD);
+    let [first, second, _] = strikes();
+    let sent = [(0.5, first), (1.0, second)];
+    for (time_scale, strike) in sent {
+        handle.set(Settings { time_scale, ..settings() }).expect("valid settings");
+        handle.strike(strike).expect("room");
+    }
+    (1..4).for_each(|tick| force_loop.tick(tick * PERIOD_NS, PERIOD));
+    let given = std::iter::from_fn(|| records.pop().ok())
+        .filter_map(|record| Some((record.input.settings.time_scale, record.input.strike?)));
+    assert_eq!(given.collect::<Vec<_>>(), sent);
+    assert_eq!(handle.latest().status.settings.time_scale, 1.0);
+}
+
+/// Settings do not wait for strikes that wait for room, nor does a reset.
+#[test]
+fn a_full_queue_is_an_error_until_the_loop_ticks() {
+    let (mut force_loop, mut handle) = new_loop();
+    let mut records = handle.begin_recording().expect("no recording yet");
+    let strikes = 64;
+    (0..strikes).for_each(|_| handle.strike(strike(0.02, DVec3::NEG_Z)).expect("room"));
+    let set = |friction: f64| Settings { friction: [friction; 4], ..settings() };
+    let accepted = (0..2000).take_while(|&rank| handle.set(set(f64::from(rank))).is_ok()).count();
+    assert_eq!(accepted, 1024 - strikes);
+    let refused = handle.reset().expect_err("full").to_string();
+    assert!(refused.contains("the loop does not tick") && !refused.contains('\n'), "{refused}");
+    // Each strike takes its turn, and then the settings behind them come into force.
+    let ticks = strikes as u64 + 1;
+    (0..ticks).for_each(|tick| force_loop.tick(tick * PERIOD_NS, PERIOD));
+    assert_eq!(handle.latest().status.settings.friction[0], (accepted - 1) as f64);
+    handle.set(set(0.7)).expect("room");
+    handle.reset().expect("room");
+    (ticks..ticks + 20).for_each(|tick| force_loop.tick(tick * PERIOD_NS, PERIOD));
+    assert_eq!(handle.latest().status.settings.friction[0], 0.7);
+    let given: Vec<_> = std::iter::from_fn(|| records.pop().ok()).map(|record| record.input.strike.is_some()).collect();
+    let (before, after) = given.split_at(ticks as usize);
+    assert!(
+        before.iter().any(|&given| given) && !before.iter().all(|&given| given) && !after.iter().any(|&given| given)
+    );
+}
+
 /// More than may be under way at once wait until one is over.
 #[test]
 fn all_strikes_are_given_and_no_more_wait_than_there_is_room_for() {
@@ -81,7 +127,7 @@ fn a_reset_takes_back_the_strikes_before_it_alone() {
     let mut records = handle.begin_recording().expect("no recording yet");
     force_loop.tick(0, PERIOD);
     (0..5).for_each(|_| handle.strike(strike(0.02, DVec3::NEG_Z)).expect("room"));
-    handle.set(Settings { resets: 1, ..settings() }).expect("valid settings");
+    handle.reset().expect("room");
     handle.strike(strike(0.02, DVec3::Y)).expect("room");
     (1..20).for_each(|tick| force_loop.tick(tick * PERIOD_NS, PERIOD));
     let given: Vec<_> = std::iter::from_fn(|| records.pop().ok()).filter_map(|record| record.input.strike).collect();

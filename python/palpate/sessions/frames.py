@@ -136,8 +136,7 @@ class RecordedFrames:
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         again = _native.Replay(self.simulation._core, self.recording.source)
-        settings, made = list(self.recording.settings), 0
-        scales = settings[0]["stiffness_scale"] if settings else []
+        made = 0
         for row in self.rows.tolist():
             _, differences = again.step(row + 1 - made)
             made = row + 1
@@ -145,9 +144,7 @@ class RecordedFrames:
                 tick, of, quantity = differences[0][:3]
                 _warn(f"frames are not as recorded from tick {tick} on ({of} {quantity}): made by another version?")
                 self._told = True
-            while settings and settings[0]["tick"] <= row:
-                scales = settings.pop(0)["stiffness_scale"]
-            frame = frame_of(again.frame(), self.simulation.bodies, scales)
+            frame = frame_of(again.frame(), self.simulation.bodies)
             yield RecordedFrame(row, float(self.recording.time[row]), frame, self._present[row])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,22 +10,22 @@ import numpy as np
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltBody
-from palpate.simulation import settings
+from palpate.scene.tables import SceneTables
 from palpate.simulation.script import strike_of
+from palpate.simulation.settings import checked
 
 
 class Adjustable:
-    """Settings of a simulation: kept here, and handed to the loop."""
+    """Settings of a simulation, which the native part of it has."""
 
+    scene: SceneTables
     bodies: tuple[BuiltBody, ...]
     _core: _native.SimulationCore
-    _scales: list[float]
-    _radii: list[float]
-    _friction: list[float]
-    _strain_limit: float
+    # Whether the native part has measures of the strain of all bodies.
     _armed: bool
-    # Held while what is kept here of the settings changes.
-    _keeping: threading.Lock
+
+    def _settings(self) -> dict[str, Any]:
+        return self._core.settings()
 
     def set_radius(self, contact_radius: float | str, tool: int | None = None) -> None:
         """Contact radius of contacts that begin from now on, m, of one tool or of all.
@@ -37,11 +36,7 @@ class Adjustable:
             A radius under which a contact would cover more nodes than a tick can weigh.
 
         """
-        tools = range(len(self._radii)) if tool is None else [self._tool(tool)]
-        radius = settings.checked_radius(contact_radius)
-        for changed in tools:
-            self._core.set_contact_radius(changed, radius)
-            self._keep("_radii", changed, radius)
+        self._set_of_tools("contact_radius", contact_radius, tool)
 
     def set_friction(self, friction: float, tool: int | None = None) -> None:
         """Coulomb's coefficient of friction from now on, of one tool or of all; 0 slides freely.
@@ -52,24 +47,20 @@ class Adjustable:
             A coefficient that is negative, or greater than 10.
 
         """
-        coefficient = settings.checked_friction(friction)
-        tools = range(len(self._friction)) if tool is None else [self._tool(tool)]
-        for changed in tools:
-            self._core.set_friction(changed, coefficient)
-            self._keep("_friction", changed, coefficient)
+        self._set_of_tools("friction", friction, tool)
 
     def friction_of(self, tool: int = 0) -> float:
         """Coulomb's coefficient of friction of a tool."""
-        return self._friction[self._tool(tool)]
+        return self._settings()["friction"][self._tool(tool)]
 
     def contact_radius_of(self, tool: int = 0) -> float:
         """Contact radius of contacts of a tool that begin from now on, m."""
-        return self._radii[self._tool(tool)]
+        return self._settings()["contact_radius"][self._tool(tool)]
 
     @property
     def contact_radius(self) -> float:
         """Contact radius of contacts of the first tool that begin from now on, m."""
-        return self._radii[0]
+        return self.contact_radius_of()
 
     def largest_contact_radius(self, limit: float) -> float:
         """Largest contact radius up to ``limit`` (m) that can be weighed everywhere, to about a hundredth."""
@@ -79,7 +70,7 @@ class Adjustable:
         """Young's modulus of a body now, Pa; None for one of several materials, with loads, or in motion."""
         reference = self.bodies[self._body(body)].green.youngs_modulus
         fixed = reference is None or self.bodies[body].motion is not None
-        return None if fixed else reference * self._scales[body]
+        return None if fixed else reference * self.stiffness_scale_of(body)
 
     @property
     def youngs_modulus(self) -> float | None:
@@ -88,12 +79,12 @@ class Adjustable:
 
     def stiffness_scale_of(self, body: int = 0) -> float:
         """Young's modulus of a body now over that of its Green's function."""
-        return self._scales[self._body(body)]
+        return self._settings()["stiffness_scale"][self._body(body)]
 
     @property
     def stiffness_scale(self) -> float:
         """Young's modulus of the first body now over that of its Green's function."""
-        return self._scales[0]
+        return self.stiffness_scale_of()
 
     def set_youngs_modulus(self, youngs_modulus: float | str, body: int = 0) -> None:
         """Change the stiffness of a body of one material at rest, without loads, Pa: it only scales the compliance.
@@ -109,9 +100,12 @@ class Adjustable:
             raise SceneError(
                 "the body has several materials, or loads, or moves: its stiffness cannot be changed while running"
             )
-        scale = settings.checked_modulus(youngs_modulus) / reference
-        self._core.set_stiffness_scale(body, scale)
-        self._keep("_scales", body, scale)
+        self._core.set("stiffness_scale", body, checked("youngs_modulus", youngs_modulus) / reference)
+
+    @property
+    def strain_limit(self) -> float:
+        """Largest strain to which tools may take the bodies now; 0 for any."""
+        return self._settings()["strain_limit"]
 
     def set_strain_limit(self, strain_limit: float) -> None:
         """Largest strain to which tools may take the bodies from now on; 0 takes the limit away.
@@ -122,15 +116,15 @@ class Adjustable:
             A limit below 0 or above 1.
 
         """
-        self._strain_limit = settings.checked_strain_limit(strain_limit)
-        self._arm_strain_limit()
-        self._core.set_strain_limit(self._strain_limit)
+        limit = checked("strain_limit", strain_limit)
+        self._arm_strain_limit(limit)
+        self._core.set("strain_limit", 0, limit)
 
-    def _arm_strain_limit(self) -> None:
+    def _arm_strain_limit(self, limit: float | None = None) -> None:
         """Give the loop what measures strain, once it is asked to limit it: it takes a factor of every body."""
-        if self._strain_limit > 0 and not self._armed:
-            for rank, body in enumerate(self.bodies):
-                self._core.set_strain_measure(rank, body.green.native_strain_measure)
+        asked = self._core.settings()["strain_limit"] if limit is None else limit
+        if asked > 0 and not self._armed:
+            _native.set_strain_measures(self._core, [body.green.native_strain_measure for body in self.bodies])
             self._armed = True
 
     def strike(
@@ -148,7 +142,7 @@ class Adjustable:
 
         """
         struck = self._moving_body("strike", body)
-        self._core.strike(struck, *strike_of(point, impulse, duration), self._radii[0])
+        self._core.strike(struck, *strike_of(point, impulse, duration))
 
     def set_time_scale(self, time_scale: float) -> None:
         """Seconds that bodies in motion advance in a second, in (0, 1]: below one is slow motion.
@@ -160,7 +154,12 @@ class Adjustable:
 
         """
         self._moving_body("slow motion", None)
-        self._core.set_time_scale(settings.checked_time_scale(time_scale))
+        self._core.set("time_scale", 0, checked("time_scale", time_scale))
+
+    @property
+    def time_scale(self) -> float:
+        """Seconds that bodies in motion advance in a second."""
+        return self._settings()["time_scale"]
 
     def watch(self, node: int, body: int = 0) -> None:
         """Log the displacement of a surface node (mesh index) from now on; at first it is the lowest one's.
@@ -172,13 +171,6 @@ class Adjustable:
 
         """
         self._core.watch(self._body(body), self._rank_of(node, body))
-
-    def _keep(self, name: str, rank: int, value: Any) -> None:
-        """Keep what is set of a tool or body, which another thread may have removed meanwhile."""
-        with self._keeping:
-            values = getattr(self, name)
-            if rank < len(values):
-                values[rank] = value
 
     def _rank_of(self, node: int, body: int) -> int:
         surface = self.bodies[body].green.surface_nodes
@@ -194,9 +186,14 @@ class Adjustable:
             raise SceneError(f"{what}: the body does not move; give the scene a [dynamics] table")
         return chosen
 
+    def _set_of_tools(self, name: str, value: float | str, tool: int | None) -> None:
+        number = checked(name, value)
+        for changed in range(len(self.scene.tools)) if tool is None else [self._tool(tool)]:
+            self._core.set(name, changed, number)
+
     def _tool(self, tool: int) -> int:
-        if not 0 <= tool < len(self._radii):
-            raise SceneError(f"there is no tool {tool}: the scene has {len(self._radii)}")
+        if not 0 <= tool < len(self.scene.tools):
+            raise SceneError(f"there is no tool {tool}: the scene has {len(self.scene.tools)}")
         return tool
 
     def _body(self, body: int) -> int:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate import _native
 from palpate.errors import BodyError, Error, SceneError
 from palpate.scene import BuiltBody
 from palpate.scene.mistakes import located
@@ -28,7 +29,9 @@ def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
     except Error as error:
         path, text = scene.source
         raise SceneError(f"{located(path, text, ['tool', rank, 'shape'])}: tool.shape: {error}") from None
-    return shape, tool.contact_radius, tool.contact, most, tool.friction, tool.pad_youngs_modulus
+    # Settings have the names of their keys in the table.
+    settings = {name: getattr(tool, name) for name in _native.TOOL_SETTINGS}
+    return shape, tool.contact, most, tool.pad_youngs_modulus, settings
 
 
 def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:

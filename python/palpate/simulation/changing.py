@@ -22,9 +22,6 @@ from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
 from palpate.vectors import three_numbers
 
-UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-
-Rank = int | None
 Given, Answer = ParamSpec("Given"), TypeVar("Answer")
 
 
@@ -51,17 +48,11 @@ class Changing:
     scene: SceneTables
     bodies: tuple[BuiltBody, ...]
     _core: _native.SimulationCore
-    _scales: list[float]
-    _radii: list[float]
-    _friction: list[float]
-    _targets: list[tuple[Any, Any]]
-    _grab: list[bool]
     _armed: bool
     _running: bool
     # Of the scene that the loop has, as the core counts them; None while another one comes in.
     _number: int | None
     _changing: threading.RLock
-    _keeping: threading.Lock
     _given: dict[int, Device]
     _devices: dict[int, str]
 
@@ -86,9 +77,10 @@ class Changing:
         built, table = _built(body)
         place = _placed(table.position if position is None else position, table.orientation, orientation)
         built, table = replace(built, position=place[0], orientation=place[1]), _moved(table, place)
-        bodies = [*range(len(self.bodies)), None]
         scene = self.scene.model_copy(update={"bodies": [*self.scene.bodies, table]})
-        self._exchange(scene, (*self.bodies, built), bodies, list(range(len(self.scene.tools))))
+        measure = built.green.native_strain_measure if self._armed else None
+        arguments = body_arguments(built, _needs_moduli(scene))
+        self._take(scene, (*self.bodies, built), lambda: _native.add_body(self._core, arguments, measure))
         return len(self.bodies) - 1
 
     @one_at_a_time
@@ -101,13 +93,12 @@ class Changing:
             No such body, the last one, or a loop that is being recorded.
 
         """
-        kept: list[Rank] = [rank for rank in range(len(self.bodies)) if rank != self._body(body)]
-        if not kept:
+        if len(self.bodies) == 1 and self._body(body) == 0:
             raise SceneError("a simulation needs a body: add another one before the last is removed")
-        tables = [table for rank, table in enumerate(self.scene.bodies) if rank != body]
-        bodies = tuple(one for rank, one in enumerate(self.bodies) if rank != body)
+        bodies, tables = list(self.bodies), list(self.scene.bodies)
+        del bodies[self._body(body)], tables[body]
         scene = self.scene.model_copy(update={"bodies": tables})
-        self._exchange(scene, bodies, kept, list(range(len(self.scene.tools))))
+        self._take(scene, tuple(bodies), lambda: _native.remove_body(self._core, body))
 
     @one_at_a_time
     def place_body(self, body: int, position: Sequence[float], orientation: Sequence[float] | None = None) -> None:
@@ -127,7 +118,7 @@ class Changing:
         bodies[body] = replace(moved, position=place[0], orientation=place[1])
         tables[body] = _moved(tables[body], place)
         scene = self.scene.model_copy(update={"bodies": tables})
-        self._exchange(scene, tuple(bodies), list(range(len(bodies))), list(range(len(self.scene.tools))))
+        self._take(scene, tuple(bodies), lambda: _native.place_body(self._core, body, *place))
 
     @one_at_a_time
     def take_store(self, body: int, green: GreensFunction) -> None:
@@ -143,8 +134,8 @@ class Changing:
         """
         bodies = list(self.bodies)
         bodies[body] = replace(bodies[self._body(body)], green=green)
-        ranks: tuple[list[Rank], list[Rank]] = list(range(len(bodies))), list(range(len(self.scene.tools)))
-        self._exchange(self.scene, tuple(bodies), *ranks, exchanged=body)
+        arguments = body_arguments(bodies[body], _needs_moduli(self.scene))
+        self._take(self.scene, tuple(bodies), lambda: _native.replace_body(self._core, body, arguments))
 
     @one_at_a_time
     def add_tool(self, device: str | Device = "simulated", **table: Any) -> int:
@@ -173,7 +164,8 @@ class Changing:
         tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
         scene = self.scene.model_copy(update={"tools": [*tools, tool], "device": first, "further_devices": further})
         scene = BuiltScene(scene, self.bodies).scene
-        self._exchange(scene, self.bodies, list(range(len(self.bodies))), [*range(rank), None])
+        arguments = tool_arguments(scene, rank)
+        self._take(scene, self.bodies, lambda: _native.add_tool(self._core, arguments))
         if given is not None:
             self._given[rank] = given
         if self._running and (given is not None or kind != "simulated"):
@@ -195,13 +187,13 @@ class Changing:
             No such tool, the last one, or a loop that is being recorded.
 
         """
-        kept: list[Rank] = [rank for rank in range(len(self.scene.tools)) if rank != self._tool(tool)]
-        if not kept:
+        if len(self.scene.tools) == 1 and self._tool(tool) == 0:
             raise SceneError("a simulation needs a tool: add another one before the last is removed")
-        devices = tables_of_tools(self.scene, without=tool)
+        devices = tables_of_tools(self.scene, without=self._tool(tool))
         tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
         update = {"tools": tools[:tool] + tools[tool + 1 :], "device": devices[0], "further_devices": devices[1:]}
-        self._exchange(self.scene.model_copy(update=update), self.bodies, list(range(len(self.bodies))), kept)
+        scene = self.scene.model_copy(update=update)
+        self._take(scene, self.bodies, lambda: _native.remove_tool(self._core, tool))
         gone, connected = self._given.pop(tool, None), tool in self._devices
         self._given = {rank - (rank > tool): given for rank, given in self._given.items()}
         self._devices = {rank - (rank > tool): name for rank, name in self._devices.items() if rank != tool}
@@ -238,43 +230,12 @@ class Changing:
         warn_if_limited(self._core, tool, self._devices[tool])
         return self._devices[tool]
 
-    def _exchange(
-        self,
-        scene: SceneTables,
-        bodies: tuple[BuiltBody, ...],
-        body_ranks: list[Rank],
-        tool_ranks: list[Rank],
-        exchanged: int | None = None,
-    ) -> None:
-        """Give the core bodies and tools, of which some were at these ranks before; one of them has another store."""
-        local = any(tool.contact == "local" for tool in scene.tools)
-        new_bodies = [
-            body_arguments(body, local) for body, rank in zip(bodies, body_ranks, strict=True) if rank is None
-        ]
-        new_tools = [tool_arguments(scene, tool) for tool, rank in enumerate(tool_ranks) if rank is None]
-        places = [(tuple(body.position), tuple(body.orientation)) for body in bodies]
-        other = None if exchanged is None else (exchanged, body_arguments(bodies[exchanged], local))
-        number = _native.change(self._core, (body_ranks, new_bodies, places), (tool_ranks, new_tools), other)
+    def _take(self, scene: SceneTables, bodies: tuple[BuiltBody, ...], change: Callable[[], int]) -> None:
+        """Go on with another scene once the core has changed to it."""
+        number = change()
         # Until all belongs to the new scene, none of it is taken for a frame.
         self._number = None
         self.scene, self.bodies = scene, bodies
-        tools = scene.tools
-        with self._keeping:
-            self._scales = [1.0 if rank is None else self._scales[rank] for rank in body_ranks]
-            radii, friction, targets, grab = self._radii, self._friction, self._targets, self._grab
-            new = [rank is None for rank in tool_ranks]
-            kept = [0 if rank is None else rank for rank in tool_ranks]
-            self._radii = [tools[t].contact_radius if new[t] else radii[k] for t, k in enumerate(kept)]
-            self._friction = [tools[t].friction if new[t] else friction[k] for t, k in enumerate(kept)]
-            self._targets = [((0.0, 0.0, 0.0), UPRIGHT) if new[t] else targets[k] for t, k in enumerate(kept)]
-            self._grab = [not new[t] and grab[k] for t, k in enumerate(kept)]
-        if self._armed and None in body_ranks:
-            for rank, was in enumerate(body_ranks):
-                if was is None:
-                    self._core.set_strain_measure(rank, bodies[rank].green.native_strain_measure)
-            # The running loop takes the measures with a scene that is otherwise the same.
-            everything = (list(range(len(bodies))), [], places), (list(range(len(tools))), [])
-            number = _native.change(self._core, *everything)
         self._number = number
 
     def _tool(self, tool: int) -> int:
@@ -295,6 +256,10 @@ def _built(body: Body | GreensFunction | Scene | Mapping[str, Any]) -> tuple[Bui
     scene = body if isinstance(body, Scene) else Scene(body=dict(body))
     built = scene.build()
     return built.bodies[0], built.scene.bodies[0]
+
+
+def _needs_moduli(scene: SceneTables) -> bool:
+    return any(tool.contact == "local" for tool in scene.tools)
 
 
 def _placed(

@@ -189,17 +189,14 @@ class Frame(ComparedByValue, Exported):
         return all(body.within_linear_range for body in self.bodies)
 
 
-def frame_of(raw: dict[str, Any], bodies: Sequence[BuiltBody], stiffness_scales: Sequence[float]) -> Frame:
-    """Frame of a tick as the native module hands it out, of a running loop or of one made again.
-
-    ``stiffness_scales`` are Young's moduli of the bodies in that tick over those of their Green's functions.
-    """
+def frame_of(raw: dict[str, Any], bodies: Sequence[BuiltBody]) -> Frame:
+    """Frame of a tick as the native module hands it out, of a running loop or of one made again."""
     statistics = {name: raw[name] for name in (*STATISTICS, "port_energy")}
     for name in ("compute_us", "wakeup_us"):
         statistics[name] = dict(zip(PERCENTILES, raw[name], strict=True))
     moved = tuple(
         BodyFrame(surface.reshape(-1, 3), None if energy is None else Energy(*energy), body.green, body, scale)
-        for body, (surface, energy), scale in zip(bodies, raw["bodies"], stiffness_scales, strict=True)
+        for body, (surface, energy, scale) in zip(bodies, raw["bodies"], strict=True)
     )
     tools = [np.array(raw[k]) for k in ("forces", "torques", "positions", "orientations", "active", "limited")]
     contacts = [contact_of(record, bodies) for record in raw["contacts"]]

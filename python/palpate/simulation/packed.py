@@ -140,7 +140,7 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
 
 
 def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Path) -> dict[str, Any]:
-    (kind, lengths, vertices, triangles), contact_radius, law, max_stiffness, friction, pad = arguments
+    (kind, lengths, vertices, triangles), law, max_stiffness, pad, settings = arguments
     device = scene.device_of(rank)
     arrays = None
     if kind == "surface":
@@ -149,8 +149,7 @@ def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Pat
     return {
         "shape": {"kind": kind, "lengths": lengths, "arrays": arrays},
         "law": law,
-        "contact_radius": contact_radius,
-        "friction": friction,
+        **settings,
         "pad_youngs_modulus": pad,
         "max_stiffness": max_stiffness,
         "max_force": device.max_force / device.force_scale,

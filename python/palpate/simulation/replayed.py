@@ -66,8 +66,6 @@ class ReplayedSimulation(Simulation):
             raise SceneError("the recording has no tick that can be made again")
         self.checked, self.restarts = 0, 0
         self.difference: Difference | None = None
-        self.time_scale = 1.0
-        self.watched: tuple[int, int] | None = None
         # Of all ticks: what computing took then, not now.
         self._timing = {"compute_us": _percentiles(recorded.compute_us), "wakeup_us": _percentiles(recorded.wakeup_us)}
         self._begin()
@@ -96,7 +94,6 @@ class ReplayedSimulation(Simulation):
             self._take_log(tick)
             if time.monotonic() > end:
                 break
-        self._take_settings()
 
     def _compare(self, found: list[tuple[int, str, str, list[float], list[float]]]) -> None:
         if found and self.difference is None:
@@ -110,20 +107,19 @@ class ReplayedSimulation(Simulation):
         if goal - self.made < LOG_SECONDS * self.scene.device.rate:
             self._rows.append(rows)
 
-    def _take_settings(self) -> None:
-        radii, friction, scales, limit, self.time_scale, self.watched = self._again.settings()
-        self._radii, self._friction, self._scales, self._strain_limit = radii, friction, scales, limit
+    def _settings(self) -> dict[str, Any]:
+        return self._again.settings()
 
     @property
-    def strain_limit(self) -> float:
-        """Largest strain to which tools may take the bodies at the tick that is shown."""
-        return self._strain_limit
+    def watched(self) -> tuple[int, int] | None:
+        """Body and rank of the surface node that was watched at the tick that is shown."""
+        return self._again.settings()["watched"]
 
     def frame(self) -> Frame:
         """Read the latest tick that was made; its timing is that of the recording."""
         if self._frame is None:
             raw = {**self._again.frame(), "ticks": self.made, **self._timing}
-            self._frame = self._flagged(frame_of(raw, self.bodies, self._scales), self.bodies)
+            self._frame = self._flagged(frame_of(raw, self.bodies), self.bodies)
         return self._frame
 
     def _read_frame(self) -> Frame:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from palpate import units
@@ -9,77 +12,42 @@ from palpate.errors import SceneError
 from palpate.scene import MOST_FRICTION
 from palpate.vectors import number
 
-
-def checked_radius(value: float | str) -> float:
-    """Contact radius, m.
-
-    Raises
-    ------
-    SceneError
-        A negative number, or one that is not finite.
-
-    """
-    radius = units.length(value)
-    if not (np.isfinite(radius) and radius >= 0):
-        raise SceneError(f"the contact radius must not be negative, got {radius:g} m")
-    return radius
+Check = tuple[Callable[[Any], float], Callable[[float], bool], str]
 
 
-def checked_modulus(value: float | str) -> float:
-    """Young's modulus, Pa.
-
-    Raises
-    ------
-    SceneError
-        A number that is not positive, or not finite.
-
-    """
-    modulus = units.pressure(value)
-    if not (np.isfinite(modulus) and modulus > 0):
-        raise SceneError(f"Young's modulus must be positive, got {modulus:g} Pa")
-    return modulus
+def _plain(what: str) -> Callable[[Any], float]:
+    return lambda value: number(value, what, SceneError)
 
 
-def checked_friction(value: float) -> float:
-    """Coulomb's coefficient of friction.
+# By name: how a value is read, whether it is within its range, and what is said of one that is not.
+_CHECKS: dict[str, Check] = {
+    "contact_radius": (units.length, lambda x: x >= 0, "the contact radius must not be negative, got {:g} m"),
+    "youngs_modulus": (units.pressure, lambda x: x > 0, "Young's modulus must be positive, got {:g} Pa"),
+    "friction": (
+        _plain("friction"),
+        lambda x: 0 <= x <= MOST_FRICTION,
+        f"friction must lie between 0 and {MOST_FRICTION:g}, got {{:g}}",
+    ),
+    "strain_limit": (
+        _plain("the limit of strain"),
+        lambda x: 0 <= x <= 1,
+        "the limit of strain must lie in [0, 1], got {:g}",
+    ),
+    "time_scale": (_plain("the time scale"), lambda x: 0 < x <= 1, "the time scale must lie in (0, 1], got {:g}"),
+}
+
+
+def checked(name: str, value: Any) -> float:
+    """Value of a setting; of one without a range of its own any finite number.
 
     Raises
     ------
     SceneError
-        A coefficient that is negative, or too large for any pair of materials.
+        A value that is no number, or out of its range.
 
     """
-    friction = number(value, "friction", SceneError)
-    if not 0.0 <= friction <= MOST_FRICTION:
-        raise SceneError(f"friction must lie between 0 and {MOST_FRICTION:g}, got {friction:g}")
-    return friction
-
-
-def checked_strain_limit(value: float) -> float:
-    """Largest strain to which tools take a body; 0 for none.
-
-    Raises
-    ------
-    SceneError
-        A limit below 0 or above 1.
-
-    """
-    limit = number(value, "the limit of strain", SceneError)
-    if not 0.0 <= limit <= 1.0:
-        raise SceneError(f"the limit of strain must lie in [0, 1], got {limit:g}")
-    return limit
-
-
-def checked_time_scale(value: float) -> float:
-    """Seconds that bodies in motion advance in a second.
-
-    Raises
-    ------
-    SceneError
-        A scale outside of (0, 1].
-
-    """
-    scale = number(value, "the time scale", SceneError)
-    if not 0 < scale <= 1:
-        raise SceneError(f"the time scale must lie in (0, 1], got {scale:g}")
-    return scale
+    read, holds, refused = _CHECKS.get(name, (_plain(name), lambda x: True, ""))
+    checked = read(value)
+    if not (np.isfinite(checked) and holds(checked)):
+        raise SceneError(refused.format(checked))
+    return checked

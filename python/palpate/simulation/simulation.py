@@ -27,7 +27,7 @@ from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.changing import UPRIGHT, Changing
+from palpate.simulation.changing import Changing
 from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
 from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
@@ -91,11 +91,6 @@ class Simulation(Adjustable, Changing):
         built = scheduled(scene, cpus, priority)
         self.scene, self.bodies = built.scene, built.bodies
         device, tools = self.scene.device, self.scene.tools
-        self._scales = [1.0] * len(self.bodies)
-        self._radii = [tool.contact_radius for tool in tools]
-        self._friction = [tool.friction for tool in tools]
-        self._targets: list[tuple[Any, Any]] = [((0.0, 0.0, 0.0), UPRIGHT)] * len(tools)
-        self._grab = [False] * len(tools)
         self._core = _native.SimulationCore(
             [body_arguments(body, any(tool.contact == "local" for tool in tools)) for body in self.bodies],
             [tool_arguments(self.scene, rank) for rank in range(len(tools))],
@@ -109,14 +104,14 @@ class Simulation(Adjustable, Changing):
         for tool in self._given:
             self._tool(tool)
         self._devices: dict[int, str] = {}
-        self._strain_limit, self._armed = self.scene.view.strain_limit, False
-        self._running, self._warned = False, False
+        self._armed, self._running, self._warned = False, False, False
         self._number: int | None = 0
-        self._changing, self._keeping = threading.RLock(), threading.Lock()
+        self._changing = threading.RLock()
         self._to_record: Path | None = None
 
     def __repr__(self) -> str:
-        tools = f"{len(self._radii)} tool{'s' if len(self._radii) > 1 else ''}"
+        count = len(self.scene.tools)
+        tools = f"{count} tool{'s' if count > 1 else ''}"
         moves = ", a body in motion" if any(body.motion for body in self.bodies) else ""
         return f"Simulation({self.scene.name}, {tools}{moves}, {'running' if self._running else 'stopped'})"
 
@@ -226,7 +221,7 @@ class Simulation(Adjustable, Changing):
         return None if status is None else RecordingStatus(*status)
 
     def _begin_recording(self, path: Path) -> None:
-        tools = len(self._radii)
+        tools = len(self.scene.tools)
         self._core.begin_recording(path, self._about((tools, tools == 1), clock=True))
 
     def _about(self, shown: tuple[int, bool], clock: bool) -> dict[str, str]:
@@ -254,23 +249,18 @@ class Simulation(Adjustable, Changing):
             raise SceneError(f"tool {tool} is moved by {self._devices[tool]}")
         place = three_numbers(position, "a tool's position", SceneError, units.length)
         moving = (0.0, 0.0, 0.0) if velocity is None else three_numbers(velocity, "a tool's velocity", SceneError)
-        (_, turned), held = self._targets[self._tool(tool)], self._grab[tool]
+        turned = None
         if orientation is not None:
-            turned = tuple(orientations_of([orientation], np.array([[place]]))[0, 0].tolist())
-        self._keep("_targets", tool, (place, turned))
-        self._core.set_target(tool, (place, turned), moving, True, held)
+            turned = orientations_of([orientation], np.array([[place]]))[0, 0].tolist()
+        self._core.set_target(self._tool(tool), (place, turned), moving, True, None)
 
     def grab(self, on: bool, tool: int = 0) -> None:
         """Grab the surface near the tool, or let go."""
-        target = self._targets[self._tool(tool)]
-        self._keep("_grab", tool, bool(on))
-        self._core.set_target(tool, target, (0.0, 0.0, 0.0), True, bool(on))
+        self._core.set_target(self._tool(tool), (None, None), (0.0, 0.0, 0.0), True, bool(on))
 
     def remove(self, tool: int = 0) -> None:
         """Take a tool out of the scene until it is moved again."""
-        target = self._targets[self._tool(tool)]
-        self._keep("_grab", tool, False)
-        self._core.set_target(tool, target, (0.0, 0.0, 0.0), False, False)
+        self._core.set_target(self._tool(tool), (None, None), (0.0, 0.0, 0.0), False, False)
 
     def closest(self, points: np.ndarray, body: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Closest points of a body's surface as tools under the local law meet it: smooth between the nodes.
@@ -306,26 +296,26 @@ class Simulation(Adjustable, Changing):
 
         """
         frame = self._read_frame()
-        if not self._warned and np.any(frame.limited) and frame.largest_strain >= AT_LIMIT * self._strain_limit:
+        if not self._warned and np.any(frame.limited) and frame.largest_strain >= AT_LIMIT * self.strain_limit:
             self._warned = True
             warnings.warn(self._limit_text("a tool"), TouchWarning, stacklevel=2)
         return frame
 
     def _limit_text(self, what: str) -> str:
         return (
-            f"{what} was held at the strain limit of {100 * self._strain_limit:.0f} % (view.strain_limit): its "
+            f"{what} was held at the strain limit of {100 * self.strain_limit:.0f} % (view.strain_limit): its "
             f"force is that of the limit, not of its position; press less deep"
         )
 
     def _read_frame(self) -> Frame:
         """Read the latest tick, without a word about the limit of strain."""
-        raw, bodies, scales = self._of_this_scene(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
+        raw, bodies = self._of_this_scene(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
         failed = self._given.get(raw["failed_program"])
         if failed is not None and failed.failure is not None:
             raw["fault"] = f"tool {raw['failed_program']}: {failed.failure}; forces are off until a reset"
-        return self._flagged(frame_of(raw, bodies, scales), bodies)
+        return self._flagged(frame_of(raw, bodies), bodies)
 
     def _flagged(self, frame: Frame, bodies: Sequence[BuiltBody]) -> Frame:
         """Add to a frame which tools touch a thin part of these bodies."""
@@ -334,21 +324,19 @@ class Simulation(Adjustable, Changing):
 
     def contacts(self) -> list[Contact]:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
-        records, bodies, _ = self._of_this_scene(self._core.contacts)
+        records, bodies = self._of_this_scene(self._core.contacts)
         return [contact_of(record, bodies) for record in records or []]
 
-    def _of_this_scene(
-        self, read: Callable[[], tuple[int, Any] | None]
-    ) -> tuple[Any, tuple[BuiltBody, ...], list[float]]:
+    def _of_this_scene(self, read: Callable[[], tuple[int, Any] | None]) -> tuple[Any, tuple[BuiltBody, ...]]:
         """Read from the loop what belongs to the bodies that it comes with; None where it does not run.
 
         Another thread may be changing the scene: between its change of the loop and that of the bodies are moments.
         """
         for _ in range(CHANGE_WAITS):
-            answer, bodies, scales = read(), self.bodies, self._scales
+            answer, bodies = read(), self.bodies
             number = self._number
             if answer is None or answer[0] == number:
-                return answer and answer[1], bodies, scales
+                return answer and answer[1], bodies
             time.sleep(CHANGE_WAIT)
         raise SimulationError("another thread changes the scene all the time: no frame of it can be read")
 
@@ -371,7 +359,7 @@ class Simulation(Adjustable, Changing):
             raise SceneError("a body from a store knows only its surface: stress needs its elements")
         field = green.stress_recovery.recover(displacements)
         # A stiffness changed while running scales stress, not strain.
-        return SurfaceStress(self._scales[body] * field.stress, field.strain)
+        return SurfaceStress(self.stiffness_scale_of(body) * field.stress, field.strain)
 
     def drain_log(self) -> np.ndarray:
         """Rows of the 1 kHz log since the last call.
@@ -405,7 +393,7 @@ class Simulation(Adjustable, Changing):
             A fault that latched within the run.
 
         """
-        path = positions_of(positions, len(self._radii))
+        path = positions_of(positions, len(self.scene.tools))
         bad = np.argwhere(~np.isfinite(path).all(axis=2))
         if len(bad):
             raise SceneError(f"position {bad[0, 0]} is not finite")
@@ -463,14 +451,14 @@ class Simulation(Adjustable, Changing):
         grabs: np.ndarray | None = None,
         records: bool = True,
     ) -> Recording:
-        path = positions_of(positions, len(self._radii))
+        path = positions_of(positions, len(self.scene.tools))
         turned, held = orientations_of(orientations, path), grabs_of(grabs, path)
         body = self._moving_body("strike", None) if strikes else 0
-        struck = [(int(tick), body, *strike_of(*strike), self._radii[0]) for tick, *strike in strikes]
+        struck = [(int(tick), body, *strike_of(*strike)) for tick, *strike in strikes]
         nodes = [(0, node) if np.ndim(node) == 0 else tuple(node) for node in watch]
         ranks = [(self._body(body), self._rank_of(node, body)) for body, node in nodes]
         self._arm_strain_limit()
-        ticks, given, tools = *path.shape[:2], len(self._radii)
+        ticks, given, tools = *path.shape[:2], len(self.scene.tools)
         everything = for_all_tools(path, turned, held, tools)
         happens = (sorted(struck, key=lambda strike: strike[0]), ranks)
         about = self._about((given, np.ndim(positions) == 2), clock=False) if records else None

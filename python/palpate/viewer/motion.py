@@ -125,7 +125,11 @@ class MovingBody:
     def set_time_scale(self, time_scale: float) -> None:
         """Slow motion."""
         self._simulation.set_time_scale(time_scale)
-        self.time_scale = time_scale
+
+    @property
+    def time_scale(self) -> float:
+        """Seconds that the body advances in a second."""
+        return self._simulation.time_scale
 
     def show_mode(self, message: Mapping[str, Any]) -> None:
         """Show a mode of the list, counted from 1; 0 ends that."""

@@ -82,13 +82,6 @@ class ReplaySession(Session):
     def _go_to(self, tick: int) -> None:
         self._goal, self._place = tick, float(tick)
 
-    def settings(self) -> dict[str, Any]:
-        """Message with what the settings were at the tick that is shown."""
-        self._strain_limit = self._replayed.strain_limit
-        if self._moving is not None:
-            self._moving.time_scale = self._replayed.time_scale
-        return super().settings()
-
     def reshaped(self, message: Mapping[str, Any]) -> None:
         """Refuse: tools have the shapes that they had.
 

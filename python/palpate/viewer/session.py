@@ -6,11 +6,13 @@ import contextlib
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from palpate._native import TOOL_SETTINGS
 from palpate.errors import DeviceError, Error, ViewerError
 from palpate.green import GreensFunction
 from palpate.scene import BuiltScene
@@ -87,7 +89,6 @@ class Session:
         self._active = [False] * len(scene.tools)
         # The press under way of each tool, for a session that takes the place of this one.
         self._pressed: dict[int, Mapping[str, Any]] = {}
-        self._strain_limit = scene.view.strain_limit
         largest = self.simulation.largest_contact_radius(LARGEST_RADIUS * self.size)
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
         moving = next((body for body, one in enumerate(built.bodies) if one.motion is not None), None)
@@ -127,12 +128,15 @@ class Session:
         return {
             "type": "settings",
             "youngs_modulus": [self.simulation.youngs_modulus_of(body) for body in range(len(self._bodies))],
-            "contact_radius": [self.simulation.contact_radius_of(tool) for tool in range(len(self._active))],
-            "friction": [self.simulation.friction_of(tool) for tool in range(len(self._active))],
+            **self._of_tools(),
             "shape": [kind_of(tool) for tool in self.built.scene.tools],
-            "strain_limit": self._strain_limit,
+            "strain_limit": self.simulation.strain_limit,
             "time_scale": None if self._moving is None else self._moving.time_scale,
         }
+
+    def _of_tools(self) -> dict[str, list[float]]:
+        now = self.simulation._settings()
+        return {name: now[name] for name in TOOL_SETTINGS}
 
     def _defaults(self) -> dict[str, Any]:
         """Return what the sliders go back to: the values of the scene."""
@@ -140,8 +144,7 @@ class Session:
         changeable = [self.simulation.youngs_modulus_of(body) is not None for body in range(len(moduli))]
         return {
             "youngs_modulus": [e if able else None for e, able in zip(moduli, changeable, strict=True)],
-            "contact_radius": [tool.contact_radius for tool in tools],
-            "friction": [tool.friction for tool in tools],
+            **{name: [getattr(tool, name) for tool in tools] for name in TOOL_SETTINGS},
             "strain_limit": self.built.scene.view.strain_limit,
         }
 
@@ -214,14 +217,12 @@ class Session:
 
     def take_over(self, other: Session) -> None:
         """Set what the sliders of another session on the same bodies have set."""
-        for rank in range(len(self._active)):
-            self.simulation.set_radius(other.simulation.contact_radius_of(rank), rank)
-            self.simulation.set_friction(other.simulation.friction_of(rank), rank)
+        self._set_tools(other._of_tools())
         for rank in range(len(self._bodies)):
             modulus = other.simulation.youngs_modulus_of(rank)
             if modulus is not None:
                 self.simulation.set_youngs_modulus(modulus, rank)
-        self._set_strain_limit(other._strain_limit, {})
+        self.simulation.set_strain_limit(other.simulation.strain_limit)
         if self._moving is not None and other._moving is not None:
             self._moving.set_time_scale(other._moving.time_scale)
 
@@ -254,7 +255,7 @@ class Session:
             "name": scene.name,
             "title": titled(scene.name),
             "size": self.size,
-            "strain_limit": self._strain_limit,
+            "strain_limit": self.simulation.strain_limit,
             "defaults": self._defaults(),
             "max_force": scene.device.max_force,
             "bodies": [body.header(self.simulation.youngs_modulus_of(i)) for i, body in enumerate(self._bodies)],
@@ -269,8 +270,7 @@ class Session:
             "device": self.simulation.devices.get(tool),
             "shapes": shape_choices(self.own_tools[tool]),
             "contact": self.built.scene.tools[tool].contact,
-            "friction": self.simulation.friction_of(tool),
-            "contact_radius": self.simulation.contact_radius_of(tool),
+            **{name: values[tool] for name, values in self._of_tools().items()},
             "max_contact_radius": self._max_radii[tool],
         }
 
@@ -391,11 +391,11 @@ class Session:
 
     def _set(self, message: Mapping[str, Any]) -> bool:
         known: dict[str, Callable[[float, Mapping[str, Any]], None]] = {
+            **{name: partial(self._set_of_tools, name) for name in TOOL_SETTINGS},
             "youngs_modulus": self._set_youngs_modulus,
             "contact_radius": self._set_radius,
-            "friction": self._set_friction,
-            "strain_limit": self._set_strain_limit,
-            "time_scale": self._set_time_scale,
+            "strain_limit": lambda limit, _: self.simulation.set_strain_limit(limit),
+            "time_scale": lambda scale, _: self._in_motion("slow motion").set_time_scale(scale),
         }
         keys = set(message) - {"type", "body", "tool"}
         if not keys or not keys <= set(known):
@@ -408,20 +408,18 @@ class Session:
         body = index(message, "body", len(self._bodies))
         self.simulation.set_youngs_modulus(youngs_modulus, body)
 
-    def _set_time_scale(self, time_scale: float, _message: Mapping[str, Any]) -> None:
-        self._in_motion("slow motion").set_time_scale(time_scale)
-
     def _tools(self, message: Mapping[str, Any]) -> Sequence[int]:
         """Return the tool that a message names, or all of them."""
         return [index(message, "tool", len(self._active))] if "tool" in message else range(len(self._active))
 
-    def _set_friction(self, friction: float, message: Mapping[str, Any]) -> None:
+    def _set_of_tools(self, name: str, value: float, message: Mapping[str, Any]) -> None:
         for tool in self._tools(message):
-            self.simulation.set_friction(friction, tool)
+            self.simulation._set_of_tools(name, value, tool)
 
-    def _set_strain_limit(self, limit: float, _message: Mapping[str, Any]) -> None:
-        self.simulation.set_strain_limit(limit)
-        self._strain_limit = limit
+    def _set_tools(self, values: Mapping[str, Sequence[float]]) -> None:
+        for name, of_tools in values.items():
+            for tool, value in enumerate(of_tools):
+                self.simulation._set_of_tools(name, value, tool)
 
     def _set_radius(self, radius: float, message: Mapping[str, Any]) -> None:
         tools = self._tools(message)
@@ -434,10 +432,8 @@ class Session:
     def _reset(self, _message: Mapping[str, Any]) -> bool:
         self.release()
         defaults = self._defaults()
-        for rank in range(len(self._active)):
-            self.simulation.set_radius(defaults["contact_radius"][rank], rank)
-            self.simulation.set_friction(defaults["friction"][rank], rank)
-        self._set_strain_limit(defaults["strain_limit"], {})
+        self._set_tools({name: defaults[name] for name in TOOL_SETTINGS})
+        self.simulation.set_strain_limit(defaults["strain_limit"])
         for rank, modulus in enumerate(defaults["youngs_modulus"]):
             if modulus is not None:
                 self.simulation.set_youngs_modulus(modulus, rank)

@@ -132,7 +132,7 @@ def test_what_cannot_be_is_refused(green, tmp_path):
                 change()
         for _ in range(3):
             simulation.add_tool(radius="4mm")
-        with pytest.raises(palpate.Error, match="1 to 4 tools"):
+        with pytest.raises(palpate.Error, match="at most 4 tools"):
             simulation.add_tool(radius="4mm")
         assert len(simulation.scene.tools) == 4 and len(simulation.frame().forces) == 4
         simulation.record(tmp_path / "run.mcap")

@@ -151,6 +151,20 @@ def test_without_a_limit_a_tool_goes_anywhere(press):
     assert frame.contacts[0].displacement == pytest.approx(frame.positions[0] - frame.contacts[0].anchor, abs=1e-12)
 
 
+def test_a_limit_that_is_first_set_while_running_holds(tmp_path):
+    body = palpate.Body(box_mesh((8, 5, 5)), material=palpate.Material(10e3, 0.4), fixed=lambda p: p[:, 2] < 1e-6)
+    scene = built(body, tmp_path / "block.palpate")
+    view = scene.scene.view.model_copy(update={"strain_limit": 0.0})
+    scene = BuiltScene(scene.scene.model_copy(update={"view": view}), scene.bodies)
+    with palpate.Simulation(scene) as simulation:
+        simulation.move(TOP + [0, 0, RADIUS - 0.02])
+        assert simulation.strain_limit == 0.0 and settle(simulation).largest_strain > 1.1 * LIMIT
+        simulation.set_strain_limit(LIMIT)
+        frame = settle(simulation)
+        assert simulation.strain_limit == LIMIT
+        assert frame.limited[0] and frame.largest_strain <= PLACES * LIMIT
+
+
 @pytest.mark.parametrize("limit", [-0.1, 1.5, np.nan])
 def test_a_limit_out_of_range_is_refused_while_running_too(press, limit):
     with pytest.raises(palpate.SceneError, match="limit of strain"):

@@ -1,5 +1,7 @@
 //! What stands in `scene.json`. Numbers are SI; vectors x y z, quaternions w x y z.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 
 /// The whole file.
@@ -71,13 +73,13 @@ pub enum Scheme {
     Exact,
 }
 
+/// A key that is none of these is a setting.
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct ToolDescription {
     pub shape: ShapeDescription,
     pub law: String,
-    pub contact_radius: f64,
-    pub friction: f64,
+    #[serde(flatten)]
+    pub settings: BTreeMap<String, f64>,
     pub pad_youngs_modulus: Option<f64>,
     pub max_stiffness: f64,
     /// Largest force in the scene that its device may put out, N.

@@ -149,10 +149,10 @@ fn tool(folder: &Path, described: ToolDescription) -> Result<Tool> {
     Ok(Tool {
         shape: Some(shape),
         law: Some(LawKind::parse(&described.law).ok_or_else(unknown)?),
-        contact_radius: Some(described.contact_radius),
-        friction: described.friction,
+        settings: described.settings,
         pad_youngs_modulus: described.pad_youngs_modulus,
         max_stiffness: described.max_stiffness,
         device: DeviceLimits { max_force: described.max_force, ..DeviceLimits::UNLIMITED },
+        softened: false,
     })
 }
