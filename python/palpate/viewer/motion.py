@@ -11,7 +11,7 @@ import numpy as np
 from palpate.body import free_end
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
-from palpate.fields import HONEST_STRAIN
+from palpate.fields import HONEST_STRAIN, SurfaceStrain
 from palpate.palpation.interpolation import node_normals
 from palpate.scene import StrikeTable
 from palpate.simulation import Contact, Simulation
@@ -23,6 +23,8 @@ LISTED_MODES = 20
 SHOWN_HZ = 1.0
 # A mode shape swings by this part of the body's size, unless that would strain the body beyond what is honest.
 MODE_SWING = 0.08
+# Strain of the surface is that of displacements of this part of the size: modes have a length of their own, and it is not linear.
+SMALL = 1e-4
 # A strike lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
 STRIKE_PERIODS = 0.06
 # Strain that the default strike is seen to lead to at instants of the first period (peaks between them are higher, and
@@ -181,8 +183,11 @@ class MovingBody:
         return _ShownMode(chosen, float(basis.frequencies[chosen - 1]), swing * shape, swing * largest)
 
     def _strain_of(self, displacements: np.ndarray) -> float:
-        """Largest strain of displacements alone, without that of the body's own loads."""
+        """Largest strain of small displacements, as large as these: without that of the body's own loads."""
         measure, free = self._green.strain_measure, self._green.free_displacements
+        if isinstance(measure, SurfaceStrain):
+            part = SMALL * self._size / np.linalg.norm(displacements, axis=1).max()
+            return measure.largest(part * displacements) / part
         return float(measure.magnitudes(measure.sample(free + displacements) - measure.sample(free)).max())
 
     def _default_impulse(self) -> float:

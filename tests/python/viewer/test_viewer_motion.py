@@ -167,6 +167,19 @@ def test_the_default_strike_swings_a_body_visibly_and_honestly(moving):
     assert max(swings) > 0.03
 
 
+def test_a_large_body_swings_and_is_struck_like_a_small_one(moving, monkeypatch):
+    """The strain of a body whose inside is not followed is that of its surface: about the same for a first mode."""
+    whole = Session(moving)
+    whole.close()
+    monkeypatch.setattr("palpate.green.function.MOST_NODES_INSIDE", 0)
+    monkeypatch.delitem(vars(moving.bodies[0].green), "strain_measure")
+    large = Session(moving)
+    large.close()
+    assert large._moving.impulse == pytest.approx(whole._moving.impulse, rel=0.5)
+    swings = [session._moving._prepare_mode(3).header["amplitude"] for session in (whole, large)]
+    assert swings[1] == pytest.approx(swings[0], rel=0.5)
+
+
 def test_the_tool_is_limited_in_motion(moving):
     """By the static response: the body comes to rest within the limit, though the tool is 20 mm deep."""
 
