@@ -23,7 +23,7 @@ LISTED_MODES = 20
 SHOWN_HZ = 1.0
 # A mode shape swings by this part of the body's size, unless that would strain the body beyond what is honest.
 MODE_SWING = 0.08
-# Strain of the surface is that of displacements of this part of the size: modes have a length of their own, and it is not linear.
+# Strain of the surface is not linear: it is that of displacements of this part of the size.
 SMALL = 1e-4
 # A strike lasts this part of the first period. A shorter one would strain what it hits far more than all the rest.
 STRIKE_PERIODS = 0.06
