@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 
 import matplotlib.figure
 import meshio
@@ -143,7 +144,10 @@ def test_a_running_frame_is_written(block, block_green, tmp_path):
     scene = palpate.Scene(body={"store": "block.palpate"}, tool={"contact": "patch"})
     with palpate.Simulation(BuiltScene.of(scene, block, block_green)) as simulation:
         simulation.set_youngs_modulus("20kPa")
-        frame = simulation.frame()
+        # A frame has the stiffness of its tick.
+        deadline = time.monotonic() + 60
+        while (frame := simulation.frame()).bodies[0]._stiffness_scale == 1.0 and time.monotonic() < deadline:
+            time.sleep(0.01)
     frame.write(tmp_path / "frame.vtu")
     assert len(meshio.read(tmp_path / "frame.vtu").points) == len(block.mesh.nodes)
     assert frame.bodies[0]._stiffness_scale == pytest.approx(2.0)

@@ -322,10 +322,11 @@ def test_the_impulse_is_given_and_repeated(moving_page):
 
     _, energy = swings(page, swung_and_damped)
     assert energy[-1] > 0
-    # 10 N for a millisecond: what the node's neighbourhood takes up by it.
-    work = state(page)["motion"]["work"]
+    # 10 N for a millisecond. How much work it does depends on how the node moves then; it may slow it down.
+    before = state(page)["motion"]
     page.get_by_test_id("repeat").click()
-    again = until(page, lambda s: s["motion"]["struck_at"] > first["struck_at"] and s["motion"]["work"] > 1.5 * work)
+    until(page, lambda s: s["motion"]["struck_at"] > before["struck_at"])
+    again = until(page, lambda s: abs(s["motion"]["work"] - before["work"]) > 0.02 * before["work"])
     assert again["motion"]["watched"] == first["watched"]
     page.get_by_test_id("speed-4").click()
     until(page, lambda s: page.locator("#speed-4").get_attribute("aria-pressed") == "true")
