@@ -243,6 +243,11 @@ def test_cmake_finds_it_and_its_static_form_links(prefix, tmp_path):
     assert subprocess.run([static], capture_output=True).returncode == 2
 
 
+# Where a struct gets its first values: a member that has been added begins with its own.
+FILLED = re.compile(r"(struct_size: size_of::<Self>\(\) as u32,|\.\.sized::zeroed\(\))")
+BARE = "  Self { ..sized::zeroed() }"
+
+
 def grown_library(folder: Path) -> Path:
     """Folder of a library whose structs that may grow have one more member at their ends, as a later version has."""
     copy = folder / "grown"
@@ -260,9 +265,11 @@ def grown_library(folder: Path) -> Path:
         for name in re.findall(r"unsafe impl Sized for (\w+)", text.split("#[cfg(test)]")[0]):
             whole, added = rf"(pub struct {name} {{.*?)\n}}", r"\1\n    pub added: [f64; 3],\n}"
             text, count = re.subn(whole, added, text, count=1, flags=re.S)
-            filled = "struct_size: size_of::<Self>() as u32,"
-            after = text.index(filled, text.index(f"struct {name}"))
-            text = text[:after] + text[after:].replace(filled, filled + " added: [7.0; 3],", 1)
+            at = text.index(f"struct {name}")
+            end = text.find("pub struct ", at)
+            own, filled = FILLED.subn(r"added: [7.0; 3], \1", text[at:end].replace("  sized::zeroed()", BARE), count=1)
+            assert filled == 1, name
+            text = text[:at] + own + text[end:]
             grown += [name] * count
         source.write_text(text.replace("//!", "#![allow(missing_docs)]\n//!", 1) if source.name == "lib.rs" else text)
     assert len(grown) == 6

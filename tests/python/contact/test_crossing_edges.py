@@ -133,6 +133,7 @@ def deepest_without_force(crossing: Crossing, path: np.ndarray, forces: np.ndarr
 
 # Not reached yet (docs/accuracy.md): how many times more than allowed a force may jump, and be lost, meanwhile.
 OPEN = {
+    ("ridge", 30, "ellipsoid", "across"): (2, 1),
     ("ridge", 30, "capsule", "along"): (6, 1),
     ("ridge", 30, "capsule", "yawed"): (6, 1),
     ("ridge", 30, "punch", "upright"): (6, 1),
