@@ -181,8 +181,8 @@ fn settle(
         }
         if cells {
             let miss = local.miss(slots.len());
-            // From a place where nothing touches the method does not find back. The last answer is the best one.
-            let untouched = step + 1 < most && local.untouched(slots.len());
+            // From a place where nothing touches the method does not find back.
+            let untouched = local.untouched(slots.len());
             if miss.is_nan() || (miss > least && !untouched) {
                 // A part of the last step, or where it led from.
                 let part = (least / miss).powf(DEPTH_BY_FORCE).clamp(TAKEN_BACK[0], TAKEN_BACK[1]);

@@ -83,26 +83,22 @@ impl LocalScratch {
     }
 
     /// Lengthens steps out of the surface: where much more force is there than can be, the straight line of Newton's method takes
-    /// back a part of the depth at most, for a force like `d^m`. The depth `d_0` is that of `m = 3/2`, or that of the tool where it is
-    /// less deep, as a flat one is. With `x = d/d_0`, `c = C F_0/d_0` and what is left of the equation, `r`, the next depth is that of
-    /// `x + c x^m = 1 + c - r/d_0`. Returns the longest step, m.
+    /// back a third of the depth at most, for a force like `d^(3/2)`. With `x = d/d_0`, `c = C F_0/d_0` and what is left of the
+    /// equation, `r`, the next depth is that of `x + c x^(3/2) = 1 + c - r/d_0`. Returns the longest step, m.
     pub(super) fn go_by_power(&mut self, count: usize) -> f64 {
         let mut longest = 0.0f64;
         for a in 0..count {
             let response = &self.responses[a];
             let (normal, indentation) = (response.foot.normal, &response.indentation);
-            let of_power = 1.5 * indentation.force / indentation.stiffness;
-            let depth = if response.sunk > 0.0 { of_power.min(response.sunk) } else { of_power };
+            let depth = 1.5 * indentation.force / indentation.stiffness;
             let out = self.steps[a].dot(normal);
             if depth > 0.0 && depth.is_finite() && out > 0.0 {
-                let power = (indentation.stiffness * depth / indentation.force).max(1.0);
                 let c = (normal.dot(self.between[a][a] * normal) * indentation.force / depth).max(0.0);
                 // What is left of the equation follows from Newton's own step.
-                let right = (1.0 + c - out * (1.0 + power * c) / depth).max(0.0);
+                let right = (1.0 + c - out * (1.0 + 1.5 * c) / depth).max(0.0);
                 let mut x = 1.0f64;
                 for _ in 0..6 {
-                    let rise = c * x.powf(power - 1.0);
-                    x = (x - (x + rise * x - right) / (1.0 + power * rise)).max(0.0);
+                    x = (x - (x + c * x.powf(1.5) - right) / (1.0 + 1.5 * c * x.sqrt())).max(0.0);
                 }
                 self.steps[a] += normal * ((1.0 - x) * depth - out);
             }
@@ -117,10 +113,7 @@ impl LocalScratch {
             let (place, before) = self.best[a];
             let (response, way) = (&mut self.responses[a], self.places[a] - place);
             let squared = way.length_squared();
-            if self.stepped && response.force == DVec3::ZERO && before.force == DVec3::ZERO {
-                // Two places in the air: what is known of the force between them and the surface stays.
-                response.jacobian = before.jacobian;
-            } else if self.stepped && squared > 0.0 {
+            if self.stepped && squared > 0.0 {
                 let missed = response.force - before.force - response.jacobian * way;
                 response.jacobian += outer(missed, way) * (1.0 / squared);
             }
