@@ -12,7 +12,7 @@ use crate::{Error, Result};
 
 /// A kind of files.
 pub(crate) struct ArraysKind {
-    /// Told from others by this text.
+    /// Marks the files of this kind.
     pub format: &'static str,
     /// What people call one, such as "file of modes".
     pub name: &'static str,

@@ -91,7 +91,7 @@ fn of_bytes(bytes: &[u8]) -> Result<Ticks<&[u8]>, String> {
     Ticks::new(bytes)
 }
 
-/// All numbers as text of the shortest digits that tell them apart.
+/// All numbers as text with the fewest digits that read back the same.
 fn text(record: &TickRecord) -> String {
     let mut record = *record;
     // The loop of these tests is due at times long past.

@@ -1,6 +1,6 @@
 //! How something that a tick must not make comes into a running loop, and what it replaces goes out.
 //!
-//! It is exchanged in one tick. Whoever offers it waits for that tick, or takes the offer back if none comes.
+//! It is exchanged in one tick. The thread that offers it waits for that tick, or takes the offer back if none comes.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};

@@ -1,4 +1,4 @@
-//! Two rings between a running loop and somebody beside it: what a tick must not make comes in through one, and what it replaces
+//! Two rings between a running loop and another thread: what a tick must not make comes in through one, and what it replaces
 //! goes out through the other, for memory must not be freed in a tick.
 //!
 //! Wait-free for both ends. The loop takes something in only where what goes out for it has room.
