@@ -1,4 +1,4 @@
-# `make demo` sets everything up in ./.venv and runs the main job; `make test` sets up and passes all checks.
+# `make demo` sets everything up in ./.venv and runs the main job; `make test` sets up and passes the tests.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -18,10 +18,11 @@ check-tools:
 $(BIN)/python: | check-tools
 	$(PYTHON) -m venv $(VENV)
 
-# The extension is rebuilt when a source changes; cargo itself decides how much.
+# The extension is rebuilt when a source changes; cargo itself decides how much. Python compiles the modules that it
+# imports, a small part of what pip would.
 $(VENV)/.installed: $(BIN)/python pyproject.toml Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.9,<2"
-	. $(BIN)/activate && maturin develop --release --quiet --extras test >$(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
+	. $(BIN)/activate && PIP_NO_COMPILE=1 maturin develop --release --quiet --extras test >$(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@touch $@
 
 # The page of the viewer, served by the package.
@@ -52,8 +53,13 @@ demo: $(VENV)/.installed $(PAGE)
 # Two processes: much of the time goes into waiting for browsers, meshers and servers; tests/python/conftest.py gives what
 # each of them takes on, and in which order.
 PYTEST := $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no-loadscope-reorder
-test: $(VENV)/.installed $(PAGE) lint
+test: | check-tools
+	@# npm and pip wait for downloads while cargo compiles.
+	cargo test --release --quiet --workspace --no-run & \
+		$(MAKE) --no-print-directory $(PAGE) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
+		wait $$! && exit $$status
 	cargo test --release --quiet --workspace
+	cd viewer && npm run --silent check
 	$(PYTEST) -m "not slow" $(ARGS)
 
 # Long campaigns: hundreds of random touches, presses, writers, answers, and whole builds. CI runs them after `make test`.
@@ -70,13 +76,13 @@ sanitize:
 	RUSTFLAGS="-Zsanitizer=thread -Cunsafe-allow-abi-mismatch=sanitizer" cargo +nightly test --quiet --config profile.dev.opt-level=0 \
 		--target $$(rustc -vV | sed -n 's/host: //p') $(OTHER_BUILD) --test handoff
 
-lint: $(VENV)/.installed viewer/node_modules/.checks
+# What compilers and linters object to; clippy takes as long as a build.
+lint: $(VENV)/.installed
 	cargo fmt --all --check
 	cargo clippy --release --quiet --workspace --all-targets -- -D warnings
 	cargo clippy --release --quiet -p palpate-core -p palpate-servo --no-default-features -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	cd viewer && npm run --silent check
 	$(BIN)/python scripts/check_architecture.py
 
 clean:

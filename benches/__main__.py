@@ -7,6 +7,7 @@ import typer
 from benches.contact import contact
 from benches.dynamics import dynamics
 from benches.elements import elements
+from benches.fill import fill
 from benches.paper import paper
 from benches.precompute import precompute
 from benches.record import record
@@ -27,7 +28,7 @@ app = typer.Typer(
 )
 for command in (
     *(tick, contact, scale, precompute, surface, elements),
-    *(paper, dynamics, record, viewer, zwidth, touches),
+    *(paper, dynamics, record, viewer, zwidth, touches, fill),
 ):
     app.command()(command)
 

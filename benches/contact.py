@@ -20,7 +20,7 @@ from benches.output import Json, Out, Table, make_folder, show
 from palpate.body import Body
 from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.green import GreensFunction
-from palpate.progress import narrated
+from palpate.progress import status_line
 from palpate.simulation import Simulation
 from palpate.validation.ticks import tick_times
 from palpate.validation.verify.contact import tools
@@ -193,7 +193,7 @@ def contact(out: Out = None, as_json: Json = False) -> None:
 
     Peers: pip install 'palpate[bench]'. Example: python -m benches contact --out plots
     """
-    with narrated("pressing; with all peers it takes some minutes"):
+    with status_line("pressing; with all peers it takes some minutes"):
         results = run()
     more = {"radius": RADIUS, "depths": DEPTHS, "truth": results.truth, "missing": results.missing}
     ratios = {"ratios": [row.means / results.truth for row in results.rows]}

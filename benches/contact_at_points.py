@@ -10,13 +10,12 @@ from scipy.optimize import nnls
 
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
+from palpate.mesh.shape_functions import TRIANGLE_EDGES, TRIANGLE_POINTS, TRIANGLE_WEIGHTS, values
 from palpate.validation.verify.contact.signorini import (
     Gap,
     compliance_along,
-    face_shapes,
     faces_on,
     triangle_areas,
-    triangle_rule,
 )
 
 
@@ -41,16 +40,15 @@ def forces_at_mesh_points(
     up = np.array([0.0, 0.0, 1.0])
     faces = faces_on(green, mesh, mesh.nodes[mesh.nodes[:, 2].argmax()], up)
     nodes, local = np.unique(faces, return_inverse=True)
-    at, weight = triangle_rule()
     corners = mesh.nodes[faces[:, :3], :2]
-    shapes = face_shapes(at, faces.shape[1])
-    points = np.einsum("qk,fkx->fqx", at, corners).reshape(-1, 2)
-    areas = np.outer(triangle_areas(corners), weight).ravel()
+    shapes = values(TRIANGLE_POINTS, faces.shape[1], TRIANGLE_EDGES)
+    points = np.einsum("qk,fkx->fqx", TRIANGLE_POINTS, corners).reshape(-1, 2)
+    areas = np.outer(triangle_areas(corners), TRIANGLE_WEIGHTS).ravel()
     near = np.flatnonzero(gap(points) < 2 * max(depths))
     rows = np.zeros((len(near), len(nodes)))
     local = local.reshape(faces.shape)
     for row, point in zip(rows, near, strict=True):
-        row[local[point // len(at)]] = shapes[point % len(at)]
+        row[local[point // len(shapes)]] = shapes[point % len(shapes)]
     compliance = rows @ compliance_along(green, nodes, up) @ rows.T + np.diag(1 / (penalty * areas[near]))
     factor = scipy.linalg.cholesky(compliance, lower=True)
     gaps = gap(points[near])

@@ -26,7 +26,7 @@ from palpate.dynamics import ModalBasis, Newmark, modes, rayleigh_from_ratios
 from palpate.dynamics.matrices import Matrices
 from palpate.green import precompute
 from palpate.mesh import TetMesh, tetrahedralize
-from palpate.progress import narrated
+from palpate.progress import status_line
 from palpate.scene import YOUNGS_MODULUS, BodyMotion, BuiltScene, Scene
 from palpate.simulation import Simulation
 
@@ -241,6 +241,6 @@ def dynamics(
 
     Example: python -m benches dynamics --json > dynamics.json
     """
-    with narrated("measuring beam and livers in motion"):
+    with status_line("measuring beam and livers in motion"):
         rows = run(large)
     show(as_json, rows, as_table(rows))

@@ -22,7 +22,7 @@ from palpate.body import Body, Material
 from palpate.figures import COLORS, empty_figure, write_figure
 from palpate.green import precompute
 from palpate.mesh import TetMesh, tetrahedralize
-from palpate.progress import narrated
+from palpate.progress import status_line
 from palpate.validation.verify import felt
 from palpate.validation.verify.solution import green_of, quiet_body
 
@@ -153,7 +153,7 @@ def elements(out: Out = None, as_json: Json = False) -> None:
 
     Example: python -m benches elements --out plots
     """
-    with narrated("measuring both elements on a cube and on the liver"):
+    with status_line("measuring both elements on a cube and on the liver"):
         rows = run()
     show(as_json, rows, as_table(rows))
     if folder := make_folder(out):

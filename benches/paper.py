@@ -20,7 +20,7 @@ from benches.timing import call_times
 from palpate import models
 from palpate.body import Body, Material
 from palpate.green import GreensFunction, precompute
-from palpate.progress import narrated
+from palpate.progress import status_line
 from palpate.scene import YOUNGS_MODULUS, BuiltScene, Scene
 from palpate.simulation import Simulation
 
@@ -197,6 +197,6 @@ def paper(as_json: Json = False) -> None:
 
     Example: python -m benches paper --json > paper.json
     """
-    with narrated("measuring doll, kidney and liver"):
+    with status_line("measuring doll, kidney and liver"):
         rows = run()
     show(as_json, rows, as_table(rows))

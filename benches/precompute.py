@@ -34,7 +34,7 @@ from palpate.errors import BodyError
 from palpate.figures import empty_figure, write_figure
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh, tetrahedralize
-from palpate.progress import narrated
+from palpate.progress import status_line
 
 # Longest edge of the liver's elements, m; "1k" is the paper's liver itself, 1404 nodes.
 SIZES: dict[str, float | None] = {"1k": None, "2k": 0.0095, "15k": 0.00395, "20k": 0.0034}
@@ -296,7 +296,7 @@ def precompute(
 
     Example: python -m benches precompute --sizes 1k,2k --out plots
     """
-    with narrated("measuring; the larger bodies take minutes"):
+    with status_line("measuring; the larger bodies take minutes"):
         results = run(sizes.split(","), [int(count) for count in threads.split(",")])
     if folder := make_folder(out):
         plot(results, folder / "precompute.png")

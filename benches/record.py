@@ -17,7 +17,7 @@ import numpy as np
 import typer
 
 from benches.output import Json, Table, show
-from palpate.progress import narrated, progress_reporter
+from palpate.progress import progress_reporter, status_line
 from palpate.scene import BuiltScene, Scene
 from palpate.simulation import Recording, Simulation, replay
 
@@ -196,7 +196,7 @@ def record(
     results = []
     for scene in scenes:
         read = Scene.read(scene)
-        with narrated(f"preparing {read.name}"):
+        with status_line(f"preparing {read.name}"):
             built = read.build()
         with tempfile.TemporaryDirectory() as folder, progress_reporter(read.name, True) as report:
             results.append(run_session(built, scene.stem, Path(folder) / "session.mcap", 60 * minutes, report=report))

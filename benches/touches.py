@@ -18,7 +18,7 @@ from benches.emulation import FIRM, LOOSE, Device, Hand, Held, Motion, emulate, 
 from benches.output import Json, Table, show
 from benches.zwidth import Spring
 from palpate.models import NAMES
-from palpate.progress import narrated
+from palpate.progress import status_line
 from palpate.scene import BuiltScene, Scene, model_scene
 from palpate.simulation import Simulation
 
@@ -247,9 +247,9 @@ def touches(
     given = [(path.stem, Scene.read(path)) for path in scenes or []]
     found: list[Touch] = []
     for name, scene in given or [(name, model_scene(name, True, False)) for name in NAMES]:
-        with narrated(f"touching {name}"):
+        with status_line(f"touching {name}"):
             found += [replace(touch, scene=name) for touch in touch_with_all(scene.build(progress=False), devices)]
-    with narrated("touching hard blocks"):
+    with status_line("touching hard blocks"):
         spring, own = Spring(), known["Touch"]
         hard = controls(spring, own)
         hardest = [

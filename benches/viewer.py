@@ -24,7 +24,7 @@ import typer
 from benches import surfaces as large_surfaces
 from benches.output import Json, Table, show
 from palpate import models
-from palpate.progress import narrated
+from palpate.progress import status_line
 from palpate.scene import model_scene
 from palpate.viewer import messages
 from palpate.viewer.server import ViewerServer
@@ -32,7 +32,7 @@ from palpate.viewer.server import ViewerServer
 # What a hand does at most: a slider reports 25 times a second, the pointer a hundred.
 SETTINGS_HZ, PRESSES_HZ = 25.0, 100.0
 # Between two beats of the event loop, and between two looks at the threads, s.
-BEAT, LOOK = 2e-3, 50e-3
+BEAT, POLL_SECONDS = 2e-3, 50e-3
 # Threads of this process, on Linux.
 TASKS = "/proc/self/task"
 # A model that is not there after this time is not awaited any longer, s.
@@ -128,11 +128,11 @@ def viewer(
     Example: python -m benches viewer --seconds 2
     """
     if surfaces:
-        with narrated("measuring frames and a page"):
+        with status_line("measuring frames and a page"):
             domes = large_surfaces.run()
         show(as_json, domes, large_surfaces.as_table(domes))
         return
-    with narrated("measuring; an empty cache takes a minute or two"):
+    with status_line("measuring; an empty cache takes a minute or two"):
         rows = run(paper=paper, seconds=seconds)
     show(as_json, rows, as_table(rows))
 
@@ -231,7 +231,7 @@ def _watched_threads(loops: list[tuple[float, int]]) -> Iterator[None]:
     done = threading.Event()
 
     def watch() -> None:
-        while not done.wait(LOOK):
+        while not done.wait(POLL_SECONDS):
             count = servo_threads()
             if count is not None:
                 loops.append((time.monotonic(), count))
@@ -293,7 +293,7 @@ class _Page:
         options = {"origin": f"http://{address}", "proxy": None, "max_size": None}
         async with connect(f"ws://{address}/socket", **options) as socket:
             self._socket = socket
-            await self._say(type="hello", token=token, version=messages.VERSION)
+            await self._send(type="hello", token=token, version=messages.VERSION)
             self._begin("pressed")
             listening = asyncio.create_task(self._listen())
             await self._arrival(0)
@@ -318,7 +318,7 @@ class _Page:
     async def _change(self, name: str, round_name: str) -> None:
         self._begin(f"to {name}, {round_name}")
         before = self._scenes
-        await self._say(type="model", name=name)
+        await self._send(type="model", name=name)
         await self._arrival(before)
         self._begin(f"{name} pressed")
         await asyncio.sleep(self._seconds)
@@ -337,7 +337,7 @@ class _Page:
 
         await asyncio.wait_for(there(), LONGEST_SWITCH)
 
-    async def _say(self, **message: Any) -> None:
+    async def _send(self, **message: Any) -> None:
         await self._socket.send(json.dumps(message))
 
     async def _listen(self) -> None:
@@ -356,7 +356,7 @@ class _Page:
                 self._scenes += 1
                 self._ticks = None
             else:
-                await self._say(type="ack", frame=header["frame"])
+                await self._send(type="ack", frame=header["frame"])
                 self._count(header["ticks"])
 
     def _count(self, ticks: int) -> None:
@@ -372,7 +372,7 @@ class _Page:
             size, radius = self._scene["size"], self._scene["tools"][0]["radius"]
             depth = DEPTH * size * np.sin(2 * np.pi * PRESSING_HZ * time.monotonic())
             place = self._top + [0.0, 0.0, radius - depth]
-            await self._say(type="press", tool=0, position=place.tolist(), grab=False)
+            await self._send(type="press", tool=0, position=place.tolist(), grab=False)
             await asyncio.sleep(1.0 / PRESSES_HZ)
 
     async def _move_sliders(self) -> None:
@@ -381,8 +381,8 @@ class _Page:
             tool, body = self._scene["tools"][0], self._scene["bodies"][0]
             share = 0.3 + 0.7 * (turn % 14) / 13
             if turn % 2 and body["youngs_modulus"] is not None:
-                await self._say(type="set", body=0, youngs_modulus=share * body["youngs_modulus"])
+                await self._send(type="set", body=0, youngs_modulus=share * body["youngs_modulus"])
             else:
-                await self._say(type="set", tool=0, contact_radius=share * tool["max_contact_radius"])
+                await self._send(type="set", tool=0, contact_radius=share * tool["max_contact_radius"])
             turn += 1
             await asyncio.sleep(1.0 / SETTINGS_HZ)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import tomllib
 
-from import_circles import Graph, Names, circles_of_siblings, is_within
+from import_circles import Graph, Names, circles_of_siblings
 from python_imports import imported_names, imports_of_own_package, python_imports
 from rust_imports import rust_imports, rust_modules
 
@@ -44,14 +44,6 @@ PYTHON_ORDER = (
 )
 
 PACKAGE = "the package itself"
-
-# Imports that close a circle and are tolerated: crate, importing module, imported module, and the reason. An entry that
-# closes no circle is reported.
-KNOWN_IMPORTS = {
-    ("core", "simulation/contacts", "simulation/law"): "a contact contains the state of the local law",
-    ("core", "simulation/model", "simulation/law"): "the local law decides which tools need cells",
-    ("core", "simulation/state", "simulation/law"): "the local law decides which tools need cells",
-}
 
 # What in backquotes can only be a name of code: with `::` or a dot, in CamelCase, or words joined by underscores;
 # symbols of formulas are shorter.
@@ -274,9 +266,7 @@ def rust_import_problems() -> list[str]:
         crate = manifest.parent.relative_to(ROOT / "crates").as_posix()
         files = rust_modules(manifest.parent / "src")
         graph = rust_imports(files)
-        known = {(one, other) for (name, one, other) in KNOWN_IMPORTS if name == crate}
-        problems += needless_problems(crate, graph, known)
-        for circle in circles_of_siblings(without(graph, known)):
+        for circle in circles_of_siblings(graph):
             steps = ", ".join(" -> ".join(relative(files[module]) for module in step) for step in circle)
             problems.append(f"crates/{crate} has a circle of imports: {steps}")
         if crate == "core":
@@ -301,25 +291,6 @@ def chapter_problems(files: dict[Names, Path], graph: Graph) -> list[str]:
             if CHAPTERS.index(name) > CHAPTERS.index(chapter[0])
         ]
     return problems
-
-
-def needless_problems(crate: str, graph: Graph, known: set[tuple[str, str]]) -> list[str]:
-    """Tolerated imports that close no circle."""
-    return [
-        f"crates/{crate}: {one} -> {other} closes no circle any more, take it out of KNOWN_IMPORTS"
-        for one, other in sorted(known)
-        if circles_of_siblings(without(graph, known - {(one, other)})) == circles_of_siblings(without(graph, known))
-    ]
-
-
-def without(graph: Graph, known: set[tuple[str, str]]) -> Graph:
-    """Leave out the imports of one module of a crate (``simulation/state``) from another one, for each such pair."""
-    left = {module: set(used) for module, used in graph.items()}
-    for names in known:
-        one, other = (tuple(name.split("/")) for name in names)
-        for module in filter(lambda module: is_within(module, one), left):
-            left[module] -= {used for used in left[module] if is_within(used, other)}
-    return left
 
 
 def small_build_problems() -> list[str]:

@@ -17,11 +17,6 @@ def is_below(module: Names, other: Names) -> bool:
     return len(module) > len(other) and module[: len(other)] == other
 
 
-def is_within(module: Names, other: Names) -> bool:
-    """Whether a module is another one or lies in it."""
-    return module[: len(other)] == other
-
-
 def circles_of_siblings(graph: Graph) -> list[list[Import]]:
     """Circles among the modules of the same parent, each as the imports that close it.
 

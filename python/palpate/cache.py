@@ -1,4 +1,4 @@
-"""The folder of precomputed files, and what lies in it."""
+"""The cache: the folder of precomputed files, and its contents."""
 
 from __future__ import annotations
 
@@ -92,10 +92,10 @@ def _entry(file: Path, folder: Path) -> CachedFile:
     head, dot, ending = relative.partition(".")
     name = f"{head[:12]}{dot}{ending}" if head and "/" not in relative else relative
     written = not leftover and _WRITTEN.search(file.name) is not None
-    return CachedFile(file, name, stat.st_size, stat.st_mtime, _about(file, leftover), leftover, written)
+    return CachedFile(file, name, stat.st_size, stat.st_mtime, _description(file, leftover), leftover, written)
 
 
-def _about(file: Path, leftover: bool) -> str:
+def _description(file: Path, leftover: bool) -> str:
     if leftover:
         return "left by a killed process"
     if _WRITTEN.search(file.name):

@@ -1,4 +1,4 @@
-"""How large the cache may become: what was used least recently goes first, what a process has open stays."""
+"""Size limit of the cache: files used least recently are deleted first, files that a process has open stay."""
 
 from __future__ import annotations
 

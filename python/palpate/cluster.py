@@ -1,4 +1,4 @@
-"""Workers of dask.distributed: connecting to them, and what may be wrong with them."""
+"""Workers of dask.distributed: connecting to them, and errors of the connection."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from distributed import Client, Future, Security
 
 # For the scheduler to answer, and for a first worker to join it, s.
-PATIENCE = 5.0
+CONNECT_SECONDS = 5.0
 # Between looks for workers that have come or gone, s.
-LOOK = 1.0
+POLL_SECONDS = 1.0
 
 Item = TypeVar("Item")
 
@@ -46,23 +46,23 @@ def connected(dask: str | Client) -> Iterator[Client]:
     except ImportError:
         raise ClusterError("a cluster needs dask.distributed: pip install 'palpate[cluster]'") from None
     if isinstance(dask, distributed.Client):
-        with _lost_is_told():
+        with _reporting_lost_connection():
             _require_workers(dask)
             yield dask
         return
     if not isinstance(dask, str):
         raise ClusterError(f"dask takes the address of a scheduler, or a distributed.Client; got {brief_repr(dask)}")
-    with _quiet():
+    with _muted_library_log():
         security = _security_for(dask)
         try:
-            client = distributed.Client(dask, security=security, timeout=PATIENCE, set_as_default=False)
+            client = distributed.Client(dask, security=security, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, ValueError, TimeoutError):
             which = " with these certificates" if security.require_encryption else ""
             raise ClusterError(
                 f"no scheduler answers at {dask}{which}: 'dask scheduler' starts one and prints its address"
             ) from None
         try:
-            with _lost_is_told():
+            with _reporting_lost_connection():
                 _require_workers(client)
                 yield client
         finally:
@@ -170,9 +170,9 @@ def wait_for_some(client: Client, futures: list[Future]) -> list[Future]:
     try:
         if futures:
             with client.as_current():
-                wait(futures, timeout=LOOK, return_when="FIRST_COMPLETED")
+                wait(futures, timeout=POLL_SECONDS, return_when="FIRST_COMPLETED")
         else:
-            client.wait_for_workers(1, timeout=LOOK)
+            client.wait_for_workers(1, timeout=POLL_SECONDS)
     except (TimeoutError, CancelledError):
         require_scheduler(client)
     return [future for future in futures if future.done()]
@@ -188,7 +188,7 @@ def require_scheduler(client: Client) -> None:
 
     """
     if client.status != "running":
-        raise _lost()
+        raise _connection_lost_error()
 
 
 def result_of(client: Client, future: Future) -> Any:
@@ -200,7 +200,7 @@ def result_of(client: Client, future: Future) -> Any:
         The scheduler is lost, from which it comes: the library would wait for it for ever.
 
     """
-    patience = PATIENCE
+    patience = CONNECT_SECONDS
     while True:
         try:
             return future.result(timeout=patience)
@@ -227,7 +227,7 @@ def failure(future: Future) -> Exception:
 def _require_workers(client: Client) -> None:
     """Refuse a cluster of nobody, and one of another version."""
     try:
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client.wait_for_workers(1, timeout=CONNECT_SECONDS)
     except TimeoutError:
         raise ClusterError(
             f"the scheduler at {client.scheduler.address} has no worker: 'dask worker {client.scheduler.address}' "
@@ -260,30 +260,30 @@ def require_version(found: str | None, address: str) -> None:
         raise ClusterError(f"the worker at {address} has {told}, not {_native.__version__}: install the same version")
 
 
-def _lost() -> ClusterError:
+def _connection_lost_error() -> ClusterError:
     return ClusterError("the scheduler is lost; what was finished is kept, and the same command goes on from there")
 
 
 @contextlib.contextmanager
-def _lost_is_told() -> Iterator[None]:
-    """Have whatever the library raises where the scheduler is lost be told as that."""
+def _reporting_lost_connection() -> Iterator[None]:
+    """Turn errors of the library after the scheduler was lost into one clear error."""
     from distributed import CancelledError
     from distributed.client import ClosedClientError
 
     try:
         yield
     except (CancelledError, ClosedClientError):
-        raise _lost() from None
+        raise _connection_lost_error() from None
     except OSError as error:
         # Not one of files, here or in what the caller does meanwhile.
         modules = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
         if any(name.startswith("distributed.") for name in modules):
-            raise _lost() from None
+            raise _connection_lost_error() from None
         raise
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def _muted_library_log() -> Iterator[None]:
     """Keep the library's own account of a failed connection from the terminal: the error says it in a line."""
     # The library gives its client a level of its own.
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]

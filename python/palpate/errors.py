@@ -1,4 +1,4 @@
-"""Exceptions of Palpate: one-line messages that say what is wrong, where, and what helps."""
+"""Exceptions of Palpate. Each message is one line: what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class PalpateWarning(UserWarning):
 
 
 class MeshWarning(PalpateWarning):
-    """Something about a mesh was repaired or left out."""
+    """Something about a mesh was changed, left out or lost."""
 
 
 class LockingWarning(PalpateWarning):

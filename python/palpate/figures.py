@@ -1,4 +1,4 @@
-"""How all plots look: colours, sizes, a light grid."""
+"""Style of all plots: colours, sizes, a light grid."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def empty_figure(width: float, height: float) -> Figure:
 def write_figure(figure: Figure, path: Path, *, grid: bool = True) -> None:
     """Light grid where one helps, open frame; written beside and renamed."""
     for axes in figure.axes if grid else ():
-        _lighten(axes)
+        _style_axes(axes)
     with written_beside(path) as partial:
         figure.savefig(partial, format="png")
 
 
-def _lighten(axes: Axes) -> None:
+def _style_axes(axes: Axes) -> None:
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)

@@ -1,4 +1,4 @@
-"""Files that a killed process was still writing: beside their place, named after it and the process.
+"""Unfinished files of killed processes: beside their place, named after it and the process.
 
 Files are written as ``<name>.<process>.new`` (stores), ``<name>.<process>.partial`` (what stands beside them) or
 ``.<process>.<name>`` (everything else) and renamed when they are complete. A process that is killed leaves them, in

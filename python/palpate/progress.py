@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator
 class Reporter:
     """Is called with what is done and all there is to do; ``phase`` is told what is being done."""
 
-    def __init__(self, told: Callable[[int, int], None], phase: Callable[[str], None]):
-        self._told, self.phase = told, phase
+    def __init__(self, report: Callable[[int, int], None], phase: Callable[[str], None]):
+        self._report, self.phase = report, phase
 
     def __call__(self, done: int, total: int) -> None:
         """Tell how far it is."""
-        self._told(done, total)
+        self._report(done, total)
 
 
 @contextlib.contextmanager
@@ -40,7 +40,7 @@ def progress_reporter(title: str, progress: bool | Callable[[int, int], None]) -
 
 
 @contextlib.contextmanager
-def narrated(text: str) -> Iterator[None]:
+def status_line(text: str) -> Iterator[None]:
     """Say on a terminal what takes long; it disappears when done."""
     shown = sys.stderr.isatty()
     if shown:

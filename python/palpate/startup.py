@@ -1,4 +1,4 @@
-"""Ctrl-C while the command line is still importing what it needs: one line and exit code 130, no traceback."""
+"""Handling of Ctrl-C during imports of the command line: one line and exit code 130, no traceback."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ FORCE_UNITS = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 ACCELERATION_UNITS = {"m/s2": 1.0, "m/s^2": 1.0}
 SPEED_UNITS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
 MEMORY_UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30}
+SHARE_UNITS = {"%": 0.01}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0}
 
 # Characters of a wrong value that a message repeats.
@@ -80,6 +81,7 @@ density = _reader(DENSITY_UNITS, "density", "Density in kg/m^3.")
 stiffness = _reader(STIFFNESS_UNITS, "stiffness", "Stiffness in N/m.")
 force = _reader(FORCE_UNITS, "force", "Force in N.")
 acceleration = _reader(ACCELERATION_UNITS, "acceleration", "Acceleration in m/s^2.")
+share = _reader(SHARE_UNITS, "share", "Share of a whole, 1 or 100 %.")
 time = _reader(TIME_UNITS, "time", "Time in s.")
 speed = _reader(SPEED_UNITS, "speed", "Speed in m/s.")
 memory = _reader(MEMORY_UNITS, "memory size", "Memory in bytes.")

@@ -89,6 +89,19 @@ def rotated(vectors: np.ndarray, orientation: Sequence[float]) -> np.ndarray:
     return vectors + 2.0 * np.cross(v, np.cross(v, vectors) + w * vectors)
 
 
+def turning_z_to(directions: np.ndarray) -> np.ndarray:
+    """Give the unit quaternions w x y z (..., 4) that turn z to directions (..., 3) by the smallest angle.
+
+    That of no turn for a direction of zero, half a turn about x for one straight down.
+    """
+    directions = np.asarray(directions, dtype=float)
+    x, y, z = np.moveaxis(directions, -1, 0) / np.maximum(np.linalg.norm(directions, axis=-1), np.finfo(float).tiny)
+    # (1 + cos, axis sin) is twice the cosine of half the angle times the quaternion.
+    turned = np.stack([1.0 + z, -y, x, np.zeros_like(z)], axis=-1)
+    turned[z < -1 + 1e-12] = (0.0, 1.0, 0.0, 0.0)
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+
 def conjugate(orientation: Sequence[float]) -> tuple[float, float, float, float]:
     """Turn back what a unit quaternion w x y z turns."""
     w, x, y, z = orientation

@@ -63,9 +63,13 @@ class Program:
 
 
 @contextlib.contextmanager
-def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None):
-    """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends."""
-    context = chromium.new_context(viewport={"width": size[0], "height": size[1]})
+def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, sharpness: float = 0.5):
+    """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends.
+
+    Drawing in software takes most of the time of a test: half of the pixels along each side do, where a test does not
+    look at them.
+    """
+    context = chromium.new_context(viewport={"width": size[0], "height": size[1]}, device_scale_factor=sharpness)
     context.set_default_timeout(1e3 * PATIENCE)
     page = context.new_page()
     complaints = []
@@ -130,8 +134,13 @@ def press(page, notches: int = 0, place: tuple[float, float] | None = None, cont
     settled_depth(page)
     seen = until(page, lambda s: s["contacts"] == contacts and s["forceMagnitude"] > 0.01)
     for _ in range(notches):
-        page.mouse.wheel(0, 100)
+        wheel(page, 100)
     return (settled_depth(page) and state(page)) if notches else seen
+
+
+def wheel(page, pixels: float) -> None:
+    """Turn the wheel by so many pixels of the page's layout: Chromium counts those of the screen."""
+    page.mouse.wheel(0, pixels * page.evaluate("window.devicePixelRatio"))
 
 
 def settled_depth(page) -> float:

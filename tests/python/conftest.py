@@ -43,6 +43,13 @@ def pytest_collection_modifyitems(items):
         item.add_marker(pytest.mark.xdist_group("browser" if rank(item) == 0 else str(item.path)))
 
 
+def pytest_collection_finish(session):
+    """Refuse versions of pytest and xdist between which groups are lost: xdist appends them to the names of tests."""
+    lost = [item.nodeid for item in session.items if "@" not in item.nodeid]
+    if getattr(session.config.option, "loadgroup", False) and lost:
+        raise pytest.UsageError(f"xdist does not group the tests: {lost[0]}; 'pip install \"pytest<9.2\"'")
+
+
 def box_mesh(cells=(4, 3, 3), size=(0.08, 0.05, 0.05), jitter=0.15, seed=1) -> TetMesh:
     """Box of tetrahedra (scikit-fem's), interior nodes moved at random: independent of our own mesher."""
     import skfem
@@ -190,9 +197,9 @@ def program(cache):
 
 
 @pytest.fixture
-def page(chromium, program):
-    """A page of the module's ``program``."""
+def page(chromium, program, request):
+    """A page of the module's ``program``, as sharp as its ``SHARPNESS``."""
     from browser import opened
 
-    with opened(chromium, program) as page:
+    with opened(chromium, program, sharpness=getattr(request.module, "SHARPNESS", 0.5)) as page:
         yield page

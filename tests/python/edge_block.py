@@ -29,8 +29,9 @@ from scipy.spatial.transform import Rotation
 from palpate.body import Body, Material
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
+from palpate.mesh.elements import FACE_TRIANGLES
 from palpate.mesh.files import FROM_NETGEN
-from palpate.validation.verify.contact.signorini import PARTS, PLACES
+from palpate.mesh.shape_functions import TRIANGLE_NODES
 from palpate.validation.verify.solution import green_of, quiet_body
 
 SOFT = Material(10e3, 0.45)
@@ -199,15 +200,15 @@ class DirectContact:
         at, weight = _six_points()
         rows, places = len(self._faces), self._places[self._faces]
         shapes, hats, areas = [], [], []
-        for part in PARTS[6]:
-            corners = PLACES[part]
+        for part in FACE_TRIANGLES[6]:
+            corners = TRIANGLE_NODES[part]
             for barycentric, hat, share in zip(at @ corners, at, weight, strict=True):
                 values, slopes = _shape_functions(barycentric)
                 tangents = np.einsum("sa,fac->fsc", slopes, places)
                 area = np.linalg.norm(np.cross(tangents[:, 0], tangents[:, 1]), axis=1) / 2
                 shapes.append(_rows(np.tile(values, (rows, 1)), self._faces, len(self._nodes)))
                 hats.append(_rows(np.tile(hat, (rows, 1)), self._faces[:, part], len(self._nodes)))
-                areas.append(area * share / len(PARTS[6]))
+                areas.append(area * share / len(FACE_TRIANGLES[6]))
         return scipy.sparse.vstack(shapes).tocsr(), scipy.sparse.vstack(hats).tocsr(), np.concatenate(areas)
 
 

@@ -194,13 +194,6 @@ def test_code_after_a_test_counts(rust):
     assert len(rust(**{"tool.rs": tool})) == 1
 
 
-def test_known_imports_stand_as_long_as_they_close_a_circle(check, rust, monkeypatch):
-    monkeypatch.setattr(check, "KNOWN_IMPORTS", {("planted", "tool", "scene"): "a reason"})
-    assert rust(**{"tool.rs": "use crate::scene::Scene;\npub struct Tool;\n"}) == []
-    (problem,) = rust()
-    assert problem == "crates/planted: tool -> scene closes no circle any more, take it out of KNOWN_IMPORTS"
-
-
 def test_chapters_import_earlier_ones_only(rust):
     planted = {"mesh/mod.rs": "use crate::simulation::step;\n", "simulation/mod.rs": "pub fn step() {}\n"}
     assert rust("core", **planted)[-1] == "core's mesh/mod.rs imports simulation, a later chapter"

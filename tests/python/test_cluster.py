@@ -168,7 +168,7 @@ def test_mistakes_of_a_cluster_are_told_in_a_line(workers, body, tmp_path, monke
         assert "\n" not in str(error.value)
         assert not os.listdir(tmp_path)
 
-    monkeypatch.setattr(clusters, "PATIENCE", 0.5)
+    monkeypatch.setattr(clusters, "CONNECT_SECONDS", 0.5)
     refuses("tcp://127.0.0.1:1", "no scheduler answers at tcp://127.0.0.1:1")
     refuses("nonsense", "no scheduler answers at nonsense")
     refuses(8786, "address of a scheduler")

@@ -12,7 +12,7 @@ from websockets.asyncio.client import connect
 
 from palpate.viewer import messages
 from palpate.viewer.server import ViewerServer
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 
 # Frames come as fast as a busy machine lets them: a wait ends by what they hold, and fails only after this time, s.
 PATIENCE = 60.0
@@ -20,7 +20,7 @@ PATIENCE = 60.0
 TICKS_APART = 15
 
 
-def frame_of(session: Session, wants: Wants) -> tuple[dict, dict[str, np.ndarray]]:
+def frame_of(session: Session, wants: ClientView) -> tuple[dict, dict[str, np.ndarray]]:
     """Header and arrays of a frame that a new client gets."""
     return messages.decode(session.frame_message(1, (0, 0), wants)[0])
 

@@ -31,7 +31,7 @@ describe("tools that are pinned", () => {
     sent = [];
     control = new Control(store, (message) => sent.push(message));
     store.update({ connection: "open", role: "control" });
-    control.takeScene(scene(2));
+    control.receiveScene(scene(2));
   });
 
   const pressWith = (index: number) => store.update({ pressing: { tool: index, grab: false, depth: 0 } });
@@ -61,7 +61,7 @@ describe("tools that are pinned", () => {
   });
 
   it("are not offered for a single tool", () => {
-    control.takeScene(scene(1));
+    control.receiveScene(scene(1));
     pressWith(0);
     control.togglePin();
     expect(store.get().pressing).not.toBeNull();
@@ -72,15 +72,15 @@ describe("tools that are pinned", () => {
     pressWith(0);
     control.togglePin();
     // Frames from before the press arrived do not count.
-    control.takeFrame(frame(false, false));
+    control.receiveFrame(frame(false, false));
     expect(store.get().pinned).toEqual([0]);
-    control.takeFrame(frame(true, false));
-    control.takeFrame(frame(false, false));
+    control.receiveFrame(frame(true, false));
+    control.receiveFrame(frame(false, false));
     expect(store.get().pinned).toEqual([]);
   });
 
   it("are let go when control is lost, and with a new scene", () => {
-    for (const end of [() => control.takeText({ type: "role", role: "watch" }), () => control.takeScene(scene(2))]) {
+    for (const end of [() => control.receiveText({ type: "role", role: "watch" }), () => control.receiveScene(scene(2))]) {
       store.update({ role: "control" });
       pressWith(0);
       control.togglePin();
@@ -102,7 +102,7 @@ describe("what is shown", () => {
     sent = [];
     control = new Control(store, (message) => sent.push(message));
     store.update({ connection: "open", role: "control" });
-    control.takeScene({ ...scene(2), name: "block" });
+    control.receiveScene({ ...scene(2), name: "block" });
   });
 
   afterEach(() => {
@@ -128,11 +128,11 @@ describe("what is shown", () => {
       { type: "field", name: "displacement" },
       { type: "field", name: "strain", max: 5 },
     ]);
-    control.tellWishes();
+    control.sendView();
     expect(sent.at(-1)).toEqual({ type: "field", name: "strain", max: 5 });
-    control.takeScene({ ...scene(1), name: "block" });
+    control.receiveScene({ ...scene(1), name: "block" });
     expect(store.get().ranges).toEqual({ strain: 5 });
-    control.takeScene({ ...scene(1), name: "another" });
+    control.receiveScene({ ...scene(1), name: "another" });
     expect(store.get().ranges).toEqual({});
     expect(sent.at(-1)).toEqual({ type: "field", name: "strain" });
   });
@@ -148,12 +148,12 @@ describe("what is shown", () => {
     expect(store.get()).toMatchObject({ shownScale: 1, postures: [{ tilt: 0, turn: 0 }, { tilt: 0, turn: 0 }] });
     // The answer counts, however short a time after the slider was moved it comes.
     const { settings } = store.get();
-    control.takeText({ ...settings!, friction: [0.3, 0.3] });
+    control.receiveText({ ...settings!, friction: [0.3, 0.3] });
     expect(store.get().settings?.friction).toEqual([0.3, 0.3]);
   });
 
   it("says why a store is not cut open", () => {
-    control.takeScene({ ...scene(1), bodies: [{ ...body, tets: 0, regions: [] }] } as unknown as SceneMessage);
+    control.receiveScene({ ...scene(1), bodies: [{ ...body, tets: 0, regions: [] }] } as unknown as SceneMessage);
     control.toggleLayer("cutaway");
     expect(store.get().layers.cutaway).toBe(false);
     expect(store.get().notices).toEqual([NO_INSIDE]);
@@ -172,8 +172,8 @@ describe("an exam", () => {
     sent = [];
     control = new Control(store, (message) => sent.push(message));
     store.update({ connection: "open", role: "control" });
-    control.takeText({ ...exam, places: [] });
-    control.takeScene(scene(1));
+    control.receiveText({ ...exam, places: [] });
+    control.receiveScene(scene(1));
   });
 
   it("shows nothing that an eye could read it from, whatever key is hit", () => {
@@ -186,19 +186,19 @@ describe("an exam", () => {
     control.answer(true);
     control.answer(false);
     expect(sent).toEqual([{ type: "answer", found: true }]);
-    control.takeText({ ...exam, trial: 2, places: [] });
+    control.receiveText({ ...exam, trial: 2, places: [] });
     expect(store.get().answering).toBe(true);
-    control.takeScene(scene(1));
+    control.receiveScene(scene(1));
     control.answer(false);
     expect(sent.at(-1)).toEqual({ type: "answer", found: false });
   });
 
   it("takes the answer again where the server refused it, and none when it is over", () => {
     control.answer(true);
-    control.takeText({ type: "error", text: "touch the body first" });
+    control.receiveText({ type: "error", text: "touch the body first" });
     control.answer(true);
     expect(sent).toHaveLength(2);
-    control.takeText({ ...exam, places: [], result: { lines: [], plot: "" } });
+    control.receiveText({ ...exam, places: [], result: { lines: [], plot: "" } });
     control.answer(true);
     expect(sent).toHaveLength(2);
     expect(store.get().answering).toBe(false);

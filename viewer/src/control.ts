@@ -1,5 +1,5 @@
-// What the person may do and what the server says, each as a change of the state and, where it concerns the body, a
-// message. Buttons, keys and the pointer all go through here.
+// Commands of the user and messages of the server: each changes the state, and sends a message where it concerns the
+// body. Buttons, keys and the pointer all go through here.
 
 import { RateLimit } from "./net/rate_limit";
 import type {
@@ -21,7 +21,7 @@ import type { Axis, Layer, Posture, Store, Theme } from "./store";
 /** A slider dragged quickly sends no more often than this. */
 const SEND_INTERVAL_MS = 40;
 /** For so long after the person moved a slider, values from the server do not move it back. */
-const OWN_VALUE_MS = 400;
+const LOCAL_VALUE_MS = 400;
 /** More than so many notices hide the picture. */
 const NOTICES_MAX = 3;
 /** How a tool is held at first: a stylus lies on its side, the others stand upright. */
@@ -43,21 +43,21 @@ export class Control {
 
   // What the server says.
 
-  takeText(message: TextMessage): void {
+  receiveText(message: TextMessage): void {
     switch (message.type) {
       case "welcome":
         this.store.update({ version: message.version, models: message.models });
-        return this.takeRole(message.role);
+        return this.receiveRole(message.role);
       case "role":
-        return this.takeRole(message.role);
+        return this.receiveRole(message.role);
       case "settings":
-        return this.takeSettings(message);
+        return this.receiveSettings(message);
       case "status":
         return this.store.update({ status: message });
       case "recorded":
         return this.store.update({ recorded: message });
       case "exam":
-        return this.takeExam(message);
+        return this.receiveExam(message);
       case "computed":
         return this.store.update({ computed: message });
       case "error":
@@ -67,7 +67,7 @@ export class Control {
   }
 
   /** A new scene: what was touched is let go, and choices that it does not offer are dropped. */
-  takeScene(scene: SceneMessage): void {
+  receiveScene(scene: SceneMessage): void {
     this.release();
     const { field, strike, layers, scene: before, postures, coloring, ranges } = this.store.get();
     const posture = ({ shape }: { shape: ShapeName }, tool: number) =>
@@ -99,22 +99,22 @@ export class Control {
     });
     // A bare store has no tetrahedra to be shown.
     if (layers.cutaway && !hasInside(scene)) this.toggleLayer("cutaway");
-    if (this.store.get().ranges !== ranges && field !== null) this.tellField(field);
+    if (this.store.get().ranges !== ranges && field !== null) this.sendField(field);
   }
 
   /** A pinned tool that has left the scene, by a fault or another way, is pinned no more. */
-  takeFrame(frame: FrameMessage): void {
+  receiveFrame(frame: FrameMessage): void {
     const { pinned, frame: before } = this.store.get();
     const left = (tool: number) => before?.tools[tool]?.active && !frame.tools[tool]?.active;
     this.store.update({ frame, pinned: pinned.some(left) ? pinned.filter((tool) => !left(tool)) : pinned });
-    if (frame.replay) this.takeReplayedSettings(frame.replay.settings);
+    if (frame.replay) this.receiveReplayedSettings(frame.replay.settings);
   }
 
   /** What this page looks at, told again after a connection was lost. */
-  tellWishes(): void {
+  sendView(): void {
     const { layers, field } = this.store.get();
     if (layers.cutaway) this.send({ type: "cutaway", on: true });
-    if (field !== null) this.tellField(field);
+    if (field !== null) this.sendField(field);
   }
 
   notice(text: string): void {
@@ -133,7 +133,7 @@ export class Control {
     if (exam) return;
     const on = !layers[layer];
     if (layer === "cutaway") {
-      if (on && !(scene && hasInside(scene))) return this.notice(whyWhole(scene));
+      if (on && !(scene && hasInside(scene))) return this.notice(noCutReason(scene));
       this.send({ type: "cutaway", on });
     }
     this.store.update({ layers: { ...layers, [layer]: on } });
@@ -151,7 +151,7 @@ export class Control {
   chooseField(field: string): void {
     const { layers } = this.store.get();
     this.store.update({ field, coloring: "field", layers: { ...layers, colors: true } });
-    this.tellField(field);
+    this.sendField(field);
   }
 
   /** Colours by region or by material. */
@@ -179,7 +179,7 @@ export class Control {
   lockRange(field: string, max: number | null): void {
     const others = Object.entries(this.store.get().ranges).filter(([name]) => name !== field);
     this.store.update({ field, ranges: Object.fromEntries(max === null ? others : [...others, [field, max]]) });
-    this.tellField(field);
+    this.sendField(field);
   }
 
   chooseTheme(theme: Theme): void {
@@ -358,7 +358,7 @@ export class Control {
   }
 
   /** A replay carries its settings with every frame; most change nothing. */
-  private takeReplayedSettings(settings: SettingsMessage): void {
+  private receiveReplayedSettings(settings: SettingsMessage): void {
     if (JSON.stringify(settings) !== JSON.stringify(this.store.get().settings)) this.store.update({ settings });
   }
 
@@ -366,24 +366,24 @@ export class Control {
     this.store.update({ pressing: null, pinned: [...this.store.get().pinned, tool], pinNext: false });
   }
 
-  private tellField(name: string): void {
+  private sendField(name: string): void {
     const max = this.store.get().ranges[name];
     this.send({ type: "field", name, ...(max !== undefined && { max }) });
   }
 
-  private takeExam(exam: ExamMessage): void {
+  private receiveExam(exam: ExamMessage): void {
     // The next trial begins with its scene.
     const { answering } = this.store.get();
     this.store.update({ exam, answering: answering && !exam.result, layers: NO_LAYERS, coloring: "field" });
   }
 
-  private takeRole(role: Role): void {
+  private receiveRole(role: Role): void {
     if (role === "watch") this.release();
     this.store.update(role === "watch" ? { role, strike: false } : { role });
   }
 
-  private takeSettings(settings: SettingsMessage): void {
-    const own = performance.now() - this.changedMs < OWN_VALUE_MS ? this.store.get().settings : null;
+  private receiveSettings(settings: SettingsMessage): void {
+    const own = performance.now() - this.changedMs < LOCAL_VALUE_MS ? this.store.get().settings : null;
     this.store.update({ settings: own ? { ...own, time_scale: settings.time_scale } : settings });
   }
 
@@ -410,6 +410,6 @@ export function hasInside(scene: SceneMessage): boolean {
 }
 
 /** Why no body can. */
-export function whyWhole(scene: SceneMessage | null): string {
+export function noCutReason(scene: SceneMessage | null): string {
   return scene?.bodies.some(({ drawn }) => drawn) ? TOO_LARGE_TO_CUT : NO_INSIDE;
 }

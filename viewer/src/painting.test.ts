@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 
 import { maskOfNodes, nodesOfMask } from "./net/computed_messages";
 import type { ClientMessage, SceneMessage } from "./net/protocol";
-import { LATER, NEVER, PAINTED, Painting, READY, WAITING, countStates, isGrowing, touchStates } from "./painting";
+import { NOT_READY, NOT_TOUCHABLE, PAINTED, Painting, READY, WAITING, countStates, isGrowing, touchStates } from "./painting";
 import { Store } from "./store";
 
 const COUNT = 20_000;
@@ -33,11 +33,11 @@ describe("painting", () => {
     painting.add([Uint32Array.of(1, 5, 6), Uint32Array.of(3)]);
     painting.add([Uint32Array.of(6, 7), new Uint32Array(0)]);
     const states = touchStates(store.get(), 0)!;
-    expect([states[1], states[5], states[7], states[8]]).toEqual([READY, PAINTED, PAINTED, LATER]);
+    expect([states[1], states[5], states[7], states[8]]).toEqual([READY, PAINTED, PAINTED, NOT_READY]);
     expect(touchStates(store.get(), 1)).toBeNull();
     expect(countStates(store.get())).toEqual([4 + 8, 0, COUNT - 4 - 3, 0, 3]);
     painting.undo();
-    expect(touchStates(store.get(), 0)![7]).toBe(LATER);
+    expect(touchStates(store.get(), 0)![7]).toBe(NOT_READY);
     painting.clear();
     expect(store.get().strokes).toEqual([]);
     // A stroke over what is ready is none.
@@ -70,7 +70,7 @@ describe("painting", () => {
     store.update({ computed: { type: "computed", bodies: [{ ...body!, ...masks }, other!] } });
     painting.add([Uint32Array.of(0, 6, 8), new Uint32Array(0)]);
     const states = touchStates(store.get(), 0)!;
-    expect([0, 5, 6, 7, 8].map((node) => states[node])).toEqual([PAINTED, READY, WAITING, LATER, NEVER]);
+    expect([0, 5, 6, 7, 8].map((node) => states[node])).toEqual([PAINTED, READY, WAITING, NOT_READY, NOT_TOUCHABLE]);
     expect(countStates(store.get())).toEqual([1 + 8, COUNT - 4, 1, 1, 1]);
   });
 

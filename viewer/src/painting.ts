@@ -13,8 +13,8 @@ const BRUSH_STEP = 1.25;
 
 /** What a node of the surface is; of the nodes that a vertex stands for the largest is shown. */
 export const READY = 0;
-export const NEVER = 1;
-export const LATER = 2;
+export const NOT_TOUCHABLE = 1;
+export const NOT_READY = 2;
 export const WAITING = 3;
 export const PAINTED = 4;
 
@@ -30,13 +30,13 @@ export function isGrowing({ computed, exam }: Readonly<State>): boolean {
 
 /** What each surface node of a body is; null where no more can be touched later. */
 export function touchStates({ computed, scene, strokes }: Readonly<State>, body: number): Uint8Array | null {
-  const [told, header] = [computed?.bodies[body], scene?.bodies[body]];
-  if (!told?.ready || !header || !grows(told)) return null;
-  const states = new Uint8Array(header.surface_nodes).fill(told.region === null ? LATER : NEVER);
-  for (const node of told.region === null ? [] : nodesOfMask(told.region)) states[node] = LATER;
-  for (const node of told.waiting === null ? [] : nodesOfMask(told.waiting)) states[node] = WAITING;
-  for (const stroke of strokes) for (const node of stroke[body] ?? []) if (states[node] === LATER) states[node] = PAINTED;
-  for (const node of nodesOfMask(told.ready)) states[node] = READY;
+  const [columns, header] = [computed?.bodies[body], scene?.bodies[body]];
+  if (!columns?.ready || !header || !grows(columns)) return null;
+  const states = new Uint8Array(header.surface_nodes).fill(columns.region === null ? NOT_READY : NOT_TOUCHABLE);
+  for (const node of columns.region === null ? [] : nodesOfMask(columns.region)) states[node] = NOT_READY;
+  for (const node of columns.waiting === null ? [] : nodesOfMask(columns.waiting)) states[node] = WAITING;
+  for (const stroke of strokes) for (const node of stroke[body] ?? []) if (states[node] === NOT_READY) states[node] = PAINTED;
+  for (const node of nodesOfMask(columns.ready)) states[node] = READY;
   return states;
 }
 
@@ -67,7 +67,7 @@ export class Painting {
     this.store.update({ paintTool: state.paintTool === tool ? null : tool });
   }
 
-  putAway(): void {
+  leavePaintTool(): void {
     this.store.update({ paintTool: null });
   }
 
@@ -85,7 +85,7 @@ export class Painting {
     const state = this.store.get();
     const kept = stroke.map((nodes, body) => {
       const states = touchStates(state, body);
-      return states ? nodes.filter((node) => states[node] === LATER) : new Uint32Array(0);
+      return states ? nodes.filter((node) => states[node] === NOT_READY) : new Uint32Array(0);
     });
     if (kept.some((nodes) => nodes.length > 0)) this.store.update({ strokes: [...state.strokes, kept] });
   }

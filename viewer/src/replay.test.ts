@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 
 import type { ReplayEvent, ReplayScene } from "./net/session_messages";
-import { Handle, WORTH_TELLING_MS, Way, clock, marksOf, placeOf, stepped, verdict } from "./replay";
+import { Handle, LONG_SEEK_MS, Way, clock, marksOf, placeOf, stepped, verdict } from "./replay";
 
 const scene = (events: ReplayEvent[] = [], ticks = 20_001): ReplayScene => ({
   name: "liver.mcap",
@@ -86,13 +86,13 @@ describe("the verdict", () => {
 describe("the way to a tick", () => {
   it("is told once it has taken a while, until it is there", () => {
     const way = new Way();
-    expect(way.told({ tick: 10, goal: 10 }, 0)).toBeNull();
-    expect(way.told({ tick: 20, goal: 100 }, 10)).toBeNull();
-    expect(way.told({ tick: 40, goal: 100 }, 10 + WORTH_TELLING_MS)).toBe(0.4);
+    expect(way.seekProgress({ tick: 10, goal: 10 }, 0)).toBeNull();
+    expect(way.seekProgress({ tick: 20, goal: 100 }, 10)).toBeNull();
+    expect(way.seekProgress({ tick: 40, goal: 100 }, 10 + LONG_SEEK_MS)).toBe(0.4);
     // The line is dragged on meanwhile.
-    expect(way.told({ tick: 50, goal: 200 }, 20 + WORTH_TELLING_MS)).toBe(0.25);
-    expect(way.told({ tick: 200, goal: 200 }, 30 + WORTH_TELLING_MS)).toBeNull();
-    expect(way.told({ tick: 200, goal: 300 }, 40 + WORTH_TELLING_MS)).toBeNull();
+    expect(way.seekProgress({ tick: 50, goal: 200 }, 20 + LONG_SEEK_MS)).toBe(0.25);
+    expect(way.seekProgress({ tick: 200, goal: 200 }, 30 + LONG_SEEK_MS)).toBeNull();
+    expect(way.seekProgress({ tick: 200, goal: 300 }, 40 + LONG_SEEK_MS)).toBeNull();
   });
 });
 

@@ -1,9 +1,9 @@
-// The time line of a replay: what is told of times, where its marks stand, and when the way to a tick is worth telling.
+// The time line of a replay: texts of times, positions of marks, and when the progress of a seek is shown.
 
 import type { ReplayEvent, ReplayFrame, ReplayScene } from "./net/session_messages";
 
 /** A way that takes longer is shown, ms. */
-export const WORTH_TELLING_MS = 300;
+export const LONG_SEEK_MS = 300;
 /** Marks nearer than this part of the line would cover each other, and are one. */
 const MARK_APART = 0.006;
 
@@ -63,13 +63,13 @@ export function verdict({ difference, checked }: Pick<ReplayFrame, "difference" 
 export class Way {
   private begunMs: number | null = null;
 
-  told({ tick, goal }: Pick<ReplayFrame, "tick" | "goal">, nowMs: number): number | null {
+  seekProgress({ tick, goal }: Pick<ReplayFrame, "tick" | "goal">, nowMs: number): number | null {
     if (tick === goal) {
       this.begunMs = null;
       return null;
     }
     this.begunMs ??= nowMs;
-    return nowMs - this.begunMs >= WORTH_TELLING_MS ? tick / goal : null;
+    return nowMs - this.begunMs >= LONG_SEEK_MS ? tick / goal : null;
   }
 }
 

@@ -1,5 +1,5 @@
-// The state of the page, in one place: what the server said last, and what the person has chosen. Parts of the page read
-// it, change it by `update`, and hear of changes of the keys they name.
+// The state of the page: the server's last messages, and the user's choices. Parts of the page read it, change it by
+// `update`, and subscribe to keys.
 
 import type { ConnectionState } from "./net/connection";
 import type { ComputedMessage } from "./net/computed_messages";

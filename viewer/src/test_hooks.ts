@@ -1,4 +1,4 @@
-// `window.palpate`: what a browser test needs to know, and where on the screen it may press.
+// `window.palpate`: state that browser tests read, and points on the screen that they may press.
 
 import * as THREE from "three";
 

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 
 import type { BodyMessage, ContactMessage, Quaternion, Vec3 } from "./net/protocol";
-import { contactsOf, deepest, feltStiffness, wholeForce } from "./tool_contacts";
+import { contactsOf, deepest, feltStiffness, totalForce } from "./tool_contacts";
 
 const H = Math.SQRT1_2;
 const contact = (over: Partial<ContactMessage>): ContactMessage => ({
@@ -36,7 +36,7 @@ describe("the contacts of a tool", () => {
   });
 
   it("push together with the sum of their forces", () => {
-    const whole = wholeForce([wall(-1, 2), wall(1, 2)]);
+    const whole = totalForce([wall(-1, 2), wall(1, 2)]);
     [0, 0, -2 * Math.SQRT2].forEach((component, axis) => expect(whole[axis]).toBeCloseTo(component, 12));
   });
 });

@@ -1,4 +1,4 @@
-// What the places at which a tool touches make together: in a groove or a fold, or on two bodies, it touches at several.
+// Totals over the contacts of a tool: in a groove or a fold, or on two bodies, it touches at several.
 
 import * as THREE from "three";
 
@@ -15,7 +15,7 @@ export function deepest(contacts: readonly ContactMessage[]): ContactMessage | n
 }
 
 /** Of all contacts on what they touch, N, in the frame of the scene. */
-export function wholeForce(contacts: readonly ContactMessage[]): Vec3 {
+export function totalForce(contacts: readonly ContactMessage[]): Vec3 {
   const sum: Vec3 = [0, 0, 0];
   for (const { force } of contacts) force.forEach((component, axis) => (sum[axis]! += component));
   return sum;
@@ -30,7 +30,7 @@ export function wholeForce(contacts: readonly ContactMessage[]): Vec3 {
  */
 export function feltStiffness(contacts: readonly ContactMessage[], bodies: readonly BodyMessage[]): number | null {
   if (contacts.length === 1) return contacts[0]!.stiffness;
-  const direction = new THREE.Vector3(...wholeForce(contacts)).normalize();
+  const direction = new THREE.Vector3(...totalForce(contacts)).normalize();
   // What holds itself, as between two walls that face each other, has no direction of its force.
   if (contacts.length === 0 || direction.lengthSq() === 0) return null;
   let whole = 0;

@@ -53,16 +53,16 @@ export class Viewer {
     const { store, control } = this;
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     this.connection = new Connection(`${scheme}://${location.host}/socket`, token, {
-      onState: (state) => this.takeConnection(state),
-      onText: (message) => control.takeText(message),
-      onScene: (scene) => this.takeScene(scene),
+      onState: (state) => this.receiveConnection(state),
+      onText: (message) => control.receiveText(message),
+      onScene: (scene) => this.receiveScene(scene),
       onFrame: (frame) => this.frames.push(frame),
       onUnreadable: (reason) => control.notice(`A message could not be read: ${reason}`),
     });
     const viewport = new Viewport(
       byId<HTMLCanvasElement>("canvas"),
       ["readout", "legend", "hint"].map((id) => byId(id)),
-      () => this.takeFrames(),
+      () => this.receiveFrames(),
       () => this.frames.answer(),
     );
     this.stage = new Stage(viewport, store);
@@ -97,22 +97,22 @@ export class Viewer {
     this.connection.open();
   }
 
-  private takeConnection(connection: ConnectionState): void {
+  private receiveConnection(connection: ConnectionState): void {
     this.store.update({ connection });
-    if (connection === "open") this.control.tellWishes();
+    if (connection === "open") this.control.sendView();
     if (connection === "lost" || connection === "refused") {
       this.control.release();
       this.frames.clear();
     }
   }
 
-  private takeScene(data: SceneData): void {
+  private receiveScene(data: SceneData): void {
     // Frames of the scene before are not drawn any more, but the server still counts on an answer.
     this.frames.take();
     const again = data.header.name === this.store.get().scene?.name;
     // With another tool on the same body a press goes on.
     const held = again ? this.pointer.held : null;
-    this.control.takeScene(data.header);
+    this.control.receiveScene(data.header);
     this.store.update({ sizes: data.bodies.map(({ nodes }) => sidesOf(nodes)) });
     this.stage.setScene(data);
     if (held) this.pointer.pressAgain(held);
@@ -124,13 +124,13 @@ export class Viewer {
   }
 
   /** Takes in what has arrived since the last drawing: all of the log, and the newest frame. Tells whether the picture changes. */
-  private takeFrames(): boolean {
+  private receiveFrames(): boolean {
     const frames = this.frames.take();
     const newest = frames.at(-1);
     if (!newest) return false;
     for (const frame of frames) this.plots.append(frame);
     const changed = this.statistics.timed(() => this.stage.update(newest));
-    this.control.takeFrame(newest.header);
+    this.control.receiveFrame(newest.header);
     return changed;
   }
 }

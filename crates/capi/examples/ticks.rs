@@ -1,4 +1,4 @@
-//! What a tick costs a program in Rust: `ticks SCENE POSITIONS PASSES`, for `python -m benches tick c`.
+//! Computing time of ticks in a Rust program: `ticks SCENE POSITIONS PASSES`, for `python -m benches tick c`.
 //!
 //! Positions are ticks x 3 doubles of the first tool. Prints the shortest of the passes, ns a tick.
 

@@ -1,4 +1,4 @@
-//! Which interface this is.
+//! Version of the C interface.
 
 /// Raised when a program must be compiled again; part of the library's run-time name.
 pub const PALPATE_ABI_MAJOR: u32 = 1;

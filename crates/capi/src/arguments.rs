@@ -1,4 +1,4 @@
-//! Pointers from C as references and slices, null pointers refused by name.
+//! Conversion of C pointers to references and slices. A null pointer is an error that names the argument.
 #![allow(unsafe_code)] // raw pointers of callers, who answer for what they point to
 
 use std::ffi::{CStr, c_char};
@@ -94,11 +94,11 @@ pub unsafe fn path<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a Path> 
     unsafe { text(pointer, name) }.map(Path::new)
 }
 
-/// Hands an object out.
+/// Moves an object to the heap and stores its pointer for the caller.
 ///
 /// # Safety
 /// The place is null or may be written.
-pub unsafe fn hand_out<T>(object: T, place: *mut *mut T, name: &str) -> Outcome<()> {
+pub unsafe fn store_handle<T>(object: T, place: *mut *mut T, name: &str) -> Outcome<()> {
     if place.is_null() {
         return Err(null(name));
     }
@@ -107,11 +107,11 @@ pub unsafe fn hand_out<T>(object: T, place: *mut *mut T, name: &str) -> Outcome<
     Ok(())
 }
 
-/// Takes an object back; nothing for null.
+/// Frees an object; nothing for null.
 ///
 /// # Safety
-/// The pointer is null or came from [`hand_out`], and nobody uses it any more.
-pub unsafe fn take_back<T>(pointer: *mut T) {
+/// The pointer is null or came from [`store_handle`], and nobody uses it any more.
+pub unsafe fn free_handle<T>(pointer: *mut T) {
     if !pointer.is_null() {
         // SAFETY: the caller's.
         drop(unsafe { Box::from_raw(pointer) });

@@ -1,4 +1,4 @@
-//! The device of a tool whose readings the program brings and whose wrenches it takes.
+//! Device whose readings the program supplies and whose wrenches the program fetches.
 
 use std::sync::{Arc, Mutex};
 
@@ -28,7 +28,7 @@ pub fn program_device(limits: DeviceLimits) -> (DeviceEnd, ProgramDevice) {
 
 impl DeviceEnd {
     /// Sets what the next tick reads.
-    pub fn bring(&mut self, reading: Reading) {
+    pub fn set_reading(&mut self, reading: Reading) {
         if let Ok(mut exchange) = self.0.try_lock() {
             *exchange = Exchange { reading, wrench: Wrench::default() };
         }

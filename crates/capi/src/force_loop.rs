@@ -11,13 +11,13 @@ use glam::DVec3;
 use palpate_core::simulation::Pose;
 use palpate_devices::Device;
 use palpate_devices::simulated::{self, simulated};
-use palpate_scene::{BodyId, Prepared, ToolId, carried_over, unit_quaternion};
+use palpate_scene::{BodyId, PreparedScene, ToolId, carried_over, unit_quaternion};
 use palpate_servo::{ForceLoop, LoopHandle, Published, Servo, StrainWorker, check_period};
 
-use crate::arguments::{hand_out, shared, take_back};
+use crate::arguments::{free_handle, shared, store_handle};
 use crate::device::{DeviceEnd, program_device};
 use crate::scene::SceneGraph;
-use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::status::{Outcome, Refusal, Status, catching_panics};
 use crate::store::Store;
 
 /// A force loop. One thread at a time may tick it; any other threads may read frames and change settings meanwhile.
@@ -46,7 +46,7 @@ pub(crate) struct TickSide {
 
 /// What frames and settings need.
 pub(crate) struct FrameSide {
-    pub prepared: Prepared,
+    pub prepared: PreparedScene,
     runner: Runner,
     /// The tick that was read last.
     pub latest: Published,
@@ -108,7 +108,7 @@ impl Runner {
 }
 
 /// A loop for the program to tick, at rest.
-fn to_be_ticked(prepared: &Prepared) -> Outcome<(TickSide, Runner)> {
+fn to_be_ticked(prepared: &PreparedScene) -> Outcome<(TickSide, Runner)> {
     let (ends, devices): (Vec<_>, Vec<_>) = prepared
         .devices
         .iter()
@@ -156,7 +156,7 @@ impl Loop {
             return Err(Refusal::state("the loop's own thread runs already"));
         }
         let (targets, devices) = frame.prepared.tools.iter().map(|_| simulated_device()).unzip();
-        let Prepared { model, limits, settings, scheduling, strain, .. } = frame.prepared.clone();
+        let PreparedScene { model, limits, settings, scheduling, strain, .. } = frame.prepared.clone();
         let servo = Servo::start(model, devices, limits, settings, scheduling, strain, None)?;
         // Not before: a start that is refused must not have kept the program from ticking.
         self.try_tick()?.force_loop = None;
@@ -184,7 +184,7 @@ impl Loop {
         let _one_at_a_time = self.changing.lock().unwrap_or_else(PoisonError::into_inner);
         // Beside the loop, frames and settings.
         let before = self.frame().prepared.clone();
-        let (next, kept) = graph.scene.prepare_change(&before)?;
+        let (next, previous_ranks) = graph.scene.prepare_change(&before)?;
         let mut frame = self.frame();
         let FrameSide { prepared, runner, latest } = &mut *frame;
         let Runner::Thread { servo, targets } = runner else {
@@ -193,9 +193,9 @@ impl Loop {
             ));
         };
         let new = |old: &Option<usize>| old.is_none().then(simulated_device).unzip();
-        let (fresh, devices) = kept.tools[..next.tools.len()].iter().map(new).unzip();
-        prepared.go_on_with(next, kept, Some(servo.as_mut()), devices)?;
-        *targets = carried_over(std::mem::take(targets), fresh, &kept);
+        let (fresh, devices) = previous_ranks.tools[..next.tools.len()].iter().map(new).unzip();
+        prepared.continue_with(next, previous_ranks, Some(servo.as_mut()), devices)?;
+        *targets = carried_over(std::mem::take(targets), fresh, &previous_ranks);
         *latest = servo.latest().clone();
         Ok(())
     }
@@ -219,11 +219,11 @@ fn unknown(what: &str, handle: u32) -> Refusal {
 /// scene later does not change it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_new(scene: *const SceneGraph, force_loop: *mut *mut Loop) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let made = Loop::new(unsafe { shared(scene, "scene") }?)?;
         // SAFETY: the caller's pointer.
-        unsafe { hand_out(made, force_loop, "loop") }?;
+        unsafe { store_handle(made, force_loop, "loop") }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -232,8 +232,8 @@ pub unsafe extern "C" fn palpate_loop_new(scene: *const SceneGraph, force_loop: 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_free(force_loop: *mut Loop) {
     // SAFETY: the caller's pointer.
-    guarded(|| unsafe {
-        take_back(force_loop);
+    catching_panics(|| unsafe {
+        free_handle(force_loop);
         Ok(Status::PalpateOk)
     });
 }
@@ -242,7 +242,7 @@ pub unsafe extern "C" fn palpate_loop_free(force_loop: *mut Loop) {
 /// Tools are out of the scene until then. The program cannot tick until palpate_loop_stop.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_start(force_loop: *mut Loop) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         unsafe { shared(force_loop, "loop") }?.start()?;
         Ok(Status::PalpateOk)
@@ -252,7 +252,7 @@ pub unsafe extern "C" fn palpate_loop_start(force_loop: *mut Loop) -> Status {
 /// Stops that thread. The loop is at rest then, and for the program to tick; settings stay. Once more, it does nothing.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_stop(force_loop: *mut Loop) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         unsafe { shared(force_loop, "loop") }?.stop()?;
         Ok(Status::PalpateOk)
@@ -264,7 +264,7 @@ pub unsafe extern "C" fn palpate_loop_stop(force_loop: *mut Loop) -> Status {
 /// loop was made of. Takes as long as it takes to prepare what is new; the loop ticks meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_change(force_loop: *mut Loop, scene: *const SceneGraph) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (own, scene) = unsafe { (shared(force_loop, "loop")?, shared(scene, "scene")?) };
         own.change(scene)?;
@@ -291,7 +291,7 @@ pub struct Target {
 /// Sends a simulated tool to a target, while the loop's own thread runs.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_set_target(force_loop: *mut Loop, tool: u32, target: *const Target) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (own, target) = unsafe { (shared(force_loop, "loop")?, shared(target, "target")?) };
         let pose = pose(target.position, target.orientation);

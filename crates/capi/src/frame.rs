@@ -1,4 +1,4 @@
-//! What is drawn of a tick: forces, contacts, deformed surfaces, statistics.
+//! Results of a tick for drawing: forces, contacts, deformed surfaces, statistics.
 #![allow(unsafe_code)] // called from C with raw pointers
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
@@ -6,13 +6,13 @@ use std::ffi::c_char;
 
 use glam::DVec3;
 use palpate_core::simulation::{Contact, MAX_CONTACTS, MAX_TOOLS, Mode};
-use palpate_scene::Prepared;
+use palpate_scene::PreparedScene;
 use palpate_servo::{Published, Summary};
 
 use crate::arguments::{array_mut, exclusive, require_count, shared};
 use crate::force_loop::Loop;
-use crate::sized::{self, Sized};
-use crate::status::{Outcome, Status, guarded};
+use crate::status::{Outcome, Status, catching_panics};
+use crate::versioned_struct::{self, VersionedStruct};
 
 /// Most tools of a scene.
 pub const PALPATE_MAX_TOOLS: usize = 4;
@@ -89,12 +89,12 @@ pub struct Frame {
 
 impl Default for Frame {
     fn default() -> Self {
-        sized::zeroed()
+        versioned_struct::zeroed()
     }
 }
 
 // SAFETY: numbers only; the size comes first.
-unsafe impl Sized for Frame {
+unsafe impl VersionedStruct for Frame {
     const NAME: &str = "palpate_frame";
     const FIRST_SIZE: usize = 760;
 }
@@ -172,14 +172,14 @@ pub struct ContactRecord {
 /// the tick; callers of frames and settings wait for each other.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_get_frame(force_loop: *mut Loop, frame: *mut Frame) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let own = unsafe { shared(force_loop, "loop") }?;
         let mut side = own.frame();
         let tools = side.prepared.tools.len();
         let filled = Frame::of(side.refresh(), tools);
         // SAFETY: the caller's pointer.
-        unsafe { sized::write(&filled, frame) }?;
+        unsafe { versioned_struct::write(&filled, frame) }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -192,7 +192,7 @@ pub unsafe extern "C" fn palpate_loop_get_contacts(
     capacity: usize,
     count: *mut usize,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (own, places, count) = unsafe {
             (shared(force_loop, "loop")?, array_mut(contacts, capacity, "contacts")?, exclusive(count, "count")?)
@@ -205,7 +205,7 @@ pub unsafe extern "C" fn palpate_loop_get_contacts(
     })
 }
 
-fn record(prepared: &Prepared, contact: &Contact) -> ContactRecord {
+fn record(prepared: &PreparedScene, contact: &Contact) -> ContactRecord {
     let placement = &prepared.model.bodies[contact.body].placement;
     let vector = |v: DVec3| placement.vector_to_world(v).to_array();
     let (body, tool) = (prepared.bodies[contact.body].0, prepared.tools[contact.tool].0);
@@ -213,16 +213,16 @@ fn record(prepared: &Prepared, contact: &Contact) -> ContactRecord {
         tool,
         body,
         grabs: u32::from(contact.mode == Mode::Grab),
-        slips: u32::from(contact.local.slipping),
+        slips: u32::from(contact.slipping),
         limited: u32::from(contact.limited),
         reserved: 0,
         point: placement.point_to_world(contact.point).to_array(),
         normal: vector(contact.normal),
         force: vector(contact.force),
-        torque: vector(-contact.local.torque),
-        radius: contact.local.radius,
-        depth: contact.local.depth,
-        stiffness: contact.local.stiffness,
+        torque: vector(-contact.torque),
+        radius: contact.radius,
+        depth: contact.depth,
+        stiffness: contact.stiffness,
     }
 }
 
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn palpate_loop_get_surface_size(
     nodes: *mut usize,
     triangles: *mut usize,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (own, nodes, triangles) = unsafe { (shared(force_loop, "loop")?, nodes.as_mut(), triangles.as_mut()) };
         let side = own.frame();
@@ -253,7 +253,7 @@ pub unsafe extern "C" fn palpate_loop_get_triangles(
     nodes: *mut u32,
     triangles: usize,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let own = unsafe { shared(force_loop, "loop") }?;
         let side = own.frame();
@@ -274,7 +274,7 @@ pub unsafe extern "C" fn palpate_loop_get_rest_positions(
     nodes: usize,
 ) -> Status {
     // SAFETY: the caller's pointers.
-    guarded(|| unsafe { put_positions(force_loop, body, positions, nodes, false) })
+    catching_panics(|| unsafe { put_positions(force_loop, body, positions, nodes, false) })
 }
 
 /// Positions of the surface nodes of a body in the tick of the last palpate_loop_get_frame, x y z of each, m, in the world.
@@ -287,7 +287,7 @@ pub unsafe extern "C" fn palpate_loop_get_positions(
     nodes: usize,
 ) -> Status {
     // SAFETY: the caller's pointers.
-    guarded(|| unsafe { put_positions(force_loop, body, positions, nodes, true) })
+    catching_panics(|| unsafe { put_positions(force_loop, body, positions, nodes, true) })
 }
 
 /// Positions of surface nodes in the world, at rest or where the latest tick has moved them.

@@ -1,10 +1,10 @@
-//! The library itself: versions, the clock, what was wrong.
+//! Version of the library, its clock, and the last error.
 #![allow(unsafe_code)] // exported by name
 
 use std::ffi::{CStr, c_char};
 
 use crate::abi::{PALPATE_ABI_MAJOR, PALPATE_ABI_MINOR};
-use crate::status::told;
+use crate::status::last_error;
 
 /// The interface that the library was built with: PALPATE_ABI_MAJOR * 65536 + PALPATE_ABI_MINOR.
 #[unsafe(no_mangle)]
@@ -27,7 +27,7 @@ pub extern "C" fn palpate_version() -> *const c_char {
 /// refused call of that thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_last_error() -> *const c_char {
-    told()
+    last_error()
 }
 
 /// Nanoseconds of the monotonic clock by which ticks are timed (CLOCK_MONOTONIC).

@@ -9,7 +9,7 @@ use palpate_servo::Script;
 
 use crate::arguments::{array, array_mut, optional_mut, require_count, shared};
 use crate::scene::SceneGraph;
-use crate::status::{Refusal, Status, guarded, tell};
+use crate::status::{Refusal, Status, catching_panics, set_last_error};
 
 /// Moves the tools of a scene through positions, one tick a row: `positions` (ticks x tools, x y z, m; NAN takes a tool out of the
 /// scene) and `orientations` (ticks x tools, w x y z; null does not turn them). `forces` gets the force on each device
@@ -26,7 +26,7 @@ pub unsafe extern "C" fn palpate_scene_run(
     forces: *mut f64,
     torques: *mut f64,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let prepared = unsafe { shared(scene, "scene") }?.scene.prepare()?;
         require_count("tools", tools, prepared.model.tools.len())?;
@@ -60,7 +60,7 @@ pub unsafe extern "C" fn palpate_scene_run(
         torques.into_iter().flatten().zip(&recording.torques).for_each(|(to, t)| *to = t.to_array());
         Ok(match recording.fault {
             Some(fault) => {
-                tell(fault.to_string());
+                set_last_error(fault.to_string());
                 Status::PalpateFault
             }
             None => Status::PalpateOk,

@@ -1,4 +1,4 @@
-//! What may be said of bodies, tools, devices and scenes.
+//! Options of bodies, tools, devices and scenes.
 #![allow(unsafe_code)] // structs of callers are filled
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
@@ -11,8 +11,8 @@ use palpate_devices::{DeviceLimits, known};
 use palpate_scene::{DEFAULT_FRICTION, DEFAULT_MAX_STIFFNESS, Scene, Tool};
 
 use crate::arguments::{array, text};
-use crate::sized::{self, Sized};
-use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::status::{Outcome, Refusal, Status, catching_panics};
+use crate::versioned_struct::{self, VersionedStruct};
 
 /// A sphere of `radius` around the tool's origin.
 pub const PALPATE_SHAPE_SPHERE: u32 = 0;
@@ -54,12 +54,12 @@ pub struct BodyOptions {
 
 impl Default for BodyOptions {
     fn default() -> Self {
-        Self { orientation: [1.0, 0.0, 0.0, 0.0], ..sized::zeroed() }
+        Self { orientation: [1.0, 0.0, 0.0, 0.0], ..versioned_struct::zeroed() }
     }
 }
 
 // SAFETY: numbers only; the size comes first.
-unsafe impl Sized for BodyOptions {
+unsafe impl VersionedStruct for BodyOptions {
     const NAME: &str = "palpate_body_options";
     const FIRST_SIZE: usize = 80;
 }
@@ -105,12 +105,12 @@ pub struct ToolOptions {
 impl Default for ToolOptions {
     fn default() -> Self {
         // A sphere under the law that suits the bodies: both are zero.
-        Self { friction: DEFAULT_FRICTION, max_stiffness: DEFAULT_MAX_STIFFNESS, ..sized::zeroed() }
+        Self { friction: DEFAULT_FRICTION, max_stiffness: DEFAULT_MAX_STIFFNESS, ..versioned_struct::zeroed() }
     }
 }
 
 // SAFETY: numbers and pointers only; the size comes first.
-unsafe impl Sized for ToolOptions {
+unsafe impl VersionedStruct for ToolOptions {
     const NAME: &str = "palpate_tool_options";
     const FIRST_SIZE: usize = 96 + 4 * size_of::<usize>();
 }
@@ -134,9 +134,9 @@ impl ToolOptions {
         };
         let law = match self.law {
             PALPATE_LAW_DEFAULT => None,
-            PALPATE_LAW_LOCAL => Some(LawKind::Local),
-            PALPATE_LAW_PATCH => Some(LawKind::Patch),
-            PALPATE_LAW_NODE => Some(LawKind::Node),
+            PALPATE_LAW_LOCAL => Some(LawKind::LOCAL),
+            PALPATE_LAW_PATCH => Some(LawKind::PATCH),
+            PALPATE_LAW_NODE => Some(LawKind::NODE),
             other => return Err(Refusal::argument(format!("there is no contact law {other}"))),
         };
         let given = |name: &str, value: f64| match value {
@@ -144,7 +144,7 @@ impl ToolOptions {
             _ if value > 0.0 && value.is_finite() => Ok(Some(value)),
             _ => Err(Refusal::argument(format!("{name} is {value}, it must be positive, or 0 for the default"))),
         };
-        if !matches!(shape, None | Some(ToolShape::Sphere { .. })) && !matches!(law, None | Some(LawKind::Local)) {
+        if !matches!(shape, None | Some(ToolShape::Sphere { .. })) && !matches!(law, None | Some(LawKind::LOCAL)) {
             return Err(Refusal::argument(
                 "patches and nodes are for spheres: a tool of another shape takes the local law",
             ));
@@ -247,7 +247,7 @@ impl Default for DeviceOptions {
 }
 
 // SAFETY: numbers only; the size comes first.
-unsafe impl Sized for DeviceOptions {
+unsafe impl VersionedStruct for DeviceOptions {
     const NAME: &str = "palpate_device_limits";
     const FIRST_SIZE: usize = 80;
 }
@@ -283,7 +283,7 @@ impl Default for SceneOptions {
 }
 
 // SAFETY: numbers only; the size comes first.
-unsafe impl Sized for SceneOptions {
+unsafe impl VersionedStruct for SceneOptions {
     const NAME: &str = "palpate_scene_options";
     const FIRST_SIZE: usize = 64;
 }
@@ -308,7 +308,7 @@ impl SceneOptions {
     ///
     /// # Errors
     /// The one that is, by name.
-    pub fn give_to(&self, scene: &mut Scene) -> Outcome<()> {
+    pub fn apply_to(&self, scene: &mut Scene) -> Outcome<()> {
         let mut limits = scene.limits;
         (limits.max_force, limits.max_slew, limits.ramp) = (self.max_force, self.max_slew, self.ramp);
         (limits.max_torque, limits.max_torque_slew) = (self.max_torque, self.max_torque_slew);
@@ -353,7 +353,7 @@ pub unsafe extern "C" fn palpate_device_limits_known(
     limits: *mut DeviceOptions,
     struct_size: usize,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let name = unsafe { text(name, "name") }?;
         let found = known::ALL.iter().find(|(other, _)| other.eq_ignore_ascii_case(name));
@@ -362,17 +362,17 @@ pub unsafe extern "C" fn palpate_device_limits_known(
             return Err(Refusal::argument(format!("no device '{name}' is known: there are {}", names.join(", "))));
         };
         // SAFETY: the caller's pointer.
-        unsafe { sized::write_as(&DeviceOptions::of(*found), limits, struct_size) }?;
+        unsafe { versioned_struct::write_as(&DeviceOptions::of(*found), limits, struct_size) }?;
         Ok(Status::PalpateOk)
     })
 }
 
 /// # Safety
 /// The pointer is null or points to `struct_size` bytes.
-unsafe fn init<T: Sized>(options: *mut T, struct_size: usize) -> Status {
-    guarded(|| {
+unsafe fn init<T: VersionedStruct>(options: *mut T, struct_size: usize) -> Status {
+    catching_panics(|| {
         // SAFETY: the caller's.
-        unsafe { sized::write_as(&T::default(), options, struct_size) }?;
+        unsafe { versioned_struct::write_as(&T::default(), options, struct_size) }?;
         Ok(Status::PalpateOk)
     })
 }

@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use palpate_core::contact::Moduli;
 use palpate_scene::{Body, BodyId, Scene, ToolId, placement};
 
-use crate::arguments::{exclusive, hand_out, path, shared, take_back};
+use crate::arguments::{exclusive, free_handle, path, shared, store_handle};
 use crate::options::{BodyOptions, DeviceOptions, SceneOptions, ToolOptions};
-use crate::sized;
-use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::status::{Outcome, Refusal, Status, catching_panics};
 use crate::store::Store;
+use crate::versioned_struct;
 
 /// How far from one the length of an orientation may be.
 const UNIT_LENGTH: f64 = 1e-6;
@@ -34,9 +34,9 @@ impl SceneGraph {
 /// Makes a scene without bodies and tools.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_new(scene: *mut *mut SceneGraph) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
-        unsafe { hand_out(SceneGraph::new(Scene::default()), scene, "scene") }?;
+        unsafe { store_handle(SceneGraph::new(Scene::default()), scene, "scene") }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -44,12 +44,12 @@ pub unsafe extern "C" fn palpate_scene_new(scene: *mut *mut SceneGraph) -> Statu
 /// Reads a scene that `palpate pack` has written (the folder), or a bare store (.palpate) with a tool that suits it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_load(file: *const c_char, scene: *mut *mut SceneGraph) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let file = unsafe { path(file, "file") }?;
         let loaded = Scene::load(file)?;
         // SAFETY: the caller's pointer.
-        unsafe { hand_out(SceneGraph::new(loaded), scene, "scene") }?;
+        unsafe { store_handle(SceneGraph::new(loaded), scene, "scene") }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -58,8 +58,8 @@ pub unsafe extern "C" fn palpate_scene_load(file: *const c_char, scene: *mut *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_free(scene: *mut SceneGraph) {
     // SAFETY: the caller's pointer.
-    guarded(|| unsafe {
-        take_back(scene);
+    catching_panics(|| unsafe {
+        free_handle(scene);
         Ok(Status::PalpateOk)
     });
 }
@@ -72,11 +72,11 @@ pub unsafe extern "C" fn palpate_scene_add_body(
     options: *const BodyOptions,
     body: *mut u32,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (scene, store, handle) = unsafe { (exclusive(scene, "scene")?, shared(store, "store")?, body.as_mut()) };
         // SAFETY: the caller's pointer.
-        let options = if options.is_null() { BodyOptions::default() } else { unsafe { sized::read(options) }? };
+        let options = unsafe { versioned_struct::read_or_default(options) }?;
         let mut body = Body::of_store(store.green.clone())?;
         require_place(options.position, options.orientation)?;
         body.placement = placement(options.position, options.orientation);
@@ -99,7 +99,7 @@ pub unsafe extern "C" fn palpate_scene_place_body(
     position: *const f64,
     orientation: *const f64,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers, to three and four numbers.
         let (scene, position, orientation) = unsafe {
             (
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn palpate_scene_place_body(
 /// Takes a body out of the scene; loops that were made before keep it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_remove_body(scene: *mut SceneGraph, body: u32) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let scene = unsafe { exclusive(scene, "scene") }?;
         scene.scene.remove_body(BodyId(body)).ok_or_else(|| unknown("body", body))?;
@@ -134,11 +134,11 @@ pub unsafe extern "C" fn palpate_scene_add_tool(
     options: *const ToolOptions,
     tool: *mut u32,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (scene, handle) = unsafe { (exclusive(scene, "scene")?, tool.as_mut()) };
         // SAFETY: the caller's pointer.
-        let options = if options.is_null() { ToolOptions::default() } else { unsafe { sized::read(options) }? };
+        let options = unsafe { versioned_struct::read_or_default(options) }?;
         // SAFETY: the caller's vertices and triangles.
         let id = scene.scene.add_tool(unsafe { options.tool() }?)?;
         handle.into_iter().for_each(|handle| *handle = id.0);
@@ -149,7 +149,7 @@ pub unsafe extern "C" fn palpate_scene_add_tool(
 /// Takes a tool out of the scene; loops that were made before keep it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_remove_tool(scene: *mut SceneGraph, tool: u32) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let scene = unsafe { exclusive(scene, "scene") }?;
         scene.scene.remove_tool(ToolId(tool)).ok_or_else(|| unknown("tool", tool))?;
@@ -165,9 +165,9 @@ pub unsafe extern "C" fn palpate_scene_set_device(
     tool: u32,
     limits: *const DeviceOptions,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
-        let (scene, limits) = unsafe { (exclusive(scene, "scene")?, sized::read(limits)?) };
+        let (scene, limits) = unsafe { (exclusive(scene, "scene")?, versioned_struct::read(limits)?) };
         match scene.scene.set_device(ToolId(tool), limits.limits()) {
             true => Ok(Status::PalpateOk),
             false => Err(unknown("tool", tool)),
@@ -178,9 +178,9 @@ pub unsafe extern "C" fn palpate_scene_set_device(
 /// Reads limits and scheduling of a scene. Set struct_size before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_get_options(scene: *const SceneGraph, options: *mut SceneOptions) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
-        unsafe { sized::write(&SceneOptions::of(&shared(scene, "scene")?.scene), options) }?;
+        unsafe { versioned_struct::write(&SceneOptions::of(&shared(scene, "scene")?.scene), options) }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -188,10 +188,10 @@ pub unsafe extern "C" fn palpate_scene_get_options(scene: *const SceneGraph, opt
 /// Changes limits and scheduling of a scene, for loops that are made from now on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_set_options(scene: *mut SceneGraph, options: *const SceneOptions) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
-        let (scene, options) = unsafe { (exclusive(scene, "scene")?, sized::read(options)?) };
-        options.give_to(&mut scene.scene)?;
+        let (scene, options) = unsafe { (exclusive(scene, "scene")?, versioned_struct::read(options)?) };
+        options.apply_to(&mut scene.scene)?;
         Ok(Status::PalpateOk)
     })
 }
@@ -203,7 +203,7 @@ pub unsafe extern "C" fn palpate_scene_get_counts(
     bodies: *mut usize,
     tools: *mut usize,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (scene, bodies, tools) = unsafe { (&shared(scene, "scene")?.scene, bodies.as_mut(), tools.as_mut()) };
         bodies.into_iter().for_each(|count| *count = scene.bodies().count());

@@ -1,4 +1,4 @@
-//! What may be changed while a loop runs.
+//! Settings that may be changed while a loop runs.
 #![allow(unsafe_code)] // called from C with raw pointers
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
@@ -6,7 +6,7 @@ use palpate_core::simulation::Strike;
 
 use crate::arguments::shared;
 use crate::force_loop::{FrameSide, Loop};
-use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::status::{Outcome, Refusal, Status, catching_panics};
 
 /// Changes a setting of what `rank` finds in the loop.
 ///
@@ -18,7 +18,7 @@ unsafe fn set(
     rank: impl FnOnce(&FrameSide) -> Outcome<usize>,
     value: f64,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's.
         let mut side = unsafe { shared(force_loop, "loop") }?.frame();
         let rank = rank(&side)?;
@@ -89,7 +89,7 @@ pub unsafe extern "C" fn palpate_loop_strike(
     radius: f64,
     duration: f64,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers, to three numbers each.
         let (own, point, impulse) = unsafe {
             (
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn palpate_loop_strike(
 /// Lets go of everything, brings bodies in motion to rest and clears a fault; forces ramp in anew.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_reset(force_loop: *mut Loop) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         unsafe { shared(force_loop, "loop") }?.frame().handle().reset()?;
         Ok(Status::PalpateOk)

@@ -1,14 +1,14 @@
-//! Answers without a loop: a pressed patch, a change of boundary conditions.
+//! Static solutions without a loop: a pressed patch, changed boundary conditions.
 #![allow(unsafe_code)] // called from C with raw pointers
 #![allow(clippy::missing_safety_doc)] // palpate.h states at its top what holds for all pointers
 
-use palpate_core::capacitance::{self, Change, Sorted};
+use palpate_core::capacitance::{self, Change, SplitConditions};
 use palpate_core::contact;
 use palpate_core::green::GreensFunction;
 use palpate_core::green::accuracy::require_right;
 
 use crate::arguments::{array, exclusive, optional_mut, require_count, shared};
-use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::status::{Outcome, Refusal, Status, catching_panics};
 use crate::store::Store;
 
 /// A condition on a surface node displaces it, m; components that are not numbers stay as they are.
@@ -44,7 +44,7 @@ pub unsafe extern "C" fn palpate_store_touch(
     nodes: usize,
     error: *mut f64,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers, to three numbers each.
         let (store, point, wanted, force) = unsafe {
             (
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn palpate_store_touch(
             return Err(Refusal::argument(format!("radius is {radius} m, it must not be negative")));
         }
         // SAFETY: the caller's pointers.
-        let (all, told) = unsafe { (answers(store, displacements, nodes)?, error.as_mut()) };
+        let (all, error_out) = unsafe { (answers(store, displacements, nodes)?, error.as_mut()) };
         let wanted = wanted.map(|d| (!d.is_nan()).then_some(d));
         if wanted.iter().flatten().any(|d| !d.is_finite()) {
             return Err(Refusal::argument("displacement is not finite"));
@@ -67,7 +67,7 @@ pub unsafe extern "C" fn palpate_store_touch(
         require_right("the answer", touch.error)?;
         *force = touch.force.to_array();
         all.into_iter().for_each(|all| all.copy_from_slice(&touch.displacements));
-        told.into_iter().for_each(|told| *told = touch.error);
+        error_out.into_iter().for_each(|error_out| *error_out = touch.error);
         Ok(Status::PalpateOk)
     })
 }
@@ -84,18 +84,18 @@ pub unsafe extern "C" fn palpate_store_solve(
     nodes: usize,
     error: *mut f64,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (store, conditions) = unsafe { (shared(store, "store")?, array(conditions, count, "conditions")?) };
         // SAFETY: the caller's pointers.
-        let (u, f, told) =
+        let (u, f, error_out) =
             unsafe { (answers(store, displacements, nodes)?, answers(store, forces, nodes)?, error.as_mut()) };
         let (known, switched) = sorted(&store.green, conditions)?;
         let answer = capacitance::solve(&store.green, &known, &switched)?;
         require_right("the answer", answer.error)?;
         u.into_iter().for_each(|u| u.copy_from_slice(&answer.displacements));
         f.into_iter().for_each(|f| f.copy_from_slice(&answer.forces));
-        told.into_iter().for_each(|told| *told = answer.error);
+        error_out.into_iter().for_each(|error_out| *error_out = answer.error);
         Ok(Status::PalpateOk)
     })
 }
@@ -113,7 +113,7 @@ unsafe fn answers<'a>(store: &Store, place: *mut f64, nodes: usize) -> Outcome<O
 }
 
 /// Conditions by column of the operator, in ascending order.
-fn sorted(green: &GreensFunction, conditions: &[Condition]) -> Outcome<Sorted> {
+fn sorted(green: &GreensFunction, conditions: &[Condition]) -> Outcome<SplitConditions> {
     let mut change = Change::default();
     for (rank, &Condition { node, kind, value }) in conditions.iter().enumerate() {
         let touchable = green.touch.binary_search(&node);

@@ -1,4 +1,4 @@
-//! What a function returns, and the line of text behind it.
+//! Status codes of the C functions, and the message of the last error.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -72,27 +72,27 @@ thread_local! {
 }
 
 /// Runs what stands behind a function: a refusal leaves its message, a panic stays inside.
-pub fn guarded(run: impl FnOnce() -> Outcome) -> Status {
+pub fn catching_panics(run: impl FnOnce() -> Outcome) -> Status {
     match catch_unwind(AssertUnwindSafe(run)) {
         Ok(Ok(status)) => status,
         Ok(Err(refusal)) => {
-            tell(refusal.message);
+            set_last_error(refusal.message);
             refusal.status
         }
         Err(panic) => {
-            tell(format!("a mistake within palpate, please report it: {}", said(&*panic)));
+            set_last_error(format!("a mistake within palpate, please report it: {}", panic_message(&*panic)));
             Status::PalpateErrorInternal
         }
     }
 }
 
-fn said(panic: &dyn Any) -> &str {
+fn panic_message(panic: &dyn Any) -> &str {
     let owned = panic.downcast_ref::<String>().map(String::as_str);
     owned.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }
 
-/// Keeps a message for the calling thread.
-pub fn tell(message: String) {
+/// Stores the error message of the calling thread.
+pub fn set_last_error(message: String) {
     let mut bytes = message.into_bytes();
     bytes.retain(|&byte| byte != 0);
     let text = CString::new(bytes).unwrap_or_default();
@@ -100,8 +100,8 @@ pub fn tell(message: String) {
     let _ = LAST.try_with(|last| last.replace(text));
 }
 
-/// The message of the calling thread.
-pub fn told() -> *const c_char {
+/// Error message of the calling thread.
+pub fn last_error() -> *const c_char {
     const NONE: &CStr = c"";
     LAST.try_with(|last| last.borrow().as_ptr()).unwrap_or(NONE.as_ptr())
 }

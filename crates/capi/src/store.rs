@@ -8,9 +8,9 @@ use std::sync::Arc;
 use palpate_core::green::GreensFunction;
 use palpate_scene::moduli_of_store;
 
-use crate::arguments::{array_mut, hand_out, path, require_count, shared, take_back};
-use crate::sized::{self, Sized};
-use crate::status::{Status, guarded};
+use crate::arguments::{array_mut, free_handle, path, require_count, shared, store_handle};
+use crate::status::{Status, catching_panics};
+use crate::versioned_struct::{self, VersionedStruct};
 
 /// A Green's function in memory. It never changes: any threads may use it at the same time.
 pub struct Store {
@@ -45,12 +45,12 @@ pub struct StoreInfo {
 
 impl Default for StoreInfo {
     fn default() -> Self {
-        sized::zeroed()
+        versioned_struct::zeroed()
     }
 }
 
 // SAFETY: numbers only; the size comes first.
-unsafe impl Sized for StoreInfo {
+unsafe impl VersionedStruct for StoreInfo {
     const NAME: &str = "palpate_store_info";
     const FIRST_SIZE: usize = 88;
 }
@@ -58,12 +58,12 @@ unsafe impl Sized for StoreInfo {
 /// Reads a store (.palpate) and verifies every block of it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_store_load(file: *const c_char, store: *mut *mut Store) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let file = unsafe { path(file, "file") }?;
         let green = Arc::new(GreensFunction::load(file, None)?);
         // SAFETY: the caller's pointer.
-        unsafe { hand_out(Store { green }, store, "store") }?;
+        unsafe { store_handle(Store { green }, store, "store") }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -72,8 +72,8 @@ pub unsafe extern "C" fn palpate_store_load(file: *const c_char, store: *mut *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_store_free(store: *mut Store) {
     // SAFETY: the caller's pointer.
-    guarded(|| unsafe {
-        take_back(store);
+    catching_panics(|| unsafe {
+        free_handle(store);
         Ok(Status::PalpateOk)
     });
 }
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn palpate_store_free(store: *mut Store) {
 /// Says what a store holds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_store_get_info(store: *const Store, info: *mut StoreInfo) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let green = &unsafe { shared(store, "store") }?.green;
         let positions = &green.surface.positions;
@@ -99,7 +99,7 @@ pub unsafe extern "C" fn palpate_store_get_info(store: *const Store, info: *mut 
             ..StoreInfo::default()
         };
         // SAFETY: the caller's pointer.
-        unsafe { sized::write(&filled, info) }?;
+        unsafe { versioned_struct::write(&filled, info) }?;
         Ok(Status::PalpateOk)
     })
 }
@@ -107,7 +107,7 @@ pub unsafe extern "C" fn palpate_store_get_info(store: *const Store, info: *mut 
 /// Rest positions of the surface nodes, x y z of each, m, in the body's own frame.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_store_get_positions(store: *const Store, positions: *mut f64, nodes: usize) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let rest = &unsafe { shared(store, "store") }?.green.surface.positions;
         require_count("nodes", nodes, rest.len())?;
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn palpate_store_get_positions(store: *const Store, positi
 /// Triangles that the surface is drawn by, outward, three numbers of surface nodes each.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_store_get_triangles(store: *const Store, nodes: *mut u32, triangles: usize) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointer.
         let surface = &unsafe { shared(store, "store") }?.green.surface;
         require_count("triangles", triangles, surface.triangles.len())?;

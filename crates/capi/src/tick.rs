@@ -6,7 +6,7 @@ use palpate_devices::{Buttons, Reading, Twist, Wrench};
 
 use crate::arguments::{array, array_mut, require_count, shared};
 use crate::force_loop::{Loop, pose, running};
-use crate::status::{Outcome, Refusal, Status, guarded};
+use crate::status::{Outcome, Refusal, Status, catching_panics};
 
 /// Of palpate_reading.buttons: the tool holds on to what it touches.
 pub const PALPATE_BUTTON_GRAB: u32 = 1;
@@ -45,7 +45,7 @@ pub struct DeviceWrench {
 /// Refuses devices that cannot be ticked with a time `period` between two ticks, s: ask once, before the first tick.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_check_period(force_loop: *const Loop, period: f64) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         require_period(period)?;
         // SAFETY: the caller's pointer.
         unsafe { shared(force_loop, "loop") }?.frame().check_period(period)?;
@@ -68,7 +68,7 @@ pub unsafe extern "C" fn palpate_loop_tick(
     wrenches: *mut DeviceWrench,
     tools: usize,
 ) -> Status {
-    guarded(|| {
+    catching_panics(|| {
         // SAFETY: the caller's pointers.
         let wrenches = unsafe { array_mut(wrenches, tools, "wrenches") }?;
         // Not one of an earlier tick, whatever happens below.
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn palpate_loop_tick(
         require_count("tools", tools, side.ends.len())?;
         let force_loop = side.force_loop.as_mut().ok_or_else(running)?;
         for (end, said) in side.ends.iter_mut().zip(readings) {
-            end.bring(reading(said, now_ns));
+            end.set_reading(reading(said, now_ns));
         }
         force_loop.tick(now_ns, period);
         for (end, to) in side.ends.iter_mut().zip(wrenches) {

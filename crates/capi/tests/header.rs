@@ -1,4 +1,4 @@
-//! The header in the repository is what the sources say.
+//! The header in the repository is the one generated from the sources.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Every call that cannot be obeyed is refused by name, and changes nothing.
+//! Invalid calls return an error that names the argument, and change nothing.
 #![allow(unsafe_code)] // calls what C calls
 
 mod common;

@@ -1,4 +1,4 @@
-//! Where the memory lies that a tick reads, so that the loop can have it locked: this crate calls no operating system.
+//! Address ranges of the memory that a tick reads, which the servo locks: this crate makes no system calls.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! What a driver implements.
+//! The `Device` trait, which every driver implements, and its readings, faults and limits.
 
 use std::fmt;
 
@@ -18,7 +18,7 @@ impl Buttons {
     }
 }
 
-/// What a device says at a tick.
+/// Reading of a device at a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Where the tool is.
@@ -119,7 +119,7 @@ impl DeviceLimits {
         self.max_stiffness.min(passive)
     }
 
-    /// What both allow.
+    /// The lower of both limits, one by one.
     pub fn lower_of(&self, other: &Self) -> Self {
         let lower = |one: Option<f64>, other: Option<f64>| match (one, other) {
             (Some(one), Some(other)) => Some(one.min(other)),

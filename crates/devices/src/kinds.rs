@@ -1,12 +1,12 @@
 //! The kinds of devices, by name.
 
-use crate::{Connection, Listing, OpenError, Opened, forcedimension, haply, openhaptics};
+use crate::{Connection, Listing, OpenError, ReadyDevice, forcedimension, haply, openhaptics};
 
 /// What the module of a driver does.
 struct Driver {
     kind: &'static str,
     list: fn(&Connection) -> Listing,
-    open: fn(&Connection) -> Result<Opened, OpenError>,
+    open: fn(&Connection) -> Result<ReadyDevice, OpenError>,
 }
 
 /// All drivers, by the kind that a scene names.
@@ -42,6 +42,6 @@ pub fn list(kind: &str, connection: &Connection) -> Result<Listing, OpenError> {
 ///
 /// # Errors
 /// See the driver's own; a kind that there is not.
-pub fn open(kind: &str, connection: &Connection) -> Result<Opened, OpenError> {
+pub fn open(kind: &str, connection: &Connection) -> Result<ReadyDevice, OpenError> {
     driver(kind).and_then(|driver| (driver.open)(connection))
 }

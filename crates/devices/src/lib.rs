@@ -18,8 +18,8 @@ pub mod simulated;
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
 pub use kinds::{kinds, list, open};
-pub use mounted::{Mounted, Workspace};
-pub use opening::{Connection, FoundDevice, Listing, OpenError, Opened, Scheduler};
+pub use mounted::{MountedDevice, Workspace};
+pub use opening::{Connection, FoundDevice, Listing, OpenError, ReadyDevice, Scheduler};
 
 // All that a driver knows of the core; `scripts/check_architecture.py` checks it.
 pub use palpate_core::simulation::{Pose, Twist, Wrench};

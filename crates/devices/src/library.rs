@@ -1,4 +1,4 @@
-//! A vendor's library, loaded at run time: where it is looked for, and what is said when it is not there.
+//! A vendor's library, loaded at run time: search paths, and error messages if it is not found.
 //!
 //! A library that has been loaded stays: unloading those that run a thread of their own, and loading them again, breaks them.
 #![allow(unsafe_code)] // To run somebody else's code is unsafe, whatever its declarations say.
@@ -13,7 +13,7 @@ use libloading::Library;
 use crate::{Connection, OpenError};
 
 /// How a vendor's library is found.
-pub(crate) struct Search {
+pub(crate) struct LibrarySearch {
     /// Name of the library's product, as a person knows it.
     pub product: &'static str,
     /// Environment variable that names the file.
@@ -26,7 +26,7 @@ pub(crate) struct Search {
     pub advice: &'static str,
 }
 
-impl Search {
+impl LibrarySearch {
     /// Files to try, in their order: what was asked for, and only that; else the usual ones.
     fn candidates(&self, connection: &Connection) -> Vec<PathBuf> {
         if let Some(asked) = &connection.library {
@@ -95,7 +95,7 @@ macro_rules! api {
 pub(crate) use api;
 
 /// Functions of a library that is loaded, `A`, and its file.
-pub(crate) struct Loaded<A: 'static> {
+pub(crate) struct LoadedLibrary<A: 'static> {
     pub path: PathBuf,
     pub api: &'static A,
 }
@@ -111,14 +111,14 @@ impl<A: Sync> Libraries<A> {
     /// The library of a connection, with what `bind` makes of its symbols; from the second call on the one of the first.
     pub fn get(
         &self,
-        search: &Search,
+        search: &LibrarySearch,
         connection: &Connection,
         bind: impl FnOnce(&'static Library) -> Result<A, libloading::Error>,
-    ) -> Result<Loaded<A>, OpenError> {
+    ) -> Result<LoadedLibrary<A>, OpenError> {
         let mut loaded = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let candidates = search.candidates(connection);
         if let Some((path, api)) = loaded.iter().find(|(path, _)| candidates.contains(path)) {
-            return Ok(Loaded { path: path.clone(), api });
+            return Ok(LoadedLibrary { path: path.clone(), api });
         }
         let (path, library) = search.load(connection)?;
         let api = bind(library).map_err(|error| {
@@ -127,7 +127,7 @@ impl<A: Sync> Libraries<A> {
         })?;
         let api = Box::leak(Box::new(api));
         loaded.push((path.clone(), api));
-        Ok(Loaded { path, api })
+        Ok(LoadedLibrary { path, api })
     }
 }
 
@@ -152,7 +152,7 @@ fn one_line(message: &str) -> String {
 mod tests {
     use super::*;
 
-    const NOWHERE: Search = Search {
+    const NOWHERE: LibrarySearch = LibrarySearch {
         product: "a product",
         variable: "PALPATE_TEST_LIBRARY_OF_NOBODY",
         names: &["libpalpate_of_nobody.so.3", "libpalpate_of_nobody.so"],

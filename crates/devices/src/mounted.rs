@@ -1,4 +1,4 @@
-//! Where a device stands in a scene: its workspace mapped to the scene, its limits seen from there, its clutch.
+//! Placement of a device in a scene: its workspace mapped to the scene, its limits seen from there, its clutch.
 //!
 //! With `R` the device's orientation, `s` the scene's metres per metre of the device, `c` the force on the hand per force in
 //! the scene:
@@ -62,7 +62,7 @@ impl Workspace {
 }
 
 /// A device in a scene: itself a device, in the scene's frame and units.
-pub struct Mounted {
+pub struct MountedDevice {
     device: Box<dyn Device>,
     workspace: Workspace,
     limits: DeviceLimits,
@@ -72,7 +72,7 @@ pub struct Mounted {
     held_at: Option<DVec3>,
 }
 
-impl Mounted {
+impl MountedDevice {
     /// With limits of the scene on top of the device's own, both at the device.
     pub fn new(device: Box<dyn Device>, workspace: Workspace, scene_limits: &DeviceLimits) -> Self {
         let limits = workspace.limits_in_scene(&device.limits().lower_of(scene_limits));
@@ -80,7 +80,7 @@ impl Mounted {
     }
 
     /// Takes the clutch's button out of the reading, and the tool out of the scene while that button is held.
-    fn clutched(&mut self, reading: &mut Reading) {
+    fn apply_clutch(&mut self, reading: &mut Reading) {
         let Some(button) = self.workspace.clutch else { return };
         let bit = 1u32.checked_shl(u32::from(button)).unwrap_or(0);
         let pressed = reading.buttons.0 & bit != 0;
@@ -105,7 +105,7 @@ impl Mounted {
     }
 }
 
-impl Device for Mounted {
+impl Device for MountedDevice {
     fn name(&self) -> &str {
         self.device.name()
     }
@@ -120,7 +120,7 @@ impl Device for Mounted {
         }
         reading.pose.position = position + scale * reading.pose.position + self.offset;
         reading.twist.linear *= scale;
-        self.clutched(&mut reading);
+        self.apply_clutch(&mut reading);
         Ok(reading)
     }
 
@@ -147,22 +147,22 @@ mod tests {
     use crate::Buttons;
 
     /// Says what it is told to, and remembers what it got.
-    struct Told {
-        said: Arc<Mutex<Reading>>,
-        got: Arc<Mutex<Wrench>>,
+    struct FixedDevice {
+        input: Arc<Mutex<Reading>>,
+        written: Arc<Mutex<Wrench>>,
     }
 
-    impl Device for Told {
+    impl Device for FixedDevice {
         fn name(&self) -> &str {
             "told"
         }
 
         fn read(&mut self, _: u64, _: f64) -> Result<Reading, DeviceFault> {
-            Ok(*self.said.lock().expect("not poisoned"))
+            Ok(*self.input.lock().expect("not poisoned"))
         }
 
         fn write(&mut self, wrench: Wrench) -> Result<(), DeviceFault> {
-            *self.got.lock().expect("not poisoned") = wrench;
+            *self.written.lock().expect("not poisoned") = wrench;
             Ok(())
         }
 
@@ -171,10 +171,10 @@ mod tests {
         }
     }
 
-    fn mounted(workspace: Workspace) -> (Mounted, Arc<Mutex<Reading>>, Arc<Mutex<Wrench>>) {
-        let (said, got) = (Arc::default(), Arc::default());
-        let told = Told { said: Arc::clone(&said), got: Arc::clone(&got) };
-        (Mounted::new(Box::new(told), workspace, &DeviceLimits::UNLIMITED), said, got)
+    fn mounted(workspace: Workspace) -> (MountedDevice, Arc<Mutex<Reading>>, Arc<Mutex<Wrench>>) {
+        let (input, written) = (Arc::default(), Arc::default());
+        let fixed = FixedDevice { input: Arc::clone(&input), written: Arc::clone(&written) };
+        (MountedDevice::new(Box::new(fixed), workspace, &DeviceLimits::UNLIMITED), input, written)
     }
 
     fn workspace() -> Workspace {
@@ -194,8 +194,8 @@ mod tests {
 
     #[test]
     fn positions_are_mapped_and_power_keeps_its_ratio() {
-        let (mut device, said, got) = mounted(workspace());
-        *said.lock().expect("not poisoned") = reading(DVec3::new(0.01, 0.0, 0.02), 0);
+        let (mut device, input, written) = mounted(workspace());
+        *input.lock().expect("not poisoned") = reading(DVec3::new(0.01, 0.0, 0.02), 0);
         let seen = device.read(0, 1e-3).expect("a reading");
         // x of the device is y of the scene.
         assert!((seen.pose.position - DVec3::new(0.1, 0.22, 0.34)).length() < 1e-15);
@@ -203,11 +203,11 @@ mod tests {
         assert!((seen.pose.orientation * DVec3::X - DVec3::Y).length() < 1e-15);
         let wrench = Wrench { force: DVec3::new(1.0, -2.0, 3.0), torque: DVec3::new(0.1, 0.4, 0.2) };
         device.write(wrench).expect("taken");
-        let (got, said) = (*got.lock().expect("not poisoned"), *said.lock().expect("not poisoned"));
-        assert!((got.force - DVec3::new(-1.0, -0.5, 1.5)).length() < 1e-15, "{:?}", got.force);
+        let (written, input) = (*written.lock().expect("not poisoned"), *input.lock().expect("not poisoned"));
+        assert!((written.force - DVec3::new(-1.0, -0.5, 1.5)).length() < 1e-15, "{:?}", written.force);
         for (of_scene, of_device) in [
-            (wrench.force.dot(seen.twist.linear), got.force.dot(said.twist.linear)),
-            (wrench.torque.dot(seen.twist.angular), got.torque.dot(said.twist.angular)),
+            (wrench.force.dot(seen.twist.linear), written.force.dot(input.twist.linear)),
+            (wrench.torque.dot(seen.twist.angular), written.torque.dot(input.twist.angular)),
         ] {
             assert!((of_device - 0.25 * of_scene).abs() < 1e-15);
         }
@@ -223,15 +223,15 @@ mod tests {
         assert_eq!(coarse.limits().max_stiffness, 150.0);
         assert_eq!(coarse.limits().own_damping, Some(0.5));
         let lower = DeviceLimits { max_force: 1.0, ..DeviceLimits::UNLIMITED };
-        let told = Told { said: Arc::default(), got: Arc::default() };
-        assert_eq!(Mounted::new(Box::new(told), Workspace::default(), &lower).limits().max_force, 1.0);
+        let fixed = FixedDevice { input: Arc::default(), written: Arc::default() };
+        assert_eq!(MountedDevice::new(Box::new(fixed), Workspace::default(), &lower).limits().max_force, 1.0);
     }
 
     #[test]
     fn the_clutch_lets_the_hand_reach_for_more() {
-        let (mut device, said, _) = mounted(Workspace { orientation: DQuat::IDENTITY, ..workspace() });
+        let (mut device, input, _) = mounted(Workspace { orientation: DQuat::IDENTITY, ..workspace() });
         let mut tick = |x: f64, buttons: u32| {
-            *said.lock().expect("not poisoned") = reading(DVec3::new(x, 0.0, 0.0), buttons);
+            *input.lock().expect("not poisoned") = reading(DVec3::new(x, 0.0, 0.0), buttons);
             device.read(0, 1e-3).expect("a reading")
         };
         assert_eq!(tick(0.05, 0b01).pose.position.x, 0.2);
@@ -244,22 +244,22 @@ mod tests {
         assert!((tick(-0.04, 0).pose.position.x - 0.22).abs() < 1e-15);
         // Away while the button is held: it is where it was when it is back.
         assert!(!tick(-0.04, 0b10).active);
-        *said.lock().expect("not poisoned") = Reading::default();
+        *input.lock().expect("not poisoned") = Reading::default();
         assert!(!device.read(0, 1e-3).expect("a reading").active);
-        *said.lock().expect("not poisoned") = reading(DVec3::new(f64::NAN, 0.0, 0.0), 0);
+        *input.lock().expect("not poisoned") = reading(DVec3::new(f64::NAN, 0.0, 0.0), 0);
         assert!(device.read(0, 1e-3).expect("a reading").pose.position.x.is_nan());
-        *said.lock().expect("not poisoned") = reading(DVec3::new(-0.04, 0.0, 0.0), 0);
+        *input.lock().expect("not poisoned") = reading(DVec3::new(-0.04, 0.0, 0.0), 0);
         assert!((device.read(0, 1e-3).expect("a reading").pose.position.x - 0.22).abs() < 1e-15);
     }
 
     #[test]
     fn a_device_in_place_changes_no_bit() {
-        let (mut device, said, got) = mounted(Workspace::default());
+        let (mut device, input, written) = mounted(Workspace::default());
         let exact = reading(DVec3::new(0.1, 1.0 / 3.0, -0.7), 3);
-        *said.lock().expect("not poisoned") = exact;
+        *input.lock().expect("not poisoned") = exact;
         assert_eq!(device.read(0, 1e-3), Ok(exact));
         let wrench = Wrench { force: DVec3::new(1.0 / 3.0, 0.0, 2.0), torque: DVec3::Z };
         device.write(wrench).expect("taken");
-        assert_eq!(*got.lock().expect("not poisoned"), wrench);
+        assert_eq!(*written.lock().expect("not poisoned"), wrench);
     }
 }

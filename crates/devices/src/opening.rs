@@ -1,4 +1,4 @@
-//! How a driver finds its devices and opens one.
+//! Types for listing and opening devices: connection, found device, error, scheduler.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ pub struct Connection {
 }
 
 /// A device that is ready, and who calls the tick.
-pub struct Opened {
+pub struct ReadyDevice {
     /// To be read and written once a tick.
     pub device: Box<dyn Device>,
     /// The driver whose thread alone may read and write it; none for a device that any thread may.

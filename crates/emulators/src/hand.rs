@@ -3,7 +3,7 @@
 use std::env;
 
 use glam::DVec3;
-use palpate_devices::emulated::{Hand, Wanted, Waypoint};
+use palpate_devices::emulated::{Hand, HandTarget, Waypoint};
 
 /// Environment variable with the path of the hand: `time x y z; ...` in s and mm, right, away and up from the middle of the workspace.
 /// At the end it begins anew. A single place is held loosely.
@@ -26,8 +26,8 @@ pub fn hand_from_environment() -> Hand {
     });
     match waypoints[..] {
         // One that goes nowhere lets itself be moved, as for a check of the device.
-        [only] => Hand::loose(Wanted::At(only.position)),
-        _ => Hand::firm(Wanted::Along(repeated(&waypoints))),
+        [only] => Hand::loose(HandTarget::At(only.position)),
+        _ => Hand::firm(HandTarget::Along(repeated(&waypoints))),
     }
 }
 
@@ -69,9 +69,9 @@ mod tests {
 
     #[test]
     fn the_hand_goes_where_the_text_leads_it_again_and_again() {
-        let wanted = Wanted::Along(repeated(&parse("0 0 0 20; 1 0 5 20; 3 0 0 20").expect("waypoints")));
+        let target = HandTarget::Along(repeated(&parse("0 0 0 20; 1 0 5 20; 3 0 0 20").expect("waypoints")));
         for (time, y) in [(1.0, 5e-3), (3.0, 0.0), (4.0, 5e-3), (301.0, 5e-3)] {
-            assert!((wanted.at(time) - DVec3::new(0.0, y, 0.02)).length() < 1e-9, "{time}");
+            assert!((target.at(time) - DVec3::new(0.0, y, 0.02)).length() < 1e-9, "{time}");
         }
     }
 

@@ -7,5 +7,5 @@ pub mod library;
 mod priority;
 mod tip;
 
-pub use priority::be_on_time;
+pub use priority::request_realtime;
 pub use tip::{SteeredTip, Tip};

@@ -65,7 +65,7 @@ impl SteeredTip {
     /// Held by the hand that the environment names.
     pub fn in_hand(mechanics: Mechanics) -> Self {
         let hand = hand_from_environment();
-        Self::free(FreeTip::new(mechanics, hand.wanted.at(0.0), Some(hand)))
+        Self::free(FreeTip::new(mechanics, hand.target.at(0.0), Some(hand)))
     }
 
     /// In the middle of its workspace, where a test has put it.
@@ -112,7 +112,7 @@ impl SteeredTip {
 
 #[cfg(test)]
 mod tests {
-    use palpate_devices::emulated::{Hand, Wanted};
+    use palpate_devices::emulated::{Hand, HandTarget};
 
     use super::*;
 
@@ -121,8 +121,8 @@ mod tests {
 
     #[test]
     fn a_tip_in_a_hand_is_where_the_hand_wants_it() {
-        let hand = Hand::firm(Wanted::At(0.02 * DVec3::Z));
-        let mut tip = SteeredTip::free(FreeTip::new(MECHANICS, hand.wanted.at(0.0), Some(hand)));
+        let hand = Hand::firm(HandTarget::At(0.02 * DVec3::Z));
+        let mut tip = SteeredTip::free(FreeTip::new(MECHANICS, hand.target.at(0.0), Some(hand)));
         tip.advance(1.0);
         assert!((tip.measure().position.z - 0.02).abs() < 1e-6);
     }

@@ -4,19 +4,19 @@ use std::time::Duration;
 
 use glam::DVec3;
 use palpate_devices::{
-    Buttons, Connection, DeviceFault, OpenError, Opened, Wrench, forcedimension, haply, openhaptics,
+    Buttons, Connection, DeviceFault, OpenError, ReadyDevice, Wrench, forcedimension, haply, openhaptics,
 };
 use palpate_emulators::conformance::{Bench, Disturbance, Endurance, Facts, assert_conforms, endure};
-use palpate_emulators::inverse_service::{InverseService, MIDDLE, Options, Persona, Trouble};
+use palpate_emulators::inverse_service::{InverseService, MIDDLE, Options, Release, ReplyFlaw};
 use palpate_emulators::library::{EmulatedLibrary, Steering};
-use palpate_emulators::{SteeredTip, Tip, be_on_time};
+use palpate_emulators::{SteeredTip, Tip, request_realtime};
 use serde_json::json;
 
 /// The first device of an emulated library; the suite's thread is another than the test's.
 struct LibraryBench {
     steering: Steering,
     connection: Connection,
-    open: fn(&Connection) -> Result<Opened, OpenError>,
+    open: fn(&Connection) -> Result<ReadyDevice, OpenError>,
     facts: Facts,
 }
 
@@ -34,7 +34,7 @@ const LIBRARY: Facts = Facts {
     force_holds: Duration::from_millis(50),
     recovers_within: Duration::from_secs(5),
     driver_error: DeviceFault::Driver(0x0304),
-    hurries: true,
+    can_run_fast: true,
 };
 
 fn openhaptics(library: &EmulatedLibrary) -> LibraryBench {
@@ -61,7 +61,7 @@ impl Bench for LibraryBench {
         self.facts
     }
 
-    fn open(&mut self) -> Result<Opened, OpenError> {
+    fn open(&mut self) -> Result<ReadyDevice, OpenError> {
         (self.open)(&self.connection)
     }
 
@@ -81,8 +81,8 @@ impl Bench for LibraryBench {
         self.steering.disturb(0, disturbance);
     }
 
-    fn hurry(&mut self, as_fast_as_possible: bool) {
-        self.steering.hurry(as_fast_as_possible);
+    fn run_fast(&mut self, as_fast_as_possible: bool) {
+        self.steering.run_fast(as_fast_as_possible);
     }
 }
 
@@ -92,23 +92,23 @@ const GRIP: &str = "61576";
 
 /// An arm and a grip of the emulated service.
 struct HaplyBench {
-    persona: Persona,
+    release: Release,
     service: InverseService,
 }
 
 impl HaplyBench {
-    fn new(persona: Persona) -> Self {
-        let service = InverseService::start(&Options { persona, ..Options::default() }).expect("a free port");
+    fn new(release: Release) -> Self {
+        let service = InverseService::start(&Options { release, ..Options::default() }).expect("a free port");
         service.add_arm(ARM, "inverse3", SteeredTip::held());
         service.add_grip(GRIP, ARM);
-        Self { persona, service }
+        Self { release, service }
     }
 }
 
 impl Bench for HaplyBench {
     fn facts(&self) -> Facts {
         Facts {
-            middle: if self.persona >= Persona::V35 { DVec3::ZERO } else { MIDDLE },
+            middle: if self.release >= Release::V35 { DVec3::ZERO } else { MIDDLE },
             position_tolerance: 1e-9,
             velocity_tolerance: 1e-9,
             velocity_settles: Duration::from_millis(60),
@@ -121,11 +121,11 @@ impl Bench for HaplyBench {
             force_holds: Duration::from_millis(100),
             recovers_within: Duration::from_secs(4),
             driver_error: DeviceFault::Driver(1),
-            hurries: false,
+            can_run_fast: false,
         }
     }
 
-    fn open(&mut self) -> Result<Opened, OpenError> {
+    fn open(&mut self) -> Result<ReadyDevice, OpenError> {
         // Longer than a machine pauses that builds and tests other things: the suite asks that no force be withheld then.
         let address = format!("{}&hold=40", self.service.address());
         haply::open(&Connection { address: Some(address), ..Connection::default() })
@@ -146,11 +146,13 @@ impl Bench for HaplyBench {
     fn disturb(&mut self, disturbance: Option<Disturbance>) {
         self.service.plug(ARM, disturbance != Some(Disturbance::Unplugged));
         let old = disturbance == Some(Disturbance::WrongVersion);
-        self.service.set_persona(if old { Persona::V30 } else { self.persona });
-        self.service.set_trouble(match disturbance {
-            Some(Disturbance::DriverError) => Some(Trouble::Truncated),
-            Some(Disturbance::SlowReplies) => Some(Trouble::Late(Duration::from_millis(150))),
-            Some(Disturbance::NotFinite) => Some(Trouble::Replaced("/inverse3/0/state/cursor_position/x", json!(null))),
+        self.service.set_release(if old { Release::V30 } else { self.release });
+        self.service.set_reply_flaw(match disturbance {
+            Some(Disturbance::DriverError) => Some(ReplyFlaw::Truncated),
+            Some(Disturbance::SlowReplies) => Some(ReplyFlaw::Late(Duration::from_millis(150))),
+            Some(Disturbance::NotFinite) => {
+                Some(ReplyFlaw::Replaced("/inverse3/0/state/cursor_position/x", json!(null)))
+            }
             _ => None,
         });
     }
@@ -186,18 +188,18 @@ fn every_model_of_openhaptics_conforms() {
 /// With all releases at the same time: the suite runs again what fails while the machine stalls.
 #[test]
 fn every_release_of_haplys_service_conforms() {
-    be_on_time();
+    request_realtime();
     std::thread::scope(|scope| {
-        for persona in [Persona::V31, Persona::V34, Persona::V35] {
-            let named = std::thread::Builder::new().name(format!("service of {}", persona.name()));
-            named.spawn_scoped(scope, move || assert_conforms(HaplyBench::new(persona))).expect("a thread");
+        for release in [Release::V31, Release::V34, Release::V35] {
+            let named = std::thread::Builder::new().name(format!("service of {}", release.name()));
+            named.spawn_scoped(scope, move || assert_conforms(HaplyBench::new(release))).expect("a thread");
         }
     });
 }
 
 /// `cargo test --release -p palpate-emulators --test conformance minute -- --ignored --nocapture --test-threads 1`.
 fn endures_a_minute_at_1_khz(bench: impl Bench) {
-    let figures = endure(bench, Endurance { ticks: 60_000, hurried: false }).expect("no tick missed");
+    let figures = endure(bench, Endurance { ticks: 60_000, fast: false }).expect("no tick missed");
     println!("{figures:#?}");
     assert!(figures.seconds < 90.0);
 }
@@ -217,6 +219,6 @@ fn a_minute_of_openhaptics() {
 #[test]
 #[ignore = "a minute"]
 fn a_minute_of_haply() {
-    be_on_time();
-    endures_a_minute_at_1_khz(HaplyBench::new(Persona::V35));
+    request_realtime();
+    endures_a_minute_at_1_khz(HaplyBench::new(Release::V35));
 }

@@ -122,7 +122,7 @@ fn said_within(device: &mut dyn Device, time: Duration, wanted: Option<DeviceFau
     }
 }
 
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 
 #[test]
 fn a_force_does_not_outlive_motors_that_were_off() {
@@ -134,7 +134,7 @@ fn a_force_does_not_outlive_motors_that_were_off() {
     // The loop writes on until the guard has found out.
     while device.read(began.elapsed().as_nanos() as u64, 1e-3) != Err(DeviceFault::MotorsOff) {
         let _ = device.write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
-        assert!(began.elapsed() < PATIENCE);
+        assert!(began.elapsed() < TIMEOUT);
     }
     std::thread::sleep(Duration::from_millis(100));
     emulated.disturb(0, None);
@@ -147,7 +147,7 @@ fn a_device_that_cannot_be_read_is_let_go_at_once() {
     let emulated = emulated("sigma.7");
     let mut device = forcedimension::open(&emulated.connection(None)).expect("opens").device;
     for _ in 0..5 {
-        assert!(said_within(&mut *device, PATIENCE, None).is_ok());
+        assert!(said_within(&mut *device, TIMEOUT, None).is_ok());
         let pushed = Wrench { force: DVec3::X, torque: 0.01 * DVec3::Z };
         device.write(pushed).expect("written");
         assert_eq!(emulated.motors(0), pushed);
@@ -166,13 +166,13 @@ fn a_device_that_comes_back_is_the_same_one() {
     let places = [0.01 * DVec3::X, 0.02 * DVec3::X];
     (0..2).for_each(|rank| emulated.set_tip(rank, Tip::at(places[rank as usize])));
     emulated.disturb(0, Some(Disturbance::Unplugged));
-    assert_eq!(said_within(&mut *device, PATIENCE, Some(DeviceFault::Disconnected)), Err(DeviceFault::Disconnected));
+    assert_eq!(said_within(&mut *device, TIMEOUT, Some(DeviceFault::Disconnected)), Err(DeviceFault::Disconnected));
     // Time for some attempts.
     let other = said_within(&mut *device, Duration::from_millis(700), None);
     assert_eq!(other, Err(DeviceFault::Disconnected), "another device was taken for it");
     let listing = forcedimension::list(&emulated.connection(None));
     assert!(listing.found[0].obstacle.is_some(), "nobody can tell which one it is");
     emulated.disturb(0, None);
-    let back = said_within(&mut *device, PATIENCE, None).expect("it is back");
+    let back = said_within(&mut *device, TIMEOUT, None).expect("it is back");
     assert!((back - places[0]).length() < 1e-12, "{back}");
 }

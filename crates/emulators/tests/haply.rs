@@ -5,10 +5,10 @@ mod haply_service;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
-use palpate_devices::emulated::{self, Hand, Wanted, known};
+use palpate_devices::emulated::{self, Hand, HandTarget, known};
 use palpate_devices::haply::{list, open};
 use palpate_devices::{Buttons, Connection, Device, DeviceFault, Wrench};
-use palpate_emulators::inverse_service::{InverseService, MIDDLE, Options, Persona, Trouble};
+use palpate_emulators::inverse_service::{InverseService, MIDDLE, Options, Release, ReplyFlaw};
 use palpate_emulators::{SteeredTip, Tip};
 use serde_json::json;
 
@@ -51,8 +51,8 @@ fn until_force(device: &mut dyn Device, service: &InverseService, force: DVec3) 
 #[test]
 fn the_origin_is_the_middle_of_the_workspace_where_it_can_be_chosen() {
     let _beside = beside_others();
-    for (persona, origin) in [(Persona::V31, MIDDLE), (Persona::V34, MIDDLE), (Persona::V35, DVec3::ZERO)] {
-        let service = service(persona);
+    for (release, origin) in [(Release::V31, MIDDLE), (Release::V34, MIDDLE), (Release::V35, DVec3::ZERO)] {
+        let service = service(release);
         let mut device = opened(&service);
         let held = DVec3::new(0.01, 0.02, -0.03);
         service.set_tip(ARM, Tip::at(held));
@@ -69,13 +69,13 @@ fn the_origin_is_the_middle_of_the_workspace_where_it_can_be_chosen() {
 #[test]
 fn limits_tell_the_measured_delay() {
     let _alone = alone();
-    let slow = Trouble::Late(Duration::from_millis(3));
-    let service = service(Persona::V35);
+    let slow = ReplyFlaw::Late(Duration::from_millis(3));
+    let service = service(Release::V35);
     let quick = opened(&service).limits();
     assert!(quick.delay > 0.5e-3, "half a period before and after the tick: {}", quick.delay);
     assert_eq!((quick.max_force, quick.max_torque, quick.rate), (10.0, 0.0, Some(2000.0)));
     // A greeting that is late does no harm either.
-    service.set_trouble(Some(slow));
+    service.set_reply_flaw(Some(slow));
     let delay = opened(&service).limits().delay;
     assert!(delay > 3.4e-3, "{delay} {}", quick.delay);
 }
@@ -83,7 +83,7 @@ fn limits_tell_the_measured_delay() {
 #[test]
 fn lists_what_there_is_and_says_what_to_do() {
     let _beside = beside_others();
-    let service = service(Persona::V34);
+    let service = service(Release::V34);
     service.add_arm("0B02", "minverse", SteeredTip::held());
     service.set_calibrated("0B02", false);
     let listing = list(&connection(&service));
@@ -109,26 +109,26 @@ fn lists_what_there_is_and_says_what_to_do() {
 #[test]
 fn what_does_not_answer_as_the_service_does_is_refused_in_time() {
     let _beside = beside_others();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let refused = |expected: &str| {
         let began = Instant::now();
         let error = open(&connection(&service)).err().expect(expected).to_string();
         assert!(error.contains(expected), "{error}");
         assert!(!error.contains('\n') && began.elapsed() < Duration::from_secs(3), "{error}");
     };
-    service.set_persona(Persona::V30);
+    service.set_release(Release::V30);
     refused("update it to 3.1 or later");
-    service.set_persona(Persona::V35);
-    for (trouble, expected) in [
-        (Trouble::Silence, "does not answer in time"),
-        (Trouble::Truncated, "does not greet as"),
-        (Trouble::Text("[]".into()), "does not greet as"),
-        (Trouble::Binary, "does not greet as"),
-        (Trouble::Cut, "does not speak as"),
-        (Trouble::Huge(1 << 20), "does not speak as"),
-        (Trouble::Missing("/inverse3/0/state"), "error 2"),
+    service.set_release(Release::V35);
+    for (reply_flaw, expected) in [
+        (ReplyFlaw::Silence, "does not answer in time"),
+        (ReplyFlaw::Truncated, "does not greet as"),
+        (ReplyFlaw::Text("[]".into()), "does not greet as"),
+        (ReplyFlaw::Binary, "does not greet as"),
+        (ReplyFlaw::Cut, "does not speak as"),
+        (ReplyFlaw::Huge(1 << 20), "does not speak as"),
+        (ReplyFlaw::Missing("/inverse3/0/state"), "error 2"),
     ] {
-        service.set_trouble(Some(trouble));
+        service.set_reply_flaw(Some(reply_flaw));
         refused(expected);
     }
     let nobody = Connection { address: Some("ws://127.0.0.1:9".into()), ..Connection::default() };
@@ -144,7 +144,7 @@ fn what_does_not_answer_as_the_service_does_is_refused_in_time() {
 #[test]
 fn an_arm_in_use_is_refused_and_a_second_one_is_not() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut first = opened(&service);
     until_force(&mut *first, &service, DVec3::X);
     let error = open(&connection(&service)).err().expect("in use").to_string();
@@ -167,55 +167,55 @@ fn an_arm_in_use_is_refused_and_a_second_one_is_not() {
 #[test]
 fn bad_replies_are_faults_and_take_the_force_off() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
     let state = "/inverse3/0/state";
     let x = "/inverse3/0/state/cursor_position/x";
-    for (trouble, expected) in [
-        (Trouble::Truncated, DeviceFault::Driver(1)),
-        (Trouble::Binary, DeviceFault::Driver(1)),
-        (Trouble::Text("".into()), DeviceFault::Driver(1)),
-        (Trouble::Text("[".repeat(100_000)), DeviceFault::Driver(1)),
+    for (reply_flaw, expected) in [
+        (ReplyFlaw::Truncated, DeviceFault::Driver(1)),
+        (ReplyFlaw::Binary, DeviceFault::Driver(1)),
+        (ReplyFlaw::Text("".into()), DeviceFault::Driver(1)),
+        (ReplyFlaw::Text("[".repeat(100_000)), DeviceFault::Driver(1)),
         (
-            Trouble::Text(r#"{"inverse3":[{"device_id":"0A01","state":{"cursor_position":{"x":NaN}}}]}"#.into()),
+            ReplyFlaw::Text(r#"{"inverse3":[{"device_id":"0A01","state":{"cursor_position":{"x":NaN}}}]}"#.into()),
             DeviceFault::Driver(1),
         ),
-        (Trouble::Text("null".into()), DeviceFault::Driver(2)),
-        (Trouble::Text("{}".into()), DeviceFault::Driver(2)),
-        (Trouble::Missing(state), DeviceFault::Driver(2)),
-        (Trouble::Missing("/inverse3/0/state/cursor_velocity"), DeviceFault::Driver(2)),
-        (Trouble::Missing("/inverse3/0/device_id"), DeviceFault::Disconnected),
-        (Trouble::Missing("/inverse3/0"), DeviceFault::Disconnected),
-        (Trouble::Replaced(state, json!([1, 2])), DeviceFault::Driver(2)),
-        (Trouble::Replaced(x, json!("0.1")), DeviceFault::Driver(2)),
-        (Trouble::Replaced(x, json!(null)), DeviceFault::NotFinite),
-        (Trouble::Replaced(x, json!(1e300)), DeviceFault::Driver(3)),
-        (Trouble::Replaced("/inverse3/0/state/cursor_velocity/z", json!(-1e9)), DeviceFault::Driver(3)),
-        (Trouble::Replaced("/wireless_verse_grip/0/state/orientation/w", json!(null)), DeviceFault::NotFinite),
-        (Trouble::Replaced("/inverse3", json!({"0A01": {}})), DeviceFault::Driver(4)),
-        (Trouble::Replaced("/inverse3/0/status/calibrated", json!(false)), DeviceFault::MotorsOff),
-        (Trouble::Replaced("/inverse3/0/status/power_supply", json!(false)), DeviceFault::MotorsOff),
-        (Trouble::Cut, DeviceFault::Disconnected),
-        (Trouble::Huge(1 << 20), DeviceFault::Disconnected),
-        (Trouble::Silence, DeviceFault::Stale),
-        (Trouble::Late(Duration::from_millis(150)), DeviceFault::Stale),
+        (ReplyFlaw::Text("null".into()), DeviceFault::Driver(2)),
+        (ReplyFlaw::Text("{}".into()), DeviceFault::Driver(2)),
+        (ReplyFlaw::Missing(state), DeviceFault::Driver(2)),
+        (ReplyFlaw::Missing("/inverse3/0/state/cursor_velocity"), DeviceFault::Driver(2)),
+        (ReplyFlaw::Missing("/inverse3/0/device_id"), DeviceFault::Disconnected),
+        (ReplyFlaw::Missing("/inverse3/0"), DeviceFault::Disconnected),
+        (ReplyFlaw::Replaced(state, json!([1, 2])), DeviceFault::Driver(2)),
+        (ReplyFlaw::Replaced(x, json!("0.1")), DeviceFault::Driver(2)),
+        (ReplyFlaw::Replaced(x, json!(null)), DeviceFault::NotFinite),
+        (ReplyFlaw::Replaced(x, json!(1e300)), DeviceFault::Driver(3)),
+        (ReplyFlaw::Replaced("/inverse3/0/state/cursor_velocity/z", json!(-1e9)), DeviceFault::Driver(3)),
+        (ReplyFlaw::Replaced("/wireless_verse_grip/0/state/orientation/w", json!(null)), DeviceFault::NotFinite),
+        (ReplyFlaw::Replaced("/inverse3", json!({"0A01": {}})), DeviceFault::Driver(4)),
+        (ReplyFlaw::Replaced("/inverse3/0/status/calibrated", json!(false)), DeviceFault::MotorsOff),
+        (ReplyFlaw::Replaced("/inverse3/0/status/power_supply", json!(false)), DeviceFault::MotorsOff),
+        (ReplyFlaw::Cut, DeviceFault::Disconnected),
+        (ReplyFlaw::Huge(1 << 20), DeviceFault::Disconnected),
+        (ReplyFlaw::Silence, DeviceFault::Stale),
+        (ReplyFlaw::Late(Duration::from_millis(150)), DeviceFault::Stale),
     ] {
         until_force(&mut *device, &service, DVec3::new(0.0, 0.0, 2.0));
-        service.set_trouble(Some(trouble.clone()));
+        service.set_reply_flaw(Some(reply_flaw.clone()));
         let mut fault = None;
         tick_until(&mut *device, DVec3::Z, "a fault", |said| {
             fault = said.err();
             fault.is_some()
         });
-        assert_eq!(fault, Some(expected), "{trouble:?}");
+        assert_eq!(fault, Some(expected), "{reply_flaw:?}");
         // The tick that is told of it has written none, and what was written before counts no more.
         let began = Instant::now();
         while began.elapsed() < Duration::from_millis(40) {
             let _ = device.read(0, PERIOD);
             std::thread::sleep(Duration::from_millis(1));
         }
-        assert_eq!(service.motors(ARM).force, DVec3::ZERO, "{trouble:?}");
-        service.set_trouble(None);
+        assert_eq!(service.motors(ARM).force, DVec3::ZERO, "{reply_flaw:?}");
+        service.set_reply_flaw(None);
         tick_until(&mut *device, DVec3::ZERO, "readings again", |said| said.is_ok());
     }
 }
@@ -224,13 +224,13 @@ fn bad_replies_are_faults_and_take_the_force_off() {
 #[test]
 fn a_connection_is_not_given_up_with_a_force_on_the_motors() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
     for _ in 0..3 {
         until_force(&mut *device, &service, DVec3::Y);
-        service.set_trouble(Some(Trouble::Huge(1 << 20)));
+        service.set_reply_flaw(Some(ReplyFlaw::Huge(1 << 20)));
         tick_until(&mut *device, DVec3::Y, "the loss", |said| said == Err(DeviceFault::Disconnected));
-        service.set_trouble(None);
+        service.set_reply_flaw(None);
         tick_until(&mut *device, DVec3::ZERO, "readings again", |said| said.is_ok());
     }
     assert_eq!(service.take_complaints(), Vec::<String>::new());
@@ -240,22 +240,22 @@ fn a_connection_is_not_given_up_with_a_force_on_the_motors() {
 #[test]
 fn oddities_are_tolerated() {
     let _beside = beside_others();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
-    for trouble in [
-        Trouble::Replaced("/inverse3/0/status", json!(7)),
-        Trouble::Replaced("/inverse3/0/status/ready", json!("yes")),
-        Trouble::Replaced("/session", json!([])),
-        Trouble::Replaced("/wireless_verse_grip", json!({"a": 1})),
-        Trouble::Replaced("/wireless_verse_grip/0/state", json!(null)),
-        Trouble::Replaced("/wireless_verse_grip/0/state/buttons", json!([true])),
-        Trouble::Replaced("/wireless_verse_grip/0/state/orientation", json!({"w": 0, "x": 0, "y": 0, "z": 0})),
-        Trouble::Missing("/wireless_verse_grip"),
-        Trouble::Replaced("/inverse3/0/state/cursor_position", json!({"y": 0, "z": 1, "x": 0, "w": {}})),
+    for reply_flaw in [
+        ReplyFlaw::Replaced("/inverse3/0/status", json!(7)),
+        ReplyFlaw::Replaced("/inverse3/0/status/ready", json!("yes")),
+        ReplyFlaw::Replaced("/session", json!([])),
+        ReplyFlaw::Replaced("/wireless_verse_grip", json!({"a": 1})),
+        ReplyFlaw::Replaced("/wireless_verse_grip/0/state", json!(null)),
+        ReplyFlaw::Replaced("/wireless_verse_grip/0/state/buttons", json!([true])),
+        ReplyFlaw::Replaced("/wireless_verse_grip/0/state/orientation", json!({"w": 0, "x": 0, "y": 0, "z": 0})),
+        ReplyFlaw::Missing("/wireless_verse_grip"),
+        ReplyFlaw::Replaced("/inverse3/0/state/cursor_position", json!({"y": 0, "z": 1, "x": 0, "w": {}})),
     ] {
-        service.set_trouble(Some(trouble.clone()));
+        service.set_reply_flaw(Some(reply_flaw.clone()));
         for _ in 0..20 {
-            device.read(0, PERIOD).unwrap_or_else(|fault| panic!("{trouble:?}: {fault}"));
+            device.read(0, PERIOD).unwrap_or_else(|fault| panic!("{reply_flaw:?}: {fault}"));
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -265,9 +265,9 @@ fn oddities_are_tolerated() {
 #[test]
 fn replies_that_nobody_asked_for_do_not_make_readings_old() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
-    service.set_trouble(Some(Trouble::Twice));
+    service.set_reply_flaw(Some(ReplyFlaw::Twice));
     tick_until(&mut *device, DVec3::ZERO, "a second", |_| service.messages() > 1000);
     service.set_tip(ARM, Tip::at(DVec3::Y));
     let began = Instant::now();
@@ -280,7 +280,7 @@ fn replies_that_nobody_asked_for_do_not_make_readings_old() {
 #[test]
 fn the_arm_is_idle_at_once_when_the_device_is_dropped() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
     until_force(&mut *device, &service, DVec3::Y);
     drop(device);
@@ -294,7 +294,7 @@ fn the_arm_is_idle_at_once_when_the_device_is_dropped() {
 #[test]
 fn a_force_that_is_not_repeated_is_taken_off_by_the_driver() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
     until_force(&mut *device, &service, DVec3::Y);
     let (stopped, before) = (Instant::now(), service.messages());
@@ -315,7 +315,7 @@ fn a_force_that_is_not_repeated_is_taken_off_by_the_driver() {
 #[test]
 fn the_arms_own_safety_takes_forces_off_until_the_brake_is_released() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
     until_force(&mut *device, &service, DVec3::Y);
     service.trigger_safety("0B02", "ebrake_triggered");
@@ -338,7 +338,7 @@ fn the_arms_own_safety_takes_forces_off_until_the_brake_is_released() {
 #[test]
 fn a_service_that_starts_anew_is_found_again() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let mut device = opened(&service);
     until_force(&mut *device, &service, DVec3::Y);
     service.drop_connections();
@@ -352,9 +352,9 @@ fn a_service_that_starts_anew_is_found_again() {
 #[test]
 fn the_way_into_a_wall_is_where_hand_and_wall_balance() {
     let _beside = beside_others();
-    let service = InverseService::start(&Options { persona: Persona::V34, ..Options::default() }).expect("a free port");
+    let service = InverseService::start(&Options { release: Release::V34, ..Options::default() }).expect("a free port");
     let (wall, wanted) = (300.0, -0.02 * DVec3::Z);
-    let hand = Hand::loose(Wanted::At(wanted));
+    let hand = Hand::loose(HandTarget::At(wanted));
     let mechanics = known::mechanics("Inverse3").expect("known");
     let expected = wanted.z * hand.stiffness / (wall + hand.stiffness);
     // Friction holds the tip within this.
@@ -379,7 +379,7 @@ fn the_way_into_a_wall_is_where_hand_and_wall_balance() {
 #[test]
 fn grips_fall_asleep_and_wake() {
     let _beside = beside_others();
-    let service = service(Persona::V34);
+    let service = service(Release::V34);
     let mut device = opened(&service);
     let turned = glam::DQuat::from_rotation_x(0.3);
     service.set_tip(ARM, Tip { orientation: turned, ..Tip::at(DVec3::ZERO) });

@@ -8,7 +8,7 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use glam::DVec3;
-use palpate_devices::{Connection, Device, Opened, Wrench, forcedimension, haply, openhaptics};
+use palpate_devices::{Connection, Device, ReadyDevice, Wrench, forcedimension, haply, openhaptics};
 use palpate_emulators::SteeredTip;
 use palpate_emulators::inverse_service::{InverseService, Options};
 use palpate_emulators::library::EmulatedLibrary;
@@ -49,7 +49,7 @@ fn a_tick_of_force_dimension() {
 #[test]
 fn a_tick_of_openhaptics() {
     let library = EmulatedLibrary::with_devices("palpate_emulated_hd", "Touch");
-    let Opened { mut device, scheduler } = openhaptics::open(&library.connection(None)).expect("opens");
+    let ReadyDevice { mut device, scheduler } = openhaptics::open(&library.connection(None)).expect("opens");
     let scheduler = scheduler.expect("the library has its own loop");
     let (sender, results) = channel();
     let (mut tick, mut most) = (0, 0);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use glam::DVec3;
-use palpate_devices::{Connection, Device, DeviceFault, Opened, Reading, Wrench, openhaptics};
+use palpate_devices::{Connection, Device, DeviceFault, Reading, ReadyDevice, Wrench, openhaptics};
 use palpate_emulators::Tip;
 use palpate_emulators::conformance::Disturbance;
 use palpate_emulators::library::EmulatedLibrary;
@@ -15,7 +15,7 @@ fn emulated(models: &str) -> EmulatedLibrary {
 
 /// Ticks of the library, with what a device says in each; a loop that stops after some of them.
 fn ticks<R: Send + 'static>(
-    opened: Vec<Opened>,
+    opened: Vec<ReadyDevice>,
     count: usize,
     mut each: impl FnMut(usize, &mut [Box<dyn Device>]) -> R + Send + 'static,
 ) -> Vec<R> {
@@ -87,7 +87,7 @@ fn a_device_that_is_not_calibrated_gets_no_force() {
 #[test]
 fn a_panic_does_not_reach_the_library() {
     let emulated = emulated("Touch");
-    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let ReadyDevice { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
     let scheduler = scheduler.expect("the library has its own loop");
     let mut tick = 0;
     let begun = scheduler.start(Box::new(move || {
@@ -130,7 +130,7 @@ fn nonsense_is_survived() {
     let emulated = emulated("Touch");
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
     let steering = emulated.steering();
-    steering.hurry(true);
+    steering.run_fast(true);
     let good = ticks(opened, 20_000, move |tick, devices| {
         // Some errors say that the device is gone; then it is well for a while, to come back.
         steering.disturb(0, if tick % 1000 < 900 { Some(Disturbance::Nonsense) } else { None });
@@ -143,7 +143,7 @@ fn nonsense_is_survived() {
         assert!(force == DVec3::ZERO || (force - 0.5 * DVec3::X).length() < 1e-12, "{force}");
         said.is_ok()
     });
-    steering.hurry(false);
+    steering.run_fast(false);
     println!("{} good readings of {}", good.iter().filter(|good| **good).count(), good.len());
     for _ in 0..200 {
         steering.disturb(0, Some(Disturbance::Nonsense));
@@ -241,7 +241,7 @@ fn no_force_outlives_the_ticks_of_the_library() {
 #[test]
 fn a_loop_that_runs_is_not_stopped_for_another_device() {
     let emulated = emulated("Touch, Left=PHANTOM Omni");
-    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let ReadyDevice { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
     let scheduler = scheduler.expect("the library has its own loop");
     let begun = scheduler.start(Box::new(move || {
         let _ = device.read(0, 1e-3);
@@ -258,7 +258,7 @@ fn a_loop_that_runs_is_not_stopped_for_another_device() {
 #[test]
 fn a_scheduler_that_does_not_start_again_is_a_fault() {
     let emulated = emulated("Touch");
-    let Opened { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
+    let ReadyDevice { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
     let scheduler = scheduler.expect("the library has its own loop");
     let (sender, said) = std::sync::mpsc::channel();
     let begun = scheduler.start(Box::new(move || {

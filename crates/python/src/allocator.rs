@@ -1,4 +1,4 @@
-//! The allocator of the C library during a precomputation, and the scratch of products of matrices.
+//! Settings of the C library's allocator during a precomputation, and a check of the memory for matrix products.
 #![allow(unsafe_code)] // libc
 
 use std::sync::Once;
@@ -12,7 +12,7 @@ const MAPPED: libc::c_int = 4 << 20;
 /// What may stay free at the end of small blocks, bytes: once the size above is set it would be 128 kB, and a fifth of the
 /// time of a body of 1404 nodes went into giving pages back and taking them again.
 #[cfg(target_env = "gnu")]
-const KEPT: libc::c_int = 64 << 20;
+const TRIM_THRESHOLD: libc::c_int = 64 << 20;
 
 /// Gives large blocks back to the system as soon as they are freed.
 ///
@@ -27,7 +27,7 @@ pub fn return_large_blocks() {
         #[cfg(target_env = "gnu")]
         unsafe {
             libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED);
-            libc::mallopt(libc::M_TRIM_THRESHOLD, KEPT);
+            libc::mallopt(libc::M_TRIM_THRESHOLD, TRIM_THRESHOLD);
         }
     });
 }
@@ -40,17 +40,17 @@ pub fn return_large_blocks() {
 /// # Errors
 /// [`Error::Memory`], with how much it is.
 pub fn require_scratch_of_products() -> Result<()> {
-    static GIVEN: AtomicBool = AtomicBool::new(false);
+    static SCRATCH_CHECKED: AtomicBool = AtomicBool::new(false);
     // The threads of the pool, and the one that calls.
     let (threads, each) = (rayon::current_num_threads() + 1, 2 * third_level_cache());
-    if GIVEN.load(Ordering::Relaxed) {
+    if SCRATCH_CHECKED.load(Ordering::Relaxed) {
         return Ok(());
     }
     let mut probes = vec![Vec::<u8>::new(); threads];
     let refused = probes.iter_mut().any(|probe| probe.try_reserve_exact(each).is_err());
     drop(probes);
     if !refused {
-        GIVEN.store(true, Ordering::Relaxed);
+        SCRATCH_CHECKED.store(true, Ordering::Relaxed);
         return Ok(());
     }
     let (all, each) = (threads as f64 * each as f64 / 1e9, each as f64 / 1e9);

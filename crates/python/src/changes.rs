@@ -1,12 +1,12 @@
-//! Bodies, tools and devices that come into a simulation or go out of it, also while its loop runs.
+//! Adding, replacing and removing bodies, tools and devices of a simulation, also while its loop runs.
 
 use std::sync::PoisonError;
 
-use palpate_core::simulation::Kept;
+use palpate_core::simulation::PreviousRanks;
 use palpate_core::{Error, Result};
 use palpate_devices::simulated::{Target, simulated};
-use palpate_devices::{Device, DeviceLimits, Mounted, Workspace};
-use palpate_scene::{Body, BodyId, Prepared, Scene, ToolId, carried_over, placement};
+use palpate_devices::{Device, DeviceLimits, MountedDevice, Workspace};
+use palpate_scene::{Body, BodyId, PreparedScene, Scene, ToolId, carried_over, placement};
 use pyo3::prelude::*;
 
 use crate::connection::{
@@ -14,7 +14,7 @@ use crate::connection::{
 };
 use crate::errors::to_python;
 use crate::scene::{BodyArguments, ToolArguments, scene_body, scene_tool};
-use crate::simulation::{Parts, SimulationCore};
+use crate::simulation::{RunningParts, SimulationCore};
 use crate::strain::StrainMeasure;
 
 /// Gives a tool a device for the next start, or at once where the loop runs.
@@ -163,8 +163,8 @@ fn tool_at(scene: &Scene, rank: usize) -> Result<ToolId> {
 /// A scene that has been prepared beside the loop.
 struct Change {
     scene: Scene,
-    next: Prepared,
-    kept: Kept,
+    next: PreparedScene,
+    previous_ranks: PreviousRanks,
 }
 
 impl SimulationCore {
@@ -176,8 +176,8 @@ impl SimulationCore {
         };
         let change = py.detach(|| -> Result<Change> {
             edit(&mut scene)?;
-            let (next, kept) = scene.prepare_change(&before)?;
-            Ok(Change { scene, next, kept })
+            let (next, previous_ranks) = scene.prepare_change(&before)?;
+            Ok(Change { scene, next, previous_ranks })
         });
         change.map_err(|e| to_python(py, e))
     }
@@ -196,14 +196,14 @@ impl SimulationCore {
         let change = self.prepare_change(py, edit)?;
         let mut parts = self.parts(py);
         let new = |old: &Option<usize>| old.is_none().then(|| parts.device_of(usize::MAX, None));
-        let devices = change.kept.tools[..change.next.tools.len()].iter().map(new).collect();
+        let devices = change.previous_ranks.tools[..change.next.tools.len()].iter().map(new).collect();
         parts.exchange(py, change, devices)?;
         parts.number += 1;
         Ok(parts.number)
     }
 }
 
-impl Parts {
+impl RunningParts {
     /// The device of a tool: the one that is connected, or a simulated one at its target, with the limits that the scene gives it.
     pub(crate) fn device_of(&self, tool: usize, connected: Option<Connected>) -> LoopDevice {
         if let Some(Connected { device, scheduler, .. }) = connected {
@@ -214,24 +214,25 @@ impl Parts {
         let limits = self.prepared.devices.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED);
         let device: Box<dyn Device> = match limits == DeviceLimits::UNLIMITED {
             true => Box::new(device),
-            false => Box::new(Mounted::new(Box::new(device), Workspace::default(), &limits)),
+            false => Box::new(MountedDevice::new(Box::new(device), Workspace::default(), &limits)),
         };
         LoopDevice { device, handle: Some(handle), scheduler: None }
     }
 
     /// Goes on with a changed scene, in the loop too if it runs, with devices where they are new.
     fn exchange(&mut self, py: Python<'_>, change: Change, devices: Vec<Option<LoopDevice>>) -> PyResult<()> {
-        let Change { scene, next, kept } = change;
-        let new_tools: Vec<_> = kept.tools[..next.tools.len()].iter().map(Option::is_none).collect();
+        let Change { scene, next, previous_ranks } = change;
+        let new_tools: Vec<_> = previous_ranks.tools[..next.tools.len()].iter().map(Option::is_none).collect();
         let (handles, devices) =
             devices.into_iter().map(|new| new.map(|new| (new.handle, new.device)).unzip()).unzip::<_, _, _, Vec<_>>();
         let Self { prepared, servo, .. } = self;
-        py.detach(|| prepared.go_on_with(next, kept, servo.as_mut(), devices)).map_err(|e| to_python(py, e))?;
-        self.handles = carried_over(std::mem::take(&mut self.handles), handles, &kept);
+        py.detach(|| prepared.continue_with(next, previous_ranks, servo.as_mut(), devices))
+            .map_err(|e| to_python(py, e))?;
+        self.handles = carried_over(std::mem::take(&mut self.handles), handles, &previous_ranks);
         let connected = new_tools.iter().map(|new| new.then_some(None)).collect();
-        self.connected = carried_over(std::mem::take(&mut self.connected), connected, &kept);
+        self.connected = carried_over(std::mem::take(&mut self.connected), connected, &previous_ranks);
         let targets = new_tools.iter().map(|new| new.then(Target::default)).collect();
-        self.targets = carried_over(std::mem::take(&mut self.targets), targets, &kept);
+        self.targets = carried_over(std::mem::take(&mut self.targets), targets, &previous_ranks);
         self.scene = scene;
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! A precomputation in pieces: columns by some processes, the store by one.
+//! Precomputation by several processes: some solve columns, one writes the store.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -6,7 +6,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_core::green::accuracy::Accuracy;
 use palpate_core::green::{
-    ColumnStore as Store, Columns, Measurement, Parts, Precision, Problem, Target, Wanted, Working, checksum,
+    AssembledProblem, ColumnStore as Store, Columns, Measurement, Precision, Problem, RequestedPrecision, Target,
+    TaskMemory, checksum,
 };
 use palpate_core::{Error, Result};
 use pyo3::prelude::*;
@@ -16,42 +17,42 @@ use crate::allocator::require_scratch_of_products;
 use crate::claim::{StoreClaim, claimed};
 use crate::errors::to_python;
 use crate::green::{named, problem};
-use crate::watched::run_watched;
+use crate::interruptible::run_interruptible;
 
 /// What a store needs to know of a factor: format, columns of a block, accuracy, free response (rows).
-type Measured<'py> = (&'static str, usize, [f64; 5], Bound<'py, PyArray1<f64>>);
-type GivenMeasured<'py> = (String, usize, [f64; 5], PyReadonlyArray1<'py, f64>);
+type MeasurementTuple<'py> = (&'static str, usize, [f64; 5], Bound<'py, PyArray1<f64>>);
+type MeasurementArguments<'py> = (String, usize, [f64; 5], PyReadonlyArray1<'py, f64>);
 
 /// A factored problem: any block of its columns, from any thread.
 #[pyclass(frozen, module = "palpate._native")]
 pub struct ColumnJob {
     columns: Columns,
-    working: Mutex<Memories>,
+    working: Mutex<TaskMemories>,
     returned: Condvar,
 }
 
 /// Memory of the tasks, each for blocks of up to some width.
-struct Memories {
-    free: Vec<(usize, Working)>,
+struct TaskMemories {
+    free: Vec<(usize, TaskMemory)>,
     /// How many more may be made.
     allowed: usize,
 }
 
 impl ColumnJob {
-    fn memories(&self) -> MutexGuard<'_, Memories> {
+    fn memories(&self) -> MutexGuard<'_, TaskMemories> {
         self.working.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Memory for a block, once as few others are being solved as the bound of memory allows.
-    fn take(&self, width: usize) -> Working {
+    fn take(&self, width: usize) -> TaskMemory {
         let mut memories = self.memories();
         loop {
             if let Some((room, working)) = memories.free.pop() {
-                return if room >= width { working } else { self.columns.working(width) };
+                return if room >= width { working } else { self.columns.task_memory(width) };
             }
             if memories.allowed > 0 {
                 memories.allowed -= 1;
-                return self.columns.working(width);
+                return self.columns.task_memory(width);
             }
             memories = self.returned.wait(memories).unwrap_or_else(PoisonError::into_inner);
         }
@@ -86,19 +87,19 @@ impl ColumnJob {
         memory: Option<usize>,
     ) -> PyResult<Self> {
         let problem = problem(arguments)?;
-        let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
+        let wanted = named(py, precision_name)?.map_or(RequestedPrecision::Within(within), RequestedPrecision::Named);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| to_python(py, Error::Invalid(format!("no threads could be started: {e}"))))?;
         require_scratch_of_products().map_err(|e| to_python(py, e))?;
         let factored = || Columns::new(&problem, wanted, memory, false, &|_| {}, &|| Ok(()));
         let columns = py.detach(|| pool.install(factored)).map_err(|e| to_python(py, e))?;
-        let working = Mutex::new(Memories { free: Vec::new(), allowed: columns.tasks });
+        let working = Mutex::new(TaskMemories { free: Vec::new(), allowed: columns.tasks });
         Ok(Self { columns, working, returned: Condvar::new() })
     }
 
     /// What the store needs to know.
     #[getter]
-    fn measured<'py>(&self, py: Python<'py>) -> Measured<'py> {
+    fn measured<'py>(&self, py: Python<'py>) -> MeasurementTuple<'py> {
         let Measurement { precision, accuracy, response, width } = &self.columns.measurement;
         (precision.name(), *width, accuracy.to_array(), response.clone().into_pyarray(py))
     }
@@ -125,7 +126,7 @@ impl ColumnJob {
 #[pyclass(frozen, module = "palpate._native")]
 pub struct ColumnLayout {
     problem: Problem,
-    parts: Arc<Parts>,
+    parts: Arc<AssembledProblem>,
 }
 
 #[pymethods]
@@ -134,7 +135,7 @@ impl ColumnLayout {
     #[new]
     fn new(py: Python<'_>, arguments: &Bound<'_, PyTuple>) -> PyResult<Self> {
         let problem = problem(arguments)?;
-        let parts = py.detach(|| Parts::new(&problem)).map_err(|e| to_python(py, e))?;
+        let parts = py.detach(|| AssembledProblem::new(&problem)).map_err(|e| to_python(py, e))?;
         Ok(Self { problem, parts: Arc::new(parts) })
     }
 
@@ -168,7 +169,7 @@ impl ColumnStore {
         layout: &ColumnLayout,
         precision_name: Option<&str>,
         within: f64,
-        measured: GivenMeasured<'_>,
+        measured: MeasurementArguments<'_>,
         path: PathBuf,
         description: &str,
         claim: Option<&StoreClaim>,
@@ -178,7 +179,7 @@ impl ColumnStore {
         let precision = Precision::parse(&name).filter(|_| width > 0).ok_or_else(unusable)?;
         let accuracy = Accuracy::from_slice(&accuracy).ok_or_else(unusable)?;
         let measurement = Measurement { precision, accuracy, response: response.as_array().to_vec(), width };
-        let wanted = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
+        let wanted = named(py, precision_name)?.map_or(RequestedPrecision::Within(within), RequestedPrecision::Named);
         let claim = claimed(py, claim, path)?;
         let target = Target { precision: wanted, memory: None, description, phase: &|_| {} };
         let open = || Store::open(claim, &layout.problem, Arc::clone(&layout.parts), &measurement, &target);
@@ -206,7 +207,7 @@ impl ColumnStore {
     /// Whether something that belongs to another computation was thrown away.
     #[getter]
     fn discarded(&self) -> bool {
-        self.store().found.discarded
+        self.store().previous.discarded
     }
 
     /// Keeps the panel of a block; whether it fits its checksum.
@@ -218,11 +219,6 @@ impl ColumnStore {
     #[pyo3(signature = (progress=None))]
     fn finish(&self, py: Python<'_>, progress: Option<Py<PyAny>>) -> PyResult<()> {
         let total = self.columns();
-        run_watched(py, total, progress.as_ref(), |note| self.store().finish(rayon::current_num_threads(), note))
-    }
-
-    /// Removes what is there.
-    fn discard(&self) {
-        self.store().discard();
+        run_interruptible(py, total, progress.as_ref(), |note| self.store().finish(rayon::current_num_threads(), note))
     }
 }

@@ -1,11 +1,11 @@
-//! Devices as Python opens them, and as the loop takes them.
+//! Opening of devices from Python, and their hand-over to the loop.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use palpate_core::{Error, Result};
 use palpate_devices::simulated::Handle;
-use palpate_devices::{Connection, Device, DeviceLimits, Mounted, OpenError, Opened, Scheduler, Workspace};
+use palpate_devices::{Connection, Device, DeviceLimits, MountedDevice, OpenError, ReadyDevice, Scheduler, Workspace};
 use pyo3::prelude::*;
 
 use crate::errors::raised;
@@ -51,13 +51,13 @@ pub fn device_error(py: Python<'_>, error: &OpenError) -> PyErr {
 #[pyclass(module = "palpate._native")]
 pub struct OpenedDevice {
     /// Shared by no two threads at once.
-    opened: Mutex<Option<Opened>>,
+    opened: Mutex<Option<ReadyDevice>>,
     name: String,
     limits: DeviceLimits,
 }
 
-impl From<Opened> for OpenedDevice {
-    fn from(opened: Opened) -> Self {
+impl From<ReadyDevice> for OpenedDevice {
+    fn from(opened: ReadyDevice) -> Self {
         let (name, limits) = (opened.device.name().to_owned(), opened.device.limits());
         Self { opened: Mutex::new(Some(opened)), name, limits }
     }
@@ -68,7 +68,7 @@ impl OpenedDevice {
     ///
     /// # Errors
     /// A device that a loop has taken already.
-    pub fn take(&mut self, py: Python<'_>) -> PyResult<Opened> {
+    pub fn take(&mut self, py: Python<'_>) -> PyResult<ReadyDevice> {
         let taken = || OpenError::new(self.name.clone(), "another loop has this device: open it once more");
         let opened = self.opened.get_mut().unwrap_or_else(PoisonError::into_inner).take();
         opened.ok_or_else(|| device_error(py, &taken()))
@@ -126,8 +126,8 @@ impl Connected {
         let (position, orientation, scale, force_scale, clutch) = workspace;
         let workspace =
             Workspace { position: position.into(), orientation: quaternion(orientation), scale, force_scale, clutch };
-        let Opened { device, scheduler } = device.take(py)?;
-        let mounted = Mounted::new(device, workspace, &limits_of(limits));
+        let ReadyDevice { device, scheduler } = device.take(py)?;
+        let mounted = MountedDevice::new(device, workspace, &limits_of(limits));
         Ok(Self { limits: mounted.limits(), device: Mutex::new(Box::new(mounted)), scheduler })
     }
 }

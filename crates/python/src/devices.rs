@@ -1,4 +1,4 @@
-//! Haptic devices of this machine: what their drivers find, and a check of one by itself.
+//! Haptic devices of this machine: listing them, and the self-check of one.
 
 use std::path::PathBuf;
 
@@ -83,7 +83,7 @@ impl DeviceCheck {
 
     /// What has been seen of it so far; None before its first tick.
     fn seen<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(seen) = self.check.seen() else { return Ok(None) };
+        let Some(seen) = self.check.observation() else { return Ok(None) };
         let told = PyDict::new(py);
         told.set_item("time", seen.time)?;
         told.set_item("readings", seen.readings)?;

@@ -61,14 +61,14 @@ fn repeat(py: Python<'_>, count: usize, mut step: impl FnMut(usize) + Send) -> P
 }
 
 /// Rows that are pushed (k), their forces (steps, k), and rows that are watched (w).
-type Played<'py> = (Vec<u32>, PyReadonlyArray2<'py, f64>, Vec<usize>);
+type ForceHistory<'py> = (Vec<u32>, PyReadonlyArray2<'py, f64>, Vec<usize>);
 
 /// Makes a step for each row of forces on a body of so many rows; displacements (steps, w). `step` is given the forces, and
 /// where what is watched goes.
 fn played<'py>(
     py: Python<'py>,
     count: usize,
-    (rows, forces, watch): Played<'py>,
+    (rows, forces, watch): ForceHistory<'py>,
     mut step: impl FnMut(&[(u32, f64)], &[usize], &mut [f64]) + Send,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let forces = forces.as_array();
@@ -228,12 +228,6 @@ impl ModalMotion {
         let mut out = vec![0.0; rows.len()];
         py.detach(|| self.model.read(&self.modal_numbers(order), rows.into_iter(), &mut out));
         Ok(out.into_pyarray(py))
-    }
-
-    /// Modal displacements, velocities, accelerations or forces (`order` 0 to 3), (m).
-    fn modal<'py>(&self, py: Python<'py>, order: usize) -> Bound<'py, PyArray1<f64>> {
-        let numbers = if order == 3 { self.state.load.clone() } else { self.modal_numbers(order) };
-        self.model.flat(&numbers).into_pyarray(py)
     }
 
     /// Kinetic, strain, dissipated energy and work, J.

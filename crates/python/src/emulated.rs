@@ -1,12 +1,12 @@
-//! The loop of a simulation on emulated devices, and what is known of devices.
+//! Run of a simulation on emulated devices, and the table of known devices.
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
 use numpy::IntoPyArray;
-use palpate_devices::emulated::{Command, Hand, Mechanics, Tip, Wanted, Waypoint, emulated, known};
+use palpate_devices::emulated::{Command, Hand, HandTarget, Mechanics, Tip, Waypoint, emulated, known};
 use palpate_devices::{Buttons, DeviceLimits};
-use palpate_scene::Prepared;
+use palpate_scene::PreparedScene;
 use palpate_servo::{Emulation, SafetyLimits};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -49,7 +49,7 @@ pub fn emulate<'py>(
     let (ticks, reach) = until;
     let starts: Vec<DVec3> = devices.iter().map(|(_, _, [start, _], _, _)| DVec3::from(*start)).collect();
     let devices = devices.into_iter().map(device).collect();
-    let Prepared { model, limits: of_scene, settings, strain, .. } = core.prepared(py);
+    let PreparedScene { model, limits: of_scene, settings, strain, .. } = core.prepared(py);
     let limits = limits.map_or(of_scene, stage);
     let mut columns: [Vec<f64>; 4] = Default::default();
     let mut fault = None;
@@ -58,11 +58,11 @@ pub fn emulate<'py>(
         emulation.run(devices, |tick, _| {
             let mut runs_away = false;
             for (tool, start) in starts.iter().enumerate() {
-                let truth = tick.truths[tool];
+                let true_motion = tick.true_motions[tool];
                 let said = tick.readings[tool].pose.position;
-                let row = [truth.position, truth.velocity, said, tick.wrenches[tool].force];
+                let row = [true_motion.position, true_motion.velocity, said, tick.wrenches[tool].force];
                 columns.iter_mut().zip(row).for_each(|(column, vector)| column.extend(vector.to_array()));
-                let away = truth.position.distance(*start);
+                let away = true_motion.position.distance(*start);
                 runs_away |= away > reach || !away.is_finite();
             }
             fault = fault.or(tick.fault);
@@ -85,8 +85,8 @@ fn device(
     let mechanics = Mechanics { mass, damping, dry_friction, encoder_step, delay };
     let hand = hand.map(|([mass, damping, stiffness], waypoints)| {
         let waypoint = |(time, place): (f64, [f64; 3])| Waypoint { time, position: place.into() };
-        let wanted = Wanted::Along(waypoints.into_iter().map(waypoint).collect());
-        Hand { mass, damping, stiffness, wanted }
+        let target = HandTarget::Along(waypoints.into_iter().map(waypoint).collect());
+        Hand { mass, damping, stiffness, target }
     });
     let tip = Tip::new(mechanics, start.into(), hand).moving(velocity.into());
     let [max_force, max_stiffness, max_damping] = limits;

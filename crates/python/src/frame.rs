@@ -1,4 +1,4 @@
-//! A tick as Python sees it.
+//! Conversion of a published tick to Python.
 
 use numpy::IntoPyArray;
 use palpate_core::simulation::{Model, Snapshot};

@@ -1,4 +1,4 @@
-//! The Green's function: precompute, store, answers.
+//! The Green's function: precomputation, store, solutions.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -10,8 +10,8 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::capacitance::{self, Change};
 use palpate_core::fem::Supports;
 use palpate_core::green::{
-    Found, GreensFunction, Growth, Phase, Plan, Precision, Problem, Progress, Target, Wanted, plan, precompute,
-    precompute_to,
+    GreensFunction, Growth, Phase, Plan, Precision, PreviousWork, Problem, Progress, RequestedPrecision, Target, plan,
+    precompute, precompute_to,
 };
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, contact};
@@ -22,7 +22,7 @@ use crate::allocator::require_scratch_of_products;
 use crate::body::{self, indices, materials, vectors};
 use crate::claim::{StoreClaim, claimed};
 use crate::errors::to_python;
-use crate::watched::{run_watched, run_watched_and};
+use crate::interruptible::{run_interruptible, run_interruptible_and};
 
 /// A Green's function in memory, or in memory and its store.
 #[pyclass(frozen, module = "palpate._native")]
@@ -69,10 +69,10 @@ fn interior(problem: &Problem) -> Result<palpate_core::green::Interior> {
     palpate_core::green::Interior::new(&stiffness, &problem.supports, &problem.surface_nodes, &problem.loads)
 }
 
-/// Removes what is kept beside a store of contacts with it.
+/// Removes the files of contacts beside a store.
 #[pyfunction]
 pub(crate) fn forget_contacts(store: PathBuf) {
-    contact::forget_kept(&store);
+    contact::remove_compliance_files(&store);
 }
 
 /// The format of a name, if one is named.
@@ -137,7 +137,7 @@ impl GreenCore {
             require_scratch_of_products()?;
             precompute(&problem, precision, note)
         };
-        let mut green = run_watched(py, total, progress.as_ref(), compute)?;
+        let mut green = run_interruptible(py, total, progress.as_ref(), compute)?;
         green.description = description;
         Ok(Self { green: Arc::new(green) })
     }
@@ -166,7 +166,8 @@ impl GreenCore {
         claim: Option<&StoreClaim>,
     ) -> PyResult<(usize, bool)> {
         let problem = problem(arguments)?;
-        let precision = named(py, precision_name)?.map_or(Wanted::Within(within), Wanted::Named);
+        let precision =
+            named(py, precision_name)?.map_or(RequestedPrecision::Within(within), RequestedPrecision::Named);
         let total = 3 * problem.touch.len();
         let phase = |begun: Phase| {
             crate::allocator::return_free_pages();
@@ -194,12 +195,12 @@ impl GreenCore {
             }
         };
         crate::allocator::return_large_blocks();
-        let found = run_watched_and(py, total, progress.as_ref(), &mut meanwhile, |note| {
+        let found = run_interruptible_and(py, total, progress.as_ref(), &mut meanwhile, |note| {
             require_scratch_of_products()?;
             let next = || Some(std::mem::take(&mut *lock())).filter(|nodes| !nodes.is_empty());
             let ready = |nodes| written.store(nodes, Ordering::Relaxed);
             let growth = Growth { first: &first, next: &next, ready: &ready };
-            let mut found = Found::default();
+            let mut found = PreviousWork::default();
             precompute_to(claim, &problem, &target, &growth, &mut |f| found = f, note)?;
             Ok(found)
         })?;

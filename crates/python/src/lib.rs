@@ -16,7 +16,8 @@ mod errors;
 mod exchange;
 mod frame;
 mod green;
-mod programmed;
+mod interruptible;
+mod program_device;
 mod recording;
 mod replay;
 mod rerun;
@@ -24,7 +25,6 @@ mod scene;
 mod simulation;
 mod strain;
 mod surface;
-mod watched;
 
 /// The module `palpate._native`.
 #[pyo3::pymodule]
@@ -61,7 +61,7 @@ mod _native {
     #[pymodule_export]
     use crate::green::{GreenCore, Interior, forget_contacts, products};
     #[pymodule_export]
-    use crate::programmed::ProgrammedDevice;
+    use crate::program_device::ProgrammedDevice;
     #[pymodule_export]
     use crate::replay::{Replay, read_recording};
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! Recordings read as columns, and made again tick by tick.
+//! Recordings as columns, and their replay tick by tick.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -9,7 +9,7 @@ use numpy::{IntoPyArray, PyArray1};
 use palpate_core::simulation::{MAX_BODIES, Mode, Strike};
 use palpate_core::{Error, Result};
 use palpate_recording::{Ticks, same_settings};
-use palpate_scene::Prepared;
+use palpate_scene::PreparedScene;
 use palpate_servo::{Owner, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -31,13 +31,13 @@ pub enum Source {
     Bytes(Vec<u8>),
 }
 
-type AnyTicks = Ticks<Box<dyn Read + Send>>;
+type RecordedTicks = Ticks<Box<dyn Read + Send>>;
 
 /// Opens a recording.
 ///
 /// # Errors
 /// The system's; what is no recording.
-pub fn open(source: Source) -> Result<AnyTicks> {
+pub fn open(source: Source) -> Result<RecordedTicks> {
     let (read, name): (Box<dyn Read + Send>, String) = match source {
         Source::Path(path) => {
             let file = File::open(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
@@ -220,12 +220,12 @@ type DifferenceRecord = (u64, String, &'static str, Vec<f64>, Vec<f64>);
 /// A recording made again, tick by tick.
 #[pyclass(module = "palpate._native")]
 pub struct Replay {
-    parts: Mutex<(AnyTicks, palpate_servo::Replay)>,
+    parts: Mutex<(RecordedTicks, palpate_servo::Replay)>,
     model: std::sync::Arc<palpate_core::simulation::Model>,
 }
 
 impl Replay {
-    fn lock(&self) -> MutexGuard<'_, (AnyTicks, palpate_servo::Replay)> {
+    fn lock(&self) -> MutexGuard<'_, (RecordedTicks, palpate_servo::Replay)> {
         self.parts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -236,7 +236,7 @@ impl Replay {
     #[new]
     fn new(py: Python<'_>, core: &SimulationCore, source: Source) -> PyResult<Self> {
         let ticks = open(source).map_err(|e| to_python(py, e))?;
-        let Prepared { model, limits, settings, strain, devices, .. } = core.prepared(py);
+        let PreparedScene { model, limits, settings, strain, devices, .. } = core.prepared(py);
         let replay = palpate_servo::Replay::new(&model, &devices, limits, settings, strain);
         let replay = replay.map_err(|e| to_python(py, e))?;
         Ok(Self { parts: Mutex::new((ticks, replay)), model })

@@ -1,9 +1,9 @@
-//! The inputs of a recording, given to another simulation.
+//! Rerun of the inputs of a recording in another simulation.
 
 use std::collections::BTreeMap;
 
 use palpate_core::{Error, Result};
-use palpate_scene::Prepared;
+use palpate_scene::PreparedScene;
 use palpate_servo::{RecordedInput, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -24,7 +24,7 @@ pub fn rerun<'py>(
     told: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let ticks = open(source).map_err(|e| to_python(py, e))?;
-    let Prepared { model, limits, settings, strain, devices, scheduling, .. } = core.prepared(py);
+    let PreparedScene { model, limits, settings, strain, devices, scheduling, .. } = core.prepared(py);
     let settings = Settings { watch: None, ..settings };
     let header = header(about, &model, scheduling.rate, false);
     let mut file = Recorded::new(header).map_err(|e| to_python(py, e))?;

@@ -1,4 +1,4 @@
-//! Arguments of a simulation, as Python gives them, and what it reads back.
+//! Conversion of scene arguments from Python, and of what is read back.
 
 use std::collections::BTreeMap;
 
@@ -140,13 +140,13 @@ pub fn contact_records(model: &Model, state: &Snapshot) -> Vec<ContactRecord> {
             placement.point_to_world(contact.point),
             placement.vector_to_world(contact.normal),
             placement.vector_to_world(contact.force),
-            -placement.vector_to_world(contact.local.torque),
+            -placement.vector_to_world(contact.torque),
             placement.point_to_world(contact.anchor),
             placement.vector_to_world(contact.displacement),
         ];
         let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
-        let flags = [contact.limited, contact.local.slipping];
-        let numbers = [contact.local.radius, contact.local.depth, contact.local.stiffness];
+        let flags = [contact.limited, contact.slipping];
+        let numbers = [contact.radius, contact.depth, contact.stiffness];
         let vectors = vectors.map(|v| v.to_array());
         (contact.tool, contact.body, mode, vectors, flags, numbers, nodes.to_vec(), weights.to_vec())
     };

@@ -8,7 +8,7 @@ use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use palpate_core::simulation::{MAX_BODIES, Strike};
 use palpate_devices::simulated::{Handle, Target};
-use palpate_scene::{Prepared, Scene};
+use palpate_scene::{PreparedScene, Scene};
 use palpate_servo::{SafetyLimits, Scheduling, Script, Servo, Settings, TickRecord};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -29,16 +29,16 @@ type StrikeArguments = (usize, usize, [f64; 3], [f64; 3], f64);
 /// A simulation, and its loop while it runs. Any threads may call at the same time: they wait for each other, for moments.
 #[pyclass(frozen, module = "palpate._native")]
 pub struct SimulationCore {
-    parts: Mutex<Parts>,
+    parts: Mutex<RunningParts>,
     /// Held while bodies, tools and devices change, and while the loop starts or stops, which takes up to seconds; frames
     /// and settings go on meanwhile. Taken before `parts`.
     changing: Mutex<()>,
 }
 
 /// What is in a simulation, what its loop reads of that, and the loop.
-pub(crate) struct Parts {
+pub(crate) struct RunningParts {
     pub scene: Scene,
-    pub prepared: Prepared,
+    pub prepared: PreparedScene,
     /// Devices for the next start; a tool without one is moved by its target.
     pub connected: Vec<Option<Connected>>,
     /// Of tools that a target moves.
@@ -74,7 +74,7 @@ impl SimulationCore {
             scene.prepare()
         };
         let prepared = py.detach(prepare).map_err(|e| to_python(py, e))?;
-        let parts = Parts {
+        let parts = RunningParts {
             connected: prepared.tools.iter().map(|_| None).collect(),
             handles: prepared.tools.iter().map(|_| None).collect(),
             targets: vec![Target::default(); prepared.tools.len()],
@@ -98,7 +98,7 @@ impl SimulationCore {
         let (handles, devices): (Vec<_>, Vec<_>) = devices.into_iter().map(|part| (part.handle, part.device)).unzip();
         parts.handles = handles;
         drop(parts);
-        let Prepared { model, limits, settings, scheduling, strain, .. } = self.prepared(py);
+        let PreparedScene { model, limits, settings, scheduling, strain, .. } = self.prepared(py);
         let start = || Servo::start(model, devices, limits, settings, scheduling, strain, scheduler);
         let mut servo = py.detach(start).map_err(|e| to_python(py, e))?;
         let realtime = servo.realtime();
@@ -135,7 +135,7 @@ impl SimulationCore {
         grab: Option<bool>,
     ) {
         let mut parts = self.parts(py);
-        let Parts { targets, handles, .. } = &mut *parts;
+        let RunningParts { targets, handles, .. } = &mut *parts;
         let Some(target) = targets.get_mut(tool) else { return };
         place.0.into_iter().for_each(|position| target.pose.position = position.into());
         place.1.into_iter().for_each(|turned| target.pose.orientation = quaternion(turned));
@@ -154,7 +154,7 @@ impl SimulationCore {
 
     /// The settings by their names: a number, or a list with one for each tool or body.
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let Prepared { settings, tools, bodies, .. } = &self.parts(py).prepared;
+        let PreparedScene { settings, tools, bodies, .. } = &self.parts(py).prepared;
         settings_dict(py, settings, tools.len(), bodies.len())
     }
 
@@ -241,7 +241,7 @@ impl SimulationCore {
     fn begin_recording(&self, py: Python<'_>, path: PathBuf, about: BTreeMap<String, String>) -> PyResult<()> {
         let mut parts = self.parts(py);
         let header = header(about, &parts.prepared.model, parts.prepared.scheduling.rate, true);
-        let Parts { servo: Some(servo), recording, .. } = &mut *parts else { return Ok(()) };
+        let RunningParts { servo: Some(servo), recording, .. } = &mut *parts else { return Ok(()) };
         let begun = py.detach(|| Recording::begin(&path, header, servo));
         *recording = Some(begun.map_err(|e| to_python(py, e))?);
         Ok(())
@@ -280,7 +280,7 @@ impl SimulationCore {
         let grabs = grabs.as_slice()?.to_vec();
         let ticks = positions.shape()[0];
         let (strikes, watch) = extras;
-        let Prepared { model, limits, settings, strain, devices, scheduling, .. } = self.prepared(py);
+        let PreparedScene { model, limits, settings, strain, devices, scheduling, .. } = self.prepared(py);
         let (settings, rate, radius) =
             (Settings { watch: None, ..settings }, scheduling.rate, settings.contact_radius[0]);
         let strike = |(tick, body, point, impulse, duration): StrikeArguments| {
@@ -322,7 +322,7 @@ impl SimulationCore {
 
 impl SimulationCore {
     /// Its parts, for a moment. The interpreter is let go of while others have them.
-    pub(crate) fn parts(&self, py: Python<'_>) -> MutexGuard<'_, Parts> {
+    pub(crate) fn parts(&self, py: Python<'_>) -> MutexGuard<'_, RunningParts> {
         self.parts.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -332,7 +332,7 @@ impl SimulationCore {
     }
 
     /// What its loop reads.
-    pub(crate) fn prepared(&self, py: Python<'_>) -> Prepared {
+    pub(crate) fn prepared(&self, py: Python<'_>) -> PreparedScene {
         self.parts(py).prepared.clone()
     }
 
@@ -343,7 +343,7 @@ impl SimulationCore {
         change: impl FnOnce(&mut Settings) -> palpate_core::Result<()>,
     ) -> PyResult<()> {
         let mut parts = self.parts(py);
-        let Parts { prepared, servo, .. } = &mut *parts;
+        let RunningParts { prepared, servo, .. } = &mut *parts;
         let mut settings = prepared.settings;
         let changed = change(&mut settings).and_then(|()| settings.check(&prepared.model));
         let taken = changed.and_then(|()| servo.as_mut().map_or(Ok(()), |servo| servo.set(settings)));

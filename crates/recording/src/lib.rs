@@ -3,14 +3,14 @@
 //! The loop pushes a record of each tick into a ring and knows nothing of files; a thread beside it writes them
 //! ([`Recorder`]), and [`Ticks`] gives them back, bit for bit, also from a file that was cut short.
 
+mod checksummed;
 mod messages;
 mod reader;
 mod recorder;
 mod schemas;
-mod sealed;
 mod writer;
 
 pub use messages::same_settings;
-pub use reader::{Ending, Ticks};
+pub use reader::{FileEnd, Ticks};
 pub use recorder::{Recorder, RecorderStatus};
 pub use writer::{Header, TickWriter};

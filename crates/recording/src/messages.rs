@@ -1,4 +1,4 @@
-//! What is written for a tick: messages in CDR, as ROS 2 has them, one topic a kind.
+//! Messages of a tick in ROS 2's CDR encoding, one topic for each kind.
 //!
 //! `schemas` tells readers of other programs what is in them, field by field in the same order; the tests hold the two
 //! together with readers that are not ours.
@@ -8,8 +8,8 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{MAX_TOOLS, Mode, Strike};
 use palpate_devices::{Buttons, DeviceFault, Pose, Reading, Twist, Wrench};
 use palpate_servo::{
-    Computed, FaultReason, RecordedContact, RecordedInput, RecordedOutput, RecordedTool, Settings, StrainArrivals,
-    StrainAsked, TickRecord,
+    ComputedWrench, FaultReason, RecordedContact, RecordedInput, RecordedOutput, RecordedTool, Settings,
+    StrainArrivals, StrainRequestId, TickRecord,
 };
 use serde::{Deserialize, Serialize};
 
@@ -196,7 +196,7 @@ impl Tool {
 
     fn recorded(&self) -> RecordedTool {
         RecordedTool {
-            computed: Computed { law: self.law.into(), limited: self.computed.into() },
+            computed: ComputedWrench { law: self.law.into(), limited: self.computed.into() },
             wrench: self.wrench.into(),
             port: self.port_energy,
             limited: self.limited,
@@ -272,7 +272,7 @@ pub struct Tick {
     reset: bool,
     strike: bool,
     fault: Fault,
-    unasked: u32,
+    unsent: u32,
     tools: Vec<Tool>,
     contacts: Vec<Contact>,
     bodies: Vec<Body>,
@@ -294,7 +294,7 @@ impl Tick {
                 work: e.work,
             })
         };
-        let strain = |asked: &StrainAsked| Strain { body: asked.body as u8, asked: asked.tick };
+        let strain = |asked: &StrainRequestId| Strain { body: asked.body as u8, asked: asked.tick };
         Self {
             stamp,
             number: record.tick,
@@ -305,7 +305,7 @@ impl Tick {
             reset: input.reset,
             strike: input.strike.is_some(),
             fault: input.fault.into(),
-            unasked: input.strain.unasked,
+            unsent: input.strain.unsent,
             tools: (0..tools).map(|tool| Tool::of(input, tool, &output.tools[tool])).collect(),
             contacts: output.contacts.iter().map(Contact::from).collect(),
             bodies: output.bodies.iter().enumerate().filter_map(body).collect(),
@@ -316,8 +316,8 @@ impl Tick {
     /// The record again, with the settings that were in force and the latest strike.
     pub fn record(&self, (settings, strike): (Settings, Strike)) -> TickRecord {
         let mut strain = StrainArrivals::default();
-        strain.unasked = self.unasked;
-        self.strain.iter().for_each(|s| strain.push(StrainAsked { body: s.body.into(), tick: s.asked }));
+        strain.unsent = self.unsent;
+        self.strain.iter().for_each(|s| strain.push(StrainRequestId { body: s.body.into(), tick: s.asked }));
         let mut input = RecordedInput {
             due_ns: self.due_ns,
             period: self.period,

@@ -1,4 +1,4 @@
-//! Ticks as they come out of a file, whole or cut short.
+//! Reading of recorded ticks from a file, complete or cut short.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,9 +14,9 @@ use palpate_core::{Error, Result};
 use palpate_servo::{Settings, TickRecord};
 use serde::Deserialize;
 
+use crate::checksummed::verified;
 use crate::messages::{SettingsMessage, Tick};
-use crate::sealed::opened;
-use crate::writer::{ABOUT, END, SETTINGS, TICKS};
+use crate::writer::{END, METADATA, SETTINGS, TICKS};
 
 /// The ticks of a file, one after the other; nothing of the file is kept but a chunk.
 pub struct Ticks<R = BufReader<File>> {
@@ -26,14 +26,14 @@ pub struct Ticks<R = BufReader<File>> {
     topics: BTreeMap<u16, String>,
     settings: Option<(Settings, Strike)>,
     /// How the file ended; `None` while it has not, and for one that was cut short.
-    pub ending: Option<Ending>,
+    pub ending: Option<FileEnd>,
     /// Ticks so far.
     count: u64,
 }
 
 /// How a file ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ending {
+pub struct FileEnd {
     /// Ticks that were not written.
     pub dropped: u64,
 }
@@ -61,9 +61,9 @@ impl<R: Read> Ticks<R> {
         loop {
             match records.next() {
                 Some(Ok(Record::Header(_))) => {}
-                Some(Ok(Record::Metadata(metadata))) if metadata.name == ABOUT => {
+                Some(Ok(Record::Metadata(metadata))) if metadata.name == METADATA => {
                     let damaged = |reason| format!("the recording is damaged: {reason}");
-                    let about = opened(metadata.metadata).map_err(damaged)?;
+                    let about = verified(metadata.metadata).map_err(damaged)?;
                     let topics = BTreeMap::new();
                     return Ok(Self { records, about, topics, settings: None, ending: None, count: 0 });
                 }
@@ -74,12 +74,12 @@ impl<R: Read> Ticks<R> {
     }
 
     /// The end of a file that has all of its ticks: a chunk whose kind is damaged would be passed over.
-    fn ending_of(&self, texts: BTreeMap<String, String>) -> std::result::Result<Ending, String> {
-        let numbers = opened(texts)?;
+    fn end_of(&self, texts: BTreeMap<String, String>) -> std::result::Result<FileEnd, String> {
+        let numbers = verified(texts)?;
         let number = |name: &str| numbers.get(name).and_then(|number| number.parse::<u64>().ok());
         match number("ticks") {
             Some(ticks) if ticks != self.count => Err(format!("{} of {ticks} ticks are there", self.count)),
-            _ => Ok(Ending { dropped: number("dropped").unwrap_or(0) }),
+            _ => Ok(FileEnd { dropped: number("dropped").unwrap_or(0) }),
         }
     }
 
@@ -87,7 +87,7 @@ impl<R: Read> Ticks<R> {
         match record {
             Record::Channel(channel) => _ = self.topics.insert(channel.id, channel.topic),
             Record::Metadata(metadata) if metadata.name == END => {
-                self.ending = Some(self.ending_of(metadata.metadata)?);
+                self.ending = Some(self.end_of(metadata.metadata)?);
             }
             Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
                 Some(SETTINGS) => self.settings = Some(decoded::<SettingsMessage>(&data)?.settings()),

@@ -1,4 +1,4 @@
-//! What the messages are made of, in the words of ROS 2's interface definitions.
+//! Schemas of the messages, as ROS 2 interface definitions.
 
 const LINE: &str = "================================================================================\n";
 

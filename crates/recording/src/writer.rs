@@ -1,4 +1,4 @@
-//! Ticks as they go into a file.
+//! Writing of recorded ticks to a file.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -10,16 +10,16 @@ use palpate_core::simulation::Strike;
 use palpate_servo::{FaultReason, Settings, TickRecord};
 use serde::Serialize;
 
+use crate::checksummed::with_checksum;
 use crate::messages::{Log, PoseStamped, SettingsMessage, Tick, Time, WrenchStamped, same_settings};
 use crate::schemas::{NAMES, definition};
-use crate::sealed::sealed;
 
 /// Topics that there are once; those of a tool follow, two a tool.
 pub(crate) const TICKS: &str = "/ticks";
 pub(crate) const SETTINGS: &str = "/settings";
 const EVENTS: &str = "/events";
 /// Name of the record that says what was recorded, and of that which says how it ended.
-pub(crate) const ABOUT: &str = "palpate";
+pub(crate) const METADATA: &str = "palpate";
 pub(crate) const END: &str = "palpate_end";
 /// Poses and wrenches a second in the messages that every viewer of ROS 2 knows; the ticks have all of them.
 const VIEW_RATE: f64 = 50.0;
@@ -83,7 +83,7 @@ impl<W: Write + Seek> TickWriter<W> {
             .chunk_size(None)
             .disable_seeking(true);
         let mut file = options.create(file)?;
-        file.write_metadata(&Metadata { name: ABOUT.into(), metadata: sealed(header.about.clone()) })?;
+        file.write_metadata(&Metadata { name: METADATA.into(), metadata: with_checksum(header.about.clone()) })?;
         let mut schemas = Vec::new();
         for name in NAMES {
             schemas.push(file.add_schema(name, "ros2msg", definition(name).as_bytes())?);
@@ -132,7 +132,7 @@ impl<W: Write + Seek> TickWriter<W> {
             (self.settings, self.strike) = (Some(*settings), strike);
         }
         self.write(self.channels.ticks, record.tick, now_ns, &Tick::new(record, tools, stamp))?;
-        self.tell(record, now_ns)?;
+        self.write_summary(record, now_ns)?;
         let every = (self.header.rate / VIEW_RATE).round().max(1.0) as u64;
         if record.tick.is_multiple_of(every) { self.show(record, now_ns) } else { Ok(()) }
     }
@@ -153,13 +153,13 @@ impl<W: Write + Seek> TickWriter<W> {
         let dropped = self.dropped + made.map_or(0, |made| made.saturating_sub(self.next));
         let numbers = [("ticks", self.next - self.dropped), ("dropped", dropped)];
         let metadata = numbers.into_iter().map(|(name, number)| (name.to_owned(), number.to_string())).collect();
-        self.file.write_metadata(&Metadata { name: END.into(), metadata: sealed(metadata) })?;
+        self.file.write_metadata(&Metadata { name: END.into(), metadata: with_checksum(metadata) })?;
         self.file.finish()?;
         Ok(self.file.into_inner())
     }
 
     /// What people want to know of a tick.
-    fn tell(&mut self, record: &TickRecord, now_ns: u64) -> mcap::McapResult<()> {
+    fn write_summary(&mut self, record: &TickRecord, now_ns: u64) -> mcap::McapResult<()> {
         let input = &record.input;
         if input.reset {
             self.event(INFO, "reset: everything was let go of", now_ns)?;

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 use palpate_core::simulation::Strike;
 use palpate_devices::{Buttons, Device, DeviceFault, Pose, Reading, Twist};
-use palpate_recording::{Ending, Header, Recorder, TickWriter, Ticks};
+use palpate_recording::{FileEnd, Header, Recorder, TickWriter, Ticks};
 use palpate_servo::{FaultReason, ForceLoop, LoopHandle, SafetyLimits, Settings, TickRecord};
 
 use common::{PERIOD, PERIOD_NS, device, scene, settings};
@@ -82,7 +82,7 @@ fn written(records: &[TickRecord], made: u64) -> Vec<u8> {
     writer.finish(Some(made)).expect("room in memory").into_inner()
 }
 
-fn read<R: Read>(mut ticks: Ticks<R>) -> (Vec<TickRecord>, Option<Ending>) {
+fn read<R: Read>(mut ticks: Ticks<R>) -> (Vec<TickRecord>, Option<FileEnd>) {
     let records = ticks.by_ref().collect::<palpate_core::Result<Vec<_>>>().expect("whole messages");
     (records, ticks.ending)
 }
@@ -108,7 +108,7 @@ fn every_bit_is_read_again() {
     let file = of_bytes(&bytes).expect("a file of ours");
     assert_eq!(file.about["scene"], "two cubes");
     let (again, ending) = read(file);
-    assert_eq!(ending, Some(Ending { dropped: 0 }));
+    assert_eq!(ending, Some(FileEnd { dropped: 0 }));
     assert_eq!(again.len(), records.len());
     for (a, b) in again.iter().zip(&records) {
         assert_eq!(text(a), text(b));
@@ -183,7 +183,7 @@ fn what_was_dropped_is_counted_and_told() {
         assert!(told.contains(expected), "{expected}: {told}");
     }
     let (again, ending) = read(of_bytes(&bytes).expect("a file of ours"));
-    assert_eq!((again.len() as u64, ending), (TICKS - 12, Some(Ending { dropped: 17 })));
+    assert_eq!((again.len() as u64, ending), (TICKS - 12, Some(FileEnd { dropped: 17 })));
 }
 
 fn scratch(name: &str) -> PathBuf {
@@ -208,7 +208,7 @@ fn a_thread_beside_the_loop_writes_the_file() {
     assert_eq!((status.ticks, status.error), (TICKS, None));
     assert_eq!(std::fs::metadata(&path).expect("a file").len(), status.bytes);
     let (all, ending) = read(Ticks::open(&path).expect("a file of ours"));
-    assert_eq!((all.len() as u64, ending), (TICKS, Some(Ending { dropped: 0 })));
+    assert_eq!((all.len() as u64, ending), (TICKS, Some(FileEnd { dropped: 0 })));
     let (_unused, ring) = rtrb::RingBuffer::new(1);
     let refused = Recorder::start(&path, header(), ring).err().expect("the file is there").to_string();
     assert!(refused.ends_with("beside.mcap: exists: give another name, or delete it first"), "{refused}");

@@ -1,4 +1,4 @@
-//! A body of a scene: its Green's function, where it stands, and what is known of it beyond.
+//! A body of a scene: its Green's function, its placement, and its optional motion, strain measure and elastic constants.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use palpate_core::green::GreensFunction;
 use palpate_core::simulation::{BodyDynamics, BodyModel, Placement};
 use palpate_core::strain::StrainMeasure;
 
-use crate::bare::moduli_of_store;
+use crate::store_defaults::moduli_of_store;
 
 /// Modes of a body and how they are integrated.
 #[derive(Clone, Debug)]

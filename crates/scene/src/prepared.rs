@@ -1,20 +1,20 @@
-//! What a force loop takes.
+//! Preparation of a scene for a force loop: model, limits, settings and devices.
 
 use std::sync::Arc;
 
 use palpate_core::Result;
-use palpate_core::simulation::{BodyModel, Kept, Model, ToolModel};
+use palpate_core::simulation::{BodyModel, Model, PreviousRanks, ToolModel};
 use palpate_devices::{Device, DeviceLimits};
 use palpate_servo::{SafetyLimits, SceneChange, Scheduling, Servo, Settings, StrainPreparer};
 
-use crate::bare::require_precise;
 use crate::body::Body;
 use crate::graph::{BodyId, Scene, ToolId};
+use crate::store_defaults::require_precise;
 use crate::tool::Tool;
 
 /// A scene as a force loop takes it; bodies and tools by their ranks in the scene.
 #[derive(Clone)]
-pub struct Prepared {
+pub struct PreparedScene {
     /// Bodies and tools.
     pub model: Arc<Model>,
     /// Handles of the bodies.
@@ -38,7 +38,7 @@ impl Scene {
     ///
     /// # Errors
     /// No body or no tool; constants, modes or radii that a body cannot take; a store that is not precise enough.
-    pub fn prepare(&self) -> Result<Prepared> {
+    pub fn prepare(&self) -> Result<PreparedScene> {
         self.prepared_with(None)
     }
 
@@ -46,19 +46,19 @@ impl Scene {
     ///
     /// # Errors
     /// As of [`Scene::prepare`].
-    pub fn prepare_change(&self, before: &Prepared) -> Result<(Prepared, Kept)> {
+    pub fn prepare_change(&self, before: &PreparedScene) -> Result<(PreparedScene, PreviousRanks)> {
         let prepared = self.prepared_with(Some(before))?;
-        let mut kept = Kept::default();
-        for (kept, id) in kept.bodies.iter_mut().zip(&prepared.bodies) {
-            *kept = before.rank_of_body(*id);
+        let mut previous_ranks = PreviousRanks::default();
+        for (rank, id) in previous_ranks.bodies.iter_mut().zip(&prepared.bodies) {
+            *rank = before.rank_of_body(*id);
         }
-        for (kept, id) in kept.tools.iter_mut().zip(&prepared.tools) {
-            *kept = before.rank_of_tool(*id);
+        for (rank, id) in previous_ranks.tools.iter_mut().zip(&prepared.tools) {
+            *rank = before.rank_of_tool(*id);
         }
-        Ok((prepared, kept))
+        Ok((prepared, previous_ranks))
     }
 
-    fn prepared_with(&self, before: Option<&Prepared>) -> Result<Prepared> {
+    fn prepared_with(&self, before: Option<&PreparedScene>) -> Result<PreparedScene> {
         for (_, body) in self.bodies() {
             require_precise(&body.green, &body.name)?;
         }
@@ -72,7 +72,7 @@ impl Scene {
         }
         let bodies = self.bodies().map(|(id, body)| body_model(id, body, before)).collect::<Result<Vec<_>>>()?;
         let model = match before {
-            Some(before) if self.is_as_in(before, &bodies, &tools) => before.model.clone(),
+            Some(before) if self.matches(before, &bodies, &tools) => before.model.clone(),
             Some(before) => Arc::new(before.model.changed(bodies, tools)?),
             None => Arc::new(Model::new(bodies, tools)?),
         };
@@ -82,7 +82,7 @@ impl Scene {
         for (rank, (_, body)) in self.bodies().enumerate() {
             body.strain.iter().for_each(|measure| strain.set_measure(rank, measure.clone()));
         }
-        Ok(Prepared {
+        Ok(PreparedScene {
             bodies: self.bodies().map(|(id, _)| id).collect(),
             tools: self.tools().map(|(id, _)| id).collect(),
             devices: self.tools().map(|(_, tool)| tool.device).collect(),
@@ -95,7 +95,7 @@ impl Scene {
     }
 
     /// Whether bodies and tools are those of `before`, at the same places: devices and measures of strain may differ.
-    fn is_as_in(&self, before: &Prepared, bodies: &[BodyModel], tools: &[ToolModel]) -> bool {
+    fn matches(&self, before: &PreparedScene, bodies: &[BodyModel], tools: &[ToolModel]) -> bool {
         let same_body = |(one, other): (&BodyModel, &BodyModel)| one.is_same(other) && one.placement == other.placement;
         let same_tool = |(one, other): (&ToolModel, &ToolModel)| one.max_stiffness == other.max_stiffness;
         self.tools().map(|(id, _)| id).eq(before.tools.iter().copied())
@@ -105,7 +105,7 @@ impl Scene {
     }
 
     /// A tool that stays keeps its size, though the bodies that it followed may be gone.
-    fn tool_model(&self, id: ToolId, tool: &Tool, before: Option<&Prepared>) -> Result<(ToolModel, f64)> {
+    fn tool_model(&self, id: ToolId, tool: &Tool, before: Option<&PreparedScene>) -> Result<(ToolModel, f64)> {
         let period = 1.0 / before.map_or(&self.scheduling, |before| &before.scheduling).rate;
         match before.and_then(|before| Some((before, before.rank_of_tool(id)?))) {
             Some((before, rank)) => {
@@ -118,7 +118,7 @@ impl Scene {
     }
 }
 
-impl Prepared {
+impl PreparedScene {
     /// Rank of a body.
     pub fn rank_of_body(&self, id: BodyId) -> Option<usize> {
         self.bodies.iter().position(|other| *other == id)
@@ -134,33 +134,33 @@ impl Prepared {
     ///
     /// # Errors
     /// See [`Servo::change`]; everything stays as it was.
-    pub fn go_on_with(
+    pub fn continue_with(
         &mut self,
-        next: Prepared,
-        kept: Kept,
+        next: PreparedScene,
+        previous_ranks: PreviousRanks,
         servo: Option<&mut Servo>,
         devices: Vec<Option<Box<dyn Device>>>,
     ) -> Result<()> {
-        let settings = self.settings.carried_over(&next.settings, &kept);
+        let settings = self.settings.carried_over(&next.settings, &previous_ranks);
         if let Some(servo) = servo {
             let (model, strain) = (next.model.clone(), next.strain.clone());
-            servo.change(SceneChange { model, kept, devices, settings, strain })?;
+            servo.change(SceneChange { model, previous_ranks, devices, settings, strain })?;
         }
         let (limits, scheduling) = (self.limits, self.scheduling.clone());
-        *self = Prepared { settings, limits, scheduling, ..next };
+        *self = PreparedScene { settings, limits, scheduling, ..next };
         Ok(())
     }
 }
 
 /// What belongs to each tool after a change: `fresh` where there is one, else what it had.
-pub fn carried_over<T>(before: Vec<T>, fresh: Vec<Option<T>>, kept: &Kept) -> Vec<T> {
+pub fn carried_over<T>(before: Vec<T>, fresh: Vec<Option<T>>, previous_ranks: &PreviousRanks) -> Vec<T> {
     let mut before: Vec<_> = before.into_iter().map(Some).collect();
     let mut stays = |old: Option<usize>| before.get_mut(old?)?.take();
-    fresh.into_iter().zip(kept.tools).filter_map(|(fresh, old)| fresh.or_else(|| stays(old))).collect()
+    fresh.into_iter().zip(previous_ranks.tools).filter_map(|(fresh, old)| fresh.or_else(|| stays(old))).collect()
 }
 
 /// A body of another store is made anew.
-fn body_model(id: BodyId, body: &Body, before: Option<&Prepared>) -> Result<BodyModel> {
+fn body_model(id: BodyId, body: &Body, before: Option<&PreparedScene>) -> Result<BodyModel> {
     let known = before.and_then(|before| before.model.bodies.get(before.rank_of_body(id)?));
     match known.filter(|known| std::ptr::eq(known.green(), &*body.green)) {
         Some(known) => Ok(known.placed(body.placement)),

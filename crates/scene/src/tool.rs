@@ -1,4 +1,4 @@
-//! A tool of a scene: what it looks like and how it touches.
+//! A tool of a scene: its shape and its contact law.
 
 use std::collections::BTreeMap;
 
@@ -7,8 +7,8 @@ use palpate_core::contact::shape::ToolShape;
 use palpate_core::simulation::{LawKind, ToolModel, contact_size};
 use palpate_devices::DeviceLimits;
 
-use crate::bare::{largest_contact_radius, suiting_radius};
 use crate::body::Body;
+use crate::store_defaults::{default_tool_radius, largest_contact_radius};
 
 /// Coulomb's coefficient where none is given.
 pub const DEFAULT_FRICTION: f64 = 0.3;
@@ -64,11 +64,11 @@ impl Tool {
         let smallest = |radius: fn(&Body) -> f64| bodies.clone().map(radius).fold(f64::INFINITY, f64::min);
         let shape = match &self.shape {
             Some(shape) => shape.clone(),
-            None => ToolShape::sphere(smallest(|body| suiting_radius(&body.green)))?,
+            None => ToolShape::sphere(smallest(|body| default_tool_radius(&body.green)))?,
         };
         let known = bodies.clone().all(|body| body.moduli.is_some());
-        let law = self.law.unwrap_or(if known { LawKind::Local } else { LawKind::Patch });
-        let suiting = || smallest(|body| largest_contact_radius(&body.green, suiting_radius(&body.green)));
+        let law = self.law.unwrap_or(if known { LawKind::LOCAL } else { LawKind::PATCH });
+        let suiting = || smallest(|body| largest_contact_radius(&body.green, default_tool_radius(&body.green)));
         let contact_radius = self.settings.get("contact_radius").copied().unwrap_or_else(suiting);
         let radius = contact_size(&shape);
         let (pad_youngs_modulus, max_stiffness) = (self.pad_youngs_modulus, self.rendered_stiffness(period));

@@ -64,10 +64,13 @@ fn a_change_keeps_bodies_tools_and_what_was_set_of_them() {
     assert!(scene.place_body(second, moved));
     let mut next = before.clone();
     next.settings = settings;
-    let (changed, kept) = scene.prepare_change(&before).expect("a scene");
-    next.go_on_with(changed, kept, None, Vec::new()).expect("no loop");
+    let (changed, previous_ranks) = scene.prepare_change(&before).expect("a scene");
+    next.continue_with(changed, previous_ranks, None, Vec::new()).expect("no loop");
     assert!(next.model.bodies[0].is_same(&before.model.bodies[1]) && next.model.bodies[0].placement == moved);
-    assert_eq!((kept.bodies[0], kept.tools[0], kept.tools[1]), (Some(1), before.rank_of_tool(old), None));
+    assert_eq!(
+        (previous_ranks.bodies[0], previous_ranks.tools[0], previous_ranks.tools[1]),
+        (Some(1), before.rank_of_tool(old), None)
+    );
     let now = next.settings;
     assert_eq!((now.friction[..2].to_vec(), now.stiffness_scale[0]), (vec![0.7, 0.2], 2.0));
     // What is not looked at in a tick changes without another model.
@@ -128,11 +131,11 @@ fn a_tool_that_nobody_sizes_suits_its_bodies() {
     let prepared = Scene::load(&path).and_then(|scene| scene.prepare()).expect("a scene of one store");
     std::fs::remove_file(&path).expect("the store");
     let tool = &prepared.model.tools[0];
-    assert_eq!((tool.radius, tool.law), (0.1 / 16.0, LawKind::Patch), "no constants at the surface: a patch");
+    assert_eq!((tool.radius, tool.law), (0.1 / 16.0, LawKind::PATCH), "no constants at the surface: a patch");
     let mut scene = Scene::default();
     scene.add_body(body(ONE)).expect("room");
     scene.add_tool(Tool::default()).expect("room");
-    assert_eq!(scene.prepare().expect("a scene").model.tools[0].law, LawKind::Local);
+    assert_eq!(scene.prepare().expect("a scene").model.tools[0].law, LawKind::LOCAL);
     // Wider than any patch can be: shortened to what the surface takes.
     assert!(largest_contact_radius(&green(""), 1e-3) == 1e-3);
 }

@@ -1,4 +1,4 @@
-//! How something that a tick must not make comes into a running loop, and what it replaces goes out.
+//! Hand-over of a prepared object to a running loop, in exchange for the one that it replaces.
 //!
 //! It is exchanged in one tick. The thread that offers it waits for that tick, or takes the offer back if none comes.
 
@@ -8,28 +8,28 @@ use std::time::Duration;
 
 use crate::exchange::{ExchangeEnd, ExchangeHandle, exchange_ends};
 
-/// How long, and how often at most, a tick is waited for.
-const WAIT: Duration = Duration::from_micros(500);
-const MOST_WAITS: u32 = 4000;
+/// Interval between two polls, and most polls: two seconds for a tick to accept an offer.
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
+const MAX_POLLS: u32 = 4000;
 
-/// Nobody has decided yet; the loop has taken it; whoever offered it has given up.
-const OPEN: u8 = 0;
-const TAKEN: u8 = 1;
-const GIVEN_UP: u8 = 2;
+/// States of an offer: pending; accepted by the loop; withdrawn by the sender.
+const PENDING: u8 = 0;
+const ACCEPTED: u8 = 1;
+const WITHDRAWN: u8 = 2;
 
 struct Offer<T> {
     item: T,
-    decided: Arc<AtomicU8>,
+    decision: Arc<AtomicU8>,
 }
 
 /// The loop's end.
 pub(crate) struct ChangeEnd<T>(ExchangeEnd<Box<Offer<T>>>);
 
-/// Everybody else's end.
+/// The other threads' end.
 pub(crate) struct ChangeHandle<T>(ExchangeHandle<Box<Offer<T>>>);
 
-/// What has come in, on its way out.
-pub(crate) struct Taken<T>(Box<Offer<T>>);
+/// An accepted offer: its item is exchanged, then it is sent back to be freed.
+pub(crate) struct AcceptedOffer<T>(Box<Offer<T>>);
 
 /// Both ends.
 pub(crate) fn change_ends<T>() -> (ChangeEnd<T>, ChangeHandle<T>) {
@@ -38,11 +38,11 @@ pub(crate) fn change_ends<T>() -> (ChangeEnd<T>, ChangeHandle<T>) {
 }
 
 impl<T> ChangeEnd<T> {
-    /// What was offered, if it still is; never allocates or frees.
-    pub fn take(&mut self) -> Option<Taken<T>> {
+    /// Accepts an offer that has not been withdrawn; never allocates or frees.
+    pub fn take(&mut self) -> Option<AcceptedOffer<T>> {
         let offer = self.0.take()?;
-        match offer.decided.compare_exchange(OPEN, TAKEN, Ordering::AcqRel, Ordering::Acquire) {
-            Ok(_) => Some(Taken(offer)),
+        match offer.decision.compare_exchange(PENDING, ACCEPTED, Ordering::AcqRel, Ordering::Acquire) {
+            Ok(_) => Some(AcceptedOffer(offer)),
             Err(_) => {
                 self.0.give_back(offer);
                 None
@@ -50,44 +50,44 @@ impl<T> ChangeEnd<T> {
         }
     }
 
-    /// Sends out what was taken.
-    pub fn give_back(&mut self, taken: Taken<T>) {
-        self.0.give_back(taken.0);
+    /// Sends an accepted offer back.
+    pub fn give_back(&mut self, accepted: AcceptedOffer<T>) {
+        self.0.give_back(accepted.0);
     }
 }
 
-impl<T> Taken<T> {
-    /// To be exchanged.
+impl<T> AcceptedOffer<T> {
+    /// The item, to be exchanged for the loop's own.
     pub fn item(&mut self) -> &mut T {
         &mut self.0.item
     }
 }
 
 impl<T> ChangeHandle<T> {
-    /// Offers something and waits until a tick has taken it, which it gives back: whether one did.
+    /// Offers an item and waits until a tick has accepted it. Returns whether one did.
     pub fn offer(&mut self, item: T) -> bool {
-        let decided = Arc::new(AtomicU8::new(OPEN));
-        if !self.0.offer(Box::new(Offer { item, decided: decided.clone() })) {
+        let decision = Arc::new(AtomicU8::new(PENDING));
+        if !self.0.offer(Box::new(Offer { item, decision: decision.clone() })) {
             return false;
         }
-        if self.comes_back() {
+        if self.wait_for_return() {
             return true;
         }
-        if decided.compare_exchange(OPEN, GIVEN_UP, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+        if decision.compare_exchange(PENDING, WITHDRAWN, Ordering::AcqRel, Ordering::Acquire).is_ok() {
             return false;
         }
         // Taken at the last moment: its tick is under way.
-        self.comes_back();
+        self.wait_for_return();
         true
     }
 
-    /// Waits for what a tick gives back.
-    fn comes_back(&mut self) -> bool {
-        for _ in 0..MOST_WAITS {
+    /// Waits until the offer comes back.
+    fn wait_for_return(&mut self) -> bool {
+        for _ in 0..MAX_POLLS {
             if self.0.free() {
                 return true;
             }
-            std::thread::sleep(WAIT);
+            std::thread::sleep(POLL_INTERVAL);
         }
         false
     }

@@ -9,16 +9,16 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use palpate_core::simulation::{Kept, Model, State, Strike};
+use palpate_core::simulation::{Model, PreviousRanks, State, Strike};
 use palpate_core::{Error, Result};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::settings::{Settings, check_body, refuse_unless};
 
 /// Commands that may wait for a tick.
-const MOST_WAITING: usize = 1024;
+const MAX_PENDING: usize = 1024;
 /// Strikes among them, and those that wait for room on their body.
-const MOST_STRIKES: usize = 64;
+const MAX_PENDING_STRIKES: usize = 64;
 
 #[derive(Clone, Copy)]
 enum Command {
@@ -29,7 +29,7 @@ enum Command {
 
 /// The loop's end.
 pub(crate) struct CommandEnd {
-    waiting: Consumer<Command>,
+    pending: Consumer<Command>,
     /// Strikes that are next; never more than it has room for.
     strikes: VecDeque<Strike>,
     /// Strikes in the ring and in `strikes`.
@@ -40,17 +40,17 @@ pub(crate) struct CommandEnd {
 
 /// The senders' end.
 pub(crate) struct CommandHandle {
-    waiting: Producer<Command>,
+    pending: Producer<Command>,
     strike_count: Arc<AtomicUsize>,
 }
 
 /// Both ends.
 pub(crate) fn command_ends() -> (CommandEnd, CommandHandle) {
-    let (sender, waiting) = RingBuffer::new(MOST_WAITING);
+    let (sender, pending) = RingBuffer::new(MAX_PENDING);
     let strike_count = Arc::new(AtomicUsize::new(0));
-    let strikes = VecDeque::with_capacity(MOST_STRIKES);
-    let end = CommandEnd { waiting, strikes, strike_count: strike_count.clone(), reset: false };
-    (end, CommandHandle { waiting: sender, strike_count })
+    let strikes = VecDeque::with_capacity(MAX_PENDING_STRIKES);
+    let end = CommandEnd { pending, strikes, strike_count: strike_count.clone(), reset: false };
+    (end, CommandHandle { pending: sender, strike_count })
 }
 
 impl CommandHandle {
@@ -67,8 +67,8 @@ impl CommandHandle {
     /// Sends a strike.
     pub fn strike(&mut self, model: &Model, strike: Strike) -> Result<()> {
         check_body(model, strike.body, "strike")?;
-        refuse_unless(self.strike_count.load(Ordering::Relaxed) < MOST_STRIKES, || {
-            format!("{MOST_STRIKES} strikes wait already: the loop gives one a tick, and four at once to a body")
+        refuse_unless(self.strike_count.load(Ordering::Relaxed) < MAX_PENDING_STRIKES, || {
+            format!("{MAX_PENDING_STRIKES} strikes wait already: the loop gives one a tick, and four at once to a body")
         })?;
         // Counted first: the loop may take it at once.
         self.strike_count.fetch_add(1, Ordering::Relaxed);
@@ -81,12 +81,12 @@ impl CommandHandle {
 
     /// Whether nothing more can be sent until a tick.
     pub fn is_full(&self) -> bool {
-        self.waiting.is_full()
+        self.pending.is_full()
     }
 
     fn push(&mut self, command: Command) -> Result<()> {
-        let full = |_| Error::Invalid(format!("{MOST_WAITING} changes wait already: the loop does not tick"));
-        self.waiting.push(command).map_err(full)
+        let full = |_| Error::Invalid(format!("{MAX_PENDING} changes wait already: the loop does not tick"));
+        self.pending.push(command).map_err(full)
     }
 }
 
@@ -94,13 +94,13 @@ impl CommandEnd {
     /// Takes the commands of one tick and puts settings in force: whether everything is reset. Never allocates.
     pub fn receive(&mut self, settings: &mut Settings) -> bool {
         let before = std::mem::take(&mut self.reset);
-        let Ok(chunk) = self.waiting.read_chunk(self.waiting.slots()) else { return before };
+        let Ok(chunk) = self.pending.read_chunk(self.pending.slots()) else { return before };
         let (first, second) = chunk.as_slices();
         let commands = || first.iter().chain(second);
         let resets = commands().enumerate().filter(|(_, command)| matches!(command, Command::Reset));
         // What was sent before the last reset is over.
-        let overtaken = resets.last().map_or(0, |(rank, _)| rank + 1);
-        if overtaken > 0 {
+        let superseded = resets.last().map_or(0, |(rank, _)| rank + 1);
+        if superseded > 0 {
             self.strike_count.fetch_sub(self.strikes.len(), Ordering::Relaxed);
             self.strikes.clear();
         }
@@ -110,7 +110,7 @@ impl CommandEnd {
             match command {
                 Command::Set(sent) => *settings = *sent,
                 Command::Reset => {}
-                Command::Strike(_) if taken <= overtaken => {
+                Command::Strike(_) if taken <= superseded => {
                     self.strike_count.fetch_sub(1, Ordering::Relaxed);
                 }
                 Command::Strike(strike) => {
@@ -120,7 +120,7 @@ impl CommandEnd {
             }
         }
         chunk.commit(taken);
-        before || overtaken > 0
+        before || superseded > 0
     }
 
     /// The next strike, if its body has room for it.
@@ -132,8 +132,8 @@ impl CommandEnd {
     }
 
     /// Goes on with another scene, whose settings came with it: strikes follow their bodies, or end with them.
-    pub fn follow(&mut self, kept: &Kept) {
-        while let Ok(command) = self.waiting.pop() {
+    pub fn remap(&mut self, previous_ranks: &PreviousRanks) {
+        while let Ok(command) = self.pending.pop() {
             match command {
                 Command::Set(_) => {}
                 Command::Reset => {
@@ -146,7 +146,7 @@ impl CommandEnd {
         }
         let before = self.strikes.len();
         self.strikes.retain_mut(|strike| {
-            let rank = kept.bodies.iter().position(|&old| old == Some(strike.body));
+            let rank = previous_ranks.bodies.iter().position(|&old| old == Some(strike.body));
             rank.map(|rank| strike.body = rank).is_some()
         });
         self.strike_count.fetch_sub(before - self.strikes.len(), Ordering::Relaxed);

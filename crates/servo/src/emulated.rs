@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use palpate_core::Result;
 use palpate_core::simulation::{MAX_TOOLS, Model};
-use palpate_devices::emulated::{EmulatedDevice, Handle, Truth};
+use palpate_devices::emulated::{EmulatedDevice, Handle, TrueMotion};
 use palpate_devices::{Device, Reading, Wrench};
 
 use crate::force_loop::ForceLoop;
@@ -34,7 +34,7 @@ pub struct EmulatedTick {
     /// Since the start.
     pub number: usize,
     /// What the tips do when they are read.
-    pub truths: [Truth; MAX_TOOLS],
+    pub true_motions: [TrueMotion; MAX_TOOLS],
     /// What the devices say of it.
     pub readings: [Reading; MAX_TOOLS],
     /// What goes out to them.
@@ -57,7 +57,7 @@ impl Emulation<'_> {
             devices.into_iter().map(|(handle, device)| (handle, Box::new(device) as Box<dyn Device>)).unzip();
         let (mut force_loop, mut handle) =
             ForceLoop::with_clock(self.model.clone(), devices, self.limits, self.settings, || 0)?;
-        force_loop.limit_strain_of(self.strain.known());
+        force_loop.limit_strain_of(self.strain.limitable());
         let mut preparation = Preparation::new(handle.take_strain()?, self.strain);
         for number in 0.. {
             preparation.hand_over(number);
@@ -66,7 +66,10 @@ impl Emulation<'_> {
             let status = &handle.latest().status;
             let (readings, wrenches, fault) = (status.readings, status.wrenches, status.fault);
             let mut tick = EmulatedTick { number, readings, wrenches, fault, ..EmulatedTick::default() };
-            tick.truths.iter_mut().zip(&mut handles).for_each(|(truth, device)| *truth = device.truth());
+            tick.true_motions
+                .iter_mut()
+                .zip(&mut handles)
+                .for_each(|(true_motion, device)| *true_motion = device.true_motion());
             if each(&tick, &mut handles).is_break() {
                 break;
             }

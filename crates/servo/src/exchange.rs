@@ -1,7 +1,7 @@
-//! Two rings between a running loop and another thread: what a tick must not make comes in through one, and what it replaces
-//! goes out through the other, for memory must not be freed in a tick.
+//! Two rings between a running loop and another thread: objects made off the tick come in through one, and the
+//! ones they replace go out through the other, for memory must not be freed in a tick.
 //!
-//! Wait-free for both ends. The loop takes something in only where what goes out for it has room.
+//! Wait-free for both ends. The loop takes an object in only if the outgoing ring has room for the one it replaces.
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -11,7 +11,7 @@ pub(crate) struct ExchangeEnd<In, Out = In> {
     outgoing: Producer<Out>,
 }
 
-/// Everybody else's end.
+/// The other threads' end.
 pub(crate) struct ExchangeHandle<In, Out = In> {
     incoming: Producer<In>,
     outgoing: Consumer<Out>,

@@ -5,16 +5,18 @@ use std::sync::Arc;
 
 use palpate_core::Result;
 use palpate_core::memory::Ranges;
-use palpate_core::simulation::{Input, Kept, MAX_BODIES, MAX_TOOLS, Model, Output, Scratch, State, ToolInput, step};
+use palpate_core::simulation::{
+    Input, MAX_BODIES, MAX_TOOLS, Model, Output, PreviousRanks, Scratch, State, ToolInput, step,
+};
 use palpate_devices::{Device, DeviceLimits, Wrench};
 
-use crate::change::{ChangeEnd, ChangeHandle, Taken, change_ends};
+use crate::change::{AcceptedOffer, ChangeEnd, ChangeHandle, change_ends};
 use crate::clock;
 use crate::handoff::{LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
 use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::record::{RecordedInput, RecordedTool, StrainArrivals, recorded_port};
-use crate::safety::{Computed, Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
+use crate::safety::{ComputedWrench, Fault, FaultReason, SafetyLimits, SafetyStage, check_stiffness};
 use crate::settings::{Settings, refuse_unless};
 use crate::timing::{Clock, Timing};
 
@@ -31,7 +33,7 @@ pub struct ForceLoop {
     /// A fault of the whole loop.
     fault: Option<FaultReason>,
     ends: LoopEnds,
-    /// Where another scene comes in, and the other end until somebody takes it.
+    /// Hand-over of another scene, and its other end until it is taken.
     changes: ChangeEnd<Successor>,
     change_handle: Option<ChangeHandle<Successor>>,
     settings: Settings,
@@ -44,7 +46,7 @@ pub struct ForceLoop {
     /// Row of the last tick: how long it took is known when it is over.
     row: Option<LogRow>,
     /// Bodies whose requests for strain find no room in a tick that is made again.
-    withheld: u32,
+    skipped: u32,
 }
 
 impl ForceLoop {
@@ -103,7 +105,7 @@ impl ForceLoop {
             limited: [false; MAX_BODIES],
             start_ns: None,
             row: None,
-            withheld: 0,
+            skipped: 0,
         };
         Ok((force_loop, handle))
     }
@@ -116,7 +118,7 @@ impl ForceLoop {
     pub fn tick(&mut self, now_ns: u64, period: f64) {
         if self.fault == Some(FaultReason::Panic) {
             // Nothing is taken up any more, and nobody is to find the ring full.
-            self.ends.commands.follow(&Kept::default());
+            self.ends.commands.remap(&PreviousRanks::default());
             return self.release();
         }
         if catch_unwind(AssertUnwindSafe(|| self.guarded_tick(now_ns, period))).is_err() {
@@ -144,7 +146,7 @@ impl ForceLoop {
     /// # Errors
     /// A loop whose strain is limited already; no thread from the operating system.
     pub fn limit_strain(&mut self, handle: &mut LoopHandle, preparer: StrainPreparer) -> Result<StrainWorker> {
-        self.limited = preparer.known();
+        self.limited = preparer.limitable();
         StrainWorker::start(handle.take_strain()?, preparer)
     }
 
@@ -166,12 +168,12 @@ impl ForceLoop {
 
     /// Readies a tick that is made again for what did not follow from its input: faults by timing or of drivers, and requests
     /// that found no room.
-    pub(crate) fn prepare_again(&mut self, input: &RecordedInput) {
+    pub(crate) fn prepare_replay(&mut self, input: &RecordedInput) {
         self.fault = input.fault;
         for (stage, fault) in self.stages.iter_mut().zip(input.tool_faults) {
             fault.into_iter().for_each(|fault| stage.latch(fault));
         }
-        self.withheld = input.strain.unasked;
+        self.skipped = input.strain.unsent;
     }
 
     /// The end through which another scene comes in.
@@ -191,7 +193,7 @@ impl ForceLoop {
         self.read_devices(&mut input, now_ns, period);
         let output = step(&self.model, &mut self.state, &mut self.scratch, &input);
         self.write_devices(&output, period);
-        self.ask_for_strain(&input);
+        self.request_strain(&input);
         self.account(now_ns, &output);
         self.publish();
         // Not before: whoever waits for it reads what was published.
@@ -204,28 +206,28 @@ impl ForceLoop {
         overrun.into_iter().for_each(|reason| self.latch(reason));
     }
 
-    /// Goes on as the loop that has come in, if one has; what it replaces. Never allocates or frees.
-    fn take_change(&mut self) -> Option<Taken<Successor>> {
+    /// Continues as the successor loop, if there is one, and returns the replaced one. Never allocates or frees.
+    fn take_change(&mut self) -> Option<AcceptedOffer<Successor>> {
         let mut taken = self.changes.take()?;
-        let Successor { force_loop, kept, keeps_device } = taken.item();
-        force_loop.go_on_from(self, kept, keeps_device);
+        let Successor { force_loop, previous_ranks, keeps_device } = taken.item();
+        force_loop.continue_from(self, previous_ranks, keeps_device);
         std::mem::swap(self, force_loop);
         // Whoever waits does so at the ends of the loop that was there first.
         std::mem::swap(&mut self.changes, &mut force_loop.changes);
         Some(taken)
     }
 
-    /// Takes over what goes on from the loop before, whose other devices are left without a wrench.
-    fn go_on_from(&mut self, before: &mut ForceLoop, kept: &Kept, keeps_device: &[bool]) {
+    /// Takes contacts, devices and hand-offs over from the previous loop. Devices that leave get no wrench.
+    fn continue_from(&mut self, before: &mut ForceLoop, previous_ranks: &PreviousRanks, keeps_device: &[bool]) {
         // A tool with another device is another hand at another place: what it held is let go of.
-        let mut kept = *kept;
-        for (tool, keeps) in kept.tools.iter_mut().zip(keeps_device) {
+        let mut previous_ranks = *previous_ranks;
+        for (tool, keeps) in previous_ranks.tools.iter_mut().zip(keeps_device) {
             *tool = tool.filter(|&old| *keeps && old < before.devices.len());
         }
-        let kept = &kept;
-        self.state.take_over(&mut before.state, kept, &self.model);
+        let previous_ranks = &previous_ranks;
+        self.state.take_over(&mut before.state, previous_ranks, &self.model);
         let moves = self.model.bodies.iter().any(|body| body.moves());
-        for (tool, old) in kept.tools.iter().enumerate() {
+        for (tool, old) in previous_ranks.tools.iter().enumerate() {
             let Some(old) = *old else { continue };
             std::mem::swap(&mut self.devices[tool], &mut before.devices[old]);
             std::mem::swap(&mut self.stages[tool], &mut before.stages[old]);
@@ -235,11 +237,11 @@ impl ForceLoop {
             let _ = device.write(Wrench::default());
         }
         std::mem::swap(&mut self.ends.commands, &mut before.ends.commands);
-        self.ends.commands.follow(kept);
+        self.ends.commands.remap(previous_ranks);
         self.status = Status {
-            readings: by_new_rank(&before.status.readings, kept),
-            wrenches: by_new_rank(&before.status.wrenches, kept),
-            ports: by_new_rank(&before.status.ports, kept),
+            readings: remap_by_rank(&before.status.readings, previous_ranks),
+            wrenches: remap_by_rank(&before.status.wrenches, previous_ranks),
+            ports: remap_by_rank(&before.status.ports, previous_ranks),
             ..before.status
         };
         std::mem::swap(&mut self.timing, &mut before.timing);
@@ -256,7 +258,7 @@ impl ForceLoop {
         recorder.begin_tick((now_ns, period), self.fault, &self.stages);
     }
 
-    /// What has come in through the hand-offs since the last tick.
+    /// Takes commands, changes and strain responses that have arrived since the last tick.
     fn receive(&mut self, period: f64) -> Input {
         let reset = self.ends.commands.receive(&mut self.settings);
         let mut controls = self.settings.controls(reset, period, &self.limited);
@@ -276,12 +278,12 @@ impl ForceLoop {
         Input { controls, ..Input::default() }
     }
 
-    /// What the devices say. A tool with a fault is out of the scene: what it would touch has no hand behind it.
+    /// Reads the devices. A tool with a fault is out of the scene.
     fn read_devices(&mut self, input: &mut Input, now_ns: u64, period: f64) {
         for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
             let said = device.read(now_ns, period);
             self.ends.recorder.input().readings[tool] = said;
-            let admitted = stage.admit(said, now_ns, period);
+            let admitted = stage.accept_reading(said, now_ns, period);
             let reading = &mut self.status.readings[tool];
             // What is published stays a place: a number that is none would end every picture of the scene.
             match admitted.filter(|said| said.pose.is_finite()) {
@@ -307,7 +309,7 @@ impl ForceLoop {
             if output.unsound[tool] {
                 stage.latch(FaultReason::ContactUnsound);
             }
-            let computed = Computed { law: output.unlimited[tool], limited: output.wrench_on_device[tool] };
+            let computed = ComputedWrench { law: output.unlimited[tool], limited: output.wrench_on_device[tool] };
             let wrench = stage.apply(computed, share, period);
             self.status.wrenches[tool] = wrench;
             self.status.ports[tool] = stage.energy();
@@ -319,10 +321,10 @@ impl ForceLoop {
         }
     }
 
-    fn ask_for_strain(&mut self, input: &Input) {
+    fn request_strain(&mut self, input: &Input) {
         let (ends, limits) = (&mut self.ends, &input.controls.strain_limit);
-        let unasked = ends.strain.ask(&self.state, limits, ends.recorder.number(), self.withheld);
-        ends.recorder.input().strain.unasked = unasked;
+        let unsent = ends.strain.ask(&self.state, limits, ends.recorder.number(), self.skipped);
+        ends.recorder.input().strain.unsent = unsent;
     }
 
     /// Numbers of this tick; the row of the last one goes out.
@@ -403,14 +405,14 @@ pub fn check_period(model: &Model, devices: &[DeviceLimits], period: f64) -> Res
 pub(crate) struct Successor {
     pub force_loop: ForceLoop,
     /// Which bodies and tools stay.
-    pub kept: Kept,
+    pub previous_ranks: PreviousRanks,
     /// Which tools keep their device.
     pub keeps_device: Vec<bool>,
 }
 
 /// Each new rank's value: of a tool that stays the one it had.
-fn by_new_rank<T: Copy + Default>(values: &[T; MAX_TOOLS], kept: &Kept) -> [T; MAX_TOOLS] {
-    kept.tools.map(|old| old.and_then(|old| values.get(old)).copied().unwrap_or_default())
+fn remap_by_rank<T: Copy + Default>(values: &[T; MAX_TOOLS], previous_ranks: &PreviousRanks) -> [T; MAX_TOOLS] {
+    previous_ranks.tools.map(|old| old.and_then(|old| values.get(old)).copied().unwrap_or_default())
 }
 
 /// The devices are left without a wrench.

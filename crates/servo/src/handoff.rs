@@ -1,4 +1,4 @@
-//! Both ends of the wait-free hand-offs between a force loop and everybody else.
+//! Wait-free hand-offs between a force loop and other threads, with both ends of each.
 //!
 //! The latest state goes out through a triple buffer. Settings, resets and strikes come in through one bounded ring, in order.
 //! Every tick goes into another ring, and is dropped and counted if nobody drains it. Nothing that another thread does can
@@ -41,13 +41,13 @@ pub(crate) struct LoopEnds {
     pub recorder: RecorderEnd,
 }
 
-/// Everybody else's ends.
+/// The other threads' ends.
 pub struct LoopHandle {
     model: Arc<Model>,
     commands: CommandHandle,
     published: Output<Published>,
     rows: Consumer<LogRow>,
-    /// For whoever prepares strain responses.
+    /// The end of the thread that prepares strain responses.
     strain: Option<PreparerEnd>,
     recorder: RecorderHandle,
 }
@@ -106,7 +106,7 @@ impl LoopHandle {
         self.commands.is_full()
     }
 
-    /// The end of whoever prepares strain responses.
+    /// The end of the thread that prepares strain responses.
     pub(crate) fn take_strain(&mut self) -> Result<PreparerEnd> {
         let taken = || Error::Invalid("the strain of this loop is limited already".into());
         self.strain.take().ok_or_else(taken)
@@ -123,11 +123,11 @@ impl LoopHandle {
 
     /// Whether a recording has begun, and not been ended.
     pub(crate) fn is_recorded(&self) -> bool {
-        self.recorder.is_begun()
+        self.recorder.is_recording()
     }
 
-    /// Belongs to the loop that has taken the place of this one's. Log and commands go on in the same rings.
-    pub(crate) fn go_on_as(&mut self, next: LoopHandle) {
+    /// Switches to the loop that has replaced this one's. Log and commands continue in the same rings.
+    pub(crate) fn switch_to(&mut self, next: LoopHandle) {
         let Self { model, published, strain, recorder, .. } = next;
         (self.model, self.published) = (model, published);
         (self.strain, self.recorder) = (strain, recorder);

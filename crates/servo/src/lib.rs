@@ -35,14 +35,14 @@ pub use log::{LogRow, RealtimeStatus, Status};
 pub use offline::{Recording, Script, rerun, run};
 pub use preparer::{StrainPreparer, StrainWorker};
 pub use record::{
-    RecordedContact, RecordedContacts, RecordedInput, RecordedOutput, RecordedTool, StrainArrivals, StrainAsked,
+    RecordedContact, RecordedContacts, RecordedInput, RecordedOutput, RecordedTool, StrainArrivals, StrainRequestId,
     TickRecord,
 };
 pub use recorder::RecordingProgress;
 pub use replay::{Difference, Owner, Replay};
-pub use safety::{Computed, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
+pub use safety::{ComputedWrench, Fault, FaultReason, PortEnergy, SafetyLimits, SafetyStage};
 pub use scheduling::Scheduling;
-pub use self_check::{LARGEST_FORCE, Seen, SelfCheck, Task};
+pub use self_check::{LARGEST_FORCE, Observation, SelfCheck, Task};
 pub use servo::{SceneChange, Servo};
 pub use settings::{Per, Setting, Settings};
 pub use statistics::{Histogram, Summary};

@@ -1,4 +1,4 @@
-//! What a tick leaves behind in numbers.
+//! Status and log row of a tick.
 
 use glam::DVec3;
 use palpate_core::dynamics::Energy;

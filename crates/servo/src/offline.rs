@@ -1,4 +1,4 @@
-//! The same ticks without a clock.
+//! Offline runs: the same ticks without a clock, from a script or from recorded inputs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedInput, TickRecord};
-use crate::replay::Replayed;
+use crate::replay::ReplayedDevice;
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::{Settings, check_node, refuse_unless};
 use crate::strain::{PreparerEnd, StrainAnswer};
@@ -71,9 +71,10 @@ pub fn run(
 ) -> Result<Recording> {
     check(model, script)?;
     let tools = model.tools.len();
-    let devices = (0..tools).map(|tool| Box::new(Scripted::new(script, tool, tools)) as Box<dyn Device>).collect();
+    let devices =
+        (0..tools).map(|tool| Box::new(ScriptedDevice::new(script, tool, tools)) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
-    force_loop.limit_strain_of(strain.known());
+    force_loop.limit_strain_of(strain.limitable());
     let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
     let mut strikes = script.strikes.iter().peekable();
@@ -120,10 +121,10 @@ pub fn rerun(
     inputs: impl IntoIterator<Item = Result<RecordedInput>>,
     mut each: impl FnMut(&TickRecord),
 ) -> Result<()> {
-    let (mut readings, devices): (Vec<_>, Vec<_>) = devices.iter().map(|&limits| Replayed::new(limits)).unzip();
+    let (mut readings, devices): (Vec<_>, Vec<_>) = devices.iter().map(|&limits| ReplayedDevice::new(limits)).unzip();
     let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
     let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
-    force_loop.limit_strain_of(strain.known());
+    force_loop.limit_strain_of(strain.limitable());
     let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
     let mut settings = settings;
@@ -160,7 +161,7 @@ impl<'a> Preparation<'a> {
 
     pub(crate) fn hand_over(&mut self, tick: usize) {
         while self.due.front().is_some_and(|(when, _)| *when <= tick) {
-            self.due.pop_front().into_iter().for_each(|(_, response)| self.end.hand_over(response));
+            self.due.pop_front().into_iter().for_each(|(_, response)| self.end.send(response));
         }
     }
 
@@ -189,14 +190,14 @@ fn check(model: &Model, script: &Script<'_>) -> Result<()> {
 }
 
 /// The device of one tool of a script. Its pose is commanded: it may jump.
-struct Scripted {
+struct ScriptedDevice {
     poses: std::vec::IntoIter<Pose>,
     grabs: std::vec::IntoIter<bool>,
     latest: Reading,
     limits: DeviceLimits,
 }
 
-impl Scripted {
+impl ScriptedDevice {
     fn new(script: &Script<'_>, tool: usize, tools: usize) -> Self {
         fn of_tool<T: Copy>(all: &[T], tool: usize, tools: usize) -> std::vec::IntoIter<T> {
             all.iter().copied().skip(tool).step_by(tools).collect::<Vec<_>>().into_iter()
@@ -213,7 +214,7 @@ impl Scripted {
     }
 }
 
-impl Device for Scripted {
+impl Device for ScriptedDevice {
     fn name(&self) -> &str {
         "script"
     }

@@ -1,4 +1,4 @@
-//! Who prepares strain responses: a thread beside the loop, or an offline run between its ticks.
+//! Preparation of strain responses, by a thread beside the loop or between the ticks of an offline run.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 #[cfg(feature = "offline")]
 use palpate_core::simulation::StrainWatch;
-use palpate_core::simulation::{Kept, MAX_BODIES, Model};
+use palpate_core::simulation::{MAX_BODIES, Model, PreviousRanks};
 #[cfg(feature = "offline")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
@@ -38,22 +38,22 @@ impl StrainPreparer {
     }
 
     /// For another model, with the measures of the bodies that stay.
-    pub fn changed(&self, model: &Arc<Model>, kept: &Kept) -> Self {
-        let measures = kept.bodies.map(|old| self.measures.get(old?).cloned().flatten());
+    pub fn for_model(&self, model: &Arc<Model>, previous_ranks: &PreviousRanks) -> Self {
+        let measures = previous_ranks.bodies.map(|old| self.measures.get(old?).cloned().flatten());
         Self { model: model.clone(), measures }
     }
 
     /// Whether the strain of each body can be limited.
-    pub(crate) fn known(&self) -> [bool; MAX_BODIES] {
+    pub(crate) fn limitable(&self) -> [bool; MAX_BODIES] {
         self.measures.each_ref().map(Option::is_some)
     }
 
     /// `None` for a body without a measure, or contacts whose strain cannot be prepared: the bound of the tick then stays.
     pub(crate) fn prepare(&self, request: &StrainRequest) -> Option<StrainAnswer> {
-        let (measure, body) = (self.measures[request.asked.body].as_ref()?, self.model.bodies.get(request.asked.body)?);
+        let (measure, body) = (self.measures[request.id.body].as_ref()?, self.model.bodies.get(request.id.body)?);
         let patches: Vec<_> = request.patches[..request.count].iter().map(|p| (p.nodes(), p.weights())).collect();
         let response = measure.prepare(body.green(), &patches, request.limit).ok()?;
-        Some((request.asked, Box::new(StrainWatch { response, serials: request.serials })))
+        Some((request.id, Box::new(StrainWatch { response, serials: request.serials })))
     }
 }
 
@@ -65,11 +65,11 @@ impl StrainPreparer {
     }
 
     /// The same.
-    pub fn changed(&self, _model: &Arc<Model>, _kept: &Kept) -> Self {
+    pub fn for_model(&self, _model: &Arc<Model>, _previous_ranks: &PreviousRanks) -> Self {
         Self {}
     }
 
-    pub(crate) fn known(&self) -> [bool; MAX_BODIES] {
+    pub(crate) fn limitable(&self) -> [bool; MAX_BODIES] {
         [false; MAX_BODIES]
     }
 
@@ -84,14 +84,14 @@ impl PreparerEnd {
     pub fn prepare_one(&mut self, preparer: &StrainPreparer) -> Option<Option<StrainAnswer>> {
         self.responses.free();
         let mut request = self.requests.pop().ok()?;
-        while self.requests.peek().is_ok_and(|next| next.asked.body == request.asked.body) {
+        while self.requests.peek().is_ok_and(|next| next.id.body == request.id.body) {
             request = self.requests.pop().ok()?;
         }
         Some(preparer.prepare(&request))
     }
 
     /// Hands a response to the loop. One that finds no room is lost; the tick keeps its own bound then.
-    pub fn hand_over(&mut self, response: StrainAnswer) {
+    pub fn send(&mut self, response: StrainAnswer) {
         self.responses.offer(response);
     }
 }
@@ -113,7 +113,7 @@ impl StrainWorker {
         let work = move || {
             while !stopped.load(Ordering::Acquire) {
                 match end.prepare_one(&preparer) {
-                    Some(Some(response)) => end.hand_over(response),
+                    Some(Some(response)) => end.send(response),
                     Some(None) => {}
                     None => std::thread::park(),
                 }

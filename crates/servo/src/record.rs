@@ -1,4 +1,4 @@
-//! What a tick leaves behind for a recorder: everything that came into it, bit for bit, and what it answered.
+//! Record of a tick: all of its input, bit for bit, and its output.
 //!
 //! The record has a fixed size and is pushed into a ring; a tick that finds the ring full goes on without it. What came in
 //! is enough to make the same tick again: the settings, the time, what the devices said, which strain responses came, and
@@ -7,11 +7,11 @@
 use glam::DVec3;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{
-    Contact, Contacts, LawKind, MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Mode, Model, State, Strike, Wrench,
+    Contact, Contacts, MAX_BODIES, MAX_CONTACTS, MAX_TOOLS, Mode, Model, State, Strike, Wrench,
 };
 use palpate_devices::{DeviceFault, Reading};
 
-use crate::safety::{Computed, FaultReason, PortEnergy};
+use crate::safety::{ComputedWrench, FaultReason, PortEnergy};
 use crate::settings::Settings;
 
 /// Requests for strain and responses that may be under way.
@@ -76,15 +76,15 @@ pub struct RecordedInput {
 /// Strain responses, named by what asked for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StrainArrivals {
-    arrived: [StrainAsked; IN_FLIGHT],
+    arrived: [StrainRequestId; IN_FLIGHT],
     count: usize,
     /// A bit for each body whose request found no room in the tick.
-    pub unasked: u32,
+    pub unsent: u32,
 }
 
-/// Which request a strain response answers.
+/// Identity of a strain request: its body and the tick that sent it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StrainAsked {
+pub struct StrainRequestId {
     /// Whose contacts.
     pub body: usize,
     /// The tick that asked, counted as in [`TickRecord::tick`].
@@ -93,7 +93,7 @@ pub struct StrainAsked {
 
 impl StrainArrivals {
     /// One more; beyond what can be under way it is left out.
-    pub fn push(&mut self, asked: StrainAsked) {
+    pub fn push(&mut self, asked: StrainRequestId) {
         if let Some(place) = self.arrived.get_mut(self.count) {
             *place = asked;
             self.count += 1;
@@ -106,7 +106,7 @@ impl StrainArrivals {
     }
 
     /// Those that came.
-    pub fn arrived(&self) -> &[StrainAsked] {
+    pub fn arrived(&self) -> &[StrainRequestId] {
         &self.arrived[..self.count]
     }
 }
@@ -126,7 +126,7 @@ pub struct RecordedOutput {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecordedTool {
     /// What the contact laws asked for, and what the limit of strain left of it.
-    pub computed: Computed,
+    pub computed: ComputedWrench,
     /// What went out to the device.
     pub wrench: Wrench,
     /// Energy at the device's port, given, owed and never paid, J, to five digits.
@@ -173,15 +173,15 @@ pub struct RecordedContact {
     pub stiffness: f32,
 }
 
-/// Torque that nobody feels, N m: what rounding leaves of that of a sphere without friction.
+/// Torques below this are rounding errors, N m: those of a sphere without friction.
 const LEAST_TORQUE: f64 = 1e-12;
 
-fn felt(torque: DVec3) -> DVec3 {
+fn without_rounding(torque: DVec3) -> DVec3 {
     if torque.abs().max_element() < LEAST_TORQUE { DVec3::ZERO } else { torque }
 }
 
 /// The nearest number of 16 binary digits, five decimal ones: the bytes that stay zero take no room in a compressed file.
-fn brief(number: f64) -> f32 {
+fn rounded(number: f64) -> f32 {
     let single = number as f32;
     // A carry into the exponent is right, but for what is not finite.
     if single.is_finite() { f32::from_bits((single.to_bits() + 0x80) & !0xff) } else { single }
@@ -220,29 +220,27 @@ impl FromIterator<RecordedContact> for RecordedContacts {
 impl RecordedContact {
     fn of(model: &Model, contact: &Contact) -> Self {
         let placement = &model.bodies[contact.body].placement;
-        let local = contact.law == LawKind::Local;
-        let of_local = |value: f64| if local { brief(value) } else { 0.0 };
-        let vector = |vector: DVec3| vector.to_array().map(brief);
+        let vector = |vector: DVec3| vector.to_array().map(rounded);
         Self {
             tool: contact.tool as u8,
             body: contact.body as u8,
             mode: contact.mode,
-            slipping: contact.local.slipping,
+            slipping: contact.slipping,
             limited: contact.limited,
             point: vector(placement.point_to_world(contact.point)),
             normal: vector(placement.vector_to_world(contact.normal)),
             force: vector(placement.vector_to_world(contact.force)),
-            torque: vector(felt(-placement.vector_to_world(contact.local.torque))),
-            radius: of_local(contact.local.radius),
-            depth: of_local(contact.local.depth),
-            stiffness: of_local(contact.local.stiffness),
+            torque: vector(without_rounding(-placement.vector_to_world(contact.torque))),
+            radius: rounded(contact.radius),
+            depth: rounded(contact.depth),
+            stiffness: rounded(contact.stiffness),
         }
     }
 }
 
 /// Energy at a port, to five digits.
 pub(crate) fn recorded_port(port: PortEnergy) -> [f32; 3] {
-    [port.given, port.owed, port.unpaid].map(brief)
+    [port.given, port.owed, port.unpaid].map(rounded)
 }
 
 /// Time and energies of the bodies in motion.
@@ -261,10 +259,10 @@ mod tests {
     #[test]
     fn five_digits_are_kept() {
         for number in [1.0, -0.123456789, 3.0e-5, 7.77e4, 0.999999, 1.0 + 1.0 / 65536.0] {
-            let error = (f64::from(brief(number)) / number - 1.0).abs();
-            assert!(error <= 0.5 / 32768.0 && brief(number).to_bits() & 0xff == 0, "{number} {error}");
+            let error = (f64::from(rounded(number)) / number - 1.0).abs();
+            assert!(error <= 0.5 / 32768.0 && rounded(number).to_bits() & 0xff == 0, "{number} {error}");
         }
-        assert_eq!(brief(0.0), 0.0);
-        assert!(brief(f64::NAN).is_nan() && brief(f64::INFINITY).is_infinite());
+        assert_eq!(rounded(0.0), 0.0);
+        assert!(rounded(f64::NAN).is_nan() && rounded(f64::INFINITY).is_infinite());
     }
 }

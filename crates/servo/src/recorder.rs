@@ -1,4 +1,4 @@
-//! How a recording begins and ends within a running loop.
+//! Start and end of a recording in a running loop.
 //!
 //! A recording can be made again bit for bit if it begins from a known state: at rest, nothing touched, at the start of the
 //! safety ramp. That state is made beside the loop, and exchanged for the loop's own within one tick. The same way the ring
@@ -17,16 +17,16 @@ const RECORDS: usize = 4096;
 /// Exchanges that may be under way.
 const EXCHANGES: usize = 2;
 
-/// What a recording begins with.
-pub(crate) struct Beginning {
+/// The state that a recording starts from: at rest, without contacts.
+pub(crate) struct StartState {
     pub state: State,
     pub stages: Vec<SafetyStage>,
     pub records: Option<Producer<TickRecord>>,
 }
 
-/// What comes in, and goes back.
+/// Requests to the loop; each goes back with the memory that it replaced.
 pub(crate) enum Request {
-    Begin(Box<Beginning>),
+    Begin(Box<StartState>),
     End,
     /// On its way to where its memory may be freed.
     Ended(#[expect(dead_code)] Producer<TickRecord>),
@@ -55,12 +55,12 @@ pub struct RecordingProgress {
     pub dropped: u64,
 }
 
-/// Everybody else's end.
+/// The other threads' end.
 pub(crate) struct RecorderHandle {
     exchange: ExchangeHandle<Request>,
     /// As at the start of a loop.
     stages: Vec<SafetyStage>,
-    begun: bool,
+    is_recording: bool,
 }
 
 /// Both ends.
@@ -74,30 +74,30 @@ pub(crate) fn recorder_ends(stages: &[SafetyStage]) -> (RecorderEnd, RecorderHan
         first: 0,
         progress: RecordingProgress::default(),
     };
-    (end, RecorderHandle { exchange, stages: stages.to_vec(), begun: false })
+    (end, RecorderHandle { exchange, stages: stages.to_vec(), is_recording: false })
 }
 
 impl RecorderHandle {
     /// Has the loop begin anew and push a record of each tick into the ring whose other end this is.
     pub fn begin(&mut self, model: &Model) -> Result<Consumer<TickRecord>> {
-        if std::mem::replace(&mut self.begun, true) {
+        if std::mem::replace(&mut self.is_recording, true) {
             return Err(Error::Invalid("the loop is being recorded already".into()));
         }
         let (producer, consumer) = RingBuffer::new(RECORDS);
-        let beginning = Beginning { state: State::new(model), stages: self.stages.clone(), records: Some(producer) };
-        self.begun = self.exchange.offer(Request::Begin(Box::new(beginning)));
+        let beginning = StartState { state: State::new(model), stages: self.stages.clone(), records: Some(producer) };
+        self.is_recording = self.exchange.offer(Request::Begin(Box::new(beginning)));
         let busy = || Error::Invalid("the loop has not yet ended the last recording: try again".into());
-        self.begun.then_some(consumer).ok_or_else(busy)
+        self.is_recording.then_some(consumer).ok_or_else(busy)
     }
 
     /// Whether a recording has begun, and not been ended.
-    pub fn is_begun(&self) -> bool {
-        self.begun
+    pub fn is_recording(&self) -> bool {
+        self.is_recording
     }
 
     /// Has the loop stop recording.
     pub fn end(&mut self) {
-        if std::mem::replace(&mut self.begun, false) {
+        if std::mem::replace(&mut self.is_recording, false) {
             self.exchange.offer(Request::End);
         }
     }

@@ -1,4 +1,4 @@
-//! Recorded ticks made again, and what differs.
+//! Replay of recorded ticks, and the differences from the recording.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -15,7 +15,7 @@ use crate::force_loop::ForceLoop;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::LogRow;
 use crate::preparer::StrainPreparer;
-use crate::record::{RecordedContact, RecordedInput, RecordedOutput, RecordedTool, StrainAsked, TickRecord};
+use crate::record::{RecordedContact, RecordedInput, RecordedOutput, RecordedTool, StrainRequestId, TickRecord};
 use crate::safety::SafetyLimits;
 use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainRequest};
@@ -85,12 +85,12 @@ impl Replay {
     ) -> Result<Self> {
         let (mut readings, mut replayed) = (Vec::new(), Vec::new());
         for &limits in devices {
-            let (producer, device) = Replayed::new(limits);
+            let (producer, device) = ReplayedDevice::new(limits);
             readings.push(producer);
             replayed.push(Box::new(device) as Box<dyn Device>);
         }
         let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), replayed, limits, settings, || 0)?;
-        force_loop.limit_strain_of(strain.known());
+        force_loop.limit_strain_of(strain.limitable());
         let (records, end) = (handle.begin_recording()?, handle.take_strain()?);
         let tools = model.tools.len();
         Ok(Self { force_loop, handle, readings, records, strain, end, requests: VecDeque::new(), tools, longest_ns: 0 })
@@ -101,7 +101,7 @@ impl Replay {
     /// # Errors
     /// Settings that the model refuses.
     pub fn tick(&mut self, recorded: &TickRecord) -> Result<Vec<Difference>> {
-        let replayed = self.tick_again(&recorded.input)?;
+        let replayed = self.repeat_tick(&recorded.input)?;
         let Some(replayed) = replayed else { return Ok(Vec::new()) };
         let mut differences = Differences { tick: recorded.tick, of: Owner::Scene, found: Vec::new() };
         differences.compare(&recorded.output, &replayed.output, self.tools);
@@ -123,7 +123,7 @@ impl Replay {
         self.handle.drain_log(each);
     }
 
-    fn tick_again(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {
+    fn repeat_tick(&mut self, input: &RecordedInput) -> Result<Option<TickRecord>> {
         self.handle.set(input.settings)?;
         if input.reset {
             self.handle.reset()?;
@@ -132,10 +132,10 @@ impl Replay {
         for (readings, said) in self.readings.iter_mut().zip(&input.readings) {
             let _ = readings.push(*said);
         }
-        for &asked in input.strain.arrived() {
-            self.hand_over(asked);
+        for &id in input.strain.arrived() {
+            self.hand_over(id);
         }
-        self.force_loop.prepare_again(input);
+        self.force_loop.prepare_replay(input);
         let begun = computed_ns();
         self.force_loop.tick(input.due_ns, input.period);
         self.longest_ns = self.longest_ns.max(computed_ns() - begun);
@@ -146,22 +146,22 @@ impl Replay {
     }
 
     /// Answers the request that was answered then. Those before it never were, and never will be.
-    fn hand_over(&mut self, asked: StrainAsked) {
-        let answer = self.requests.iter().find(|request| request.asked == asked);
+    fn hand_over(&mut self, id: StrainRequestId) {
+        let answer = self.requests.iter().find(|request| request.id == id);
         if let Some(answer) = answer.and_then(|request| self.strain.prepare(request)) {
-            self.end.hand_over(answer);
+            self.end.send(answer);
         }
-        self.requests.retain(|request| request.asked.body != asked.body || request.asked.tick > asked.tick);
+        self.requests.retain(|request| request.id.body != id.body || request.id.tick > id.tick);
     }
 }
 
 /// A device that says what was recorded.
-pub(crate) struct Replayed {
+pub(crate) struct ReplayedDevice {
     readings: Consumer<Result<Reading, DeviceFault>>,
     limits: DeviceLimits,
 }
 
-impl Replayed {
+impl ReplayedDevice {
     /// One, and where it is told a reading before each tick.
     pub(crate) fn new(limits: DeviceLimits) -> (Producer<Result<Reading, DeviceFault>>, Self) {
         let (producer, readings) = RingBuffer::new(1);
@@ -169,7 +169,7 @@ impl Replayed {
     }
 }
 
-impl Device for Replayed {
+impl Device for ReplayedDevice {
     fn name(&self) -> &str {
         "recording"
     }

@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 
 use glam::DVec3;
 use palpate_core::{Error, Result};
-use palpate_devices::{Device, DeviceLimits, Opened, Reading, Scheduler, Wrench};
+use palpate_devices::{Device, DeviceLimits, Reading, ReadyDevice, Scheduler, Wrench};
 use triple_buffer::{Input, Output, triple_buffer};
 
 use crate::clock::{next_deadline, now_ns, sleep_until_ns};
@@ -21,7 +21,7 @@ use crate::settings::refuse_unless;
 pub const LARGEST_FORCE: f64 = 0.5;
 
 /// A push ends where the tip has gone this far, m: a hand that holds it loosely yields less.
-const LONGEST_WAY: f64 = 0.05;
+const MAX_TRAVEL: f64 = 0.05;
 
 /// Rate of a thread of ours, Hz.
 const RATE: f64 = 1000.0;
@@ -39,7 +39,7 @@ pub struct Task {
 
 /// What has been seen since a task began.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Seen {
+pub struct Observation {
     /// Number of the task.
     pub task: u64,
     /// Time since then, s.
@@ -79,7 +79,7 @@ pub struct SelfCheck {
     name: String,
     limits: DeviceLimits,
     tasks: Input<(u64, Task)>,
-    seen: Output<Seen>,
+    seen: Output<Observation>,
     number: u64,
     caller: Option<Caller>,
 }
@@ -94,10 +94,10 @@ impl SelfCheck {
     ///
     /// # Errors
     /// A driver that does not start; no thread from the operating system.
-    pub fn start(opened: Opened) -> Result<Self> {
-        let Opened { device, scheduler } = opened;
+    pub fn start(opened: ReadyDevice) -> Result<Self> {
+        let ReadyDevice { device, scheduler } = opened;
         let (tasks, asked) = triple_buffer(&(0, Task::default()));
-        let (published, seen) = triple_buffer(&Seen::default());
+        let (published, seen) = triple_buffer(&Observation::default());
         let (name, limits) = (device.name().to_owned(), device.limits());
         let mut ticker = Ticker::new(device, asked, published);
         let caller = match scheduler {
@@ -157,7 +157,7 @@ impl SelfCheck {
     }
 
     /// What has been seen of the task, of a push up to its end; wait-free. None until its first tick.
-    pub fn seen(&mut self) -> Option<Seen> {
+    pub fn observation(&mut self) -> Option<Observation> {
         Some(*self.seen.read()).filter(|seen| seen.task == self.number && seen.time > 0.0)
     }
 
@@ -185,11 +185,11 @@ struct Ticker {
     device: Box<dyn Device>,
     stage: SafetyStage,
     tasks: Output<(u64, Task)>,
-    published: Input<Seen>,
+    published: Input<Observation>,
     task: Task,
     /// Time of its first tick, ns.
     begun_ns: u64,
-    seen: Seen,
+    seen: Observation,
     /// Sum of squares about the mean, by axis, m^2.
     squares: DVec3,
     /// Time stamp of the latest measurement, and the time since, s.
@@ -197,7 +197,7 @@ struct Ticker {
 }
 
 impl Ticker {
-    fn new(device: Box<dyn Device>, tasks: Output<(u64, Task)>, published: Input<Seen>) -> Self {
+    fn new(device: Box<dyn Device>, tasks: Output<(u64, Task)>, published: Input<Observation>) -> Self {
         let device_limits = device.limits();
         let defaults = SafetyLimits::default();
         let limits = SafetyLimits {
@@ -216,7 +216,7 @@ impl Ticker {
             published,
             task: Task::default(),
             begun_ns: 0,
-            seen: Seen::default(),
+            seen: Observation::default(),
             squares: DVec3::ZERO,
             latest: None,
         }
@@ -227,13 +227,15 @@ impl Ticker {
         let (number, task) = *self.tasks.read();
         if number != self.seen.task {
             (self.task, self.squares, self.begun_ns) = (task, DVec3::ZERO, now_ns);
-            self.seen = Seen { task: number, fault: self.seen.fault, ..Seen::default() };
+            self.seen = Observation { task: number, fault: self.seen.fault, ..Observation::default() };
         }
         // By the clock: ticks that were missed count too.
         self.seen.time = 1e-9 * now_ns.saturating_sub(self.begun_ns) as f64 + period;
         let said = self.device.read(now_ns, period);
-        let reading =
-            self.stage.admit(said, now_ns, period).filter(|reading| reading.active && reading.pose.is_finite());
+        let reading = self
+            .stage
+            .accept_reading(said, now_ns, period)
+            .filter(|reading| reading.active && reading.pose.is_finite());
         // What is told of a push is up to its end.
         if let Some(reading) = reading.as_ref().filter(|_| !self.seen.done) {
             self.account(reading, period);
@@ -256,7 +258,7 @@ impl Ticker {
             return Wrench::default();
         }
         let seen = &mut self.seen;
-        seen.ran_away |= seen.first.distance(seen.last) > LONGEST_WAY;
+        seen.ran_away |= seen.first.distance(seen.last) > MAX_TRAVEL;
         seen.done |= seen.time >= seconds || seen.ran_away || !present;
         let now = if seen.done { 0.0 } else { force * seen.time / seconds };
         Wrench { force: now * direction, ..Wrench::default() }

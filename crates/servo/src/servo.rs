@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use palpate_core::simulation::{Kept, Model};
+use palpate_core::simulation::{Model, PreviousRanks};
 use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 
@@ -21,10 +21,10 @@ use crate::safety::SafetyLimits;
 use crate::scheduling::Scheduling;
 use crate::settings::Settings;
 
-/// How long, and how often at most, a tick is waited for: for the end of a recording, and for room for another change.
-const WAIT: Duration = Duration::from_millis(1);
-const MOST_WAITS: u32 = 1000;
-const MOST_WAITS_FOR_ROOM: u32 = 100;
+/// Interval between two polls, and most polls: for the end of a recording, and for room for another change.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+const MAX_POLLS: u32 = 1000;
+const MAX_ROOM_POLLS: u32 = 100;
 
 /// A running loop.
 pub struct Servo {
@@ -43,7 +43,7 @@ pub struct Servo {
 
 /// Who calls the tick.
 enum Caller {
-    /// A thread of ours, until it is told to stop.
+    /// A thread of this crate, until it is stopped.
     Thread { stop: Arc<AtomicBool>, thread: Option<JoinHandle<()>> },
     /// A driver, from its own.
     Driver(Arc<dyn Scheduler>),
@@ -73,8 +73,8 @@ impl Servo {
         force_loop.check_period(period)?;
         let changes = force_loop.take_change_handle();
         let (caller, realtime) = match scheduler {
-            Some(scheduler) => (driven(force_loop, period, scheduler)?, RealtimeStatus::default()),
-            None => on_a_thread(force_loop, period, scheduling)?,
+            Some(scheduler) => (start_driver(force_loop, period, scheduler)?, RealtimeStatus::default()),
+            None => start_thread(force_loop, period, scheduling)?,
         };
         Ok(Self { caller, handle, changes, realtime, limits, period, devices: device_limits, worker })
     }
@@ -85,7 +85,7 @@ impl Servo {
     /// See [`ForceLoop::new`]; a rate beyond what a new device takes; a tool without a device; a loop that is being recorded, or
     /// does not tick. The loop then goes on as it was.
     pub fn change(&mut self, change: SceneChange) -> Result<()> {
-        let SceneChange { model, kept, devices, settings, strain } = change;
+        let SceneChange { model, previous_ranks, devices, settings, strain } = change;
         if self.handle.is_recorded() {
             return Err(Error::Invalid(
                 "the scene cannot be changed while it is recorded: stop the recording first".into(),
@@ -94,11 +94,12 @@ impl Servo {
         let keeps_device = devices.iter().map(Option::is_none).collect();
         let mut placed: Vec<Box<dyn Device>> = Vec::new();
         for (tool, device) in devices.into_iter().enumerate() {
-            let awaited = || kept.tools.get(tool).copied().flatten().and_then(|old| self.devices.get(old));
+            let placeholder =
+                || previous_ranks.tools.get(tool).copied().flatten().and_then(|old| self.devices.get(old));
             let missing = || Error::Invalid(format!("tool {tool} is new, and has no device"));
             placed.push(match device {
                 Some(device) => device,
-                None => Box::new(Awaited(*awaited().ok_or_else(missing)?)),
+                None => Box::new(PlaceholderDevice(*placeholder().ok_or_else(missing)?)),
             });
         }
         let limits = placed.iter().map(|device| device.limits()).collect();
@@ -111,10 +112,10 @@ impl Servo {
         let worker = next.limit_strain(&mut next_handle, strain)?;
         let silent = || Error::Invalid("the loop does not tick: the scene stays as it was".into());
         let changes = self.changes.as_mut().ok_or_else(silent)?;
-        if !changes.offer(Successor { force_loop: next, kept, keeps_device }) {
+        if !changes.offer(Successor { force_loop: next, previous_ranks, keeps_device }) {
             return Err(silent());
         }
-        self.handle.go_on_as(next_handle);
+        self.handle.switch_to(next_handle);
         (self.devices, self.worker) = (limits, worker);
         Ok(())
     }
@@ -144,9 +145,9 @@ impl Servo {
 
     /// A loop that ticks makes room within one.
     fn wait_for_room(&self) {
-        let mut left = MOST_WAITS_FOR_ROOM;
+        let mut left = MAX_ROOM_POLLS;
         while self.handle.is_full() && left > 0 {
-            std::thread::sleep(WAIT);
+            std::thread::sleep(POLL_INTERVAL);
             left -= 1;
         }
     }
@@ -154,9 +155,9 @@ impl Servo {
     /// Ends the recording and waits until the loop has taken note of it: how many ticks it made meanwhile.
     pub fn end_recording(&mut self) -> u64 {
         self.handle.end_recording();
-        let mut left = MOST_WAITS;
+        let mut left = MAX_POLLS;
         while self.handle.latest().status.recording.records && left > 0 {
-            std::thread::sleep(WAIT);
+            std::thread::sleep(POLL_INTERVAL);
             left -= 1;
         }
         self.handle.latest().status.recording.ticks
@@ -202,7 +203,7 @@ pub struct SceneChange {
     /// Its bodies and tools.
     pub model: Arc<Model>,
     /// Which of them were there before.
-    pub kept: Kept,
+    pub previous_ranks: PreviousRanks,
     /// One a tool: a new device, or none for a tool that keeps the one it has.
     pub devices: Vec<Option<Box<dyn Device>>>,
     /// From now on.
@@ -211,10 +212,10 @@ pub struct SceneChange {
     pub strain: StrainPreparer,
 }
 
-/// Holds the place of a device that is to come from the loop before.
-struct Awaited(DeviceLimits);
+/// Placeholder for a device that the new loop takes over from the previous one.
+struct PlaceholderDevice(DeviceLimits);
 
-impl Device for Awaited {
+impl Device for PlaceholderDevice {
     fn name(&self) -> &str {
         "no device yet"
     }
@@ -233,7 +234,7 @@ impl Device for Awaited {
 }
 
 /// Has a thread of its own call the tick.
-fn on_a_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -> Result<(Caller, RealtimeStatus)> {
+fn start_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -> Result<(Caller, RealtimeStatus)> {
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = stop.clone();
     // Locking the memory of a large body takes a tenth of a second: wait, so that the first target set after the
@@ -257,7 +258,7 @@ fn on_a_thread(mut force_loop: ForceLoop, period: f64, scheduling: Scheduling) -
 }
 
 /// Has a driver call the tick.
-fn driven(mut force_loop: ForceLoop, period: f64, scheduler: Arc<dyn Scheduler>) -> Result<Caller> {
+fn start_driver(mut force_loop: ForceLoop, period: f64, scheduler: Arc<dyn Scheduler>) -> Result<Caller> {
     let tick = Box::new(move || force_loop.tick(now_ns(), period));
     scheduler.start(tick).map_err(|error| Error::Invalid(error.to_string()))?;
     Ok(Caller::Driver(scheduler))

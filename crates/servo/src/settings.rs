@@ -1,8 +1,8 @@
-//! What may be changed while the loop runs: the one record of it, from the scene to the tick and the frame.
+//! Settings that may be changed while the loop runs: one record, from the scene to the tick and the frame.
 
 use std::slice::{from_mut, from_ref};
 
-use palpate_core::simulation::{Controls, Kept, MAX_BODIES, MAX_TOOLS, Model};
+use palpate_core::simulation::{Controls, MAX_BODIES, MAX_TOOLS, Model, PreviousRanks};
 use palpate_core::{Error, Result};
 
 /// What may be changed while the loop runs.
@@ -121,19 +121,19 @@ impl Settings {
     }
 
     /// What goes on where a scene changes: of bodies and tools that stay what they have, of new ones that of `fresh`.
-    pub fn carried_over(&self, fresh: &Settings, kept: &Kept) -> Settings {
+    pub fn carried_over(&self, fresh: &Settings, previous_ranks: &PreviousRanks) -> Settings {
         let mut now = *self;
         for setting in &Setting::ALL {
             let ranks: &[Option<usize>] = match setting.per {
-                Per::Tool => &kept.tools,
-                Per::Body => &kept.bodies,
+                Per::Tool => &previous_ranks.tools,
+                Per::Body => &previous_ranks.bodies,
                 Per::Scene => continue,
             };
             for (rank, (to, old)) in (setting.values_mut)(&mut now).iter_mut().zip(ranks).enumerate() {
                 *to = old.map_or(setting.values(fresh)[rank], |old| setting.values(self)[old]);
             }
         }
-        let new_rank = |old: usize| kept.bodies.iter().position(|&rank| rank == Some(old));
+        let new_rank = |old: usize| previous_ranks.bodies.iter().position(|&rank| rank == Some(old));
         now.watch = self.watch.and_then(|(body, node)| Some((new_rank(body)?, node)));
         now
     }

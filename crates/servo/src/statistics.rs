@@ -1,4 +1,4 @@
-//! Times in fixed buckets: 64 to an octave from 1 ns up, so that a percentile is right to 1.6 % and costs no memory.
+//! Histogram of times with fixed buckets: 64 to an octave from 1 ns up, so that a percentile is right to 1.6 % and costs no memory.
 
 /// Buckets to an octave.
 const PER_OCTAVE: usize = 64;

@@ -1,8 +1,8 @@
-//! Strain responses prepared beside the loop: what the limit of strain in the tick needs of every set of contacts.
+//! Requests for strain responses, which the strain limit in the tick needs for every set of contacts.
 //!
-//! The tick notices that the contacts of a body have changed and puts a request into a ring; somebody who is not in a hurry
-//! prepares a response, in milliseconds, and exchanges it for the one that it replaces. Until a response has come, the tick
-//! bounds what has just begun by itself.
+//! The tick notices that the contacts of a body have changed and puts a request into a ring. The preparing
+//! thread computes a response within milliseconds and exchanges it for the previous one. Until then the tick bounds new
+//! contacts by a provisional limit.
 
 use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
@@ -13,13 +13,13 @@ use palpate_core::strain::MAX_CONTACTS_WATCHED;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::exchange::{ExchangeEnd, ExchangeHandle, exchange_ends};
-use crate::record::{IN_FLIGHT, StrainArrivals, StrainAsked};
+use crate::record::{IN_FLIGHT, StrainArrivals, StrainRequestId};
 
 /// The contacts of one body, for which strain is to be prepared.
 #[derive(Clone)]
 #[cfg_attr(not(feature = "offline"), allow(dead_code))] // nobody answers it there
 pub(crate) struct StrainRequest {
-    pub asked: StrainAsked,
+    pub id: StrainRequestId,
     pub limit: f64,
     pub serials: [u64; MAX_CONTACTS_WATCHED],
     pub patches: [Patch; MAX_CONTACTS_WATCHED],
@@ -27,23 +27,23 @@ pub(crate) struct StrainRequest {
 }
 
 /// What answers a request.
-pub(crate) type StrainAnswer = (StrainAsked, Box<StrainWatch>);
+pub(crate) type StrainAnswer = (StrainRequestId, Box<StrainWatch>);
 
 /// The loop's end.
 pub(crate) struct StrainEnd {
     requests: Producer<StrainRequest>,
     responses: ExchangeEnd<StrainAnswer, Box<StrainWatch>>,
-    /// What was asked for last: contacts and limit of each body.
-    asked: [Asked; MAX_BODIES],
+    /// Key of the latest request of each body.
+    latest: [RequestKey; MAX_BODIES],
     /// Requests from before this tick are of no use any more: their contacts are gone.
     since: u64,
     worker: Arc<OnceLock<Thread>>,
 }
 
 /// Serials of the contacts of a body, and the limit of its strain.
-type Asked = ([u64; MAX_CONTACTS_WATCHED], f64);
+type RequestKey = ([u64; MAX_CONTACTS_WATCHED], f64);
 
-/// The end of whoever prepares.
+/// The preparing thread's end.
 pub(crate) struct PreparerEnd {
     pub requests: Consumer<StrainRequest>,
     pub responses: ExchangeHandle<StrainAnswer, Box<StrainWatch>>,
@@ -58,7 +58,7 @@ pub(crate) fn strain_ends() -> (StrainEnd, PreparerEnd) {
     let end = StrainEnd {
         requests: requests_in,
         responses: responses_out,
-        asked: Default::default(),
+        latest: Default::default(),
         since: 0,
         worker: worker.clone(),
     };
@@ -66,14 +66,14 @@ pub(crate) fn strain_ends() -> (StrainEnd, PreparerEnd) {
 }
 
 impl StrainEnd {
-    /// Takes up what has come and says what that was; never allocates or frees.
+    /// Takes the responses that have arrived, and records their ids; never allocates or frees.
     pub fn receive(&mut self, state: &mut State, arrivals: &mut StrainArrivals) {
-        while let Some((asked, watch)) = self.responses.take() {
-            let replaced = if asked.tick < self.since {
+        while let Some((id, watch)) = self.responses.take() {
+            let replaced = if id.tick < self.since {
                 Some(watch)
             } else {
-                arrivals.push(asked);
-                state.watch_strain(asked.body, watch)
+                arrivals.push(id);
+                state.watch_strain(id.body, watch)
             };
             replaced.into_iter().for_each(|replaced| self.responses.give_back(replaced));
         }
@@ -81,27 +81,27 @@ impl StrainEnd {
 
     /// Begins anew with a state without contacts at a tick.
     pub fn begin(&mut self, tick: u64) {
-        (self.since, self.asked) = (tick, Default::default());
+        (self.since, self.latest) = (tick, Default::default());
     }
 
-    /// Asks in a tick for responses where contacts or the limit have changed, but for the bodies of `withheld`; a bit for each
+    /// Asks in a tick for responses where contacts or the limit have changed, but for the bodies of `skipped`; a bit for each
     /// body whose request finds no room. Never allocates or blocks.
-    pub fn ask(&mut self, state: &State, limits: &[f64; MAX_BODIES], tick: u64, withheld: u32) -> u32 {
-        let mut unasked = 0;
-        for (body, (asked, &limit)) in self.asked.iter_mut().zip(limits).enumerate() {
+    pub fn ask(&mut self, state: &State, limits: &[f64; MAX_BODIES], tick: u64, skipped: u32) -> u32 {
+        let mut unsent = 0;
+        for (body, (latest, &limit)) in self.latest.iter_mut().zip(limits).enumerate() {
             let mut now = ([0; MAX_CONTACTS_WATCHED], limit);
             for (serial, (contact, _)) in now.0.iter_mut().zip(state.contacts.iter().filter(|(c, _)| c.body == body)) {
                 *serial = contact.serial;
             }
-            if now == *asked || limit <= 0.0 || now.0[0] == 0 {
+            if now == *latest || limit <= 0.0 || now.0[0] == 0 {
                 continue;
             }
-            if self.requests.is_full() || withheld & 1 << body != 0 {
-                unasked |= 1 << body;
+            if self.requests.is_full() || skipped & 1 << body != 0 {
+                unsent |= 1 << body;
                 continue;
             }
             let mut request = StrainRequest {
-                asked: StrainAsked { body, tick },
+                id: StrainRequestId { body, tick },
                 limit,
                 serials: now.0,
                 patches: std::array::from_fn(|_| Patch::default()),
@@ -112,11 +112,11 @@ impl StrainEnd {
                 request.count += 1;
             }
             let _ = self.requests.push(request);
-            *asked = now;
+            *latest = now;
             if let Some(worker) = self.worker.get() {
                 worker.unpark();
             }
         }
-        unasked
+        unsent
     }
 }

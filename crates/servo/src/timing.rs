@@ -1,4 +1,4 @@
-//! How long ticks take, and which deadlines pass meanwhile.
+//! Computing times of ticks, and missed deadlines.
 //!
 //! A tick that is due at `D`, begins at `B` and ends at `E` misses the deadlines `D + k P <= E`, `floor((E - D) / P)` of
 //! them. It would have missed `floor((E - B) / P)` had it begun on time: those are by computing, the rest by waking up late.

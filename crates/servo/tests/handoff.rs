@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
-use palpate_core::simulation::{Kept, Strike};
+use palpate_core::simulation::{PreviousRanks, Strike};
 use palpate_devices::simulated::{Target, simulated};
 use palpate_devices::{Device, Pose};
 use palpate_servo::{ForceLoop, SafetyLimits, SceneChange, Scheduling, Servo, StrainPreparer};
@@ -106,14 +106,14 @@ fn exchange() {
     let scheduling = Scheduling::at(1000.0);
     let servo = Servo::start(model.clone(), devices, limits, settings(), scheduling, strain, None);
     let mut servo = servo.expect("a loop");
-    let mut kept = Kept::default();
-    (kept.bodies[0], kept.tools[0]) = (Some(0), Some(0));
+    let mut previous_ranks = PreviousRanks::default();
+    (previous_ranks.bodies[0], previous_ranks.tools[0]) = (Some(0), Some(0));
     for round in 1..=EXCHANGES {
         let next = Arc::new(model.changed(model.bodies.clone(), model.tools.clone()).expect("a valid scene"));
         // Every other time the tool gets another device.
         let device = (round % 2 == 0).then(|| Box::new(simulated().1) as Box<dyn Device>);
         let strain = StrainPreparer::new(&next);
-        let change = SceneChange { model: next, kept, devices: vec![device], settings: settings(), strain };
+        let change = SceneChange { model: next, previous_ranks, devices: vec![device], settings: settings(), strain };
         servo.change(change).expect("the loop ticks");
         let mut ring = servo.begin_recording().expect("no recording yet");
         let mut rows = 0;

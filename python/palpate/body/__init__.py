@@ -2,7 +2,7 @@
 
 from palpate.body.body import Body
 from palpate.body.free_end import free_end
-from palpate.body.loads import Loads, gravity_mistake
+from palpate.body.loads import Loads, gravity_error
 from palpate.body.material import Material
 from palpate.body.moduli import surface_moduli
 from palpate.body.predicate import parse
@@ -18,7 +18,7 @@ __all__ = [
     "SurfaceRegion",
     "description",
     "free_end",
-    "gravity_mistake",
+    "gravity_error",
     "parse",
     "problem_arrays",
     "surface_moduli",

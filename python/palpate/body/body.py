@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from palpate.body.assembly import element_arrays, mass_matrix, stiffness_matrix
 from palpate.body.loads import Loads
@@ -139,4 +139,4 @@ class Body:
                 )
         mechanism = find_mechanism(self.mesh, self.fixed_mask)
         if mechanism is not None:
-            raise BodyError(mechanism.told(self.mesh.nodes, len(self.mesh.nodes)))
+            raise BodyError(mechanism.message(self.mesh.nodes, len(self.mesh.nodes)))

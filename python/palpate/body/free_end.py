@@ -1,4 +1,4 @@
-"""The node to strike or to watch when nobody names one."""
+"""Default node to strike or to watch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reference loads of a body: what acts on it before anyone touches it.
+"""Reference loads of a body: forces that act on it without contact.
 
 All become nodal forces by the shape functions, `F_i = int N_i b dV + int N_i t dA`, the forces that do the same work as
 the load itself on any displacement that the elements can take.
@@ -60,7 +60,7 @@ class Loads(ComparedByValue):
 
     def __post_init__(self) -> None:
         gravity = three_numbers(self.gravity, "gravity", BodyError, units.acceleration)
-        mistake = gravity_mistake(gravity)
+        mistake = gravity_error(gravity)
         if mistake is not None:
             raise BodyError(mistake)
         object.__setattr__(self, "gravity", gravity)
@@ -130,7 +130,7 @@ def _pairs(given: Any, what: str) -> list[tuple[Selection, Any]]:
         raise BodyError(f"{what} takes pairs of a part of the surface and a load") from None
 
 
-def gravity_mistake(gravity: Sequence[float]) -> str | None:
+def gravity_error(gravity: Sequence[float]) -> str | None:
     """Say what is wrong with an acceleration, m/s^2, that no body on earth feels; None for any other."""
     size = float(np.linalg.norm(gravity))
     if size <= MOST_GRAVITY:

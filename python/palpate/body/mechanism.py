@@ -12,9 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
-import scipy.sparse.linalg
+import scipy
 
 from palpate.body.supports import rigid_constraint_rank
 from palpate.mesh import TetMesh
@@ -50,7 +48,7 @@ class Mechanism:
     freedom: int
     parts: int
 
-    def told(self, positions: np.ndarray, whole: int) -> str:
+    def message(self, positions: np.ndarray, whole: int) -> str:
         """Say where it is and what helps; ``positions`` (n, 3) m of the nodes, ``whole`` how many nodes a body has."""
         part = f"the part of {len(self.nodes)} nodes around {_place(positions[self.nodes].mean(axis=0))}"
         points = positions[self.joints]

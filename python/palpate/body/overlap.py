@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from palpate.errors import BodyError
 from palpate.mesh import TetMesh
@@ -51,7 +51,7 @@ def _first_inside(points: np.ndarray, tets: np.ndarray) -> np.ndarray | None:
     # Elements of one size at a time: a few large ones would make all of them candidates of every point.
     for size in np.unique(np.ceil(np.log2(reach))):
         chosen = np.flatnonzero(np.ceil(np.log2(reach)) == size)
-        tree = cKDTree(middles[chosen])
+        tree = scipy.spatial.cKDTree(middles[chosen])
         for block in np.array_split(points, -(-len(points) // BLOCK)):
             near = tree.query_ball_point(block, 2.0**size)
             counts = np.fromiter(map(len, near), dtype=np.int64, count=len(near))

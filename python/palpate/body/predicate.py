@@ -1,4 +1,4 @@
-"""Predicates over node positions, typed by a user: parsed against a whitelist, never run as code.
+"""Predicates over node positions, typed by a user: parsed against a whitelist, never executed as code.
 
 ``z < 0.01``, ``z < min + 5mm``, ``x > 2cm and not (y >= 0 or z < 1e-3)``. Bare numbers are metres; ``min`` and ``max``
 are the body's bounds along the axis on the other side of the comparison.

@@ -1,4 +1,4 @@
-"""The reference problem of a body as the native module takes it, and what a file says it was made from."""
+"""Arrays of a body's reference problem for the native module, and its description for files."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from palpate.body.predicate import parse
 from palpate.body.selection import node_indices
@@ -69,7 +68,7 @@ def element_components(tets: np.ndarray, node_count: int) -> np.ndarray:
     graph = scipy.sparse.coo_array(
         (np.ones(len(first), dtype=np.int8), (first, tets[:, 1:].ravel())), shape=(node_count, node_count)
     )
-    return connected_components(graph, directed=False)[1]
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
 def rigid_constraint_rank(nodes: np.ndarray, mask: np.ndarray) -> int:

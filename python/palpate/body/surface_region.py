@@ -1,4 +1,4 @@
-"""Parts of a body's surface that a user names: by nodes, a predicate, a group of the mesh file, or a solid."""
+"""Parts of a body's surface, selected by a user: by nodes, a predicate, a group of the mesh file, or a solid."""
 
 from __future__ import annotations
 

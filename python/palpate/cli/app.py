@@ -1,4 +1,4 @@
-"""Commands. Heavy imports wait inside them, so that ``palpate --help`` is quick."""
+"""The commands. Heavy imports are inside the functions, so that ``palpate --help`` is quick."""
 
 from __future__ import annotations
 
@@ -10,7 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from palpate.cli.bodies import Dask, ElementChoice, MaxSize, Repair, Unit, body_of, in_unit, is_surface, read_any
+from palpate.cli.bodies import (
+    Dask,
+    ElementChoice,
+    MaxSize,
+    MaxVolumeLoss,
+    MesherChoice,
+    Part,
+    Unit,
+    body_of,
+    fill_options,
+    in_unit,
+    is_surface,
+    read_any,
+)
 from palpate.cli.completion import precisions, units
 from palpate.startup import restore_interrupts
 
@@ -58,10 +71,10 @@ def run_commands(commands: typer.Typer) -> None:
         restore_interrupts()
         commands(standalone_mode=True)
     except Error as error:
-        sys.exit(_complain(str(error)))
+        sys.exit(_print_error(str(error)))
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        sys.exit(_complain(f"{where}{error.strerror or error}"))
+        sys.exit(_print_error(f"{where}{error.strerror or error}"))
     except KeyboardInterrupt:
         print("palpate: interrupted", file=sys.stderr)
         sys.exit(130)
@@ -73,25 +86,29 @@ def _terminate(*_signal: object) -> None:
     sys.exit(128 + signal.SIGTERM)
 
 
-def _complain(message: str) -> int:
+def _print_error(message: str) -> int:
     print(f"palpate: error: {message}", file=sys.stderr)
     return 2
 
 
 @app.command()
 def mesh(
-    surface: Annotated[Path, typer.Argument(help="Closed surface: STL, OBJ, PLY, OFF or GLB.")],
+    surface: Annotated[Path, typer.Argument(help="Surface: STL, OBJ, PLY, OFF, GLB or glTF.")],
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
     unit: Unit = None,
     max_size: MaxSize = None,
-    repair: Repair = False,
+    mesher: MesherChoice = None,
+    part: Part = None,
+    max_volume_loss: MaxVolumeLoss = None,
     quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
 ) -> None:
-    """Fill a closed surface with tetrahedra, of 4 nodes unless --quadratic: other programs and formats expect those.
+    """Fill a surface with tetrahedra, of 4 nodes unless --quadratic: other programs and formats expect those.
+
+    A surface that is open, crosses itself or has several parts is wrapped first; what was done is printed.
 
     Example: palpate mesh liver.stl liver.vtu --unit mm --max-size 4mm
 
-    Example: palpate mesh scan.ply scan.vtu --unit mm --repair
+    Example: palpate mesh scan.ply scan.vtu --unit mm --part all
     """
     from palpate.errors import MeshError
     from palpate.input_file import require_writable
@@ -100,7 +117,8 @@ def mesh(
 
     require_writable(out, MeshError)
     size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
-    made = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, repair=repair))
+    fill = fill_options(mesher, part, max_volume_loss)
+    made = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, options=fill))
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
 
@@ -131,7 +149,9 @@ def precompute(
     ] = None,
     element: ElementChoice = None,
     max_size: MaxSize = None,
-    repair: Repair = False,
+    mesher: MesherChoice = None,
+    part: Part = None,
+    max_volume_loss: MaxVolumeLoss = None,
     memory: Annotated[
         str | None, typer.Option(help="Peak memory allowed, such as 8GB; with --dask of each worker.")
     ] = None,
@@ -157,8 +177,9 @@ def precompute(
         require_writable(out, StoreError)
     material = Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
+    fill = fill_options(mesher, part, max_volume_loss)
     with cluster(dask) as workers:
-        made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, repair))
+        made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, fill))
         body = body_of(made, material, fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
         asked = {"precision": precision, "touch": region, "first": first}

@@ -1,4 +1,4 @@
-"""Bodies from files of any kind, as the commands that solve them take them."""
+"""Bodies from files of any kind, for the commands that solve them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 
     from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
+    from palpate.mesh.tetrahedralize import FillOptions
+
+
+class Mesher(str, Enum):
+    """What --mesher takes."""
+
+    NETGEN = "netgen"
+    WRAP = "wrap"
 
 
 class Element(str, Enum):
@@ -35,7 +43,17 @@ Unit = Annotated[
     ),
 ]
 MaxSize = Annotated[str | None, typer.Option(help="Longest edge, such as 4mm; default: by size and shape of the body.")]
-Repair = Annotated[bool, typer.Option("--repair", help="Fill a surface that is open or crosses itself.")]
+MesherChoice = Annotated[
+    Mesher | None,
+    typer.Option(help="netgen: the surface itself; wrap: a new one around what it encloses; default: by the surface."),
+]
+Part = Annotated[
+    str | None, typer.Option(metavar="NUMBER|all", help="Of a surface of several parts: 1 is the largest, 2 the next.")
+]
+MaxVolumeLoss = Annotated[
+    str | None,
+    typer.Option(metavar="SHARE", help="Most of the volume that the mesh of a wrapped surface may lose; default: 5%."),
+]
 ElementChoice = Annotated[
     Element | None,
     typer.Option(help="Tetrahedra with 4 or 10 nodes; default: quadratic for a surface, a volume mesh as it is."),
@@ -43,7 +61,7 @@ ElementChoice = Annotated[
 
 ToolRadius = Annotated[str | None, typer.Option(help="Radius of the tools; default: a sixteenth of the body.")]
 Fix = Annotated[
-    str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest tenth.")
+    str | None, typer.Option(help="Supported nodes, such as 'z < min + 5mm'; default of a mesh: its lowest part.")
 ]
 YoungsModulus = Annotated[str | None, typer.Option("-E", help="Young's modulus; default of a mesh: 10kPa.")]
 PoissonsRatio = Annotated[float | None, typer.Option("--nu", help="Poisson's ratio; of a mesh: 0.45.")]
@@ -74,13 +92,25 @@ def cluster(address: str | None) -> Iterator[Client | None]:
 
 def is_surface(path: Path) -> bool:
     """Whether the ending is that of a surface, which is yet to be filled."""
-    from palpate.mesh.tetrahedralize import SURFACE_ENDINGS
+    from palpate.mesh.surface_file import SURFACE_ENDINGS
 
     return path.suffix.lower() in SURFACE_ENDINGS
 
 
+def fill_options(mesher: Mesher | None, part: str | None, max_volume_loss: str | None) -> FillOptions:
+    """Options of filling, as they were typed."""
+    from palpate.mesh.tetrahedralize import FillOptions
+
+    given: dict[str, Any] = {"mesher": None if mesher is None else mesher.value}
+    if part is not None:
+        given["part"] = int(part) if part.isascii() and part.isdigit() else part
+    if max_volume_loss is not None:
+        given["max_volume_loss"] = max_volume_loss
+    return FillOptions(**given)
+
+
 def read_any(
-    path: Path, unit: str | None, element: Element | None, max_size: str | None = None, repair: bool = False
+    path: Path, unit: str | None, element: Element | None, max_size: str | None = None, fill: FillOptions | None = None
 ) -> TetMesh:
     """Read a volume mesh, or fill a surface.
 
@@ -92,15 +122,15 @@ def read_any(
     """
     from palpate.errors import MeshError
     from palpate.mesh import TetMesh
-    from palpate.mesh.tetrahedralize import tetrahedralize_with
+    from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
     from palpate.units import length
 
     if is_surface(path):
         size = None if max_size is None else length(max_size)
         chosen = "linear" if element == Element.LINEAR else "quadratic"
-        return tetrahedralize_with(chosen, path, size, unit, repair=repair)
-    if max_size is not None or repair:
-        raise MeshError(f"{path} is a volume mesh: --max-size and --repair are for surfaces")
+        return tetrahedralize_with(chosen, path, size, unit, options=fill)
+    if max_size is not None or fill not in (None, FillOptions()):
+        raise MeshError(f"{path} is a volume mesh: --max-size, --mesher, --part and --max-volume-loss are for surfaces")
     mesh = TetMesh.read(path, unit)
     if element == Element.LINEAR and mesh.is_quadratic:
         raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or say quadratic")

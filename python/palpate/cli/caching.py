@@ -1,4 +1,4 @@
-"""Commands on the precomputed files that are kept."""
+"""Commands on the cache of precomputed files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def cache_list() -> None:
     left = sum(file.leftover for file in files)
     hint = f", {left} of them leftovers: 'palpate cache clear --leftovers' deletes those" if left else ""
     size, limit = sum(f.size for f in files) / 1e6, cache_limit().size / 1e9
-    print(f"{_counted(len(files))}, {size:.1f} MB of {limit:.3g} GB in {cache_directory()}{hint}")
+    print(f"{_count_text(len(files))}, {size:.1f} MB of {limit:.3g} GB in {cache_directory()}{hint}")
 
 
 @cache_app.command("limit")
@@ -79,8 +79,8 @@ def cache_clear(
     files = [file for file in files if file.leftover or not leftovers]
     for file in files:
         file.path.unlink(missing_ok=True)
-    print(f"deleted {_counted(len(files))}, {sum(f.size for f in files) / 1e6:.1f} MB")
+    print(f"deleted {_count_text(len(files))}, {sum(f.size for f in files) / 1e6:.1f} MB")
 
 
-def _counted(count: int) -> str:
+def _count_text(count: int) -> str:
     return f"{count} file" if count == 1 else f"{count} files"

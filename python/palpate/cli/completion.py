@@ -9,19 +9,19 @@ def units(incomplete: str) -> list[str]:
     """Units of length."""
     from palpate.units import LENGTH_UNITS
 
-    return _beginning(LENGTH_UNITS, incomplete)
+    return _completions(LENGTH_UNITS, incomplete)
 
 
 def models(incomplete: str) -> list[str]:
     """Built-in models."""
     from palpate.models import NAMES
 
-    return _beginning(NAMES, incomplete)
+    return _completions(NAMES, incomplete)
 
 
 def precisions(incomplete: str) -> list[str]:
     """List the number formats of a store."""
-    return _beginning(("f16", "f32", "f64"), incomplete)
+    return _completions(("f16", "f32", "f64"), incomplete)
 
 
 def formats(incomplete: str) -> list[tuple[str, str]]:
@@ -42,8 +42,8 @@ def devices(incomplete: str) -> list[str]:
     """Kinds of devices."""
     from palpate.scene.devices import KINDS
 
-    return _beginning(KINDS, incomplete)
+    return _completions(KINDS, incomplete)
 
 
-def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
+def _completions(words: Iterable[str], incomplete: str) -> list[str]:
     return [word for word in words if word.startswith(incomplete)]

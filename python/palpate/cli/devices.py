@@ -51,7 +51,7 @@ def devices(
 
     found = listings(None if kind is None else [kind])
     if test:
-        passed = _check(_chosen(found, id), yes, as_json)
+        passed = _check(_choose_device(found, id), yes, as_json)
         raise typer.Exit(0 if passed else 1)
     plugged = [device for device in usb_devices() if kind in (None, device.kind)]
     if as_json:
@@ -62,7 +62,7 @@ def devices(
     raise typer.Exit(0 if any(listing.ready for listing in found) else 1)
 
 
-def _chosen(found: list[Listing], id: str | None) -> tuple[str, str | None]:
+def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | None]:
     """Kind and identity of the device to be checked.
 
     Raises
@@ -102,14 +102,14 @@ def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:
         raise DeviceError("a check asks before any force: run it at a terminal, or give --yes")
     kind, id = which
     with SelfCheck(kind, id) as check:
-        _say(f"{check.name} ({kind}{f' {id}' if id else ''}), {_limits_text(check.limits)}")
+        _print_line(f"{check.name} ({kind}{f' {id}' if id else ''}), {_limits_text(check.limits)}")
         _pause("put it down, or hold it still", yes)
         rest = check.watch(REST)
         seconds = RANGE_UNATTENDED if yes else RANGE
         _pause(f"then for {seconds:g} s move it through its whole range, and press each of its buttons", yes)
         moved = check.watch(seconds)
         result = Checked(check.name, check.limits, rest, moved)
-        if rest.fault is None and moved.fault is None and _wants_forces(yes):
+        if rest.fault is None and moved.fault is None and _confirm_forces(yes):
             result = Checked(check.name, check.limits, rest, moved, tuple(_pushes(check)))
     if as_json:
         told = {"schema": SCHEMA, "kind": kind, "id": id, "passed": result.passed, **asdict(result)}
@@ -132,7 +132,7 @@ def _pushes(check: SelfCheck) -> Iterator[Any]:
 
     force = min(FORCE, check.limits.max_force)
     for direction, (_, words) in DIRECTIONS.items():
-        _say(f"  {direction}: pushes {words}")
+        _print_line(f"  {direction}: pushes {words}")
         check.watch(RETURN)
         push = check.push(direction, force, RISE)
         yield push
@@ -140,26 +140,26 @@ def _pushes(check: SelfCheck) -> Iterator[Any]:
             return
 
 
-def _wants_forces(yes: bool) -> bool:
+def _confirm_forces(yes: bool) -> bool:
     question = f"the device will push with up to {FORCE:g} N in six directions: hold it loosely"
     if yes:
-        _say(question)
+        _print_line(question)
         return True
-    return not _asked(f"{question}; Enter to go on, q to stop: ").strip().lower().startswith("q")
+    return not _prompt(f"{question}; Enter to go on, q to stop: ").strip().lower().startswith("q")
 
 
 def _pause(what: str, yes: bool) -> None:
     if not yes:
-        _asked(f"{what}; Enter to go on: ")
+        _prompt(f"{what}; Enter to go on: ")
 
 
-def _asked(question: str) -> str:
+def _prompt(question: str) -> str:
     """Ask beside what is printed; an end of the input is a q."""
     print(question, end="", file=sys.stderr, flush=True)
     return sys.stdin.readline() or "q"
 
 
-def _say(line: str) -> None:
+def _print_line(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 

@@ -1,4 +1,4 @@
-"""What this machine can give, from the command line."""
+"""The command that measures whether this machine keeps 1 kHz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exams: what a person feels, or an observer of known Weber fraction."""
+"""Commands of exams, taken by a person or by a simulated observer of known Weber fraction."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def nodule(
     Example: palpate exam nodule --observer 0.1 --exams 200
     """
     from palpate.exam import ExamFile, Library
-    from palpate.progress import narrated
+    from palpate.progress import status_line
 
     found = ExamFile.default() if file is None else ExamFile.read(file)
     chosen = found.question.seed if seed is None else seed
-    with narrated(f"preparing {found.title}"):
+    with status_line(f"preparing {found.title}"):
         library = Library(found)
     if observer is not None and exams > 1:
         _print_spread(library, observer, exams, chosen or 0)
@@ -93,13 +93,13 @@ def _ask(library: Library, out: Path, seed: int | None, where: tuple[str, int, b
 def _observe(library: Library, weber_fraction: float, seed: int, out: Path) -> None:
     """One exam of an observer, with all that an exam of a person leaves."""
     from palpate.errors import SceneError
-    from palpate.exam import Record, observed
+    from palpate.exam import Record, simulated_exam
     from palpate.exam.live import finish
 
     table = out / "exam.csv"
     if table.exists():
         raise SceneError(f"{table} is there already: give another --out")
-    course: Course = observed(library, weber_fraction, seed)
+    course: Course = simulated_exam(library, weber_fraction, seed)
     record = Record(table)
     for answered in course.answers:
         record.add(course, answered)
@@ -111,9 +111,9 @@ def _print_spread(library: Library, weber_fraction: float, exams: int, seed: int
     """Print what exams find of a known observer, over seeds."""
     import numpy as np
 
-    from palpate.exam import observed_many
+    from palpate.exam import simulated_exams
 
-    found = observed_many(library, weber_fraction, exams, seed)
+    found = simulated_exams(library, weber_fraction, exams, seed)
     ratio = np.array([estimate.weber_fraction for estimate in found]) / weber_fraction
     low, middle, high = np.percentile(ratio, (5, 50, 95))
     covered = np.mean([estimate.low <= weber_fraction <= estimate.high for estimate in found])

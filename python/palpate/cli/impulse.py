@@ -12,8 +12,8 @@ from palpate import models
 from palpate.body import Body, Material, free_end
 from palpate.dynamics import Newmark, rayleigh_from_ratios
 from palpate.errors import SceneError
-from palpate.fields import HONEST_STRAIN, SurfaceStrain
-from palpate.progress import narrated
+from palpate.fields import LINEAR_STRAIN_LIMIT, SurfaceStrain
+from palpate.progress import status_line
 from palpate.scene import MODES, TOOLS, Scene
 from palpate.validation.plots import plot_history, write_columns
 
@@ -39,7 +39,7 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
     """
     body = _body(model, paper)
     mesh, node = body.mesh, free_end(body)
-    with narrated(f"{model}: {seconds:g} s of motion"):
+    with status_line(f"{model}: {seconds:g} s of motion"):
         forces, surface = _strike(body, node, seconds)
     moved = surface[:, np.searchsorted(mesh.surface_nodes, node)]
     out.mkdir(parents=True, exist_ok=True)
@@ -53,7 +53,7 @@ def impulse_history(model: str, paper: bool, seconds: float, out: Path) -> None:
     print(f"largest displacement {1e3 * np.linalg.norm(moved, axis=1).max():.3f} mm within {seconds:g} s")
     print(f"wrote {out / name}.csv and .png")
     strain = _largest_strain(body, surface)
-    if strain > HONEST_STRAIN:
+    if strain > LINEAR_STRAIN_LIMIT:
         print(
             f"palpate: note: strains reach {100 * strain:.0f} % where the node is struck, beyond linear elasticity",
             file=sys.stderr,

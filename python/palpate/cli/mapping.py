@@ -15,9 +15,11 @@ from palpate.cli.bodies import (
     ElementChoice,
     Fix,
     MaxSize,
+    MaxVolumeLoss,
+    MesherChoice,
     MeshUnit,
+    Part,
     PoissonsRatio,
-    Repair,
     ToolRadius,
     YoungsModulus,
 )
@@ -56,7 +58,9 @@ def map_command(
     unit: MeshUnit = None,
     max_size: MaxSize = None,
     element: ElementChoice = None,
-    repair: Repair = False,
+    mesher: MesherChoice = None,
+    part: Part = None,
+    max_volume_loss: MaxVolumeLoss = None,
 ) -> None:
     """Press a grid of points on a body, without a hand, and map its stiffness and what lies hidden in it.
 
@@ -73,13 +77,14 @@ def map_command(
 
     length, quickness = _quantities()
     given = {"spacing": length("--grid", grid), "depth": length("--depth", depth), "speed": quickness("--speed", speed)}
-    lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
+    lengths = {"unit": unit, "max_size": max_size, "element": element}
+    lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio}
-    built = _built(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
+    built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
     folder = out if out is not None else Path(f"{file.stem}-palpation")
     with _folder(folder):
         found, detection = _palpate(built, folder, given, on, strokes, against)
-    _tell(found, detection, folder)
+    _print_result(found, detection, folder)
 
 
 def _quantities() -> tuple[Callable[[str, str], float], Callable[[str, str], float]]:
@@ -102,12 +107,12 @@ def _quantities() -> tuple[Callable[[str, str], float], Callable[[str, str], flo
     return reader(quantities.length), reader(quantities.speed)
 
 
-def _built(file: Path, options: Any) -> BuiltScene:
+def _build_scene(file: Path, options: Any) -> BuiltScene:
     """Scene of a file, or of a built-in model by its name."""
     from palpate.cli.run_file import built_from, scene_with
     from palpate.errors import SceneError
     from palpate.models import NAMES
-    from palpate.progress import narrated
+    from palpate.progress import status_line
     from palpate.scene import model_scene
 
     if file.exists() or file.suffix:
@@ -115,7 +120,7 @@ def _built(file: Path, options: Any) -> BuiltScene:
     if str(file) not in NAMES:
         raise SceneError(f"{file}: no such file, and no model of that name; models are {', '.join(NAMES)}")
     options.refuse(file, {"radius", "fix", "youngs_modulus", "poissons_ratio"}, "a model has its own mesh")
-    with narrated(f"preparing {file}"):
+    with status_line(f"preparing {file}"):
         return scene_with(model_scene(str(file)), options).build()
 
 
@@ -148,10 +153,10 @@ def _palpate(
         kept = (folder / PARTIAL).exists()
         found = stiffness_map(built, **given, on=on, strokes=strokes, partial=folder / PARTIAL, progress=True)
         if kept:
-            told = (
+            resumed = (
                 f"{found.resumed} of {len(found.curves)} known" if found.resumed else "of another palpation: not used"
             )
-            print(f"{folder / PARTIAL}: {told}")
+            print(f"{folder / PARTIAL}: {resumed}")
         detection = None
         if other is not None or any(has_several_materials(body.body) for body in built.bodies):
             detection = compare(found, other, partial=folder / PLAIN_PARTIAL, progress=True)
@@ -166,7 +171,7 @@ def _palpate(
     return found, detection
 
 
-def _tell(found: StiffnessMap, detection: Detection | None, folder: Path) -> None:
+def _print_result(found: StiffnessMap, detection: Detection | None, folder: Path) -> None:
     """Say what was found, what was left out, and what held the tool."""
     import numpy as np
 

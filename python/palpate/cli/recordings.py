@@ -1,4 +1,4 @@
-"""Commands on recordings: made again, in the page or headless."""
+"""Replay of recordings, in the page or headless."""
 
 from __future__ import annotations
 
@@ -52,26 +52,26 @@ def replay(
 
             open_replay(recording, given, host=host, port=port, browser=browser)
             return
-        made = simulation.replay(recording, given, progress=True)
+        replayed = simulation.replay(recording, given, progress=True)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error
-    print(_said_of(file, recording, made))
-    if not made.same:
+    print(_report_text(file, recording, replayed))
+    if not replayed.same:
         raise typer.Exit(1)
 
 
-def _said_of(file: Path, recording: Recording, made: Replayed) -> str:
-    lines = [str(difference) for difference in made.differences[:SHOWN]]
-    if len(made.differences) > SHOWN:
-        lines.append(f"and {len(made.differences) - SHOWN} more, of which the first is what to look at")
+def _report_text(file: Path, recording: Recording, replayed: Replayed) -> str:
+    lines = [str(difference) for difference in replayed.differences[:SHOWN]]
+    if len(replayed.differences) > SHOWN:
+        lines.append(f"and {len(replayed.differences) - SHOWN} more, of which the first is what to look at")
     if not lines:
-        lines = [f"{file}: {made.ticks} ticks made again: every bit is as recorded"]
-    if not made.whole:
-        lines.append(_gap(recording, made.ticks))
+        lines = [f"{file}: {replayed.ticks} ticks made again: every bit is as recorded"]
+    if not replayed.whole:
+        lines.append(_gap_text(recording, replayed.ticks))
     return "\n".join(lines)
 
 
-def _gap(recording: Recording, ticks: int) -> str:
+def _gap_text(recording: Recording, ticks: int) -> str:
     """Say why a recording could not be made again to its end."""
     if recording.dropped is None:
         return f"note: the file was cut short, by a crash or a full disk; it has {len(recording.ticks)} ticks"

@@ -1,4 +1,4 @@
-"""What ``palpate run`` makes of a file: a scene, a store, or a bare mesh or surface with defaults that are told."""
+"""Scene of a file for ``palpate run``: a scene file, a store, or a mesh or surface with defaults, which are printed."""
 
 from __future__ import annotations
 
@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.cli.bodies import Element, body_of, likely_units, read_any
+from palpate.cli.bodies import Element, Mesher, body_of, fill_options, likely_units, read_any
 from palpate.errors import SceneError
 
 if TYPE_CHECKING:
     from palpate.green import BackgroundPrecompute
     from palpate.scene import BuiltScene, Scene
-
-# A bare body is held in this part of its height, from below.
-HELD_PART = 0.1
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,9 @@ class RunOptions:
     unit: str | None = None
     max_size: str | None = None
     element: Element | None = None
-    repair: bool = False
+    mesher: Mesher | None = None
+    part: str | None = None
+    max_volume_loss: str | None = None
     cpus: str | None = None
     priority: int | None = None
     device: tuple[str, ...] | None = None
@@ -47,7 +46,7 @@ class RunOptions:
 
         """
         for field in fields(self):
-            if getattr(self, field.name) not in (None, False) and field.name not in allowed | OF_LOOP:
+            if getattr(self, field.name) is not None and field.name not in allowed | OF_LOOP:
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
@@ -63,7 +62,9 @@ FLAGS = {
     "unit": "--unit",
     "max_size": "--max-size",
     "element": "--element",
-    "repair": "--repair",
+    "mesher": "--mesher",
+    "part": "--part",
+    "max_volume_loss": "--max-volume-loss",
 }
 
 
@@ -76,7 +77,7 @@ def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPre
         A file that cannot be read, filled or solved, or an option that does not belong to it.
 
     """
-    from palpate.progress import narrated
+    from palpate.progress import status_line
     from palpate.scene import Scene
 
     if file.suffix == ".palpate":
@@ -88,7 +89,7 @@ def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPre
         scene = scene_with(Scene.read(file), options)
     else:
         return _bare(file, options)
-    with narrated(f"preparing {scene.name}"):
+    with status_line(f"preparing {scene.name}"):
         if growing is None:
             return scene.build()
         built, rest = scene.build_first()
@@ -123,11 +124,11 @@ def scene_with(scene: Scene, options: RunOptions) -> Scene:
 
 def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
     """Scene whose first tools are moved by devices: of a table by name, or of a kind, where its own stood."""
-    from palpate.scene.devices import KINDS, device_ranks, moved_by
+    from palpate.scene.devices import KINDS, device_change, device_ranks
 
     if len(devices) > len(scene.tools):
         raise SceneError(f"--device was given {len(devices)} times, but the scene has {len(scene.tools)} of [[tool]]")
-    tables = [scene.device, *scene.further_devices]
+    tables = [scene.device, *scene.additional_devices]
     named = [table.name for table in tables]
     for tool, device in enumerate(devices):
         if device in named or any(table.kind == device for table in tables) or device not in KINDS:
@@ -140,7 +141,7 @@ def _with_devices(scene: Scene, devices: Sequence[str]) -> Scene:
         raise SceneError(f"--device: {error}") from None
     for tool, device in enumerate(devices):
         if scene.device_of(tool).kind != device and device not in named:
-            scene = scene.model_copy(update=moved_by(scene, tool, device))
+            scene = scene.model_copy(update=device_change(scene, tool, device))
     return scene
 
 
@@ -188,31 +189,33 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
     from palpate import units
     from palpate.body import Material
+    from palpate.body.default_support import lowest_part
     from palpate.green import precompute
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
 
-    told = []
+    defaults = []
     unit = options.unit
     if unit is None:
         unit, *others = likely_units(file)
-        told.append(f"unit {unit} (--unit{'; it may also be ' if others else ''}{' or '.join(others)})")
+        defaults.append(f"unit {unit} (--unit{'; it may also be ' if others else ''}{' or '.join(others)})")
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
-    mesh = read_any(file, known, options.element, options.max_size, options.repair)
+    fill = fill_options(options.mesher, options.part, options.max_volume_loss)
+    mesh = read_any(file, known, options.element, options.max_size, fill)
     low, high = mesh.bounds
     fix = options.fix
     if fix is None:
-        fix = f"z < min + {1e3 * HELD_PART * (high[2] - low[2]):.3g}mm"
-        told.append(f"held where {fix} (--fix)")
+        fix = lowest_part(mesh)
+        defaults.append(f"held where {fix} (--fix)")
     typed = (options.youngs_modulus, options.poissons_ratio, options.density)
     modulus, ratio, density = (
         default if value is None else value for value, default in zip(typed, ("10kPa", 0.45, "1000kg/m3"), strict=True)
     )
     if options.youngs_modulus is None:
-        told.append(f"E = {modulus} (-E)")
+        defaults.append(f"E = {modulus} (-E)")
     if options.poissons_ratio is None:
-        told.append(f"Poisson's ratio {ratio} (--nu)")
+        defaults.append(f"Poisson's ratio {ratio} (--nu)")
     material = Material(units.pressure(modulus), ratio, units.density(density))
     body = body_of(mesh, material, fix)
     green = precompute(body)
@@ -222,6 +225,6 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     of_run = RunOptions(radius=options.radius, **of_loop)
     built = BuiltScene.of(scene_with(scene, of_run), body, green)
     if options.radius is None:
-        told.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
-    print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(told)}" if told else ""))
+        defaults.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
+    print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(defaults)}" if defaults else ""))
     return built

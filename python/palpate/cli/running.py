@@ -15,9 +15,11 @@ from palpate.cli.bodies import (
     ElementChoice,
     Fix,
     MaxSize,
+    MaxVolumeLoss,
+    MesherChoice,
     MeshUnit,
+    Part,
     PoissonsRatio,
-    Repair,
     ToolRadius,
     YoungsModulus,
 )
@@ -113,7 +115,9 @@ def run(
     unit: MeshUnit = None,
     max_size: MaxSize = None,
     element: ElementChoice = None,
-    repair: Repair = False,
+    mesher: MesherChoice = None,
+    part: Part = None,
+    max_volume_loss: MaxVolumeLoss = None,
     surface_map: Annotated[
         Path | None, typer.Option("--map", help="Map of 'palpate map' to show: stiffness.vtu or detection.vtu.")
     ] = None,
@@ -150,7 +154,8 @@ def run(
     """
     from palpate.cli.run_file import RunOptions, built_from
 
-    lengths = {"unit": unit, "max_size": max_size, "element": element, "repair": repair}
+    lengths = {"unit": unit, "max_size": max_size, "element": element}
+    lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
     of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
     # What opens when a part is ready goes on with the rest beside the loop.
@@ -158,6 +163,7 @@ def run(
     options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
     built = built_from(file, options, growing if headless is None else None)
     _print_kept()
+    _print_loose(built)
     if headless is not None:
         _scripted(built, file.stem, headless, out, record)
         return
@@ -170,9 +176,9 @@ def run(
 
 
 def _build(scene: Scene) -> BuiltScene:
-    from palpate.progress import narrated
+    from palpate.progress import status_line
 
-    with narrated(f"preparing {scene.name}"):
+    with status_line(f"preparing {scene.name}"):
         return scene.build()
 
 
@@ -216,6 +222,21 @@ def _print_kept() -> None:
         print(f"kept in the cache: {kept / 1e6:.1f} MB of this scene; {of_all}", flush=True)
 
 
+def _print_loose(built: BuiltScene) -> None:
+    """Note bodies that hang by so little that a press on them is hardly felt."""
+    from palpate.green.firmness import LOOSE, firmness
+
+    radius = built.scene.tools[0].contact_radius or built.scene.tools[0].radius or 0.0
+    for body in built.bodies:
+        share = firmness(body.green, radius)
+        if share is not None and share < LOOSE:
+            print(
+                f"palpate: note: {body.name} is held loosely: its top has {share:.1g} of the stiffness of a half-space "
+                "of the same material; hold more of it (--fix, [supports])",
+                file=sys.stderr,
+            )
+
+
 def _force_line(record: PressRecord, max_force: float) -> str:
     """Tell the largest force on the device, and that of the body where the device's limit held it."""
     force = (record.log["force"] ** 2).sum(axis=1).max() ** 0.5
@@ -226,12 +247,12 @@ def _force_line(record: PressRecord, max_force: float) -> str:
 
 
 def _strain_line(record: PressRecord, strain_limit: float) -> str:
-    """Tell the largest strain, and what there is to say about it."""
+    """Line with the largest strain, its limit, and a warning beyond the range of linear elasticity."""
     line = f"largest strain {100 * record.hardest.largest_strain:.1f} %"
     if record.limited:
         line += f", where the tool was limited ([view] strain_limit = {strain_limit:g})"
     if not record.hardest.within_linear_range:
-        line += ": beyond 10 %, to which linear elasticity is honest"
+        line += ": beyond 10 %, where linear elasticity is no longer accurate"
     return line
 
 

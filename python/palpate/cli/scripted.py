@@ -1,4 +1,4 @@
-"""A press without a hand: down on the highest free point nearest the middle, and after a while up again."""
+"""Scripted press for headless runs: down on the highest free point nearest the middle, and up again."""
 
 from __future__ import annotations
 

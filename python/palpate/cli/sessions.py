@@ -1,4 +1,4 @@
-"""Recordings from the command line: written for other programs, and compared."""
+"""Commands that export and compare recordings."""
 
 from __future__ import annotations
 
@@ -119,12 +119,12 @@ def compare(
 
 
 def _rerun(recording: Recording, scene: Path) -> Recording:
-    from palpate.progress import narrated
+    from palpate.progress import status_line
     from palpate.scene import Scene
     from palpate.sessions import rerun
 
     read = Scene.read(scene)
-    with narrated(f"preparing {read.name}"):
+    with status_line(f"preparing {read.name}"):
         built = read.build()
     return rerun(recording, built, progress=True)
 
@@ -182,7 +182,7 @@ def _print(found: Comparison, names: tuple[str, str]) -> None:
                 table.add_row(*_cells(row))
         console.print(table)
     for key, was, now in found.settings:
-        print(f"{key}: {_shown(was)} and {_shown(now)}")
+        print(f"{key}: {_text_of(was)} and {_text_of(now)}")
 
 
 def _cells(row: QuantityDifference) -> tuple[str, ...]:
@@ -194,7 +194,7 @@ def _cells(row: QuantityDifference) -> tuple[str, ...]:
     return row.of, row.quantity, largest, *rest
 
 
-def _shown(value: object) -> str:
+def _text_of(value: object) -> str:
     return "nothing" if value is None else str(value)
 
 

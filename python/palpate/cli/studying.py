@@ -42,10 +42,10 @@ def study(
             told = f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on"
             print(told, file=sys.stderr)
             raise typer.Exit(130) from None
-    _tell(result, folder)
+    _print_result(result, folder)
 
 
-def _tell(result: StudyResult, folder: Path) -> None:
+def _print_result(result: StudyResult, folder: Path) -> None:
     """Write the results, and say what was found and what could not be."""
     import numpy as np
 

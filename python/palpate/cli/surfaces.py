@@ -1,4 +1,4 @@
-"""What a surface file holds."""
+"""Summary of a surface file."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ def print_surface(path: Path, unit: str | None) -> None:
         "" if shape.is_winding_consistent else "triangles that disagree on which side is outside",
     ]
     if any(faults):
-        print(f"  not closed: {', '.join(filter(None, faults))}; it can be filled with --repair")
+        print(f"  not closed: {', '.join(filter(None, faults))}; what it encloses is filled all the same")
     else:
         print(f"  closed, volume {1e6 * scale**3 * abs(shape.volume):.4g} cm3")
     if shape.body_count != 1:
-        print(f"  {shape.body_count} separate surfaces: only one can be filled")
-    repair = " --repair" if any(faults) else ""
-    print(f"  to tetrahedra: palpate mesh {path} {path.with_suffix('.vtu')} --unit {unit}{repair}")
+        print(f"  {shape.body_count} separate surfaces: of several parts the largest is filled (--part)")
+    print(f"  to tetrahedra: palpate mesh {path} {path.with_suffix('.vtu')} --unit {unit}")

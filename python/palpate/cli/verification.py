@@ -31,12 +31,12 @@ def verify(
 
     Example: palpate verify convergence felt --out plots
     """
-    from palpate.progress import narrated
+    from palpate.progress import status_line
     from palpate.validation.verify import chosen
 
     outcomes: list[tuple[Benchmark, Outcome]] = []
     for benchmark in chosen(names or []):
-        with narrated(benchmark.title):
+        with status_line(benchmark.title):
             outcomes.append((benchmark, benchmark.run()))
     if as_json:
         print(json.dumps(_as_rows(outcomes), indent=2))

@@ -1,4 +1,4 @@
-"""Haptic devices: those that a program brings, those that the drivers find, and a gentle check of one."""
+"""Haptic devices: those defined by a program, those found by the drivers, and the self-check of one."""
 
 from palpate.devices.device import Device
 from palpate.devices.listing import FoundDevice, Listing, Obstacle, kinds, listed, listings

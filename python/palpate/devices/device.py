@@ -1,4 +1,4 @@
-"""A device that a program brings: a subclass of `Device` that says where the tool is and puts forces out."""
+"""Devices defined by a program: subclasses of `Device` that read the tool's pose and render forces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from palpate import _native
-from palpate.devices.polling import Polling
+from palpate.devices.polling import PollingThread
 from palpate.devices.reading import DeviceLimits, Reading
 from palpate.errors import DeviceError
 
@@ -35,7 +35,7 @@ class Device(ABC):
     name: ClassVar[str] | str = ""
     limits: DeviceLimits = DeviceLimits()
     rate: float | None = None
-    _polling: Polling | None = None
+    _polling: PollingThread | None = None
 
     def open(self) -> None:
         """Get ready; called once, before the loop starts. What it raises ends the start."""
@@ -72,7 +72,7 @@ class Device(ABC):
         """
         if self._polling is not None:
             raise DeviceError(f"{self.name or type(self).__name__}: another tool or simulation has this device")
-        polling = Polling(self, rate)
+        polling = PollingThread(self, rate)
         opened = polling.start()
         self._polling = polling
         return opened

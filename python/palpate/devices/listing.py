@@ -1,4 +1,4 @@
-"""What the drivers find on this machine, and why they do not find more."""
+"""Devices that the drivers find on this machine, and the reasons why others cannot be used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The thread that polls a device of a program.
+"""Thread that polls a device defined by a program.
 
 It may wait for the device and for the interpreter; the loop never does.
 """
@@ -15,19 +15,19 @@ from typing import Protocol
 import numpy as np
 
 from palpate import _native
-from palpate.devices.reading import DeviceLimits, Reading, mistake_in
+from palpate.devices.reading import DeviceLimits, Reading, reading_error
 from palpate.errors import DeviceError, DeviceWarning
 from palpate.vectors import number
 
 # How long a device may take to open and give its first reading, and to end its last call, s.
 OPENING, CLOSING = 10.0, 2.0
 # Time between two attempts of a device that has failed, s.
-AGAIN = 0.1
+REOPEN_SECONDS = 0.1
 LOWEST_RATE, HIGHEST_RATE = 50.0, 10_000.0
 
 
-class Polled(Protocol):
-    """What is asked of a device; :class:`palpate.Device` tells what each does."""
+class PollableDevice(Protocol):
+    """Methods of a device that are polled; see :class:`palpate.Device`."""
 
     name: str
     limits: DeviceLimits
@@ -46,7 +46,7 @@ class Polled(Protocol):
         """Let go."""
 
 
-class Polling:
+class PollingThread:
     """A device of a program, opened and polled on a thread of its own from :meth:`start` to :meth:`stop`, once.
 
     Parameters
@@ -70,7 +70,7 @@ class Polling:
 
     """
 
-    def __init__(self, device: Polled, rate: float):
+    def __init__(self, device: PollableDevice, rate: float):
         self.name = device.name or type(device).__name__
         if not isinstance(device.limits, DeviceLimits):
             kind = type(device.limits).__name__
@@ -121,7 +121,7 @@ class Polling:
 
     def _run(self, native: _native.ProgrammedDevice) -> None:
         """All that the thread does; nothing is raised out of it."""
-        opened, message = self._attempt("open", self._device.open)
+        opened, message = self._call("open", self._device.open)
         if message is None:
             message = self._read(native)
         if message is not None:
@@ -134,7 +134,7 @@ class Polling:
             if opened:
                 with contextlib.suppress(Exception):
                     self._device.write(np.zeros(3), np.zeros(3))
-                _, message = self._attempt("close", self._device.close)
+                _, message = self._call("close", self._device.close)
                 if message is not None:
                     self._warn(message)
 
@@ -153,13 +153,13 @@ class Polling:
             failed = message is not None
             now = time.monotonic()
             # Deadlines that have passed meanwhile are left out.
-            due = max(due + self._period, now - self._period) if not failed else now + AGAIN
+            due = max(due + self._period, now - self._period) if not failed else now + REOPEN_SECONDS
             if due > now:
                 time.sleep(due - now)
 
     def _read(self, native: _native.ProgrammedDevice) -> str | None:
         """Publish a reading; why there is none."""
-        reading, message = self._attempt("read", self._device.read)
+        reading, message = self._call("read", self._device.read)
         if message is not None:
             return message
         if reading is None:
@@ -169,14 +169,14 @@ class Polling:
             how = reading.orientation, reading.velocity, reading.angular_velocity, reading.buttons
             if native.publish(reading.position, *how):
                 return None
-        return f"{self.name}.read {mistake_in(reading) or 'returned a reading that cannot be used'}"
+        return f"{self.name}.read {reading_error(reading) or 'returned a reading that cannot be used'}"
 
     def _write(self, native: _native.ProgrammedDevice) -> str | None:
         """Put out the latest wrench; why it was not."""
         force, torque, _ = native.wrench()
-        return self._attempt("write", self._device.write, np.array(force), np.array(torque))[1]
+        return self._call("write", self._device.write, np.array(force), np.array(torque))[1]
 
-    def _attempt(self, what: str, call, *arguments):
+    def _call(self, what: str, call, *arguments):
         """Call a method of the device: what it returned, True for nothing, and its mistake in one line."""
         try:
             returned = call(*arguments)

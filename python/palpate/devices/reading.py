@@ -1,4 +1,4 @@
-"""What a device says, and what it can render."""
+"""Readings and limits of a device."""
 
 from __future__ import annotations
 
@@ -95,14 +95,14 @@ class Reading:
     buttons: int = 0
 
 
-def mistake_in(reading: object) -> str | None:
+def reading_error(reading: object) -> str | None:
     """Tell what is wrong with what :meth:`Device.read` returned, in a few words; None if nothing is."""
     if not isinstance(reading, Reading):
         return f"returned {type(reading).__name__}, not a palpate.Reading"
     try:
         for name in ("position", "velocity", "angular_velocity"):
-            three_numbers(_listed(getattr(reading, name)), name, DeviceError)
-        parts = [number(part, "orientation", DeviceError) for part in _listed(reading.orientation)]
+            three_numbers(_plain_numbers(getattr(reading, name)), name, DeviceError)
+        parts = [number(part, "orientation", DeviceError) for part in _plain_numbers(reading.orientation)]
     except (DeviceError, TypeError) as error:
         return f"returned a reading whose {error}"
     if len(parts) != 4:
@@ -116,6 +116,6 @@ def mistake_in(reading: object) -> str | None:
     return None
 
 
-def _listed(values: object) -> object:
+def _plain_numbers(values: object) -> object:
     """Numbers of NumPy as those of Python."""
     return values.tolist() if isinstance(values, np.ndarray) else values

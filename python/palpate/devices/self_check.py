@@ -1,4 +1,4 @@
-"""A gentle check of one device: what it reads, and whether small forces push where they should.
+"""Self-check of one device: its readings, and whether small forces push in the right direction.
 
 The forces are made in a loop at 1 kHz of the native module and pass the safety stage of the force loop; nothing is put
 out before :meth:`SelfCheck.push` is called, and nothing any more from the tick on that sees a fault.
@@ -33,7 +33,7 @@ VISIBLE = 2e-4
 # A loop at 1 kHz wants readings as often; above this gap a device looks unplugged to the safety stage, s.
 LOWEST_RATE, LONGEST_GAP = 500.0, 0.05
 # Rate of the loop of a check, and between two looks at it, s.
-LOOP_RATE, LOOK = 1000.0, 0.02
+LOOP_RATE, POLL_SECONDS = 1000.0, 0.02
 LARGEST_FORCE: float = _native.DeviceCheck.largest_force
 
 
@@ -193,10 +193,10 @@ class SelfCheck:
         if self._program is not None:
             self._program.close_for_loop()
 
-    def watch(self, seconds: float, told: Callable[[dict[str, Any]], None] | None = None) -> Watched:
-        """Watch it without any force; ``told`` hears of it meanwhile."""
+    def watch(self, seconds: float, report: Callable[[dict[str, Any]], None] | None = None) -> Watched:
+        """Watch it without any force; ``report`` hears of it meanwhile."""
         self._check.begin((0.0, 0.0, 0.0), 0.0, 0.0)
-        seen = self._until(lambda seen: seen["time"] >= seconds or seen["fault"] is not None, seconds, told)
+        seen = self._until(lambda seen: seen["time"] >= seconds or seen["fault"] is not None, seconds, report)
         return Watched(
             seen["time"],
             seen["fresh"],
@@ -210,7 +210,7 @@ class SelfCheck:
         )
 
     def push(
-        self, direction: str, force: float, seconds: float = 1.0, told: Callable[[dict[str, Any]], None] | None = None
+        self, direction: str, force: float, seconds: float = 1.0, report: Callable[[dict[str, Any]], None] | None = None
     ) -> Push:
         """Push along one of :data:`DIRECTIONS` with a force, N, that rises over so many seconds and ends.
 
@@ -219,21 +219,21 @@ class SelfCheck:
         """
         along = DIRECTIONS[direction][0]
         self._check.begin(along, force, seconds)
-        seen = self._until(lambda seen: seen["done"], seconds, told)
+        seen = self._until(lambda seen: seen["done"], seconds, report)
         moved = float(np.dot(seen["moved"], along))
         return Push(direction, seen["largest_force"], moved, seen["ran_away"], seen["fault"])
 
     def _until(
-        self, over: Callable[[dict[str, Any]], bool], seconds: float, told: Callable[[dict[str, Any]], None] | None
+        self, over: Callable[[dict[str, Any]], bool], seconds: float, report: Callable[[dict[str, Any]], None] | None
     ) -> dict[str, Any]:
         # A driver that calls the tick may stop calling: the clock decides then.
         deadline = time.monotonic() + 2.0 * seconds + 2.0
         while time.monotonic() < deadline:
             seen = self._check.seen()
             if seen is not None:
-                if told is not None:
-                    told(seen)
+                if report is not None:
+                    report(seen)
                 if over(seen):
                     return seen
-            time.sleep(LOOK)
+            time.sleep(POLL_SECONDS)
         raise DeviceError(f"{self.name}: its driver does not call the loop any more: unplug it and start again")

@@ -1,4 +1,4 @@
-"""Eigenmodes of a body: compute them once, keep them in a file."""
+"""Eigenmodes of a body, computed once and stored in a file."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.linalg
-from scipy.sparse.linalg import LinearOperator, eigsh
+import scipy
 
 from palpate import _native
 from palpate.atomic import destination
@@ -21,7 +20,7 @@ from palpate.cache_limit import hold, make_room
 from palpate.dynamics.matrices import Matrices, start_vector
 from palpate.errors import BodyError, StoreError
 from palpate.leftovers import remove_leftovers
-from palpate.progress import narrated, progress_reporter
+from palpate.progress import progress_reporter, status_line
 
 # Up to so many free dofs the dense solver is quicker than Lanczos for most counts.
 DENSE_DOFS = 1500
@@ -182,7 +181,7 @@ def modes(
     if free <= DENSE_DOFS or 3 * wanted > free:
         if callable(progress):
             progress(0, 1)  # LAPACK does not say how far it is
-        with narrated(f"computing {wanted} modes of {free} dofs"):
+        with status_line(f"computing {wanted} modes of {free} dofs"):
             eigenvalues, vectors = _dense(matrices, wanted)
     else:
         with progress_reporter("computing modes", progress) as report:
@@ -226,8 +225,9 @@ def _lanczos(
             report(solves, max(expected, solves))
         return factor.solve(np.ascontiguousarray(right))
 
-    inverse = LinearOperator((size, size), matvec=solve, dtype=np.float64)
+    inverse = scipy.sparse.linalg.LinearOperator((size, size), matvec=solve, dtype=np.float64)
     stiffness, mass = matrices.free_stiffness, matrices.free_mass
+    eigsh = scipy.sparse.linalg.eigsh
     return eigsh(stiffness, count, mass, sigma=sigma, OPinv=inverse, v0=start_vector(size), ncv=vectors)
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.linalg import LinearOperator, eigsh
+import scipy
 
 from palpate import _native
 from palpate.body import Body
@@ -71,11 +70,12 @@ class Matrices:
         k, m = self.free_stiffness, self.free_mass
         size = k.shape[0]
         factor = self.factor(0.0, 1.0)
-        inverse = LinearOperator((size, size), matvec=factor.solve, dtype=np.float64)
+        inverse = scipy.sparse.linalg.LinearOperator((size, size), matvec=factor.solve, dtype=np.float64)
         if size <= 10:
             return float(np.linalg.eigvals(np.linalg.solve(m.toarray(), k.toarray())).real.max())
         vectors = min(size - 1, 60)
-        values, x = eigsh(k, 1, m, which="LA", Minv=inverse, v0=start_vector(size), ncv=vectors, tol=1e-7, maxiter=1000)
+        limits = {"ncv": vectors, "tol": 1e-7, "maxiter": 1000}
+        values, x = scipy.sparse.linalg.eigsh(k, 1, m, which="LA", Minv=inverse, v0=start_vector(size), **limits)
         residual = k @ x[:, 0] - values[0] * (m @ x[:, 0])
         return float(values[0] + np.sqrt(residual @ factor.solve(residual)))
 

@@ -1,4 +1,4 @@
-"""Residual flexibility: what a truncated basis leaves out, answered at once.
+"""Residual flexibility: the static response of the modes that a truncated basis leaves out.
 
 `R = Psi - Phi diag(1/omega^2) Phi^T` over the elastic modes kept, `Psi` being the static compliance. Its modes are so
 fast against the load that they follow it statically; with it, a constant load ends at the static solution for any
@@ -9,7 +9,7 @@ motion: the load is balanced by the inertia of the rigid motions first, and thei
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from palpate import _native
 from palpate.dynamics.basis import ModalBasis

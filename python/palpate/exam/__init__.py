@@ -1,15 +1,14 @@
-"""Exams: nodules hidden in a body, found by touch alone, and what that tells of a hand."""
+"""Exams: a person finds hidden nodules by touch alone; the answers give the Weber fraction of the hand."""
 
-from palpate.exam.course import Answered, Course, Trial
+from palpate.exam.course import Course, Trial, TrialAnswer
 from palpate.exam.file import ExamFile
 from palpate.exam.library import Library, Nodule
-from palpate.exam.observer import Observer, observed, observed_many
+from palpate.exam.observer import Observer, simulated_exam, simulated_exams
 from palpate.exam.psychometric import Estimate, contrast_at, estimate, proportion_correct
 from palpate.exam.record import Record
 from palpate.exam.result import Result
 
 __all__ = [
-    "Answered",
     "Course",
     "Estimate",
     "ExamFile",
@@ -19,9 +18,10 @@ __all__ = [
     "Record",
     "Result",
     "Trial",
+    "TrialAnswer",
     "contrast_at",
     "estimate",
-    "observed",
-    "observed_many",
     "proportion_correct",
+    "simulated_exam",
+    "simulated_exams",
 ]

@@ -1,4 +1,4 @@
-"""The course of an exam: which nodule comes next, what was answered, and how to go on after an interruption.
+"""Course of an exam: the next trial, the answers so far, and resuming after an interruption.
 
 Everything follows from the seed and the answers: where the nodules of each trial lie is drawn from the seed and the
 trial's number alone, and its contrast by the staircase from the answers before. So rows that are read back lead to the
@@ -35,7 +35,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Answered:
+class TrialAnswer:
     """A trial and its answer, as a row of the table holds them.
 
     Attributes
@@ -93,7 +93,7 @@ class Course:
         self._blank = set(order[: question.blanks].tolist())
         felt = library.staircase_contrasts
         self._staircase = Staircase(float(felt.min()), float(felt.max()), question.target)
-        self.answers: list[Answered] = []
+        self.answers: list[TrialAnswer] = []
 
     @property
     def count(self) -> int:
@@ -115,19 +115,19 @@ class Course:
         distance = np.abs(np.log(library.staircase_contrasts[group] / self._staircase.contrast))
         return int(group[distance.argmin()])
 
-    def answer(self, marked: Sequence[float] | None, seconds: float) -> Answered:
+    def answer(self, marked: Sequence[float] | None, seconds: float) -> TrialAnswer:
         """Take the answer of the trial that is to be answered, and go on to the next."""
         answered = self.scored(marked, seconds)
         self.take(answered)
         return answered
 
-    def take(self, answered: Answered) -> None:
+    def take(self, answered: TrialAnswer) -> None:
         """Go on to the next trial."""
         if answered.trial.nodule is not None:
             self._staircase.answered(answered.score)
         self.answers.append(answered)
 
-    def scored(self, marked: Sequence[float] | None, seconds: float) -> Answered:
+    def scored(self, marked: Sequence[float] | None, seconds: float) -> TrialAnswer:
         """Score an answer of the trial that is to be answered, which stays that."""
         trial, places = self.trial, self.library.places
         assert trial is not None, "the exam is over"
@@ -139,7 +139,7 @@ class Course:
             score = 1.0 / len(places.points) if place is None else float(place == hidden)
             distance = None if point is None else float(np.linalg.norm(point - places.points[hidden]))
         where = None if marked is None else (float(marked[0]), float(marked[1]), float(marked[2]))
-        return Answered(trial, where, place, distance, score, seconds)
+        return TrialAnswer(trial, where, place, distance, score, seconds)
 
     def estimate(self, psychometrics: Psychometrics | None = None) -> Estimate:
         """Weber fraction by the answers so far, over nodules; ``psychometrics`` of the library saves work."""

@@ -1,4 +1,4 @@
-"""The exam file: a scene file with two tables more, which say what is hidden and how it is asked for."""
+"""The exam file: a scene file with two additional tables, for the hidden nodules and for the questions."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ class ExamFile(Scene):
         """What the exam is called: the file without its ending."""
         return Path(self.source[0]).stem
 
-    def what_is_felt(self) -> dict[str, Any]:
+    def force_settings(self) -> dict[str, Any]:
         """Return what decides the forces at given places of a given body."""
         return {
             "tool": self.tools[0].model_dump(mode="json"),

@@ -1,4 +1,4 @@
-"""A session whose page is told nothing from which an eye could read what is hidden.
+"""Session whose page receives nothing that would show where the nodule is.
 
 What would give a nodule away: elements and regions, the wire frame of a mesh made finer around it, the dent that is
 shallower over it, colours, force and stiffness as numbers, arrows and plots, the centre of pressure, the limit of
@@ -17,7 +17,7 @@ from palpate.scene import BuiltScene
 from palpate.simulation import Contact, Frame
 from palpate.viewer.fields import Picture
 from palpate.viewer.messages import numbered
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 
 # The only field, always zero.
 NOTHING = {
@@ -65,7 +65,7 @@ class HiddenSession(Session):
         return {**super()._tool_header(frame, tool), **SILENT}
 
     def _drawn(
-        self, frame: Frame, log_seen: tuple[int, int], wants: Wants
+        self, frame: Frame, log_seen: tuple[int, int], wants: ClientView
     ) -> tuple[dict[str, Any], dict[str, tuple[str, np.ndarray]]]:
         """Part of a frame message: the force on the device, over a body that does not deform."""
         self._follow(frame.contacts)

@@ -1,4 +1,4 @@
-"""The bodies of an exam: one for each place, radius, depth and contrast of a nodule, and what is felt over each.
+"""Bodies of an exam: one for each place, radius, depth and contrast of a nodule, and the forces over each.
 
 All bodies have the same mesh, only the materials of elements differ, so that neither the elements nor what is drawn of
 them tells where the nodule is. Each has a store of its own in the cache: an interrupted preparation goes on where it
@@ -27,6 +27,7 @@ from palpate.exam.file import ExamFile
 from palpate.exam.pressing import Places, forces_at, places_of
 from palpate.green import GreensFunction, precompute
 from palpate.mesh import TetMesh, shapes
+from palpate.mesh.elements import FACES
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, unsolved_body
 
@@ -40,8 +41,6 @@ NO_CONTRAST = 1.0 + 1e-9
 VOLUME_TOLERANCE = 0.25
 # Smallest felt contrast of a nodule.
 LEAST_CONTRAST = 1e-4
-# Corners of the faces of a tetrahedron.
-FACES = ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ class Library:
         if abs(part - 1.0) > VOLUME_TOLERANCE:
             reason = f"its elements fill {100 * part:.0f} % of it: make them smaller with body.refine"
             raise self.exam.mistake(["nodule"], f"{told}: {reason}")
-        corners = np.sort(mesh.tets[inside][:, FACES], axis=2).reshape(-1, 3)
+        corners = np.sort(mesh.tets[inside][:, FACES[4]], axis=2).reshape(-1, 3)
         outer = {tuple(face) for face in np.sort(mesh.surface_faces[:, :3], axis=1).tolist()}
         if any(tuple(face) in outer for face in corners.tolist()):
             reason = "an element of it reaches the surface: hide it deeper, or make elements smaller with body.refine"
@@ -194,7 +193,7 @@ class Library:
 
     def _measured(self, nodules: Sequence[Nodule], report: Callable[[int, int], None]) -> np.ndarray:
         """Return forces (nodules, places), N; those that are known already are not measured again."""
-        known = _Known(self.exam, self.places)
+        known = _ForceCache(self.exam, self.places)
         rows = []
         for done, nodule in enumerate(nodules):
             report(done, len(nodules))
@@ -215,11 +214,11 @@ class Library:
         return forces
 
 
-class _Known:
+class _ForceCache:
     """Forces at the places of an exam by the key of the store, kept in a file of the cache."""
 
     def __init__(self, exam: ExamFile, places: Places):
-        said = json.dumps([version("palpate"), exam.what_is_felt(), places.points.tolist()], sort_keys=True)
+        said = json.dumps([version("palpate"), exam.force_settings(), places.points.tolist()], sort_keys=True)
         self._path = cache_directory() / f"{hashlib.sha256(said.encode()).hexdigest()[:32]}.felt.palpate"
         self.forces: dict[str, list[float]] = {}
         if self._path.exists():

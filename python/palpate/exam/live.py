@@ -1,4 +1,4 @@
-"""The exam in the browser: trial after trial on one page, each answer written before the next body is shown."""
+"""Exam in the browser: one trial after another; each answer is written before the next body is shown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palpate.exam.plot import plot_exam
 from palpate.exam.record import Record
 from palpate.exam.result import Result
 from palpate.scene import BuiltScene
-from palpate.viewer.background import LongWork
+from palpate.viewer.background import CancellableTask
 from palpate.viewer.server import Client, ViewerServer
 
 # The tone is as loud as it gets at so many times the force over plain tissue at the exam's depth.
@@ -63,8 +63,8 @@ class ExamServer(ViewerServer):
     def _make_session(self, built: BuiltScene) -> HiddenSession:
         return HiddenSession(built, self._loud_force)
 
-    async def _greet(self, client: Client) -> None:
-        await super()._greet(client)
+    async def _send_greeting(self, client: Client) -> None:
+        await super()._send_greeting(client)
         self._began = self._began or time.monotonic()
         await client.send(self._exam_message())
 
@@ -99,7 +99,7 @@ class ExamServer(ViewerServer):
         except BaseException:
             self._building = None
             raise
-        self._build_task = asyncio.create_task(self._go_on(building))
+        self._build_task = asyncio.create_task(self._next_trial(building))
 
     def _write(self, answered: Any) -> None:
         try:
@@ -107,14 +107,14 @@ class ExamServer(ViewerServer):
         except OSError as error:
             raise ViewerError(f"the answer could not be written: {error.strerror or error}; give it again") from None
 
-    async def _go_on(self, building: LongWork) -> None:
+    async def _next_trial(self, building: CancellableTask) -> None:
         trial = self._course.trial
         if trial is None:
             await self._conclude(building)
         else:
             make = lambda: self._make_session(self._course.library.built(trial.nodule))  # noqa: E731
             await self._switch("Next trial", make, self._show_next, building)
-        await self._tell_all(self._exam_message())
+        await self._send_all(self._exam_message())
 
     def _show_next(self, session: Any) -> None:
         self._exchange(session)
@@ -122,13 +122,13 @@ class ExamServer(ViewerServer):
         assert trial is not None
         self._shown, self._began = trial.number, time.monotonic()
 
-    async def _conclude(self, building: LongWork) -> None:
+    async def _conclude(self, building: CancellableTask) -> None:
         try:
             await self._worker.call(self._session.release)
             self.result = await building.run(lambda: finish(self._course, self._folder), lambda _: None)
             print("\n".join(self.result.lines()), flush=True)
         except (Error, OSError) as error:
-            await self._tell_all({"type": "error", "text": f"{error}; the answers are in {self._folder}"})
+            await self._send_all({"type": "error", "text": f"{error}; the answers are in {self._folder}"})
         finally:
             self._building = None
 
@@ -142,9 +142,9 @@ class ExamServer(ViewerServer):
             "trial": min(len(course.answers) + 1, course.count),
             "trials": course.count,
             "places": places,
-            "result": None if self.result is None else self._told(self.result),
+            "result": None if self.result is None else self._result_message(self.result),
         }
 
-    def _told(self, result: Result) -> dict[str, Any]:
+    def _result_message(self, result: Result) -> dict[str, Any]:
         picture = base64.b64encode((self._folder / "exam.png").read_bytes()).decode()
         return {"lines": result.lines(), "plot": f"data:image/png;base64,{picture}"}

@@ -1,4 +1,4 @@
-"""A hand of known Weber fraction, to test an exam with: it feels the engine's own forces, with noise.
+"""Simulated observer of known Weber fraction, for tests of an exam: the engine's forces with noise.
 
 It presses every place to the exam's depth and feels the force `F_i (1 + w n_i)`, `n_i` standard normal and independent:
 at a given depth that is the stiffness `K_i = F_i / d` with noise in proportion to it. It knows the body without nodules
@@ -38,7 +38,7 @@ class Observer:
         return int(np.argmax(felt / library.plain_forces))
 
 
-def observed(library: Library, weber_fraction: float, seed: int) -> Course:
+def simulated_exam(library: Library, weber_fraction: float, seed: int) -> Course:
     """Take a whole exam by an observer."""
     course, observer = Course(library, seed), Observer(weber_fraction, seed)
     while (trial := course.trial) is not None:
@@ -47,7 +47,7 @@ def observed(library: Library, weber_fraction: float, seed: int) -> Course:
     return course
 
 
-def observed_many(library: Library, weber_fraction: float, exams: int, seed: int = 0) -> list[Estimate]:
+def simulated_exams(library: Library, weber_fraction: float, exams: int, seed: int = 0) -> list[Estimate]:
     """Estimates of so many exams by an observer, with seeds that follow each other."""
     prepared = psychometrics_of(library)
-    return [observed(library, weber_fraction, seed + rank).estimate(prepared) for rank in range(exams)]
+    return [simulated_exam(library, weber_fraction, seed + rank).estimate(prepared) for rank in range(exams)]

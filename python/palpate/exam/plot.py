@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.exam.course import Course
 from palpate.exam.psychometric import proportion_correct
-from palpate.exam.result import Result, percent, told_fraction
+from palpate.exam.result import Result, fraction_text, percent
 from palpate.validation.plots import COLORS, empty_figure, write_figure
 
 if TYPE_CHECKING:
@@ -83,4 +83,4 @@ def _draw_function(axes: Axes, felt: np.ndarray, scores: np.ndarray, result: Res
     axes.set_ylim(0, 103)
     axes.set_xlabel("felt contrast dK/K [%]")
     axes.set_ylabel("found [%]")
-    axes.set_title(f"Weber fraction {told_fraction(estimate)}", loc="left")
+    axes.set_title(f"Weber fraction {fraction_text(estimate)}", loc="left")

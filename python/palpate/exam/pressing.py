@@ -1,4 +1,4 @@
-"""Where nodules may lie on the surface, and the forces of presses there."""
+"""Possible places of nodules, and the forces of presses there."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from palpate.exam.file import ExamFile
 from palpate.mesh import TetMesh
 from palpate.scene import BuiltScene
 from palpate.simulation import Simulation
+from palpate.vectors import turning_z_to
 
 # The tool comes down from this far above, m, by so much a tick, m (20 mm/s at 1 kHz), and stays for so many ticks: the
 # forces have long stood still by then, after the ramp of the safety stage.
@@ -89,15 +90,7 @@ def forces_at(built: BuiltScene, places: Places, depth: float) -> np.ndarray:
     path, turned = [], []
     for point, normal in zip(points, normals, strict=True):
         path += [point + np.outer(heights, normal), np.full((1, 3), np.nan)]
-        turned.append(np.tile(_upright_on(normal), (len(heights) + 1, 1)))
+        turned.append(np.tile(turning_z_to(normal), (len(heights) + 1, 1)))
     recording = Simulation(built).play(np.vstack(path), np.vstack(turned))
     last = (len(heights) + 1) * np.arange(1, len(points) + 1) - 2
     return np.einsum("ij,ij->i", recording.forces[last], normals)
-
-
-def _upright_on(normal: np.ndarray) -> np.ndarray:
-    """Return the quaternion w x y z that turns z to a normal the shortest way, `(1 + n_z, z x n)` made a unit."""
-    if normal[2] < -1 + 1e-9:
-        return np.array([0.0, 1.0, 0.0, 0.0])
-    half = np.array([1.0 + normal[2], -normal[1], normal[0], 0.0])
-    return half / np.linalg.norm(half)

@@ -1,4 +1,4 @@
-"""From answers to a Weber fraction: signal detection in one of `m` places, by maximum likelihood.
+"""Estimate of the Weber fraction from answers: signal detection in one of `m` places, maximum likelihood.
 
 Model. A press on place `i` is felt as a stiffness `K_i (1 + w n_i)` with independent standard normal `n_i`: noise in
 proportion to what is felt, Weber's law. `w` is the Weber fraction: the standard deviation of one look over what is
@@ -24,8 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import log_ndtr
+import scipy
 
 # Weber fractions that are searched, and lapse rates.
 GRID = np.geomspace(2e-3, 1.0, 450)
@@ -78,7 +77,7 @@ def proportion_correct(contrasts: np.ndarray, weber_fraction: np.ndarray | float
     weights = np.exp(-0.5 * t * t)
     weights /= weights.sum()
     arguments = (x / w)[..., None] + (1.0 + x)[..., None] * t
-    return np.exp((alternatives - 1) * log_ndtr(arguments)) @ weights
+    return np.exp((alternatives - 1) * scipy.special.log_ndtr(arguments)) @ weights
 
 
 def contrast_at(probability: float, weber_fraction: float, alternatives: int) -> float:
@@ -91,8 +90,10 @@ def contrast_at(probability: float, weber_fraction: float, alternatives: int) ->
         right = proportion_correct(np.array(distance * weber_fraction), weber_fraction, alternatives)
         return float(right) - probability
 
+    if above(FARTHEST) <= 0.0:
+        return np.inf
     # In units of w, the scale on which the function is steep.
-    return weber_fraction * float(brentq(above, 0.0, FARTHEST, xtol=1e-6)) if above(FARTHEST) > 0.0 else np.inf
+    return weber_fraction * float(scipy.optimize.brentq(above, 0.0, FARTHEST, xtol=1e-6))
 
 
 class Psychometrics:

@@ -1,4 +1,4 @@
-"""The table of an exam: one row a trial, written as soon as it is answered, read back to go on."""
+"""Table of an exam: one row for each trial, written as soon as it is answered, read again to resume."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.errors import SceneError
-from palpate.exam.course import Answered, Course
+from palpate.exam.course import Course, TrialAnswer
 from palpate.exam.library import Library
 
 COLUMNS = (
@@ -20,7 +20,7 @@ COLUMNS = (
 ASKED = COLUMNS[: COLUMNS.index("answer")]
 
 
-def row_of(course: Course, answered: Answered) -> dict[str, str]:
+def row_of(course: Course, answered: TrialAnswer) -> dict[str, str]:
     """Row of an answer; what does not apply is empty. ``contrast`` is `E/E0`, ``felt_contrast`` `dK/K`."""
     library, nodule = course.library, answered.trial.nodule
     row = dict.fromkeys(COLUMNS, "")
@@ -82,7 +82,7 @@ class Record:
             raise SceneError(f"{self._path} was begun with the seed {course.seed}, not {seed}: give another --out")
         return course
 
-    def add(self, course: Course, answered: Answered) -> None:
+    def add(self, course: Course, answered: TrialAnswer) -> None:
         """Write the row of an answer; it is on the disk when this returns."""
         new = not self._path.exists() or self._path.stat().st_size == 0
         with self._path.open("a", newline="") as stream:
@@ -103,11 +103,11 @@ class Record:
         if course.trial is None:
             raise SceneError(f"{self._path}:{line}: more trials than the exam has; give another --out")
         marked = None if row["answer"] == "none" else [float(row[f"answer_{axis}_m"]) for axis in "xyz"]
-        told = row_of(course, course.answer(marked, float(row["time_s"])))
+        expected = row_of(course, course.answer(marked, float(row["time_s"])))
         for key in (*ASKED, "correct"):
-            if told[key] != row[key]:
+            if expected[key] != row[key]:
                 raise SceneError(
-                    f"{self._path}:{line}: {key} is {row[key] or 'empty'}, this exam has {told[key] or 'none'}: "
+                    f"{self._path}:{line}: {key} is {row[key] or 'empty'}, this exam has {expected[key] or 'none'}: "
                     "the table belongs to another one; give another --out"
                 )
 

@@ -1,4 +1,4 @@
-"""What an exam comes to: the Weber fraction of a hand, what it finds in this tissue, and whether that passes."""
+"""Result of an exam: the Weber fraction, the hardest nodule that is found, and pass or fail."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ class Result:
         felt = "no felt stiffness"
         if np.isfinite(self.felt_contrast):
             felt = f"a felt stiffness {percent(self.felt_contrast)} above its surroundings"
-        told = [
-            f"Weber fraction {told_fraction(e)}",
+        lines = [
+            f"Weber fraction {fraction_text(e)}",
             f"{self.right} of {self.trials} nodules found, {self.none} answered 'none'; guesses would find 1 of "
             f"{e.alternatives}",
             f"found in {percent(self.target)} of trials: {felt}",
@@ -90,12 +90,12 @@ class Result:
         for kind in self.material_contrasts:
             nodule = f"  radius {_millimetres(kind['radius'])}, {_millimetres(kind['depth'])} deep"
             hard = kind["contrast"]
-            told.append(f"{nodule}: " + (f"{hard:.3g} times as hard as the tissue" if hard else "beyond this exam"))
+            lines.append(f"{nodule}: " + (f"{hard:.3g} times as hard as the tissue" if hard else "beyond this exam"))
         if self.blanks:
-            told.append(f"{self.false_marks} of {self.blanks} bodies without a nodule were marked")
+            lines.append(f"{self.false_marks} of {self.blanks} bodies without a nodule were marked")
         if self.passed is not None:
-            told.append("passed" if self.passed else "not passed")
-        return told
+            lines.append("passed" if self.passed else "not passed")
+        return lines
 
     def to_json(self) -> dict[str, Any]:
         """Return all numbers; what is not bounded is null."""
@@ -132,7 +132,7 @@ def percent(part: float) -> str:
     return f"{100 * part:.3g} %"
 
 
-def told_fraction(estimate: Estimate) -> str:
+def fraction_text(estimate: Estimate) -> str:
     """Weber fraction with its 95 % interval, or the bound that the answers give it."""
     low, high = percent(estimate.low), percent(estimate.high)
     if not np.isfinite(estimate.high):

@@ -1,4 +1,4 @@
-"""Weighted up-down: which contrast is asked next (Kaernbach, Perception & Psychophysics 49, 227-229, 1991).
+"""Weighted up-down staircase: the contrast of the next trial (Kaernbach, Perception & Psychophysics 49, 227-229, 1991).
 
 A right answer makes the next nodule harder to feel by the step `d`, a wrong one easier by `u`, on the logarithm of the
 felt contrast. Where the probability of a right answer is `p`, the mean step is `(1 - p) u - p d`: it vanishes at the

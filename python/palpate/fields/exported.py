@@ -1,4 +1,4 @@
-"""What is deformed, as users take it further: files, other libraries, pictures."""
+"""Export of deformed bodies to files, to other libraries, and as pictures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Exported(ABC):
+class Exportable(ABC):
     """One body or several, with files, meshes and pictures of them."""
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Displacements inside a body from those of its surface: what a cut-away view shows."""
+"""Displacements inside a body from those of its surface, for the cut-away view."""
 
 from __future__ import annotations
 

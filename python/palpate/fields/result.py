@@ -1,4 +1,4 @@
-"""A deformed body: displacements of its surface, and what follows from them."""
+"""A deformed body: displacements of its surface, with strain, stress and fields derived from them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from palpate.fields.export import surface_mesh, volume_mesh
-from palpate.fields.exported import Exported
+from palpate.fields.exported import Exportable
 from palpate.fields.picture import DeformedSurface
-from palpate.fields.strain_measure import Strained, StrainSource
+from palpate.fields.strain_measure import StrainReporting, StrainSource
 from palpate.fields.stress import StressRecovery, SurfaceStress
 from palpate.fields.surface_strain import SurfaceStrain
 
@@ -33,7 +33,7 @@ class ResultSource(StrainSource, Protocol):
         """Recovery of stress and strain at all nodes of the body."""
 
 
-class Result(Strained, Exported):
+class Result(StrainReporting, Exportable):
     """Displacements of a surface, with all that follows from them.
 
     Of a body whose elements are known, files and meshes hold its tetrahedra with ``displacement`` (m), ``strain`` and

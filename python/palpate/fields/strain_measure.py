@@ -1,4 +1,4 @@
-"""The largest strain of a pose: the one measure that is reported everywhere, and by which a tool is limited.
+"""Largest strain of a pose: the measure that is reported and that limits tools.
 
 Of a body whose elements are known it is the largest principal strain in magnitude, `max |e_1|, |e_3|`, over the surface
 nodes, with the infinitesimal strain that :class:`palpate.StressRecovery` recovers there. A bare store knows no
@@ -16,8 +16,8 @@ from typing import Protocol
 
 import numpy as np
 
-# Linear elasticity is honest to about this strain; beyond it a pose is reported.
-HONEST_STRAIN = 0.1
+# Linear elasticity is accurate up to about this strain; a pose beyond it is reported.
+LINEAR_STRAIN_LIMIT = 0.1
 # Strain at which the tool of a scene is held, and from which an answer has no meaning.
 STRAIN_LIMIT = 0.3
 
@@ -43,7 +43,7 @@ class StrainSource(Protocol):
         """Measure of the strain of its poses."""
 
 
-class Strained:
+class StrainReporting:
     """A pose that knows its largest strain; ``_source`` has the measure."""
 
     displacements: np.ndarray
@@ -56,5 +56,5 @@ class Strained:
 
     @property
     def within_linear_range(self) -> bool:
-        """Whether the largest strain is within the 10 % to which linear elasticity is honest."""
-        return self.largest_strain <= HONEST_STRAIN
+        """Whether the largest strain is within the 10 % up to which linear elasticity is accurate."""
+        return self.largest_strain <= LINEAR_STRAIN_LIMIT

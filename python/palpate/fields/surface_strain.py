@@ -4,25 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.mesh.shape_functions import TRIANGLE_EDGES, TRIANGLE_NODES, derivatives
+
 # Derivatives along the edges from corner 0 to corners 1 and 2 of the shape functions of a face, (places, nodes, 2), by
-# the number of its nodes: anywhere on a flat triangle; at each node of a 6-node face, whose barycentric coordinates are
-# the first rows below.
-_PLACES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+# the number of its nodes: anywhere on a flat triangle, at each node of a 6-node face.
 _SLOPES = {
-    3: np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]),
-    6: np.array(
-        [
-            [
-                [1 - 4 * r, 1 - 4 * r],
-                [4 * s - 1, 0],
-                [0, 4 * t - 1],
-                [4 * (r - s), -4 * s],
-                [4 * t, 4 * s],
-                [-4 * t, 4 * (r - t)],
-            ]
-            for r, s, t in _PLACES
-        ]
-    ),
+    count: derivatives(places, count, TRIANGLE_EDGES)
+    for count, places in ((3, TRIANGLE_NODES[:1]), (6, TRIANGLE_NODES))
 }
 
 

@@ -1,4 +1,4 @@
-"""Green's functions: what a precomputation will need, the precomputation, and the answers."""
+"""Green's functions: planning a precomputation, running it, and solving with the result."""
 
 from palpate.green.answer import Answer, Touch
 from palpate.green.background import BackgroundPrecompute

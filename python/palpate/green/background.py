@@ -1,4 +1,4 @@
-"""A precomputation in a process of its own, while the region that was computed first is touched."""
+"""Precomputation in a child process, while the region that was computed first can be touched."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from palpate import _native
 from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.errors import BodyError, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN
-from palpate.green.claim import waits_for
+from palpate.green.claim import waiting_message
 from palpate.green.function import GreensFunction
 from palpate.green.job import Job
 
@@ -63,10 +63,10 @@ class BackgroundPrecompute:
         self._job = job = Job.of(body, precision, touch, first, path)
         self.done, self.columns = 0, 3 * len(job.region)
         self.error: str | None = None
-        self._fresh: GreensFunction | None = None
+        self._unfetched: GreensFunction | None = None
         self._waits = False
         self._complete = job.stored()
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._painted, self._touchable = np.empty(0, np.int64), np.empty(0, np.int64)
         self._began: tuple[float, int] | None = None
         self._child: subprocess.Popen[bytes] | None = None
@@ -75,8 +75,8 @@ class BackgroundPrecompute:
             return
         with contextlib.suppress(StoreError, OSError):
             # What an interrupted computation had ready can be touched while this one begins.
-            self._fresh = GreensFunction.load(job.target, body=body)
-            self._touchable = self._fresh.touchable_nodes
+            self._unfetched = GreensFunction.load(job.target, body=body)
+            self._touchable = self._unfetched.touchable_nodes
         memory = job.allowed(None)
         job.make_room()
         # In a session of its own: Ctrl-C in a terminal is for this process, which ends the child.
@@ -101,52 +101,52 @@ class BackgroundPrecompute:
         for line in lines:
             message = json.loads(line)
             if "done" in message:
-                self._note(message["done"], message["columns"])
+                self._note_progress(message["done"], message["columns"])
             elif "error" in message:
-                self._end(message["error"])
+                self._finish(message["error"])
             elif "waiting" in message:
                 self._waits = True
             elif "theirs" in message:
                 # Of another body, perhaps.
                 with contextlib.suppress(StoreError, OSError):
-                    self._take(GreensFunction.load(self._job.target, body=self.body))
+                    self._accept(GreensFunction.load(self._job.target, body=self.body))
             else:
                 self._load(bool(message.get("finished")))
-        self._end("the process that computes the columns has ended")
+        self._finish("the process that computes the columns has ended")
 
-    def _note(self, done: int, columns: int) -> None:
-        with self._news:
+    def _note_progress(self, done: int, columns: int) -> None:
+        with self._changed:
             # The time left follows from columns that come one after the other: not from the factorisation before the
             # first of them, nor from what was there already.
             if self._began is None and done > self.done > 0:
                 self._began = (time.monotonic(), done)
             self.done, self.columns = done, columns
-            self._news.notify_all()
+            self._changed.notify_all()
 
     def _load(self, finished: bool) -> None:
         try:
             green = self._job.load() if finished else self._job.load_growing()
         except (StoreError, OSError) as error:
-            self._end(str(error))
+            self._finish(str(error))
             return
         # What tools needed to know of the stage before is kept under its name, and of no more use.
         _native.forget_contacts(self._job.target)
         if finished:
             self._job.make_room(written=True)
-        self._take(green, finished)
+        self._accept(green, finished)
 
-    def _take(self, green: GreensFunction, finished: bool = False) -> None:
-        with self._news:
-            self._fresh, self._touchable = green, green.touchable_nodes
+    def _accept(self, green: GreensFunction, finished: bool = False) -> None:
+        with self._changed:
+            self._unfetched, self._touchable = green, green.touchable_nodes
             if finished:
                 self._complete, self.done = green, self.columns
-            self._news.notify_all()
+            self._changed.notify_all()
 
-    def _end(self, reason: str) -> None:
-        with self._news:
+    def _finish(self, reason: str) -> None:
+        with self._changed:
             if self._complete is None:
                 self.error = self.error or reason
-            self._news.notify_all()
+            self._changed.notify_all()
 
     @property
     def is_complete(self) -> bool:
@@ -161,13 +161,13 @@ class BackgroundPrecompute:
     @property
     def waiting(self) -> np.ndarray:
         """Nodes that were asked for next and are not ready, ascending."""
-        with self._news:
+        with self._changed:
             return np.setdiff1d(self._painted, self._touchable)
 
     @property
     def seconds_left(self) -> float | None:
         """Until all is computed, by the columns so far, s; None while that is not known."""
-        with self._news:
+        with self._changed:
             if self._began is None or self.error is not None or self._complete is not None:
                 return None
             since, had = self._began
@@ -184,26 +184,26 @@ class BackgroundPrecompute:
 
         """
         while True:
-            with self._news:
-                fresh = self._complete or self._fresh
-                if fresh is not None:
-                    self._fresh = None
-                    return fresh
+            with self._changed:
+                unfetched = self._complete or self._unfetched
+                if unfetched is not None:
+                    self._unfetched = None
+                    return unfetched
                 if self.error is not None:
                     raise BodyError(self.error)
-                self._news.wait(0.1)
+                self._changed.wait(0.1)
                 done, columns = self.done, self.columns
                 waits, self._waits = self._waits, False
             if waits:
-                warnings.warn(waits_for(self._job.target), StoreWarning, stacklevel=2)
+                warnings.warn(waiting_message(self._job.target), StoreWarning, stacklevel=2)
             if progress is not None:
                 progress(done, columns)
 
     def take(self) -> GreensFunction | None:
         """Green's function that has become ready since it was last asked for; None for none."""
-        with self._news:
-            fresh, self._fresh = self._fresh, None
-            return fresh
+        with self._changed:
+            unfetched, self._unfetched = self._unfetched, None
+            return unfetched
 
     def paint(self, nodes: Sequence[int] | np.ndarray) -> None:
         """Let surface nodes be the next stage.
@@ -222,14 +222,14 @@ class BackgroundPrecompute:
         with contextlib.suppress(OSError):  # it has ended meanwhile
             self._input.write(line.encode())
             self._input.flush()
-            with self._news:
+            with self._changed:
                 self._painted = np.union1d(self._painted, wanted)
 
-    def give_way(self) -> None:
+    def yield_processor(self) -> None:
         """Leave a processor to a force loop that begins, and compute on the others at the lowest priority."""
         if self._child is None or not hasattr(os, "sched_setaffinity"):
             return
-        with self._news:
+        with self._changed:
             self._began = None  # it is slower from now on
         ours = sorted(os.sched_getaffinity(0))
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""How wrong an answer may be: the relative errors at which a format is chosen, an answer warned of, and refused."""
+"""Relative errors at which a number format is chosen, a warning is raised, and an answer is refused."""
 
 from __future__ import annotations
 

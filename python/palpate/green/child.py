@@ -1,4 +1,4 @@
-"""The process that computes columns beside a running force loop: ``python -m palpate.green.child``.
+"""Child process that computes columns beside a running force loop: ``python -m palpate.green.child``.
 
 It is given the problem as a pickle on its standard input, then a line of JSON for every region that is to come next,
 and writes a line of JSON on its standard output for whatever has happened. Where its input ends the program that
@@ -22,8 +22,8 @@ from palpate.errors import Error
 from palpate.green.claim import claimed
 
 
-class _Painted:
-    """What is to come next, read on a thread of its own."""
+class _NextNodes:
+    """Nodes to be computed next, read from standard input on a thread."""
 
     def __init__(self, stream: BinaryIO):
         self._stream, self._lock = stream, threading.Lock()
@@ -44,23 +44,23 @@ class _Painted:
         return nodes or None
 
 
-class _Watch:
+class _StoreWatch:
     """Reports that another process computes the store, and what that has ready."""
 
-    def __init__(self, path: Path, say: Callable[..., None]):
-        self._path, self._say = path, say
+    def __init__(self, path: Path, send: Callable[..., None]):
+        self._path, self._send = path, send
         self._seen: int | None = None
         self._waits = False
 
     def __call__(self) -> None:
         if not self._waits:
             self._waits = True
-            self._say(waiting=True)
+            self._send(waiting=True)
         with contextlib.suppress(OSError):
             now = self._path.stat().st_ino
             if now != self._seen:
                 self._seen = now
-                self._say(theirs=True)
+                self._send(theirs=True)
 
 
 def _is_finished(path: Path, key: str) -> bool:
@@ -75,29 +75,29 @@ def _is_finished(path: Path, key: str) -> bool:
 def main() -> None:
     """Compute what standard input asks for."""
     arguments = pickle.load(sys.stdin.buffer)
-    painted, told = _Painted(sys.stdin.buffer), None
+    painted, sent = _NextNodes(sys.stdin.buffer), None
 
-    def say(**message: Any) -> None:
+    def send(**message: Any) -> None:
         sys.stdout.write(json.dumps(message) + "\n")
         sys.stdout.flush()
 
     def progress(done: int, columns: int) -> None:
-        nonlocal told
-        if told != (done, columns):
-            told = (done, columns)
-            say(done=done, columns=columns)
+        nonlocal sent
+        if sent != (done, columns):
+            sent = (done, columns)
+            send(done=done, columns=columns)
 
-    growth = (arguments.pop("first"), painted.take, lambda nodes: say(ready=nodes))
+    growth = (arguments.pop("first"), painted.take, lambda nodes: send(ready=nodes))
     key, path = arguments.pop("key"), arguments["path"]
     try:
-        with claimed(path, _Watch(path, say)) as claim:
+        with claimed(path, _StoreWatch(path, send)) as claim:
             if not _is_finished(path, key):
                 _native.GreenCore.precompute_to(**arguments, progress=progress, growth=growth, claim=claim)
-        say(finished=True)
+        send(finished=True)
     except Error as error:
-        say(error=str(error))
+        send(error=str(error))
     except OSError as error:
-        say(error=f"{arguments['path']}: {error.strerror or error}")
+        send(error=f"{arguments['path']}: {error.strerror or error}")
     # The reading thread holds the lock of standard input, with which the interpreter cannot end.
     os._exit(0)
 

@@ -1,4 +1,4 @@
-"""One writer of a store at a time: who comes second waits."""
+"""Lock on a store: one process at a time writes it, others wait."""
 
 from __future__ import annotations
 
@@ -34,6 +34,6 @@ def claimed(target: Path, waiting: Callable[[], None]) -> Iterator[_native.Store
         claim.release()
 
 
-def waits_for(target: Path) -> str:
+def waiting_message(target: Path) -> str:
     """Message for the time of waiting."""
     return f"another process is computing {target}: waiting for it"

@@ -1,8 +1,9 @@
-"""Room on the disk for a store and for what an interrupted computation keeps beside it."""
+"""Disk space that a store and its partial file need."""
 
 from __future__ import annotations
 
 import shutil
+from bisect import bisect_right
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,7 +63,7 @@ def require_room(target: Path, columns: int, rows: int, precision: str, in_stage
     raise StoreError(
         f"{target}: the store in {precision} takes {_gb(needed.store)} and its unfinished columns "
         f"{_gb(needed.partial)} beside it, {_gb(needed.peak)} in all, but {_gb(free)} are free there: "
-        f"{_what_fits(columns, rows, precision, in_stages, free)}"
+        f"{_fitting_alternatives(columns, rows, precision, in_stages, free)}"
     )
 
 
@@ -73,20 +74,15 @@ def free_bytes(target: Path) -> int:
     return shutil.disk_usage(target.absolute().parent).free + held
 
 
-def _what_fits(columns: int, rows: int, precision: str, in_stages: bool, free: int) -> str:
+def _fitting_alternatives(columns: int, rows: int, precision: str, in_stages: bool, free: int) -> str:
     others = [
         f"'{other}' takes {_gb(smaller.peak)}"
         for other in STORED
         if STORED[other] < STORED[precision] and (smaller := DiskUse.of(columns, rows, other, in_stages)).peak <= free
     ]
-    low, high = 0, columns // 3
-    while low < high:
-        middle = (low + high + 1) // 2
-        if DiskUse.of(3 * middle, rows, precision, in_stages).peak <= free:
-            low = middle
-        else:
-            high = middle - 1
-    region = [f"a touch region of up to {low} of the {columns // 3} nodes fits"] if low else []
+    counts = range(1, columns // 3 + 1)
+    fitting = bisect_right(counts, free, key=lambda nodes: DiskUse.of(3 * nodes, rows, precision, in_stages).peak)
+    region = [f"a touch region of up to {fitting} of the {columns // 3} nodes fits"] if fitting else []
     return ", ".join([*region, *others, "or name a file on a larger disk"])
 
 

@@ -1,4 +1,4 @@
-"""The Green's function of a body: any touch answered by a small solve."""
+"""The Green's function of a body, and contacts solved with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A precomputation by the workers of a cluster: blocks of columns come from them, the store is written here."""
+"""Precomputation by the workers of a cluster: they solve blocks of columns, this process writes the store."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def precompute_on(
     """
     problem, precision = what.problem, what.precision
     job = worker.FactorRequest(what.key, _native.__version__, precision, memory)
-    held = submit(client, worker.received, problem)
+    held = submit(client, worker.pass_through, problem)
     try:
         measuring = _measure(client, held, job)
         # Assembled and ordered here, too, while the workers factorise.

@@ -1,4 +1,4 @@
-"""What a precomputation is of and where it goes, and that there is room for it."""
+"""A precomputation to be run: its problem, its target file, and the checks of memory and disk space."""
 
 from __future__ import annotations
 

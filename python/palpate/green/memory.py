@@ -1,4 +1,4 @@
-"""Memory of this process, and what of an allowance is left."""
+"""Memory of this process, and the remainder of a memory limit."""
 
 from __future__ import annotations
 

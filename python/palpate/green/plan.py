@@ -1,4 +1,4 @@
-"""What a precomputation will do and need, counted before any number is computed."""
+"""Plan of a precomputation: its size, memory and time, before any number is computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Green's functions from their files, or computed and written there."""
+"""Green's functions, loaded from their files or computed and stored."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from palpate.body import Body, SurfaceRegion, surface_region
 from palpate.cluster import connected
 from palpate.errors import ClusterError, PrecisionWarning, StoreError, StoreWarning
 from palpate.green.bounds import CHOSEN, WARNED, error_text, remedy
-from palpate.green.claim import claimed, waits_for
+from palpate.green.claim import claimed, waiting_message
 from palpate.green.function import GreensFunction
 from palpate.green.gathering import precompute_on
 from palpate.green.job import Job
@@ -101,15 +101,15 @@ def precompute(
     job = Job.of(body, precision, touch, first, path)
     stored = job.stored()
     if stored is not None:
-        return _told(stored)
-    with _what_is_kept_is_told(job.target), claimed(job.target, _told_once(job.target)) as claim:
+        return _warn_of_inaccuracy(stored)
+    with _reporting_disk_failures(job.target), claimed(job.target, _warn_once_of_waiting(job.target)) as claim:
         # Whoever had the claim before may have finished it.
         stored = job.stored()
         if stored is not None:
-            return _told(stored)
+            return _warn_of_inaccuracy(stored)
         job.make_room()
         if dask is None:
-            discarded = _here(job, claim, memory, progress, first is not None, ready, painted)
+            discarded = _in_this_process(job, claim, memory, progress, first is not None, ready, painted)
         else:
             # Of memory the workers see to their own; the files have to have room here.
             job.allowed(None)
@@ -122,21 +122,21 @@ def precompute(
         )
     green = job.load()
     job.make_room(written=True)
-    return _told(green)
+    return _warn_of_inaccuracy(green)
 
 
-def _told_once(target: Path) -> Callable[[], None]:
-    """Make what warns, when it is first called, that another process is waited for."""
+def _warn_once_of_waiting(target: Path) -> Callable[[], None]:
+    """Return a function that warns once that another process is computing the store."""
     calls = itertools.count()
 
     def waiting() -> None:
         if next(calls) == 0:
-            warnings.warn(waits_for(target), StoreWarning, stacklevel=5)
+            warnings.warn(waiting_message(target), StoreWarning, stacklevel=5)
 
     return waiting
 
 
-def _here(
+def _in_this_process(
     job: Job,
     claim: _native.StoreClaim,
     memory: int | str | None,
@@ -165,7 +165,7 @@ def _here(
 
 
 @contextlib.contextmanager
-def _what_is_kept_is_told(target: Path) -> Iterator[None]:
+def _reporting_disk_failures(target: Path) -> Iterator[None]:
     """Say where a full disk, or another failure of it, has left finished columns."""
     try:
         yield
@@ -198,7 +198,7 @@ def _watchers(
     return asked, written
 
 
-def _told(green: GreensFunction) -> GreensFunction:
+def _warn_of_inaccuracy(green: GreensFunction) -> GreensFunction:
     """Warn of a store in which touches may be wrong."""
     if not green.touch_error <= WARNED:
         said = f"touches of this body may be wrong by {error_text(green.touch_error)}"

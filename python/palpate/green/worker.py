@@ -1,4 +1,4 @@
-"""What a worker of a cluster does for a precomputation: it factorises once, and solves blocks of columns."""
+"""Tasks of a cluster's worker: it factorises once, and solves blocks of columns."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class _Factors:
                     # Not one that was let go while it was made.
                     if self._making.get(job.key) is making:
                         self.held[job.key] = factor
-        self._stay(job.key)
+        self._restart_idle_timer(job.key)
         return factor
 
     def release(self, key: str) -> None:
@@ -77,7 +77,7 @@ class _Factors:
         if timer is not None:
             timer.cancel()
 
-    def _stay(self, key: str) -> None:
+    def _restart_idle_timer(self, key: str) -> None:
         """Begin to count the idle time again."""
         timer = threading.Timer(IDLE, self.release, [key])
         timer.daemon = True
@@ -101,14 +101,14 @@ def threads() -> int:
     return int(get_worker().state.nthreads)
 
 
-def received(problem: Arrays) -> Arrays:
+def pass_through(problem: Arrays) -> Arrays:
     """Return the arrays as they came: as a task, what it returns is held by workers, and made again where they die."""
     return problem
 
 
 def measure(problem: Arrays, job: FactorRequest) -> tuple[tuple[Any, ...], bytes]:
     """Factorise; what the store needs to know of that, and the hash of the order of rows and columns."""
-    factor = _made(problem, job)
+    factor = _factorize(problem, job)
     return factor.measured, factor.order
 
 
@@ -121,7 +121,7 @@ def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: 
         This machine orders rows and columns otherwise: its blocks are of other columns.
 
     """
-    factor = _made(problem, job)
+    factor = _factorize(problem, job)
     if factor.order != order:
         raise ClusterError(
             f"the worker at {_address()} orders the columns otherwise: give it the same build of Palpate"
@@ -134,7 +134,7 @@ def release(key: str) -> None:
     _factors.release(key)
 
 
-def _made(problem: Arrays, job: FactorRequest) -> _native.ColumnJob:
+def _factorize(problem: Arrays, job: FactorRequest) -> _native.ColumnJob:
     require_version(job.version, _address())
     return _factors.get(job, problem)
 

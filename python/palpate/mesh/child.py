@@ -1,14 +1,23 @@
-"""Child processes for meshers, which bad surfaces crash or hang: limited in time, and gone with their parent."""
+"""Child processes for meshers, which may crash or hang: they have a time limit and end with their parent."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
+import time
+from collections.abc import Callable
+
+# How often a child's stage is looked at, s.
+LOOK = 0.1
 
 
-def run_limited(command: list[str], time_limit: float) -> int | None:
-    """Exit status of a child in a process group of its own; None if it ran out of time."""
+def run_limited(command: list[str], time_limit: float, watch: Callable[[], None] | None = None) -> int | None:
+    """Exit status of a child in a process group of its own; None if it ran out of time.
+
+    ``watch`` is called now and then while it runs.
+    """
     # Its input stays open as long as this process lives: the child's end_with_parent watches it.
     process = subprocess.Popen(
         command,
@@ -18,7 +27,12 @@ def run_limited(command: list[str], time_limit: float) -> int | None:
         start_new_session=True,
     )
     try:
-        return process.wait(time_limit)
+        deadline = time.monotonic() + time_limit
+        while watch is not None and process.poll() is None and time.monotonic() < deadline:
+            watch()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(LOOK)
+        return process.wait(max(deadline - time.monotonic(), 0.0))
     except subprocess.TimeoutExpired:
         return None
     finally:
@@ -32,6 +46,8 @@ def failure_of(status: int | None, time_limit: float) -> str | None:
     """Say how a mesher failed; None if it did not."""
     if status is None:
         return f"did not finish in {time_limit:g} s and was stopped"
+    if hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU:
+        return "used up its processor time and was stopped"
     if status < 0:
         return f"crashed ({signal.Signals(-status).name})"
     return "returned no tetrahedra" if status else None

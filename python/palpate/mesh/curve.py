@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate import _native
-from palpate.mesh.elements import EDGES, unique_edges
+from palpate.mesh.elements import AT_CORNERS, DIAGONALS, EDGES, INSIDE, unique_edges
 from palpate.mesh.tetmesh import TetMesh
 
 # A curved element's least determinant in parts of its largest, in which straight ones have 1.
@@ -17,18 +17,6 @@ MOST_BULGE, LEAST_BULGE = 0.2, 1e-3
 # An eighth of an element keeps this part of the shape that it has in the straight one, unless it is as good as this (a
 # regular tetrahedron has 1, one of a cube cut into six 0.7).
 KEPT_SHAPE, GOOD_SHAPE = 0.7, 0.5
-
-# By the nodes of a 10-node element: the eighths at its corners; the diagonals of the octahedron between them, counted
-# from its first middle; and the octahedron cut along each.
-AT_CORNERS = np.array([[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3]])
-DIAGONALS = np.array([[0, 5], [1, 3], [2, 4]])
-INSIDE = np.array(
-    [
-        [[4, 9, 5, 6], [4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5]],
-        [[5, 7, 4, 8], [5, 7, 8, 9], [5, 7, 9, 6], [5, 7, 6, 4]],
-        [[6, 8, 4, 5], [6, 8, 5, 9], [6, 8, 9, 7], [6, 8, 7, 4]],
-    ]
-)
 
 
 def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
@@ -47,7 +35,7 @@ def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh
         low, high = _native.determinant_ranges(nodes, tets.astype(np.uint32)).reshape(-1, 2).T
         return low < LEAST_DETERMINANT * high
 
-    nodes, tets = _bent(mesh, project, folded)
+    nodes, tets = _curve_edges(mesh, project, folded)
     return TetMesh(nodes, tets, mesh.regions, mesh.region_names)
 
 
@@ -67,18 +55,18 @@ def refine(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMes
     """
 
     def flattened(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
-        parts = _eighths(nodes, tets).reshape(-1, 4)
+        parts = _subelements(nodes, tets).reshape(-1, 4)
         straight = nodes.copy()
         straight[tets[:, 4:]] = nodes[tets[:, EDGES]].mean(axis=2)
         bent, before = (_shapes(points, parts).reshape(-1, 8) for points in (nodes, straight))
         return (bent < np.minimum(GOOD_SHAPE, KEPT_SHAPE * before)).any(axis=1)
 
-    nodes, tets = _bent(mesh, project, flattened)
-    parts = _eighths(nodes, tets).reshape(-1, 4)
+    nodes, tets = _curve_edges(mesh, project, flattened)
+    parts = _subelements(nodes, tets).reshape(-1, 4)
     return TetMesh(nodes, parts, np.repeat(mesh.regions, 8), mesh.region_names)
 
 
-def _bent(
+def _curve_edges(
     mesh: TetMesh,
     project: Callable[[np.ndarray], np.ndarray],
     is_bad: Callable[[np.ndarray, np.ndarray], np.ndarray],
@@ -108,7 +96,7 @@ def _bent(
         bulge[bad] = np.where(np.linalg.norm(bulge[bad], axis=1) > least, 0.7, 0.0)[:, None] * bulge[bad]
 
 
-def _eighths(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+def _subelements(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Parts (m, 8, 4) of elements (m, 10), oriented as these."""
     middles = nodes[tets[:, 4:]]
     diagonals = np.stack([np.linalg.norm(middles[:, i] - middles[:, j], axis=1) for i, j in DIAGONALS], axis=1)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from palpate.errors import MeshError
+from palpate.mesh.triangles import area_vectors, units
 
 # Corners of each edge, in the order of the mid-side nodes.
 EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
@@ -24,23 +24,20 @@ MIRRORED = {4: np.array([0, 2, 1, 3]), 10: np.array([0, 2, 1, 3, 6, 5, 4, 7, 9, 
 # By the number of a face's nodes: the flat triangles it is drawn by.
 FACE_TRIANGLES = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
 
-# The flat tetrahedra an element is drawn by: one at each corner, and the octahedron between the mid-side nodes, cut
-# along its diagonal 6-8.
-PARTS = {
-    4: np.array([[0, 1, 2, 3]]),
-    10: np.array(
-        [
-            [0, 4, 6, 7],
-            [4, 1, 5, 8],
-            [6, 5, 2, 9],
-            [7, 8, 9, 3],
-            [8, 6, 5, 4],
-            [8, 6, 9, 5],
-            [8, 6, 7, 9],
-            [8, 6, 4, 7],
-        ]
-    ),
-}
+# Of a 10-node element: the eighths at its corners; the diagonals of the octahedron between them, counted from its first
+# middle; and the octahedron cut along each.
+AT_CORNERS = np.array([[0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3]])
+DIAGONALS = np.array([[0, 5], [1, 3], [2, 4]])
+INSIDE = np.array(
+    [
+        [[4, 9, 5, 6], [4, 9, 6, 7], [4, 9, 7, 8], [4, 9, 8, 5]],
+        [[5, 7, 4, 8], [5, 7, 8, 9], [5, 7, 9, 6], [5, 7, 6, 4]],
+        [[6, 8, 4, 5], [6, 8, 5, 9], [6, 8, 9, 7], [6, 8, 7, 4]],
+    ]
+)
+
+# By the number of an element's nodes: the flat tetrahedra it is drawn by.
+PARTS = {4: np.array([[0, 1, 2, 3]]), 10: np.vstack([AT_CORNERS, INSIDE[2]])}
 
 
 def drawing_triangles(faces: np.ndarray) -> np.ndarray:
@@ -51,6 +48,19 @@ def drawing_triangles(faces: np.ndarray) -> np.ndarray:
 def drawing_tets(tets: np.ndarray) -> np.ndarray:
     """Flat tetrahedra of elements with 4 or 10 nodes, (k, 4), in the elements' order."""
     return tets[:, PARTS[tets.shape[1]]].reshape(-1, 4)
+
+
+def smallest_dihedral_angles(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Smallest dihedral angle of each element, (m,) degrees, by its corners; negative where these are inverted."""
+    areas = area_vectors(nodes[tets[:, FACES[4]]])
+    signed = np.einsum("ij,ij->i", areas[:, 3], nodes[tets[:, 3]] - nodes[tets[:, 0]])
+    normals = units(areas)
+    cosines = np.einsum("eik,ejk->eij", normals, normals)
+    i, j = np.triu_indices(4, 1)
+    # A face without an area has no normal: its element is flat.
+    cosines = np.where(areas.any(axis=2).all(axis=1)[:, None], cosines[:, i, j], -1.0)
+    angles = 180.0 - np.degrees(np.arccos(np.clip(cosines, -1, 1))).max(axis=1)
+    return np.where(signed < 0, angles, -180.0)
 
 
 def unique_edges(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,15 +91,15 @@ def boundary_faces(tets: np.ndarray) -> np.ndarray:
 
     """
     of_element = FACES[tets.shape[1]]
-    return tets[:, of_element].reshape(-1, of_element.shape[1])[_alone(tets)]
+    return tets[:, of_element].reshape(-1, of_element.shape[1])[_boundary_ranks(tets)]
 
 
 def face_owners(tets: np.ndarray) -> np.ndarray:
     """Element (k,) that each of :func:`boundary_faces` belongs to."""
-    return _alone(tets) // 4
+    return _boundary_ranks(tets) // 4
 
 
-def _alone(tets: np.ndarray) -> np.ndarray:
+def _boundary_ranks(tets: np.ndarray) -> np.ndarray:
     """Ranks, among the faces of all elements, of those of one element only."""
     corners = tets[:, FACES[tets.shape[1]][:, :3]].reshape(-1, 3)
     _, first, inverse, counts = np.unique(
@@ -108,4 +118,4 @@ def face_parts(tets: np.ndarray) -> np.ndarray:
     same = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
     a, b = order[same] // 4, order[same + 1] // 4
     graph = scipy.sparse.coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(len(tets), len(tets)))
-    return connected_components(graph, directed=False)[1]
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]

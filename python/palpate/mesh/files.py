@@ -96,7 +96,7 @@ def _read_meshio(path: Path) -> meshio.Mesh:
     # meshio prints its complaints and may end the program; both become one error of ours.
     noise = io.StringIO()
     try:
-        with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise), _no_cell_left_out(path):
+        with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise), _refusing_unknown_cells(path):
             return meshio.read(path)
     except MeshError:
         raise
@@ -110,7 +110,7 @@ def _read_meshio(path: Path) -> meshio.Mesh:
 
 
 @contextlib.contextmanager
-def _no_cell_left_out(path: Path) -> Iterator[None]:
+def _refusing_unknown_cells(path: Path) -> Iterator[None]:
     """Refuse cells of VTK types that meshio does not know: its two readers leave them out with a printed complaint."""
     from meshio import _vtk_common
     from meshio._mesh import topological_dimension

@@ -8,7 +8,6 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -17,9 +16,9 @@ import numpy as np
 from palpate import _native
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import failure_of, run_limited
-from palpate.mesh.crossings import first_crossing
 from palpate.mesh.curve import curve, refine
 from palpate.mesh.fit import GOOD_LOSS, Fit
+from palpate.mesh.surface_state import SurfaceState
 from palpate.mesh.tetmesh import TetMesh
 
 if TYPE_CHECKING:
@@ -44,11 +43,15 @@ ATTEMPTS_GIVEN = 2
 MOST_BY_NETGEN, IN_CUBE = 30_000, 3.5
 
 # Seconds for NETGEN to prove that a surface that intersects itself can be filled: mostly it hangs, or crashes.
-PATIENCE = 30.0
+TIME_LIMIT = 30.0
 
 # The mesh may cut corners of a curved surface, but not lose a part of it.
 VOLUME_TOLERANCE = 0.1
-REPAIR_HINT = "mend it in Blender or MeshLab, or let fTetWild do it: 'pip install pytetwild pyvista' and --repair"
+WRAP_HINT = "leave out mesher = 'netgen', and it is wrapped"
+
+
+class MesherFailedError(MeshError):
+    """NETGEN made no mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +62,8 @@ class Filling:
     ----------
     name
         Of the surface in messages.
-    shape
-        The surface, m.
+    surface
+        The surface, m, and what is known of it.
     element
         What it is filled with.
     size
@@ -69,15 +72,23 @@ class Filling:
         Finer balls.
     time_limit
         Of the mesher, s, in all its runs.
+    processor_limit
+        Of one run, s of processor time, which other programs do not change; None: as long as it takes.
 
     """
 
     name: str
-    shape: trimesh.Trimesh
+    surface: SurfaceState
     element: Element
     size: float | None
     refine: Sequence[Ball]
     time_limit: float
+    processor_limit: float | None = None
+
+    @property
+    def shape(self) -> trimesh.Trimesh:
+        """The surface, m."""
+        return self.surface.shape
 
     @property
     def extent(self) -> float:
@@ -97,7 +108,7 @@ class Filling:
         halvings = self._halvings(size)
         found: tuple[TetMesh, Fit] | None = None
         points, local = np.empty((0, 3)), np.empty(0)
-        patience = self.time_limit if self._crossing is None else min(self.time_limit, PATIENCE)
+        patience = self.time_limit if self._crossing is None else min(self.time_limit, TIME_LIMIT)
         deadline = time.monotonic() + patience
         for _ in range(ATTEMPTS if self.size is None else ATTEMPTS_GIVEN):
             # Where a size is given, parts that NETGEN's larger elements miss are got back by smaller ones there.
@@ -119,15 +130,15 @@ class Filling:
             if np.array_equal(before, local):
                 break
         if found is None:
-            raise MeshError(f"{self.name}: {self._reason(size, made)}")
-        self._tell(*found, size)
+            raise MesherFailedError(f"{self.name}: {self._reason(size, made)}")
+        self._warn_of_losses(*found, size)
         return found[0]
 
     def _halvings(self, size: float) -> int:
         """How often elements are halved after NETGEN."""
         return int(self.shape.volume * IN_CUBE / size**3 > MOST_BY_NETGEN)
 
-    def _tell(self, mesh: TetMesh, fit: Fit, size: float) -> None:
+    def _warn_of_losses(self, mesh: TetMesh, fit: Fit, size: float) -> None:
         """Warn of what the mesh loses, or refuse it."""
         if fit.is_good(size):
             return
@@ -146,17 +157,14 @@ class Filling:
             return crossing
         return (
             f"NETGEN {failures} with elements of {_length(size)}, though the surface does not intersect itself: try "
-            f"elements of {_length(size / 2)}, or {REPAIR_HINT}"
+            f"elements of {_length(size / 2)}, or {WRAP_HINT}"
         )
 
-    @cached_property
+    @property
     def _crossing(self) -> str | None:
         """Where the surface intersects itself, if it does."""
-        point = first_crossing(self.shape.vertices, self.shape.faces)
-        if point is None:
-            return None
-        place = ", ".join(f"{x:.4g}" for x in point)
-        return f"the surface intersects itself near ({place}) m; {REPAIR_HINT}"
+        place = self.surface.crossing
+        return None if place is None else f"the surface intersects itself near {place} m; {WRAP_HINT}"
 
     def _tetrahedra(
         self, sizes: tuple[float, int], points: np.ndarray, local: np.ndarray, deadline: float
@@ -171,6 +179,7 @@ class Filling:
             "vertices": (self.shape.vertices - origin) / extent,
             "faces": self.shape.faces,
             "size": size / unit,
+            "processor_limit": self.processor_limit or 0.0,
             "balls": np.reshape(
                 [[*((np.array(c) - origin) / extent), r / extent, h / unit] for c, r, h in self.refine], (-1, 5)
             ),

@@ -28,6 +28,7 @@ def main(route: str, given: str, made: str) -> int:
 
     with np.load(given) as job:
         vertices, faces, size = job["vertices"], job["faces"], float(job["size"])
+        _limit_processor_time(float(job["processor_limit"]))
         small = np.vstack([job["points"], *(_ball_points(b[:3], b[3], b[4]) for b in job["balls"])])
     parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE)
     if len(small):
@@ -48,6 +49,14 @@ def main(route: str, given: str, made: str) -> int:
     used = np.unique(tets)
     np.savez(made, nodes=nodes[used], tets=np.searchsorted(used, tets))
     return 0
+
+
+def _limit_processor_time(seconds: float) -> None:
+    """Let the system end this process after so much processor time; 0 sets no limit, and Windows has none."""
+    if seconds > 0 and sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 1))
 
 
 def _write_sizes(path: Path, points: np.ndarray) -> None:

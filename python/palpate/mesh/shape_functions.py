@@ -11,8 +11,9 @@ import numpy as np
 
 from palpate.mesh.elements import EDGES
 
-# Corners joined by each edge node of a triangle, in their order after the corners.
+# Corners joined by each edge node of a triangle, in their order after the corners, and the nodes' barycentric places.
 TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
+TRIANGLE_NODES = np.vstack([np.eye(3), np.eye(3)[TRIANGLE_EDGES].mean(axis=1)])
 
 # Symmetric rule of degree 4 on a triangle: barycentric points and weights that sum to one (Dunavant, 1985).
 _A, _B = 0.445948490915965, 0.091576213509771

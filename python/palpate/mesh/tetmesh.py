@@ -12,12 +12,23 @@ import numpy as np
 
 from palpate import _native
 from palpate.errors import MeshError, MeshWarning
-from palpate.mesh.elements import EDGES, FACES, MIRRORED, boundary_faces, drawing_triangles, unique_edges
+from palpate.mesh.elements import (
+    EDGES,
+    FACES,
+    MIRRORED,
+    boundary_faces,
+    drawing_triangles,
+    smallest_dihedral_angles,
+    unique_edges,
+)
 from palpate.mesh.files import Volume, read_volume, write_volume
 from palpate.mesh.shapes import Shape, elements_inside
 
 # An element flatter than this part of the cube of its longest edge has no usable shape functions.
 DEGENERATE = 1e-12
+
+# Below so many degrees between two faces an element's shape functions are poor, and so is what it feels like.
+FLAT_ANGLE = 2.0
 
 # Where the middle of an edge may lie, in parts of the edge's length from the middle between its ends: beyond a quarter
 # along the edge its quadratic map folds back, and half across is a half circle.
@@ -132,12 +143,19 @@ class TetMesh:
 
     def dihedral_angles(self) -> np.ndarray:
         """Smallest dihedral angle of each element, (m,) degrees, by its corners: below about 5 an element is poor."""
-        p = self.nodes[self.tets[:, FACES[4]]]
-        normals = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
-        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-        cosines = np.einsum("eik,ejk->eij", normals, normals)
-        i, j = np.triu_indices(4, 1)
-        return 180.0 - np.degrees(np.arccos(np.clip(cosines[:, i, j], -1, 1))).max(axis=1)
+        return smallest_dihedral_angles(self.nodes, self.tets)
+
+    def warn_of_flat_elements(self, name: str) -> None:
+        """Warn of elements whose smallest dihedral angle is below two degrees; ``name`` stands for the mesh."""
+        angles = self.dihedral_angles()
+        count = int((angles < FLAT_ANGLE).sum())
+        if count:
+            warnings.warn(
+                f"{name}: {count} tetrahedra have a dihedral angle below {FLAT_ANGLE:g} degrees (smallest: "
+                f"{angles.min():.2g}); forces near them are less accurate",
+                MeshWarning,
+                stacklevel=3,
+            )
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], unit: str | None = None) -> TetMesh:
@@ -159,7 +177,9 @@ class TetMesh:
 
         """
         volume = read_volume(Path(path), unit)
-        return cls(volume.nodes, volume.tets, volume.regions, volume.region_names)
+        mesh = cls(volume.nodes, volume.tets, volume.regions, volume.region_names)
+        mesh.warn_of_flat_elements(str(path))
+        return mesh
 
     def with_regions(self, placed: Mapping[int | str, Shape | Iterable[Shape]]) -> TetMesh:
         """Return the same mesh with solids marked as regions, later ones over earlier ones.

@@ -3,33 +3,69 @@
 from __future__ import annotations
 
 import os
-import sys
-import tempfile
-import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from palpate.errors import MeshError, MeshWarning
-from palpate.input_file import require_file
-from palpate.mesh.child import failure_of, run_limited
-from palpate.mesh.elements import face_parts
-from palpate.mesh.filling import PARTS, REPAIR_HINT, Ball, Element, Filling
+from palpate.errors import MeshError
+from palpate.mesh.filling import Ball, Element, Filling, MesherFailedError
 from palpate.mesh.size import scale_of
-from palpate.mesh.stl import load_stl
+from palpate.mesh.surface_file import SurfaceFile, load_surface
+from palpate.mesh.surface_state import BY_HAND, MOST_FOR_NETGEN, SurfaceState, require_closed, require_finite
 from palpate.mesh.tetmesh import TetMesh
-from palpate.units import length
+from palpate.mesh.wrapping import Which, Wrapping
+from palpate.progress import Reporter, progress_reporter
+from palpate.units import length, share
 from palpate.vectors import three_numbers
 
 if TYPE_CHECKING:
     import trimesh
 
-SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-# A part of a repaired body that is smaller than this share of the largest is none.
-CRUMB = 0.01
+Mesher = Literal["netgen", "wrap"]
+
 TIME_LIMIT = 300.0  # s
+# Seconds of processor time that a run of NETGEN gets at a size of its own before the surface is wrapped: which mesher
+# it is must not depend on what else the machine does.
+PATIENCE = 15.0
+# What a progress bar shows, in order.
+STAGES = (
+    *("reading", "checking", "looking for the inside", "wrapping", "filling with tetrahedra"),
+    "fitting to the surface",
+)
+
+
+@dataclass(frozen=True)
+class FillOptions:
+    """How a surface is filled.
+
+    Attributes
+    ----------
+    mesher
+        ``"netgen"`` on the surface itself, ``"wrap"``: a new surface around what the triangles enclose, filled by
+        fTetWild; None: NETGEN where the surface is closed, of one part, and not hard for it.
+    part
+        Part of the solid by its rank in volume, from 1 on, or ``"all"``, for a surface that is wrapped.
+    max_volume_loss
+        Share of the volume that a wrapped mesh may lose, or text such as ``"10%"``.
+
+    """
+
+    mesher: Mesher | None = None
+    part: Which = 1
+    max_volume_loss: float | str = 0.05
+
+    def __post_init__(self) -> None:
+        if self.mesher not in (None, "netgen", "wrap"):
+            raise MeshError(f"mesher must be 'netgen' or 'wrap', got '{self.mesher}'")
+        whole = isinstance(self.part, int) and not isinstance(self.part, bool) and self.part >= 1
+        if not (whole or self.part == "all"):
+            raise MeshError(f"part must be a number from 1 on or 'all', got '{self.part}'")
+        object.__setattr__(self, "max_volume_loss", share(self.max_volume_loss))
+        if not 0 <= float(self.max_volume_loss) < 1:
+            raise MeshError(f"max_volume_loss must be at least 0 and below 1, got {self.max_volume_loss}")
 
 
 def tetrahedralize(
@@ -38,10 +74,17 @@ def tetrahedralize(
     unit: str | None = None,
     refine: Sequence[Ball] = (),
     *,
-    repair: bool = False,
+    mesher: Mesher | None = None,
+    part: Which = 1,
+    max_volume_loss: float | str = 0.05,
     time_limit: float = TIME_LIMIT,
+    progress: bool | Callable[[int, int], None] = True,
 ) -> TetMesh:
-    """Fill a closed surface with 4-node tetrahedra, by NETGEN; or a broken one, by fTetWild.
+    """Fill a surface with 4-node tetrahedra.
+
+    A closed surface of one part is filled by NETGEN. One that is open, crosses itself, has several parts or very many
+    triangles is wrapped: what its triangles enclose, by their winding number, gets a new surface, which fTetWild fills;
+    nodes on the surface are put back on the given triangles. A :class:`palpate.MeshWarning` says what was done.
 
     Before solving, ``.to_quadratic()`` is advised, at twice the element size: at the same price the result is several
     times more accurate.
@@ -49,7 +92,7 @@ def tetrahedralize(
     Parameters
     ----------
     surface
-        STL, OBJ, PLY, OFF or GLB file, or a trimesh surface.
+        STL, OBJ, PLY, OFF, GLB or glTF file, or a trimesh surface.
     max_element_size
         Longest edge wanted, m or text such as ``"4mm"``; None: a fifteenth of the longest side, and where the surface
         is curved so strongly or the body so thin that more than a hundredth of the volume would be lost, down to a
@@ -58,23 +101,29 @@ def tetrahedralize(
         Unit of length of the surface; None: metres.
     refine
         Finer balls: ``((x, y, z), radius, size)`` in m.
-    repair
-        Fill what an open or self-intersecting surface most plausibly encloses, within a thousandth of its size; needs
-        the ``repair`` extra.
+    mesher
+        ``"netgen"`` or ``"wrap"``; None: chosen by the surface.
+    part
+        Which part of a solid of several: its rank in volume from 1 on, or ``"all"``. Wraps only.
+    max_volume_loss
+        Share of the volume that the mesh of a wrap may lose, or text such as ``"10%"``.
     time_limit
         Seconds after which the mesher is stopped.
+    progress
+        Show a bar on a terminal, or call a function with the stages done and all of them.
 
     Raises
     ------
     MeshError
-        A surface that cannot be filled, with what is wrong with it, a mesher that crashed, hung or returned nothing, or
-        a mesh that loses more than a tenth of the volume.
+        A surface that encloses nothing or cannot be filled, with what is wrong with it, a mesher that crashed, hung or
+        returned nothing, or a mesh that loses more of the volume than allowed.
     UnclearUnitError
         No unit is given, and in metres the body is below a millimetre or above three metres long; with a unit given
         that is a warning.
 
     """
-    return _fill(surface, max_element_size, "linear", unit, refine, repair, time_limit)
+    options = FillOptions(mesher, part, max_volume_loss)
+    return tetrahedralize_with("linear", surface, max_element_size, unit, refine, options, time_limit, progress)
 
 
 def tetrahedralize_with(
@@ -83,33 +132,15 @@ def tetrahedralize_with(
     max_element_size: float | str | None = None,
     unit: str | None = None,
     refine: Sequence[Ball] = (),
-    repair: bool = False,
+    options: FillOptions | None = None,
+    time_limit: float = TIME_LIMIT,
+    progress: bool | Callable[[int, int], None] = True,
 ) -> TetMesh:
-    """Fill a closed surface as :func:`tetrahedralize` does, with either element; None: a size that suits it.
+    """Fill a surface as :func:`tetrahedralize` does, with either element; None: a size that suits it.
 
     The mid-side nodes of 10-node elements lie on the surface, so these may be several times larger than a curve is wide
-    before they lose volume; those of a repaired surface are straight.
+    before they lose volume.
     """
-    return _fill(surface, max_element_size, element, unit, refine, repair)
-
-
-def _fill(
-    surface: str | os.PathLike[str] | trimesh.Trimesh,
-    max_element_size: float | str | None,
-    element: Element,
-    unit: str | None,
-    refine: Sequence[Ball],
-    repair: bool = False,
-    time_limit: float = TIME_LIMIT,
-) -> TetMesh:
-    """Tetrahedra by NETGEN, or by fTetWild."""
-    name, shape = _load(surface)
-    shape = shape.copy()
-    shape.apply_scale(scale_of(name, shape.vertices, unit))
-    if repair:
-        _check_finite(name, shape)
-    else:
-        _check_surface(name, shape)
     size = None if max_element_size is None else length(max_element_size)
     if size is not None and not (np.isfinite(size) and size > 0):
         raise MeshError(f"max_element_size must be positive, got {max_element_size}")
@@ -117,13 +148,83 @@ def _fill(
         three_numbers(center, "the centre of a ball in refine", MeshError)
         if not (np.isfinite([radius, ball_size]).all() and radius > 0 and ball_size > 0):
             raise MeshError("refine takes ((x, y, z), radius, size) with positive radius and size in metres")
-    if not repair:
-        return Filling(name, shape, element, size, refine, time_limit).mesh()
-    if refine:
-        raise MeshError("repair and refine do not go together: repair first, and mesh the result's surface again")
-    extent = float(np.ptp(shape.vertices, axis=0).max())
-    mesh = _repaired(name, shape, extent / PARTS[element] if size is None else size, extent, time_limit)
-    return mesh.to_quadratic() if element == "quadratic" else mesh
+    title = "filling the surface" if not isinstance(surface, (str, os.PathLike)) else f"filling {Path(surface).name}"
+    with progress_reporter(title, progress) as report:
+        stage = _stages(report)
+        stage("reading")
+        loaded = load_surface(surface)
+        shape = loaded.shape.copy()
+        shape.apply_scale(scale_of(loaded.name, shape.vertices, unit))
+        given = SurfaceFile(loaded.name, shape, loaded.part_names, loaded.part_of_face)
+        stage("checking")
+        mesh = _filled(given, element, size, refine, options or FillOptions(), time_limit, stage)
+    mesh.warn_of_flat_elements(loaded.name)
+    return mesh
+
+
+def _stages(report: Reporter | None) -> Callable[[str], None]:
+    """Return a function that reports a stage by its name."""
+
+    def stage(name: str) -> None:
+        if report is not None:
+            report.phase(name)
+            report(STAGES.index(name), len(STAGES))
+
+    return stage
+
+
+def _filled(
+    given: SurfaceFile,
+    element: Element,
+    size: float | None,
+    refine: Sequence[Ball],
+    options: FillOptions,
+    time_limit: float,
+    stage: Callable[[str], None],
+) -> TetMesh:
+    """Tetrahedra by the mesher that is asked for, or by the one that suits the surface."""
+    surface, reason = _chosen(given, options)
+    if surface is not None:
+        if options.part not in (1, "all"):
+            raise MeshError(f"{given.name}: there is no part {options.part}: the surface has 1")
+        stage("filling with tetrahedra")
+        own = options.mesher is None and size is None
+        patience = PATIENCE if own else None
+        try:
+            return Filling(given.name, surface, element, size, refine, time_limit, patience).mesh()
+        except MeshError as error:
+            # At a size that is given, a mesh too coarse for the shape is the size's fault.
+            if options.mesher == "netgen" or not (own or isinstance(error, MesherFailedError)):
+                raise
+            reason = "could not be filled by NETGEN"
+    loss = float(options.max_volume_loss)
+    return Wrapping(given, reason, element, size, refine, options.part, loss, time_limit, stage).mesh()
+
+
+def _chosen(given: SurfaceFile, options: FillOptions) -> tuple[SurfaceState | None, str]:
+    """Return the closed surface for NETGEN; or None, and why the surface is to be wrapped, after "the surface".
+
+    Raises
+    ------
+    MeshError
+        A surface that NETGEN is asked for and cannot fill.
+
+    """
+    if options.mesher == "netgen":
+        hint = f"{BY_HAND}, or leave out mesher = 'netgen': then it is wrapped"
+        return require_closed(given.name, given.shape, hint), ""
+    require_finite(given.name, given.shape)
+    if options.mesher == "wrap":
+        return None, "was given to be wrapped"
+    if len(given.shape.faces) > MOST_FOR_NETGEN:
+        return None, f"has {len(given.shape.faces):,} triangles"
+    # A copy is cleaned: named parts are found by the triangles of the file.
+    state = SurfaceState.of(given.shape.copy())
+    reason = state.fault() or state.doubt()
+    if reason is not None:
+        return None, reason
+    state.turn_outward(given.name)
+    return state, ""
 
 
 def read_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
@@ -135,11 +236,11 @@ def read_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
         A file that is missing or cannot be read.
 
     """
-    return _load(path)[1]
+    return load_surface(path).shape
 
 
 def closed_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
-    """Read a closed surface, in its own unit.
+    """Read a closed surface of one part, in its own unit.
 
     Raises
     ------
@@ -147,98 +248,5 @@ def closed_surface(path: str | os.PathLike[str]) -> trimesh.Trimesh:
         A file that is missing or cannot be read, or a surface that is open, crossed or empty.
 
     """
-    name, shape = _load(path)
-    _check_surface(name, shape)
-    return shape
-
-
-def _load(surface: str | os.PathLike[str] | trimesh.Trimesh) -> tuple[str, trimesh.Trimesh]:
-    import trimesh
-
-    if isinstance(surface, trimesh.Trimesh):
-        return "surface", surface
-    path = Path(surface)
-    require_file(path, MeshError)
-    if path.suffix.lower() not in SURFACE_ENDINGS:
-        raise MeshError(f"{path}: unknown surface format '{path.suffix}'; known are {', '.join(SURFACE_ENDINGS)}")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            loaded = load_stl(path) if path.suffix.lower() == ".stl" else trimesh.load_mesh(path, process=False)
-            shape = loaded.to_mesh() if isinstance(loaded, trimesh.Scene) else loaded
-    except Exception as error:
-        reason = " ".join(str(error).split())[:150]
-        raise MeshError(f"{path}: cannot be read as a surface ({reason})") from None
-    if not isinstance(shape, trimesh.Trimesh) or len(shape.faces) == 0:
-        raise MeshError(f"{path}: holds no triangles; is it really a {path.suffix[1:].upper()} file?")
-    return str(path), shape
-
-
-def _check_surface(name: str, shape: trimesh.Trimesh) -> None:
-    """Refuse what NETGEN would crash or hang on, and turn an inverted surface round (in place)."""
-    _check_finite(name, shape)
-    shape.merge_vertices(merge_tex=True, merge_norm=True)
-    shape.update_faces(shape.nondegenerate_faces())
-    shape.update_faces(shape.unique_faces())
-    shape.remove_unreferenced_vertices()
-    _, counts = np.unique(shape.edges_sorted, axis=0, return_counts=True)
-    open_edges, crowded = int((counts == 1).sum()), int((counts > 2).sum())
-    if open_edges:
-        raise MeshError(f"{name}: the surface is not closed ({open_edges} open edges); {REPAIR_HINT}")
-    if crowded:
-        raise MeshError(f"{name}: {crowded} edges are shared by more than two triangles; {REPAIR_HINT}")
-    if not shape.is_winding_consistent:
-        raise MeshError(f"{name}: its triangles do not agree on which side is outside; {REPAIR_HINT}")
-    if shape.body_count != 1:
-        raise MeshError(f"{name}: holds {shape.body_count} separate surfaces, one is needed; save them one by one")
-    if shape.volume < 0:
-        shape.invert()
-        warnings.warn(f"{name}: the surface was inside out and has been turned round", MeshWarning, stacklevel=3)
-    if shape.volume <= 0:
-        raise MeshError(f"{name}: the surface encloses no volume")
-
-
-def _check_finite(name: str, shape: trimesh.Trimesh) -> None:
-    bad = np.flatnonzero(~np.isfinite(shape.vertices).all(axis=1))
-    if bad.size:
-        raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")
-
-
-def _without_crumbs(name: str, mesh: TetMesh) -> TetMesh:
-    """Drop what fTetWild leaves hanging on edges and vertices, or beside the body: parts without a face to the rest."""
-    labels = face_parts(mesh.tets)
-    volumes = np.bincount(labels, mesh.volumes)
-    kept = (volumes >= CRUMB * volumes.max())[labels]
-    if kept.all():
-        return mesh
-    warnings.warn(
-        f"{name}: {(~kept).sum()} tetrahedra that share no face with the rest, {mesh.volumes[~kept].sum():.2g} m3 of "
-        f"{mesh.volume:.3g} m3, were dropped",
-        MeshWarning,
-        stacklevel=3,
-    )
-    used = np.unique(mesh.tets[kept])
-    return TetMesh(mesh.nodes[used], np.searchsorted(used, mesh.tets[kept]), mesh.regions[kept])
-
-
-def _repaired(name: str, shape: trimesh.Trimesh, size: float, extent: float, time_limit: float) -> TetMesh:
-    """Mesh by fTetWild, in a unit box as NETGEN's."""
-    origin = shape.vertices.min(axis=0)
-    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
-        np.savez(given, vertices=(shape.vertices - origin) / extent, faces=shape.faces, size=size / extent)
-        command = [sys.executable, "-m", "palpate.mesh.tetwild_child", str(given), str(made)]
-        status = run_limited(command, time_limit)
-        if status == 3:
-            raise MeshError("repairing needs pytetwild: pip install pytetwild pyvista")
-        failure = failure_of(status, time_limit)
-        if failure is not None or not made.exists():
-            raise MeshError(f"{name}: fTetWild {failure or 'returned no tetrahedra'}")
-        with np.load(made) as result:
-            mesh = _without_crumbs(name, TetMesh(result["nodes"] * extent + origin, result["tets"]))
-    warnings.warn(
-        f"{name}: the surface was rebuilt, within about {1e-3 * extent * 3**0.5:.2g} m of the given one",
-        MeshWarning,
-        stacklevel=3,
-    )
-    return mesh
+    loaded = load_surface(path)
+    return require_closed(loaded.name, loaded.shape).shape

@@ -19,6 +19,7 @@ import numpy as np
 from palpate.body import Body
 from palpate.errors import SceneError
 from palpate.mesh import size_text
+from palpate.palpation import files, pictures
 from palpate.palpation.protocol import Protocol, Sites, closest
 from palpate.palpation.records import DetectionRecord, Nodule
 from palpate.palpation.runs import probe
@@ -61,20 +62,16 @@ class Detection(DetectionRecord):
     def __repr__(self) -> str:
         count = f"{len(self.nodules)} nodule{'' if len(self.nodules) == 1 else 's'}"
         known = self.ratio[np.isfinite(self.ratio)]
-        told = f", ratios {known.min():.3g} to {known.max():.3g}" if len(known) else ""
-        return f"Detection({count}{told})"
+        range_text = f", ratios {known.min():.3g} to {known.max():.3g}" if len(known) else ""
+        return f"Detection({count}{range_text})"
 
     def to_meshio(self) -> meshio.Mesh:
         """Give :meth:`StiffnessMap.to_meshio` with ``plain_stiffness``, ``difference``, N/m, and ``ratio``."""
-        from palpate.palpation.files import mesh_of_detection
-
-        return mesh_of_detection(self)
+        return files.mesh_of_detection(self)
 
     def plot(self) -> Figure:
         """Picture of the ratio on the surface with the nodules, as a figure of matplotlib."""
-        from palpate.palpation.pictures import picture_of_detection
-
-        return picture_of_detection(self)
+        return pictures.picture_of_detection(self)
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write it into a folder, which is made.
@@ -85,9 +82,7 @@ class Detection(DetectionRecord):
             The files: ``detection.csv``, ``nodules.csv``, ``detection.vtu``, ``detection.png``.
 
         """
-        from palpate.palpation.files import save_detection
-
-        return save_detection(self, Path(folder))
+        return files.save_detection(self, Path(folder))
 
 
 def homogeneous(scene: SceneTables) -> SceneTables | None:
@@ -98,19 +93,19 @@ def homogeneous(scene: SceneTables) -> SceneTables | None:
     to 7 % apart. Both bodies are so looked at alike.
     """
 
-    def unfelt(regions: list[RegionTable], base: MaterialTable) -> list[RegionTable]:
+    def imperceptible_regions(regions: list[RegionTable], base: MaterialTable) -> list[RegionTable]:
         same = {**base.model_dump(), "youngs_modulus": base.youngs_modulus * (1 + UNFELT)}
         return [region.model_copy(update=same) for region in regions]
 
     if not any(scene.region if body.region is None else body.region for body in scene.bodies):
         return None
     bodies = [
-        body.model_copy(update={"region": unfelt(body.region, body.material or scene.material)})
+        body.model_copy(update={"region": imperceptible_regions(body.region, body.material or scene.material)})
         if body.region
         else body
         for body in scene.bodies
     ]
-    return scene.model_copy(update={"region": unfelt(scene.region, scene.material), "bodies": bodies})
+    return scene.model_copy(update={"region": imperceptible_regions(scene.region, scene.material), "bodies": bodies})
 
 
 def compare(

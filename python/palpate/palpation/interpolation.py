@@ -52,12 +52,3 @@ class SurfaceField:
 
     def _joined(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         return np.hstack([points / self._spacing, NORMALS * normals])
-
-
-def node_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Outward unit normals (s, 3) at nodes: means of those of the triangles around, by area."""
-    a, b, c = np.moveaxis(positions[triangles], 1, 0)
-    normals = np.zeros(positions.shape)
-    for corner in triangles.T:
-        np.add.at(normals, corner, np.cross(b - a, c - a))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.figures import empty_figure
 from palpate.mesh import size_text
-from palpate.palpation.interpolation import node_normals
+from palpate.mesh.triangles import area_vectors, node_normals, units
 from palpate.palpation.records import DetectionRecord, MapRecord, Nodule
 
 if TYPE_CHECKING:
@@ -72,8 +72,8 @@ def picture_of_curves(found: MapRecord) -> Figure:
     axes.set_xlabel("position along the stroke [mm]" if strokes else "depth [mm]")
     axes.set_ylabel(f"normal force [{unit}]")
     held = ", red: held by a limit" if any(curve.limited.any() for curve in found.curves) else ""
-    told = f"{len(found.curves)} strokes at {1e3 * found.depth:.3g} mm depth" if strokes else f"{len(lines)} presses"
-    axes.set_title(f"{told}{held}", loc="left")
+    text = f"{len(found.curves)} strokes at {1e3 * found.depth:.3g} mm depth" if strokes else f"{len(lines)} presses"
+    axes.set_title(f"{text}{held}", loc="left")
     if np.isfinite(values).any():
         label = "mean stiffness [N/m]" if strokes else f"stiffness at {1e3 * found.depth:.3g} mm [N/m]"
         figure.colorbar(drawn, ax=axes, label=label)
@@ -135,8 +135,7 @@ def _fine(found: MapRecord, values: np.ndarray, body: int) -> tuple[np.ndarray, 
 
     positions, _, triangles = found.surfaces()[body]
     edge = FINE * found.spacing
-    corners = positions[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    area = np.linalg.norm(area_vectors(positions[triangles]), axis=1).sum()
     edge = max(edge, float(np.sqrt(4 * area / MOST_TRIANGLES)))
     positions, triangles = subdivide_to_size(positions, triangles, edge, max_iter=20)
     own = np.where(found.bodies == body, values, np.nan)
@@ -158,9 +157,7 @@ def _draw_plane(
     first /= np.linalg.norm(first)
     plane = 1e3 * np.array([first, np.cross(up, first)])
     for positions, triangles, at_nodes in meshes:
-        corners = positions[triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        facing = triangles[normals @ up > 0.5 * np.linalg.norm(normals, axis=1)]
+        facing = triangles[units(area_vectors(positions[triangles])) @ up > 0.5]
         if len(facing) == 0:
             continue
         places = positions @ plane.T
@@ -176,8 +173,8 @@ def _draw_plane(
     if not known.all():
         axes.plot(*places[~known].T, "x", markersize=5, color="tab:red", linestyle="", label="held before the depth")
     for rank, nodule in enumerate(nodules):
-        told = "nodule" if rank == 0 else None
-        axes.plot(*(nodule.place @ plane.T), "+", markersize=16, markeredgewidth=2, color="black", label=told)
+        text = "nodule" if rank == 0 else None
+        axes.plot(*(nodule.place @ plane.T), "+", markersize=16, markeredgewidth=2, color="black", label=text)
     named = [int(np.abs(row).argmax()) for row in plane]
     across = [np.abs(row).max() > 999.0 for row in plane]
     for set_label, axis, true, fallback in zip((axes.set_xlabel, axes.set_ylabel), named, across, "uv", strict=True):
@@ -205,16 +202,14 @@ def _draw_body(
     light = np.array([right, np.cross(towards, right), towards]).T @ (LIGHT / np.linalg.norm(LIGHT))
     ends = []
     for positions, triangles, at_nodes in meshes:
-        corners = positions[triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+        normals = units(area_vectors(positions[triangles]))
         seen = normals @ towards > 0
         means = at_nodes[triangles[seen]].mean(axis=1)
         colors = np.where(np.isfinite(means)[:, None], shades.to_rgba(np.nan_to_num(means))[:, :3], BARE)
         brightness = AMBIENT + (1 - AMBIENT) * np.clip(normals[seen] @ light, 0.0, 1.0)
         colors = colors * brightness[:, None]
         axes.add_collection3d(
-            Poly3DCollection(1e3 * corners[seen], facecolors=colors, edgecolors=colors, linewidths=0.2)
+            Poly3DCollection(1e3 * positions[triangles[seen]], facecolors=colors, edgecolors=colors, linewidths=0.2)
         )
         ends += [positions.min(axis=0), positions.max(axis=0)]
     low, high = 1e3 * np.min(ends, axis=0), 1e3 * np.max(ends, axis=0)

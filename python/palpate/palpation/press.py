@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.vectors import turning_z_to
+
 if TYPE_CHECKING:
     from palpate.palpation.protocol import Protocol
     from palpate.simulation import Simulation
@@ -65,15 +67,8 @@ def standing_on(simulation: Simulation, normals: np.ndarray) -> tuple[np.ndarray
     Its axis is turned from z to the normal by the smallest rotation; the reach is from its origin to its front.
     """
     tool = simulation.scene.tools[0]
-    x, y, z = np.asarray(normals, dtype=float).T
-    half = np.sqrt(np.maximum((1 + z) / 2, 0.0))
-    # Of a normal straight down every axis across is as near: x.
-    down = half < 1e-6
-    safe = np.where(down, 1.0, 2 * half)
-    turned = np.column_stack([half, np.where(down, 1.0, -y / safe), np.where(down, 0.0, x / safe), np.zeros_like(half)])
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
     kind, _, vertices, _ = tool.shape_arguments(simulation.scene.folder)
-    return turned, (-float(np.min(vertices, axis=0)[2]) if kind == "surface" else tool.reach)
+    return turning_z_to(normals), (-float(np.min(vertices, axis=0)[2]) if kind == "surface" else tool.reach)
 
 
 def measured(
@@ -82,16 +77,16 @@ def measured(
     """Read a press: forces along the normal (t,), N, where strain and where force was limited (t,)."""
     early = normal_forces[depths < -EARLY * depth]
     if np.abs(early).max(initial=0.0) > EARLY_FORCE * np.abs(normal_forces).max():
-        return _nothing(OTHER_PLACE, 0.0, 0.0)
+        return _no_contact(OTHER_PLACE, 0.0, 0.0)
     if normal_forces[-1] <= 0:
-        return _nothing(NO_CONTACT, 0.0, 0.0)
+        return _no_contact(NO_CONTACT, 0.0, 0.0)
     held = limited | clamped
     window = depths >= (1 - LAST_PART) * depth
     if held[window].any():
         free = np.flatnonzero(~held[depths > 0]) + int((depths <= 0).sum())
         last = int(free[-1]) if len(free) else 0
         reached = (float(depths[last]), float(normal_forces[last])) if len(free) else (0.0, 0.0)
-        return _nothing(STRAIN_LIMIT if limited[window].any() else FORCE_LIMIT, *reached)
+        return _no_contact(STRAIN_LIMIT if limited[window].any() else FORCE_LIMIT, *reached)
     force, stiffness = value_and_slope(depths[window], normal_forces[window], depth)
     return Measured(force, stiffness, force / depth, "", depth, force)
 
@@ -103,5 +98,5 @@ def value_and_slope(depths: np.ndarray, forces: np.ndarray, at: float) -> tuple[
     return float(value), float(slope / np.ptp(depths))
 
 
-def _nothing(held_by: str, depth: float, force: float) -> Measured:
+def _no_contact(held_by: str, depth: float, force: float) -> Measured:
     return Measured(np.nan, np.nan, np.nan, held_by, depth, force)

@@ -1,4 +1,4 @@
-"""What a palpation does at every place: how far apart, how deep, how fast; and the points that it visits."""
+"""Protocol of a palpation: spacing, depth and speed, and the points that it visits."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class Selection:
         self._distance = contact_radius(simulation, protocol.depth)
         self._skipped = dict.fromkeys((NOT_TOUCHABLE, BY_A_SUPPORT, BY_AN_EDGE), 0)
 
-    def keeps(self, body: int, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    def mask(self, body: int, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         """Mask (p,) of the places to be palpated, of points (p, 3), m, on triangles (p,) of a body, in its frame."""
         shape, kept = self.shapes[body], np.ones(len(points), dtype=bool)
         if self._holds is not None:
@@ -153,18 +153,20 @@ class Selection:
         return kept
 
     @property
-    def left_out(self) -> dict[str, int]:
+    def excluded(self) -> dict[str, int]:
         """Places left out, by reason."""
         return {reason: count for reason, count in self._skipped.items() if count}
 
-    def nothing_left(self, what: str) -> str:
+    def no_sites_message(self, what: str) -> str:
         """Message where no place is left."""
         where = "" if self._on is None else f" where {self._on}"
-        told = ", ".join(f"{count} {reason}" for reason, count in self.left_out.items())
-        return f"{what}{where}: " + (f"left out are {told}; try a narrower grid" if told else "no part of the surface")
+        reasons = ", ".join(f"{count} {reason}" for reason, count in self.excluded.items())
+        return f"{what}{where}: " + (
+            f"left out are {reasons}; try a narrower grid" if reasons else "no part of the surface"
+        )
 
 
-def sites_on(simulation: Simulation, protocol: Protocol, on: str | None) -> Sites:
+def sample_sites(simulation: Simulation, protocol: Protocol, on: str | None) -> Sites:
     """Points about a spacing apart on all bodies of a scene, where a predicate holds in the body's own frame.
 
     Raises
@@ -178,18 +180,18 @@ def sites_on(simulation: Simulation, protocol: Protocol, on: str | None) -> Site
     for body, shape in enumerate(selection.shapes):
         parts = [(lattice_on if side.is_flat else evenly_on)(side, protocol.spacing) for side in shape.sides]
         points = np.concatenate([part.points for part in parts])
-        kept = selection.keeps(body, points, np.concatenate([part.triangles for part in parts]))
+        kept = selection.mask(body, points, np.concatenate([part.triangles for part in parts]))
         found.append(closest(simulation, body, simulation.bodies[body].points_to_scene(points[kept]))[:2])
     points, normals = (np.concatenate(part) for part in zip(*found, strict=True))
     if len(points) > MOST_POINTS:
         raise too_many(len(points), protocol.spacing)
     if len(points) == 0:
-        raise SceneError(selection.nothing_left("no point to press"))
+        raise SceneError(selection.no_sites_message("no point to press"))
     bodies = np.repeat(np.arange(len(found)), [len(part[0]) for part in found])
-    return Sites(points, normals, bodies, selection.left_out)
+    return Sites(points, normals, bodies, selection.excluded)
 
 
-def sites_at(simulation: Simulation, points: Sequence[Any]) -> Sites:
+def sites_at_points(simulation: Simulation, points: Sequence[Any]) -> Sites:
     """Points that are given, in the scene, m, moved onto the closest surface.
 
     Raises

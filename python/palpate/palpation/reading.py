@@ -1,4 +1,4 @@
-"""What the runs of a palpation tell: its curves, and what was measured at every point."""
+"""Evaluation of the runs of a palpation: force curves, and the values measured at every point."""
 
 from __future__ import annotations
 

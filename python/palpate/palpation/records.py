@@ -1,4 +1,4 @@
-"""What a palpation leaves, as records."""
+"""Record classes of a palpation's results."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from palpate.equality import ComparedByValue
-from palpate.palpation.interpolation import SurfaceField, node_normals
+from palpate.mesh.triangles import node_normals
+from palpate.palpation.interpolation import SurfaceField
 from palpate.palpation.sides import SurfaceShape
 from palpate.scene import BuiltScene
 

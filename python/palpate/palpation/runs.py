@@ -1,4 +1,4 @@
-"""All runs of a palpation, one after the other, those that are finished already left out."""
+"""Execution of the runs of a palpation; finished ones are not repeated."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:
     """Hash of everything that determines the forces: bodies, tool, limits, version, and every position."""
     scene = simulation.scene
     motions = [_motion_of(body.motion) for body in simulation.bodies]
-    told = {
+    identity = {
         "version": version("palpate"),
         "bodies": [(body.green.key, body.position, body.orientation) for body in simulation.bodies],
         "motions": repr(motions),
@@ -85,7 +85,7 @@ def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:
         "strain_limit": scene.view.strain_limit,
         "ticks": [len(path.positions) for path in paths],
     }
-    digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode())
     for path in paths:
         digest.update(np.ascontiguousarray(path.positions).tobytes())
         digest.update(np.ascontiguousarray(path.orientations).tobytes())

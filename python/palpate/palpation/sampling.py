@@ -1,4 +1,4 @@
-"""Where a protocol presses: points about equally far apart on the surface of a body.
+"""Sampling of a body's surface: points about equally far apart, at which a protocol presses.
 
 The surface is cut into sides along its sharp edges. A flat side gets a square lattice, as wide apart as asked, in the
 middle of the side. A curved side gets as many points as a hexagonal packing of that distance has,

@@ -1,4 +1,4 @@
-"""The sides of a body: what sharp edges part of its surface, and how far a place is from edges and supports."""
+"""Sides of a body: parts of its surface between sharp edges, and distances from edges and supports."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from palpate.green import GreensFunction
+from palpate.mesh.triangles import area_vectors, units
 
 # Faces that meet at a larger angle are two sides, rad; a side whose faces are turned less from their mean is flat.
 SHARP, FLAT = np.radians(45.0), np.radians(1.0)
@@ -76,11 +77,8 @@ class SurfaceShape:
         self.triangles = green.surface_corners
         self.fixed = np.isin(green.surface_nodes, green.fixed_nodes)
         self.touchable = np.isin(green.surface_nodes, green.touchable_nodes)
-        a, b, c = np.moveaxis(self.positions[self.triangles], 1, 0)
-        doubled = np.cross(b - a, c - a)
-        size = np.linalg.norm(doubled, axis=1)
-        self.areas = size / 2
-        self.normals = doubled / np.where(size > 0, size, 1.0)[:, None]
+        along = area_vectors(self.positions[self.triangles])
+        self.areas, self.normals = np.linalg.norm(along, axis=1), units(along)
 
     @property
     def extents(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The stiffness of a body over its surface, as a tool meets it."""
+"""Stiffness map: the contact stiffness of a body over its surface."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import SceneError
+from palpate.fields import write_result
+from palpate.palpation import files, pictures
 from palpate.palpation.press import FORCE_LIMIT, NO_CONTACT, OTHER_PLACE, STRAIN_LIMIT, Measured
-from palpate.palpation.protocol import Protocol, Sites, sites_at, sites_on
+from palpate.palpation.protocol import Protocol, Sites, sample_sites, sites_at_points
 from palpate.palpation.reading import press_paths, read_presses, read_strokes
 from palpate.palpation.records import MapRecord
 from palpate.palpation.runs import probe, run_all
@@ -61,48 +63,36 @@ class StiffnessMap(MapRecord):
 
     def __repr__(self) -> str:
         known = self.stiffness[np.isfinite(self.stiffness)]
-        told = f"{known.min():.4g} to {known.max():.4g} N/m" if len(known) else "no stiffness"
+        range_text = f"{known.min():.4g} to {known.max():.4g} N/m" if len(known) else "no stiffness"
         held = f", {len(self.points) - len(known)} held before" if len(known) < len(self.points) else ""
-        return f"StiffnessMap({len(self.points)} points {1e3 * self.depth:.3g} mm deep, {told}{held})"
+        return f"StiffnessMap({len(self.points)} points {1e3 * self.depth:.3g} mm deep, {range_text}{held})"
 
     def to_meshio(self) -> meshio.Mesh:
         """Give the surfaces of all bodies in the scene, the map at their nodes; NaN far from all points.
 
         Point data are ``stiffness`` and ``secant_stiffness``, N/m.
         """
-        from palpate.palpation.files import mesh_of_map
-
-        return mesh_of_map(self)
+        return files.mesh_of_map(self)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write what :meth:`to_meshio` gives as .vtu or .vtk, for ParaView and the page; a file is replaced at once."""
-        from palpate.fields import write_result
-
         write_result(self.to_meshio(), path)
 
     def write_points(self, path: str | os.PathLike[str]) -> None:
         """Write a row for each point as CSV."""
-        from palpate.palpation.files import write_points
-
-        write_points(self, Path(path))
+        files.write_points(self, Path(path))
 
     def write_curves(self, path: str | os.PathLike[str]) -> None:
         """Write a row for each tick of each curve as CSV."""
-        from palpate.palpation.files import write_curves
-
-        write_curves(self, Path(path))
+        files.write_curves(self, Path(path))
 
     def plot(self) -> Figure:
         """Picture of the map on the surface, as a figure of matplotlib; ``savefig`` writes it."""
-        from palpate.palpation.pictures import picture_of_map
-
-        return picture_of_map(self)
+        return pictures.picture_of_map(self)
 
     def plot_curves(self) -> Figure:
         """Force against depth of all presses, or along all strokes."""
-        from palpate.palpation.pictures import picture_of_curves
-
-        return picture_of_curves(self)
+        return pictures.picture_of_curves(self)
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write all of it into a folder, which is made: points, curves, surface, pictures.
@@ -113,9 +103,7 @@ class StiffnessMap(MapRecord):
             The files: ``points.csv``, ``curves.csv``, ``curves.png``, ``stiffness.vtu``, ``stiffness.png``.
 
         """
-        from palpate.palpation.files import save_map
-
-        return save_map(self, Path(folder))
+        return files.save_map(self, Path(folder))
 
 
 def stiffness_map(
@@ -166,7 +154,7 @@ def stiffness_map(
     if strokes:
         sites, lines = strokes_on(simulation, protocol, on)
     else:
-        sites = sites_on(simulation, protocol, on) if points is None else sites_at(simulation, points)
+        sites = sample_sites(simulation, protocol, on) if points is None else sites_at_points(simulation, points)
         lines = []
     return palpated(built, simulation, protocol, sites, lines, None if partial is None else Path(partial), progress)
 

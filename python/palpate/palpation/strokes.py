@@ -102,7 +102,7 @@ def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tu
     count = 0
     for body, shape in enumerate(selection.shapes):
         for line, triangles in (line for side in shape.sides for line in _lines(side, protocol.spacing)):
-            kept = selection.keeps(body, line, triangles)
+            kept = selection.mask(body, line, triangles)
             for run in _runs(kept):
                 feet, along, _ = closest(simulation, body, simulation.bodies[body].points_to_scene(line[run]))
                 points.append(feet)
@@ -111,8 +111,8 @@ def strokes_on(simulation: Simulation, protocol: Protocol, on: str | None) -> tu
                 strokes.append(np.arange(count, count + len(feet)))
                 count += len(feet)
     if not strokes:
-        raise SceneError(selection.nothing_left("no line to stroke"))
-    sites = Sites(np.vstack(points), np.vstack(normals), np.concatenate(bodies), selection.left_out)
+        raise SceneError(selection.no_sites_message("no line to stroke"))
+    sites = Sites(np.vstack(points), np.vstack(normals), np.concatenate(bodies), selection.excluded)
     return sites, strokes
 
 

@@ -1,4 +1,4 @@
-"""A scene made ready: meshes, bodies, their Green's functions, and what moves them."""
+"""Building of a scene: meshes, bodies, Green's functions and modes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from palpate.green import BackgroundPrecompute, GreensFunction, precompute, requ
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
 from palpate.mesh.size import scale_of
-from palpate.mesh.tetrahedralize import closed_surface, tetrahedralize_with
+from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedralize_with
 from palpate.progress import progress_reporter
 from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
@@ -132,7 +132,9 @@ def unsolved_body(scene: SceneTables, rank: int = 0, mesh: TetMesh | None = None
 
 
 @contextlib.contextmanager
-def blaming(scene: SceneTables, place: Sequence[str | int], kind: type[Error] | None = SceneError) -> Iterator[None]:
+def locating_errors(
+    scene: SceneTables, place: Sequence[str | int], kind: type[Error] | None = SceneError
+) -> Iterator[None]:
     """Name the line of a table, or of an entry of an array of tables, in an error that it leads to.
 
     The error becomes one of a ``kind``; None leaves it what it is.
@@ -152,7 +154,7 @@ def require_files(scene: SceneTables) -> None:
     for rank in range(len(scene.bodies)):
         _Builder(scene, rank).require_files()
     for rank, tool in enumerate(scene.tools):
-        with blaming(scene, ["tool", rank, "shape"]):
+        with locating_errors(scene, ["tool", rank, "shape"]):
             tool.shape_arguments(scene.folder)
 
 
@@ -167,22 +169,22 @@ class _Builder:
         table = self._table
         place = (table.title, table.position, table.orientation)
         if table.store is not None:
-            with self._blaming_file(["body", self._rank, "store"]):
+            with self._locating_errors_in_file(["body", self._rank, "store"]):
                 green = GreensFunction.load(self._scene.folder / table.store)
             return BuiltBody(None, green, None, *place)
         body = self.body()
         green = self._green(body, progress)
-        dynamics, where = self._own("dynamics")
+        dynamics, where = self._table_of_body("dynamics")
         if dynamics is None:
             return BuiltBody(body, green, None, *place)
-        with self._blaming(where):
+        with self._locating_errors(where):
             report = progress if modes_progress is None else modes_progress
             motion = dynamics.build(body, self._scene.device.max_stiffness, report)
         return BuiltBody(body, green, motion, *place)
 
     def _green(self, body: Body, progress: Progress) -> GreensFunction:
-        area, where = self._own("touch")
-        with self._blaming(where):
+        area, where = self._table_of_body("touch")
+        with self._locating_errors(where):
             asked = {"precision": self._table.precision, **area.areas(self._file_mesh)}
             if self._growing is None or area.first is None:
                 return precompute(body, **asked, progress=progress)
@@ -198,14 +200,15 @@ class _Builder:
         elif not table.fills_a_surface:
             self.body()
         else:
-            with self._blaming_file(["body", self._rank, "mesh"]):
-                surface = closed_surface(self._scene.folder / str(table.mesh))
+            with self._locating_errors_in_file(["body", self._rank, "mesh"]):
+                read = closed_surface if table.mesher == "netgen" else read_surface
+                surface = read(self._scene.folder / str(table.mesh))
                 vertices = surface.vertices * scale_of(str(table.mesh), surface.vertices, table.unit)
-            supports, where = self._own("supports")
-            with self._blaming_file(where):
+            supports, where = self._table_of_body("supports")
+            with self._locating_errors_in_file(where):
                 _predicate_mask(supports.fixed, vertices)
 
-    def _own(self, key: str) -> tuple[Any, list[str | int]]:
+    def _table_of_body(self, key: str) -> tuple[Any, list[str | int]]:
         """Table of the body, or that of the whole scene; and its place in the file."""
         own = getattr(self._table, key)
         if own is not None:
@@ -216,19 +219,19 @@ class _Builder:
         table, mesh = self._table, self.mesh() if mesh is None else mesh
         if table.element == "linear" and mesh.is_quadratic:
             source = table.mesh or table.title
-            with self._blaming_file(["body", self._rank, "element"]):
+            with self._locating_errors_in_file(["body", self._rank, "element"]):
                 raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
         if table.adds_middles:
             mesh = mesh.to_quadratic()
         # With the regions of the file, which those of the scene replace.
         self._file_mesh = mesh
-        base: MaterialTable = self._own("material")[0]
-        regions, where = self._own("region")
+        base: MaterialTable = self._table_of_body("material")[0]
+        regions, where = self._table_of_body("region")
         labels, of_file = _file_regions(mesh, len(regions))
         names: dict[str, int] = {}
         materials = {label: base.material() for label in np.unique(labels).tolist()}
         for rank, region in enumerate(regions):
-            with self._blaming([*where, rank]):
+            with self._locating_errors([*where, rank]):
                 labels[region.elements(mesh)] = rank + 1
                 materials[rank + 1] = region.material(base)
                 names[_unused(region.title, names)] = rank + 1
@@ -237,25 +240,25 @@ class _Builder:
             if label in labels:
                 names[_unused(name, names)] = label
         mesh = TetMesh(mesh.nodes, mesh.tets, labels, names)
-        loads, where = self._own("loads")
-        with self._blaming_file(self._own("supports")[1]):
+        loads, where = self._table_of_body("loads")
+        with self._locating_errors_in_file(self._table_of_body("supports")[1]):
             fixed = self._fixed(mesh)
-        with self._blaming_file(["body", self._rank]):
+        with self._locating_errors_in_file(["body", self._rank]):
             body = Body(mesh, material=materials, fixed=fixed, loads=together(loads))
         for rank, load in enumerate(loads):
-            with self._blaming([*where, rank]):
+            with self._locating_errors([*where, rank]):
                 load.check(body)
         return body
 
-    def _blaming(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
-        return blaming(self._scene, place)
+    def _locating_errors(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
+        return locating_errors(self._scene, place)
 
-    def _blaming_file(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
+    def _locating_errors_in_file(self, place: Sequence[str | int]) -> contextlib.AbstractContextManager[None]:
         """Do the same where the scene is a file: what a program has given needs no line."""
-        return blaming(self._scene, place, None) if self._scene.source[1] else contextlib.nullcontext()
+        return locating_errors(self._scene, place, None) if self._scene.source[1] else contextlib.nullcontext()
 
     def mesh(self) -> TetMesh:
-        with self._blaming_file(["body", self._rank, "model" if self._table.model is not None else "mesh"]):
+        with self._locating_errors_in_file(["body", self._rank, "model" if self._table.model is not None else "mesh"]):
             return self._read_mesh()
 
     def _read_mesh(self) -> TetMesh:
@@ -265,11 +268,12 @@ class _Builder:
         source = self._scene.folder / str(table.mesh)
         if table.fills_a_surface:
             finer = [(ball.center, ball.radius, ball.size) for ball in table.refine]
-            return tetrahedralize_with(table.element or "quadratic", source, table.max_element_size, table.unit, finer)
+            element, options = table.element or "quadratic", table.fill_options
+            return tetrahedralize_with(element, source, table.max_element_size, table.unit, finer, options)
         return TetMesh.read(source, table.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:
-        supports: SupportsTable = self._own("supports")[0]
+        supports: SupportsTable = self._table_of_body("supports")[0]
         fixed = supports.fixed
         if fixed is None and self._table.model is not None:
             return models.fixed(self._table.model, mesh)

@@ -1,4 +1,4 @@
-"""Radii of tools for which a scene gives none: they follow the body."""
+"""Default radii of tools, proportional to the size of the body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Devices of a scene: what moves each tool, where its workspace lies, and what it may put out."""
+"""Devices of a scene: which one moves each tool, its workspace and its limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Protocol, get_args
 import numpy as np
 from pydantic import Field, field_validator
 
-from palpate.scene.table import Force, Mistake, Number, Point, Stiffness, Table, Time, is_whole, one_of
+from palpate.scene.table import Force, Number, Point, Stiffness, Table, TableError, Time, is_whole, one_of
 
 Kind = Literal["simulated", "haply", "touch", "forcedimension"]
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -106,13 +106,13 @@ def device_ranks(tools: Sequence[_Tool], tables: Sequence[DeviceTable]) -> list[
         if asked in names and asked is not None:
             rank = names.index(asked)
             if rank in taken:
-                raise Mistake(
+                raise TableError(
                     f"tools {taken[rank]} and {tool} both have the device '{asked}'", ("tool", tool, "device")
                 )
             take(tool, rank)
         elif asked is not None and asked not in KINDS:
             known = [name for name in names if name] + list(KINDS)
-            raise Mistake(f"there is no device '{asked}'; there are {', '.join(known)}", ("tool", tool, "device"))
+            raise TableError(f"there is no device '{asked}'; there are {', '.join(known)}", ("tool", tool, "device"))
     for tool, asked in enumerate(tool.device for tool in tools):
         if chosen[tool] is None and asked is not None:
             fitting = (r for r, table in enumerate(tables) if table.kind == asked and r not in taken)
@@ -130,7 +130,7 @@ def device_ranks(tools: Sequence[_Tool], tables: Sequence[DeviceTable]) -> list[
     return chosen
 
 
-def check_tables(first: DeviceTable, further: Sequence[DeviceTable]) -> None:
+def check_tables(first: DeviceTable, additional: Sequence[DeviceTable]) -> None:
     """Refuse what belongs to the loop in any but the first table, and a name of two.
 
     Raises
@@ -139,16 +139,16 @@ def check_tables(first: DeviceTable, further: Sequence[DeviceTable]) -> None:
         The key, or the name.
 
     """
-    for rank, table in enumerate(further, 1):
+    for rank, table in enumerate(additional, 1):
         for key in LOOP_KEYS:
             if key in table.model_fields_set:
-                raise Mistake(
+                raise TableError(
                     f"{key} is of the whole loop: give it in the first table [[device]]", ("device", rank, key)
                 )
-    names = [table.name for table in (first, *further)]
+    names = [table.name for table in (first, *additional)]
     for rank, name in enumerate(names):
         if name is not None and name in names[:rank]:
-            raise Mistake(f"two tables have the name '{name}'", ("device", rank, "name"))
+            raise TableError(f"two tables have the name '{name}'", ("device", rank, "name"))
 
 
 class _Scene(Protocol):
@@ -170,10 +170,10 @@ def tables_of_tools(scene: _Scene, without: int | None = None) -> list[DeviceTab
     return tables
 
 
-def moved_by(scene: _Scene, tool: int, kind: str) -> dict[str, Any]:
+def device_change(scene: _Scene, tool: int, kind: str) -> dict[str, Any]:
     """Give the changes of a scene in which a tool has a device of another kind, at the place of the one it had."""
     tables = tables_of_tools(scene)
     kept = tables[tool].model_dump(exclude_unset=True, exclude={"id", "address", "library"})
     tables[tool] = DeviceTable(**{**kept, "kind": kind})
     tools = [named.model_copy(update={"device": None}) for named in scene.tools]
-    return {"tools": tools, "device": tables[0], "further_devices": tables[1:]}
+    return {"tools": tools, "device": tables[0], "additional_devices": tables[1:]}

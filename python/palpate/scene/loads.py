@@ -1,4 +1,4 @@
-"""``[[loads]]``: what acts on the body before it is touched."""
+"""``[[loads]]``: reference loads of the body."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pydantic import model_validator
 
-from palpate.body import Body, Loads, gravity_mistake, parse
+from palpate.body import Body, Loads, gravity_error, parse
 from palpate.errors import BodyError
 from palpate.scene.table import Acceleration, ForceVector, SignedPressure, Table
 
@@ -30,7 +30,7 @@ class LoadTable(Table):
             raise ValueError("give exactly one of gravity, pressure and force")
         if self.gravity is not None and not (self.on is None and self.nodes is None):
             raise ValueError("gravity acts on the whole body: leave 'on' and 'nodes' out")
-        mistake = None if self.gravity is None else gravity_mistake(self.gravity)
+        mistake = None if self.gravity is None else gravity_error(self.gravity)
         if mistake is not None:
             raise ValueError(mistake)
         if self.pressure is not None and (self.on is None or self.nodes is not None):

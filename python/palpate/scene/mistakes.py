@@ -1,4 +1,4 @@
-"""A mistake in a scene file, told with its line and the nearest known key."""
+"""Error messages for scene files, with the line and the nearest known key."""
 
 from __future__ import annotations
 
@@ -25,6 +25,9 @@ WORDS = {
     "tuple": "a list of numbers",
 }
 
+# Keys of earlier versions, and what stands for them.
+GONE = {"repair": "leave it out, for a surface that is open or crosses itself is wrapped without it (mesher = 'wrap')"}
+
 Place = Sequence[str | int]
 # A key, bare or in quotes, or several with dots between them.
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
@@ -48,6 +51,8 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
     where = ".".join(keys)
     at = located(path, text, place)
     if first["type"] == "extra_forbidden":
+        if keys[-1] in GONE:
+            return f"{at}: unknown key '{where}': {GONE[keys[-1]]}"
         known = _known_keys(model, keys[:-1])
         near = difflib.get_close_matches(keys[-1], known, 1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
@@ -58,7 +63,7 @@ def explain(path: Path, text: str, error: ValidationError, model: type[BaseModel
         return f"{at}: the key '{where}' is missing"
     if first["type"] == "value_error":
         return f"{at}: {where}: {first['msg'].removeprefix('Value error, ')}"
-    return f"{at}: {where}: {_expected(first, keys[-1])}, got {_got(first['input'])}"
+    return f"{at}: {where}: {_expected(first, keys[-1])}, got {_value_text(first['input'])}"
 
 
 def _expected(mistake: Mapping[str, Any], key: str) -> str:
@@ -78,7 +83,7 @@ def _entries(count: int) -> str:
     return "entry" if count == 1 else "entries"
 
 
-def _got(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """Value as it stands in the file; of several entries their count."""
     if isinstance(value, (list, tuple)) and any(isinstance(entry, Mapping) for entry in value):
         return str(len(value))
@@ -107,13 +112,13 @@ def line_of(text: str, place: Place) -> int | None:
         head = re.match(rf"\s*(\[\[?)\s*({KEYS})\s*\]", line)
         pair = re.match(rf"\s*({KEYS})\s*=", line)
         if head:
-            table = _entered(_parts(head[2]), head[1] == "[[", counts)
+            table = _place_of_head(_parts(head[2]), head[1] == "[[", counts)
             here = table
         elif pair:
             here = [*table, *_parts(pair[1])]
         else:
             continue
-        shared = _leads_to(here, place)
+        shared = _shared_keys(here, place)
         if shared > depth:
             found, depth = number, shared
     return found
@@ -124,7 +129,7 @@ def _parts(keys: str) -> list[str]:
     return [key.strip().strip("'\"") for key in keys.split(".")]
 
 
-def _entered(parts: Sequence[str], entry: bool, counts: dict[tuple[str | int, ...], int]) -> list[str | int]:
+def _place_of_head(parts: Sequence[str], entry: bool, counts: dict[tuple[str | int, ...], int]) -> list[str | int]:
     """Place of a table's head, given how many entries each array of tables has so far."""
     place: list[str | int] = []
     for rank, part in enumerate(parts):
@@ -137,7 +142,7 @@ def _entered(parts: Sequence[str], entry: bool, counts: dict[tuple[str | int, ..
     return place
 
 
-def _leads_to(here: Place, wanted: Place) -> int:
+def _shared_keys(here: Place, wanted: Place) -> int:
     """How many keys of ``wanted`` are those of ``here``; 0 if ``here`` leads elsewhere.
 
     A single table stands for the first entry of an array.

@@ -49,10 +49,10 @@ class Scene(SceneTables):
             if not isinstance(error.__cause__, ValidationError):
                 raise
             raise SceneError(explain(path, text, error.__cause__, cls)) from None
-        scene.stand_in(path, text)
+        scene.replace_source(path, text)
         return scene
 
-    def stand_in(self, path: Path, text: str) -> None:
+    def replace_source(self, path: Path, text: str) -> None:
         """Take a file for that of this scene: its folder is where paths start, its lines are where mistakes stand.
 
         Raises

@@ -1,4 +1,4 @@
-"""What the tables of a scene file are made of: quantities with units, and no unknown keys."""
+"""Base classes of the tables of a scene file: quantities with units, no unknown keys."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ Stiffness = Annotated[float, _quantity(units.stiffness), Field(gt=0, allow_inf_n
 Time = Annotated[float, _quantity(units.time), Field(ge=0, allow_inf_nan=False)]
 PoissonsRatio = Annotated[float, Field(gt=-1, lt=0.5)]
 _Acceleration = Annotated[float, _quantity(units.acceleration), Field(allow_inf_nan=False)]
+Share = Annotated[float, _quantity(units.share), Field(ge=0, lt=1)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 Point = tuple[Coordinate, Coordinate, Coordinate]
@@ -53,7 +54,7 @@ def one_of(what: str, allowed: Callable[[Any], bool]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-class Mistake(ValueError):
+class TableError(ValueError):
     """A mistake that shows only beside other tables, and the place in the file at which it stands."""
 
     def __init__(self, message: str, place: tuple[str | int, ...]):
@@ -69,4 +70,4 @@ def is_whole(value: Any, least: int = 0) -> bool:
 class Table(BaseModel):
     """A table of the file: unknown keys are mistakes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)

@@ -12,12 +12,13 @@ from palpate import models
 from palpate.body import parse
 from palpate.errors import BodyError, UnitError
 from palpate.fields import STRAIN_LIMIT
-from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, Element
+from palpate.mesh.surface_file import SURFACE_ENDINGS
+from palpate.mesh.tetrahedralize import Element, FillOptions, Mesher
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
 from palpate.scene.regions import MaterialTable, RegionTable
-from palpate.scene.table import Length, Number, Point, Pressure, Radius, Table, is_whole, one_of
+from palpate.scene.table import Length, Number, Point, Pressure, Radius, Share, Table, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
 from palpate.scene.touch import TouchTable
 from palpate.units import length_scale
@@ -34,6 +35,8 @@ _NODES = one_of(
     "a predicate, such as 'z < min + 5mm', or a list of node numbers",
     lambda v: v is None or isinstance(v, str) or (isinstance(v, (list, tuple)) and all(map(is_whole, v))),
 )
+
+_PART = one_of("a number from 1 on, or 'all'", lambda v: is_whole(v, 1) or v == "all")
 
 
 class RefineTable(Table):
@@ -66,7 +69,8 @@ class BodyTable(Table):
     Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
     filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
     ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
-    fix the middles between them.
+    fix the middles between them. ``mesher``, ``part`` and ``max_volume_loss`` are those of
+    :func:`palpate.tetrahedralize`.
 
     ``position`` (m) and ``orientation`` (unit quaternion w x y z) place the body's own frame in the scene; predicates
     and shapes speak of the body's own frame. ``material``, ``supports``, ``touch``, ``region``, ``loads`` and
@@ -82,6 +86,9 @@ class BodyTable(Table):
     max_element_size: Length | None = None
     element: Element | None = None
     refine: list[RefineTable] = Field(default_factory=list)
+    mesher: Mesher | None = None
+    part: Annotated[int | str, _PART] = 1
+    max_volume_loss: Share = 0.05
     precision: str | None = Field(None, pattern="^f(16|32|64)$")
     position: Point = (0.0, 0.0, 0.0)
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -116,6 +123,11 @@ class BodyTable(Table):
     def fills_a_surface(self) -> bool:
         """Whether the mesh is yet to be made."""
         return Path(self.mesh or "").suffix.lower() in SURFACE_ENDINGS
+
+    @property
+    def fill_options(self) -> FillOptions:
+        """How its surface is filled."""
+        return FillOptions(self.mesher, self.part, self.max_volume_loss)  # type: ignore[arg-type]
 
     @property
     def adds_middles(self) -> bool:
@@ -157,7 +169,7 @@ class ToolTable(ShapeTable):
 class ViewTable(Table):
     """Where the camera stands and what it looks at, m (by default the whole body), and the strain that limits the tool.
 
-    Linear elasticity is honest up to about 10 % strain, where the page warns; a finger's press on an organ goes beyond.
+    Linear elasticity is accurate up to about 10 % strain, where the page warns; finger presses go beyond.
     ``strain_limit = 0`` takes the limit away.
     """
 
@@ -178,7 +190,7 @@ class SceneTables(Table):
     tools: list[ToolTable] = Field(default=[ToolTable()], alias="tool", min_length=1, max_length=MOST_TOOLS)
     device: DeviceTable = DeviceTable()
     # As no file can name it: there they stand in further tables [[device]].
-    further_devices: list[DeviceTable] = Field(default_factory=list, alias="[[device]]", max_length=MOST_TOOLS - 1)
+    additional_devices: list[DeviceTable] = Field(default_factory=list, alias="[[device]]", max_length=MOST_TOOLS - 1)
     dynamics: DynamicsTable | None = None
     view: ViewTable = ViewTable()
 
@@ -203,13 +215,13 @@ class SceneTables(Table):
 
     @model_validator(mode="after")
     def _devices_of_tools(self) -> SceneTables:
-        check_tables(self.device, self.further_devices)
-        device_ranks(self.tools, [self.device, *self.further_devices])
+        check_tables(self.device, self.additional_devices)
+        device_ranks(self.tools, [self.device, *self.additional_devices])
         return self
 
     def device_of(self, tool: int) -> DeviceTable:
         """Table of the device that moves a tool."""
-        tables = [self.device, *self.further_devices]
+        tables = [self.device, *self.additional_devices]
         rank = device_ranks(self.tools, tables)[tool]
         return self.device.of_kind(self.tools[tool].device) if rank is None else tables[rank]
 

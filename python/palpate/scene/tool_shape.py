@@ -1,4 +1,4 @@
-"""What a tool looks like: which keys each shape takes, and the surface of one from a file."""
+"""Shapes of tools: the keys of each, and surfaces from files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import model_validator
 
-from palpate.mesh.tetrahedralize import SURFACE_ENDINGS, closed_surface
+from palpate.mesh.surface_file import SURFACE_ENDINGS
+from palpate.mesh.tetrahedralize import closed_surface
 from palpate.scene.table import Length, Table
 from palpate.units import length_scale
 

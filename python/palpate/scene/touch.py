@@ -1,4 +1,4 @@
-"""``[touch]``: which part of the surface may be touched, and which is computed first."""
+"""``[touch]``: the touchable part of the surface, and the part that is computed first."""
 
 from __future__ import annotations
 

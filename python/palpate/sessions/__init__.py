@@ -1,4 +1,4 @@
-"""Recordings taken further: written for other programs, compared, given to another scene."""
+"""Recordings: exported to other formats, compared, rerun in another scene."""
 
 from palpate.sessions.compare import Comparison, QuantityDifference, compare
 from palpate.sessions.export import FORMATS, export

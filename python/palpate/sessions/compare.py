@@ -1,4 +1,4 @@
-"""Two recordings side by side: what differs, by how much, and from which tick on."""
+"""Comparison of two recordings: differing quantities, by how much, and from which tick."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ class _Pair:
 
 def differing_settings(a: Recording, b: Recording) -> Iterator[tuple[str, Any, Any]]:
     """Keys of scenes, versions, bodies and settings that differ, with their values in both."""
-    yield from _differing(*(_told(one) for one in (a, b)))
+    yield from _differing(*(_description(one) for one in (a, b)))
     keys = [json.loads(one.about["keys"]) for one in (a, b)]
     for body, ((green, modes), (other, others)) in enumerate(zip(*keys, strict=False)):
         for what, was, now in (("mesh, material, supports or precision", green, other), ("modes", modes, others)):
@@ -201,7 +201,7 @@ def differing_settings(a: Recording, b: Recording) -> Iterator[tuple[str, Any, A
         yield "changes of settings", len(a.settings) - 1, len(b.settings) - 1
 
 
-def _told(recording: Recording) -> dict[str, Any]:
+def _description(recording: Recording) -> dict[str, Any]:
     """Collect what a recording says of itself and of its scene, by key."""
     own = {key: text for key, text in recording.about.items() if key not in ASIDE}
     return own | _flat(json.loads(recording.about["scene"]))

@@ -12,7 +12,7 @@ from palpate.errors import Error
 from palpate.input_file import require_writable
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
-from palpate.sessions import film, gltf, paraview, tables
+from palpate.sessions import tables
 from palpate.sessions.frames import RecordedFrames, Span
 from palpate.simulation import Recording
 
@@ -83,13 +83,25 @@ def export(
             return _write_tables(recorded, target, Span(start, end).within(recorded.time), report)
         span = Span(start, end, RATE if rate is None else rate)
         frames = RecordedFrames(recorded, span, scene)
-        if kind == ".pvd":
-            paraview.write_pvd(frames, target, report)
-            return [target, paraview.frames_folder(target)]
-        if kind == ".glb":
-            gltf.write_glb(frames, target, report)
-        else:
-            film.write_mp4(frames, target, span.rate, report)
+        return _write_frames(frames, target, span.rate, report)
+
+
+def _write_frames(frames: RecordedFrames, target: Path, rate: float, report: tables.Report) -> list[Path]:
+    """Write frames in the format of the target's ending; its writer loads libraries that no other command needs."""
+    kind = target.suffix.lower()
+    if kind == ".pvd":
+        from palpate.sessions import paraview
+
+        paraview.write_pvd(frames, target, report)
+        return [target, paraview.frames_folder(target)]
+    if kind == ".glb":
+        from palpate.sessions.gltf import write_glb
+
+        write_glb(frames, target, report)
+    else:
+        from palpate.sessions.film import write_mp4
+
+        write_mp4(frames, target, rate, report)
     return [target]
 
 

@@ -10,10 +10,11 @@ import trimesh
 
 from palpate.atomic import written_beside
 from palpate.errors import Error
+from palpate.mesh.triangles import area_vectors, units
 from palpate.sessions.frames import RecordedFrame, RecordedFrames
-from palpate.sessions.shapes import arrow, arrow_scale, tools_of, turning_z_to
+from palpate.sessions.shapes import arrow, arrow_scale, tools_of
 from palpate.sessions.tables import Report
-from palpate.vectors import rotated
+from palpate.vectors import rotated, turning_z_to
 
 # Pixels of a frame; even, as the encoding wants.
 WIDTH, HEIGHT, DPI = 1280, 720, 100
@@ -162,9 +163,7 @@ def _placed(
 
 def _lit(corners: np.ndarray, colors: np.ndarray) -> np.ndarray:
     """Colours (n, 4) of triangles (n, 3, 3) under a light from one side."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    bright = AMBIENT + (1 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0)
+    bright = AMBIENT + (1 - AMBIENT) * np.clip(units(area_vectors(corners)) @ LIGHT, 0.0, 1.0)
     lit = colors.copy()
     lit[:, :3] *= bright[:, None]
     return lit

@@ -1,4 +1,4 @@
-"""Frames of a recording, made again at the rate of a film."""
+"""Frames of a recording, replayed at the rate of a film."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from palpate import _native
 from palpate.errors import Error, RecordingWarning
 from palpate.scene import BuiltScene, Scene
-from palpate.simulation import Frame, Recording, frame_of, simulation_of, unbroken
+from palpate.simulation import Frame, Recording, frame_of, simulation_of, ticks_before_gap
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class RecordedFrames:
     """
 
     def __init__(self, recording: Recording, span: Span, scene: Scene | BuiltScene | None = None):
-        whole = unbroken(recording)
+        whole = ticks_before_gap(recording)
         if whole < len(recording.ticks):
             _warn(f"ticks were dropped after {recording.time[whole - 1]:.3f} s: frames end there")
         self.recording = recording
@@ -129,7 +129,7 @@ class RecordedFrames:
         columns = recording.active.reshape(len(recording.ticks), -1)
         self._present = np.zeros((len(columns), tools), dtype=bool)
         self._present[:, : columns.shape[1]] = columns
-        self._told = False
+        self._warned = False
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -140,10 +140,10 @@ class RecordedFrames:
         for row in self.rows.tolist():
             _, differences = again.step(row + 1 - made)
             made = row + 1
-            if differences and not self._told:
+            if differences and not self._warned:
                 tick, of, quantity = differences[0][:3]
                 _warn(f"frames are not as recorded from tick {tick} on ({of} {quantity}): made by another version?")
-                self._told = True
+                self._warned = True
             frame = frame_of(again.frame(), self.simulation.bodies)
             yield RecordedFrame(row, float(self.recording.time[row]), frame, self._present[row])
 

@@ -17,8 +17,9 @@ import trimesh
 from palpate.atomic import written_beside
 from palpate.errors import Error
 from palpate.sessions.frames import RecordedFrames
-from palpate.sessions.shapes import arrow, arrow_scale, longest_side, tools_of, turning_z_to
+from palpate.sessions.shapes import arrow, arrow_scale, longest_side, tools_of
 from palpate.sessions.tables import Report
+from palpate.vectors import turning_z_to
 
 # Displacements that are lost, over the longest side of the bodies: far below what is seen.
 TOLERANCE = 1e-4
@@ -82,7 +83,7 @@ def write_glb(frames: RecordedFrames, path: Path, report: Report = None) -> None
         document.add_moving(f"tool {tool}", shape, TOOLS, tracks | {"scale": scale})
         force = moved["forces"] * arrow_scale(frames.simulation, frames.recording.forces)
         length = np.linalg.norm(force, axis=1)
-        turns = np.array([turning_z_to(row) for row in force])
+        turns = turning_z_to(force)
         tracks = {"translation": moved["positions"], "rotation": turns, "scale": np.repeat(length[:, None], 3, axis=1)}
         document.add_moving(f"force {tool}", pointer, FORCE, tracks)
     with written_beside(path) as partial:

@@ -1,4 +1,4 @@
-"""What a recorded hand would have felt in another scene."""
+"""Rerun of a recorded hand's motion in another scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from palpate import _native
 from palpate.errors import SceneError
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
-from palpate.simulation import Recording, Simulation, shown_of, unbroken
+from palpate.simulation import Recording, Simulation, shown_of, ticks_before_gap
 
 
 def rerun(
@@ -49,9 +49,9 @@ def rerun(
     if simulation.scene.device.rate != rate:
         raise SceneError(f"the recording has {rate:g} ticks a second, the scene {simulation.scene.device.rate:g}")
     simulation._arm_strain_limit()
-    expected = unbroken(recorded)
+    expected = ticks_before_gap(recorded)
     now = simulation._about(shown_of(about), clock=False)
     with progress_reporter("running again", progress) as report:
-        told = None if report is None else lambda done: report(done, expected)
-        made = _native.rerun(simulation._core, recorded.source, now, told)
+        on_tick = None if report is None else lambda done: report(done, expected)
+        made = _native.rerun(simulation._core, recorded.source, now, on_tick)
     return Recording._of(made)

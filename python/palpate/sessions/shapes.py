@@ -64,16 +64,3 @@ def longest_side(simulation: Simulation) -> float:
     """Longest side of the box around the bodies, m."""
     places = [body.points_to_scene(body.green.surface_positions) for body in simulation.bodies]
     return float(np.ptp(np.vstack(places), axis=0).max())
-
-
-def turning_z_to(direction: np.ndarray) -> np.ndarray:
-    """Give the unit quaternion w x y z that turns z to a direction (3,); that of no turn for a direction of zero."""
-    length = np.linalg.norm(direction)
-    if length == 0:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    x, y, z = direction / length
-    if z < -1 + 1e-12:
-        return np.array([0.0, 1.0, 0.0, 0.0])  # half a turn about x
-    # (1 + cos, axis sin) is twice the cosine of half the angle times the quaternion.
-    quaternion = np.array([1.0 + z, -y, x, 0.0])
-    return quaternion / np.linalg.norm(quaternion)

@@ -53,10 +53,10 @@ def tick_columns(recording: Recording, rows: np.ndarray) -> dict[str, np.ndarray
     for body, energy in enumerate(recording.energies):
         for name in () if energy is None else ("kinetic", "strain", "coupling", "dissipated", "work"):
             columns[f"body{body}_{name}_J"] = getattr(energy, name)[rows]
-    told = defaultdict(list)
+    events = defaultdict(list)
     for tick, what in recording.events:
-        told[tick].append(what)
-    columns["events"] = np.array(["; ".join(told.get(tick, ())) for tick in columns["tick"].tolist()], dtype=object)
+        events[tick].append(what)
+    columns["events"] = np.array(["; ".join(events.get(tick, ())) for tick in columns["tick"].tolist()], dtype=object)
     return columns
 
 

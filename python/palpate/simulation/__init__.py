@@ -4,7 +4,7 @@ from palpate.simulation.about import scene_of, shown_of
 from palpate.simulation.frame import BodyFrame, Contact, Frame, frame_of
 from palpate.simulation.packed import pack
 from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
-from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, unbroken
+from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, ticks_before_gap
 from palpate.simulation.replayed import ReplayedSimulation
 from palpate.simulation.simulation import Simulation
 
@@ -25,5 +25,5 @@ __all__ = [
     "scene_of",
     "shown_of",
     "simulation_of",
-    "unbroken",
+    "ticks_before_gap",
 ]

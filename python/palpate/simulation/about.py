@@ -1,4 +1,4 @@
-"""What a recording says of itself: enough to build the same simulation again."""
+"""Metadata of a recording: enough to build the same simulation again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may be changed while the loop of a simulation runs."""
+"""Settings of a simulation that may be changed while its loop runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies and tools of a scene as the native module takes them."""
+"""Arguments of the native module for bodies and tools of a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies, tools and devices that come into a simulation or go out of it, also while its loop runs."""
+"""Adding and removing bodies, tools and devices of a simulation, also while its loop runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from palpate.devices import Device
 from palpate.errors import SceneError, SimulationError
 from palpate.green import GreensFunction, precompute
 from palpate.scene import BuiltBody, BuiltScene, Scene, ToolTable
-from palpate.scene.devices import KINDS, moved_by, tables_of_tools
+from palpate.scene.devices import KINDS, device_change, tables_of_tools
 from palpate.scene.tables import BodyTable, SceneTables
 from palpate.simulation.arguments import body_arguments, tool_arguments
 from palpate.simulation.connecting import connect_tool, require_devices, warn_if_limited
@@ -26,19 +26,19 @@ Given, Answer = ParamSpec("Given"), TypeVar("Answer")
 
 
 def one_at_a_time(
-    change: Callable[Concatenate[Changing, Given], Answer],
-) -> Callable[Concatenate[Changing, Given], Answer]:
+    change: Callable[Concatenate[SceneEditing, Given], Answer],
+) -> Callable[Concatenate[SceneEditing, Given], Answer]:
     """Let threads that change a simulation wait for each other: each begins with what the one before has left."""
 
     @functools.wraps(change)
-    def alone(simulation: Changing, /, *args: Given.args, **keywords: Given.kwargs) -> Answer:
-        with simulation._changing:
+    def exclusive(simulation: SceneEditing, /, *args: Given.args, **keywords: Given.kwargs) -> Answer:
+        with simulation._editing:
             return change(simulation, *args, **keywords)
 
-    return alone
+    return exclusive
 
 
-class Changing:
+class SceneEditing:
     """The nodes of a scene, while they are simulated.
 
     Ranks of bodies and tools behind one that is removed go down by one. Contacts between what stays go on, and forces
@@ -52,7 +52,7 @@ class Changing:
     _running: bool
     # Of the scene that the loop has, as the core counts them; None while another one comes in.
     _number: int | None
-    _changing: threading.RLock
+    _editing: threading.RLock
     _given: dict[int, Device]
     _devices: dict[int, str]
 
@@ -160,9 +160,11 @@ class Changing:
         kind = device if isinstance(device, str) else "simulated"
         if kind not in KINDS:
             raise SceneError(f"there is no kind of device '{kind}'; there are {', '.join(KINDS)}")
-        first, *further = [*tables_of_tools(self.scene), self.scene.device.of_kind(kind)]
+        first, *additional = [*tables_of_tools(self.scene), self.scene.device.of_kind(kind)]
         tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
-        scene = self.scene.model_copy(update={"tools": [*tools, tool], "device": first, "further_devices": further})
+        scene = self.scene.model_copy(
+            update={"tools": [*tools, tool], "device": first, "additional_devices": additional}
+        )
         scene = BuiltScene(scene, self.bodies).scene
         arguments = tool_arguments(scene, rank)
         self._take(scene, self.bodies, lambda: _native.add_tool(self._core, arguments))
@@ -191,7 +193,7 @@ class Changing:
             raise SceneError("a simulation needs a tool: add another one before the last is removed")
         devices = tables_of_tools(self.scene, without=self._tool(tool))
         tools = [named.model_copy(update={"device": None}) for named in self.scene.tools]
-        update = {"tools": tools[:tool] + tools[tool + 1 :], "device": devices[0], "further_devices": devices[1:]}
+        update = {"tools": tools[:tool] + tools[tool + 1 :], "device": devices[0], "additional_devices": devices[1:]}
         scene = self.scene.model_copy(update=update)
         self._take(scene, self.bodies, lambda: _native.remove_tool(self._core, tool))
         gone, connected = self._given.pop(tool, None), tool in self._devices
@@ -220,7 +222,7 @@ class Changing:
         kind = device if isinstance(device, str) else "simulated"
         if given is None and kind not in KINDS[1:]:
             raise SceneError(f"there is no kind of device '{kind}' to connect; there are {', '.join(KINDS[1:])}")
-        scene = self.scene.model_copy(update=moved_by(self.scene, tool, kind))
+        scene = self.scene.model_copy(update=device_change(self.scene, tool, kind))
         self._devices[tool] = connect_tool(self._core, scene, tool, given)
         self.scene, before = scene, self._given.pop(tool, None)
         if given is not None:

@@ -1,4 +1,4 @@
-"""Devices of a simulation: opened when its loop starts, and given to it with their workspaces and limits."""
+"""Devices of a simulation: opening them when the loop starts, with workspaces and limits."""
 
 from __future__ import annotations
 

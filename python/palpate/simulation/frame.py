@@ -1,4 +1,4 @@
-"""What is read of a running loop: the latest tick, its bodies and its contacts."""
+"""Frames: the latest tick of a running loop, with its bodies and contacts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.dynamics import Energy
 from palpate.equality import ComparedByValue
-from palpate.fields import DeformedSurface, Exported, Result, ResultSource, placed, together
+from palpate.fields import DeformedSurface, Exportable, Result, ResultSource, placed, together
 from palpate.scene import BuiltBody
 from palpate.vectors import brief
 
@@ -112,7 +112,7 @@ class BodyFrame(ComparedByValue, Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Frame(ComparedByValue, Exported):
+class Frame(ComparedByValue, Exportable):
     """The latest tick. Compared by value, number by number; not hashable.
 
     Attributes
@@ -185,7 +185,7 @@ class Frame(ComparedByValue, Exported):
 
     @property
     def within_linear_range(self) -> bool:
-        """Whether the largest strain is within the 10 % to which linear elasticity is honest."""
+        """Whether the largest strain is within the 10 % up to which linear elasticity is accurate."""
         return all(body.within_linear_range for body in self.bodies)
 
 

@@ -1,4 +1,4 @@
-"""What is kept of many ticks: rows of the log of a running loop, recordings of runs and of sessions."""
+"""Recordings of runs and of sessions, and the log of a running loop."""
 
 from __future__ import annotations
 

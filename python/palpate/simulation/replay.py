@@ -1,4 +1,4 @@
-"""Recordings made again, tick by tick, and what differs."""
+"""Replay of recordings tick by tick, and the differences."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def replay(
     """
     recorded = recording if isinstance(recording, Recording) else Recording.load(Path(recording))
     again = _native.Replay(simulation_of(recorded, scene)._core, recorded.source)
-    expected = unbroken(recorded)
+    expected = ticks_before_gap(recorded)
     differences: list[Difference] = []
     done = 0
     with progress_reporter("replaying", progress) as report:
@@ -151,7 +151,7 @@ def replay(
     return Replayed(done, tuple(differences), whole, again.longest_us)
 
 
-def unbroken(recording: Recording) -> int:
+def ticks_before_gap(recording: Recording) -> int:
     """Count the ticks before the first that was dropped, behind which nothing can be made again."""
     missing = np.flatnonzero(recording.ticks != np.arange(len(recording.ticks)))
     return int(missing[0]) if len(missing) else len(recording.ticks)

@@ -1,4 +1,4 @@
-"""The simulation of a recording, made again up to any tick."""
+"""Simulation that replays a recording up to any tick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palpate.scene import BuiltScene, Scene
 from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.frame import PERCENTILES, Frame, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording
-from palpate.simulation.replay import Difference, built_scene_of, unbroken
+from palpate.simulation.replay import Difference, built_scene_of, ticks_before_gap
 from palpate.simulation.simulation import Simulation
 
 # Ticks between two looks at the clock.
@@ -61,7 +61,7 @@ class ReplayedSimulation(Simulation):
         super().__init__(self.scene_as_built)
         self._arm_strain_limit()
         assume_recorded(self._core, recorded.about)
-        self.recorded, self.ticks = recorded, unbroken(recorded)
+        self.recorded, self.ticks = recorded, ticks_before_gap(recorded)
         if self.ticks == 0:
             raise SceneError("the recording has no tick that can be made again")
         self.checked, self.restarts = 0, 0

@@ -1,4 +1,4 @@
-"""What is told to ticks without a clock: paths of the tools, strikes, nodes that are watched."""
+"""Inputs of scripted runs: paths of the tools, strikes, watched nodes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of what a person changes while the loop runs: numbers in SI, or text with a unit."""
+"""Checks of settings that are changed while the loop runs: numbers in SI, or text with a unit."""
 
 from __future__ import annotations
 

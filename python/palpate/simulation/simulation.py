@@ -1,4 +1,4 @@
-"""A scene brought to life: the 1 kHz force loop with simulated tools, and the same ticks offline."""
+"""The simulation of a scene: the 1 kHz force loop, and the same ticks offline."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
 from palpate.simulation.adjustable import Adjustable
 from palpate.simulation.arguments import body_arguments, tool_arguments
-from palpate.simulation.changing import Changing
+from palpate.simulation.changing import SceneEditing
 from palpate.simulation.connecting import assume_tables, connect, disconnect, largest_force, require_devices
 from palpate.simulation.frame import Contact, Frame, contact_of, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording, RecordingStatus
@@ -52,7 +52,7 @@ def _stop_all() -> None:
         simulation.stop()
 
 
-class Simulation(Adjustable, Changing):
+class Simulation(Adjustable, SceneEditing):
     """Force loop of a scene.
 
     As a context manager it runs at 1 kHz on a thread of its own; :meth:`run` needs no clock.
@@ -106,7 +106,7 @@ class Simulation(Adjustable, Changing):
         self._devices: dict[int, str] = {}
         self._armed, self._running, self._warned = False, False, False
         self._number: int | None = 0
-        self._changing = threading.RLock()
+        self._editing = threading.RLock()
         self._to_record: Path | None = None
 
     def __repr__(self) -> str:
@@ -309,7 +309,7 @@ class Simulation(Adjustable, Changing):
 
     def _read_frame(self) -> Frame:
         """Read the latest tick, without a word about the limit of strain."""
-        raw, bodies = self._of_this_scene(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
+        raw, bodies = self._read_consistently(lambda: (raw := self._core.frame()) and (raw["scene"], raw))
         if raw is None:
             raise SimulationError("the simulation does not run: use it in a with block, or call start()")
         failed = self._given.get(raw["failed_program"])
@@ -324,10 +324,10 @@ class Simulation(Adjustable, Changing):
 
     def contacts(self) -> list[Contact]:
         """Contacts of the latest tick, without the cost of a whole frame; none while nothing runs."""
-        records, bodies = self._of_this_scene(self._core.contacts)
+        records, bodies = self._read_consistently(self._core.contacts)
         return [contact_of(record, bodies) for record in records or []]
 
-    def _of_this_scene(self, read: Callable[[], tuple[int, Any] | None]) -> tuple[Any, tuple[BuiltBody, ...]]:
+    def _read_consistently(self, read: Callable[[], tuple[int, Any] | None]) -> tuple[Any, tuple[BuiltBody, ...]]:
         """Read from the loop what belongs to the bodies that it comes with; None where it does not run.
 
         Another thread may be changing the scene: between its change of the loop and that of the bodies are moments.
@@ -398,7 +398,7 @@ class Simulation(Adjustable, Changing):
         if len(bad):
             raise SceneError(f"position {bad[0, 0]} is not finite")
         # Nobody sees a recording of it: none is written.
-        return self._told(self._play(positions, orientations, records=False)).forces
+        return self._warn_of_strain_limit(self._play(positions, orientations, records=False)).forces
 
     def play(
         self,
@@ -432,9 +432,9 @@ class Simulation(Adjustable, Changing):
             A fault that latched within the run.
 
         """
-        return self._told(self._play(positions, orientations, strikes, watch, grabs))
+        return self._warn_of_strain_limit(self._play(positions, orientations, strikes, watch, grabs))
 
-    def _told(self, recording: Recording) -> Recording:
+    def _warn_of_strain_limit(self, recording: Recording) -> Recording:
         """Warn of ticks in which the limit of strain held a tool."""
         ticks = recording.limited.reshape(len(recording.limited), -1).any(axis=1)
         if ticks.any():

@@ -1,4 +1,4 @@
-"""Where a part is so thin below a tool that the local law, a half-space, does not describe it."""
+"""Detection of parts too thin for the half-space of the local contact law."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies:
         if contact.radius > 0 and not thin[contact.tool]:
             body = bodies[contact.body]
             point, normal = body.points_to_body(contact.point), body.vectors_to_body(contact.normal)
-            thin[contact.tool] = ends_below(body.green, point, normal, THICK * size(tools[contact.tool]))
+            thin[contact.tool] = is_thin_at(body.green, point, normal, THICK * size(tools[contact.tool]))
     return thin
 
 
@@ -34,7 +34,7 @@ def size(tool: ToolTable) -> float:
     return min(tool.semi_axes) if tool.semi_axes is not None else tool.radius or 0.0
 
 
-def ends_below(green: GreensFunction, point: np.ndarray, normal: np.ndarray, thickness: float) -> bool:
+def is_thin_at(green: GreensFunction, point: np.ndarray, normal: np.ndarray, thickness: float) -> bool:
     """Whether the body ends within a thickness, m, below a point (3,) of its surface, along the inward normal."""
     places = point - np.multiply.outer(DEPTHS * thickness, normal)
     ways = green.closest_on_surface(places) - places

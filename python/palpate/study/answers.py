@@ -1,4 +1,4 @@
-"""What the bodies of a study answer: those that share an operator together."""
+"""Solutions for the bodies of a study; bodies that share an operator are solved together."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def answers_elsewhere(version: str, scenes: Sequence[StudyScene], files: Sequenc
             body = scene.bodies[0]
             name = None if body.mesh is None else Path(body.mesh).name
             here = scene.model_copy(update={"bodies": [body.model_copy(update={"mesh": name})]})
-            here.stand_in(Path(folder) / path.name, text)
+            here.replace_source(Path(folder) / path.name, text)
             moved.append(here)
         home = str(scenes[0].source[0].parent)
         return [Answers(a.rows, a.notes, a.problem.replace(folder, home)) for a in answers(moved)]

@@ -1,4 +1,4 @@
-"""The bodies of a study: every combination of the values in ``[grid]``, for each ``[[case]]``."""
+"""Cases of a study: every combination of the values in ``[grid]``, for each ``[[case]]``."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def _scene(path: Path, text: str, base: Mapping[str, Any], given: Mapping[Key, t
     except SceneError as error:
         if not isinstance(error.__cause__, ValidationError):
             raise
-        raise SceneError(_told(path, text, error.__cause__, given)) from None
-    scene.stand_in(path, text)
+        raise SceneError(_error_text(path, text, error.__cause__, given)) from None
+    scene.replace_source(path, text)
     _check(scene, path, text)
     return scene
 
@@ -150,7 +150,7 @@ def _entry(tables: Sequence[Any], step: str, key: Key) -> int:
     return int(step)
 
 
-def _told(path: Path, text: str, error: ValidationError, given: Mapping[Key, tuple[Any, Place]]) -> str:
+def _error_text(path: Path, text: str, error: ValidationError, given: Mapping[Key, tuple[Any, Place]]) -> str:
     """Say a mistake where it stands: in the grid or in a case, if it is a value from there."""
     told = explain(path, text, error, StudyTables)
     found = _names(error.errors()[0]["loc"])

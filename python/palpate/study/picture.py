@@ -1,4 +1,4 @@
-"""The picture of a study: stiffness against each of the values that were varied."""
+"""Plot of a study: stiffness against each varied value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study leaves: one table, and plots of it."""
+"""Result of a study: a table and its plots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study: read from a file, run here or by the workers of a cluster, interrupted and gone on with."""
+"""A study: read from a file, run here or by the workers of a cluster, resumed after an interruption."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Study:
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         keys = [case_key(case.scene) for case in self.cases]
-        with _Finished(folder / FINISHED) as finished:
+        with _AnswerFile(folder / FINISHED) as finished:
             found = {k: finished.known[key] for k, key in enumerate(keys) if key in finished.known}
             resumed = len(found)
             with progress_reporter("studying", progress) as report:
@@ -139,7 +139,7 @@ class Study:
                     yield ranks, result_of(client, future)
 
 
-class _Finished:
+class _AnswerFile:
     """What bodies have answered, a line of JSON each, appended as they are done; a torn line does not count."""
 
     def __init__(self, path: Path):
@@ -158,7 +158,7 @@ class _Finished:
         self._stream.truncate(whole)
         self._stream.seek(whole)
 
-    def __enter__(self) -> _Finished:
+    def __enter__(self) -> _AnswerFile:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,4 +1,4 @@
-"""Work beside the event loop: what takes longer than a moment must not keep it from its sockets."""
+"""Long computations on threads beside the event loop of the server."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Worker:
         self._thread.shutdown()
 
 
-class LongWork:
+class CancellableTask:
     """A computation that a person may cancel.
 
     It runs on a thread that nobody waits for at the end of the program. Cancelled, it stops at its next report of

@@ -1,4 +1,4 @@
-"""Columns that are computed while a session runs: what is ready goes into its loop, and the page is told."""
+"""Columns that are computed while a session runs: finished ones go into its loop, and the page gets a message."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from palpate.viewer.session import Session
 
 # Characters of a painted mask, in a message of the size that a client may send.
 LONGEST_MASK = 3000
-# Seconds that are left are told anew when they differ by this part.
-TOLD_AGAIN = 0.05
+# The time left is sent again when it differs by this part.
+TIME_LEFT_CHANGE = 0.05
 
 
 class Computing:
@@ -25,12 +25,12 @@ class Computing:
 
     def __init__(self, growing: Mapping[int, BackgroundPrecompute] | None = None):
         self._growing = dict(growing or {})
-        self._told: dict[str, Any] | None = None
+        self._last_message: dict[str, Any] | None = None
 
     def begin(self) -> None:
         """Leave the processor to the loop, which begins."""
         for background in self._growing.values():
-            background.give_way()
+            background.yield_processor()
 
     def step(self, session: Session) -> dict[str, Any] | None:
         """Give the loop what has become ready; the message for all pages, if there is something new to tell."""
@@ -40,9 +40,9 @@ class Computing:
                 if green is not None:
                     session.take_store(body, green)
         message = self.message(session)
-        if self._told is not None and _is_same(message, self._told):
+        if self._last_message is not None and _is_same(message, self._last_message):
             return None
-        self._told = message
+        self._last_message = message
         return message
 
     def message(self, session: Session) -> dict[str, Any]:
@@ -106,12 +106,12 @@ def _mask(text: Any) -> np.ndarray:
     return np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little").astype(bool)
 
 
-def _is_same(message: Mapping[str, Any], told: Mapping[str, Any]) -> bool:
+def _is_same(message: Mapping[str, Any], last: Mapping[str, Any]) -> bool:
     """Whether nothing differs but a little time."""
-    for now, before in zip(message["bodies"], told["bodies"], strict=True):
-        left, said = now["left_s"], before["left_s"]
-        if {**now, "left_s": None} != {**before, "left_s": None} or (left is None) != (said is None):
+    for now, before in zip(message["bodies"], last["bodies"], strict=True):
+        left, last_left = now["left_s"], before["left_s"]
+        if {**now, "left_s": None} != {**before, "left_s": None} or (left is None) != (last_left is None):
             return False
-        if left is not None and abs(left - said) > TOLD_AGAIN * said + 1.0:
+        if left is not None and abs(left - last_left) > TIME_LEFT_CHANGE * last_left + 1.0:
             return False
     return True

@@ -12,6 +12,7 @@ import numpy as np
 
 from palpate import _native
 from palpate.mesh.elements import face_owners
+from palpate.mesh.triangles import node_normals
 from palpate.scene import BuiltBody
 
 # Triangles of one body that a page draws at most: docs/benchmarks.md.
@@ -71,7 +72,7 @@ def drawn_surface(built: BuiltBody, of_element: np.ndarray, most: int | None = N
         deviation = max(deviation, off)
     corners = np.vstack([corners for corners, _ in parts])
     nodes, ranks = np.unique(corners, return_inverse=True)
-    owners = _owners(positions, _normals(positions, triangles), nodes)
+    owners = _owners(positions, node_normals(positions, triangles), nodes)
     return DrawnSurface(nodes, ranks.reshape(-1, 3), np.concatenate([r for _, r in parts]), owners, deviation)
 
 
@@ -91,16 +92,6 @@ def _on_seams(triangles: np.ndarray, regions: np.ndarray, count: int) -> np.ndar
         np.minimum.at(low, corner, regions)
         np.maximum.at(high, corner, regions)
     return low < high
-
-
-def _normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return unit normals (s, 3) at the nodes."""
-    a, b, c = (positions[triangles[:, k]] for k in range(3))
-    normals, areas = np.zeros_like(positions), np.cross(b - a, c - a)
-    for corner in triangles.T:
-        for axis in range(3):
-            normals[:, axis] += np.bincount(corner, areas[:, axis], len(positions))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
 
 
 def _owners(positions: np.ndarray, normals: np.ndarray, nodes: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 LOG_KEPT = 4000
 
 
-class Tail:
+class RecentRows:
     """The last rows of a growing table; clients say how many they have seen."""
 
     def __init__(self, columns: int):
@@ -29,7 +29,7 @@ class Tail:
         return self._rows[max(len(self._rows) - max(self.end - seen, 0), 0) :]
 
 
-def thinned(rows: np.ndarray, most: int, peaks: int | None = None) -> np.ndarray:
+def downsampled(rows: np.ndarray, most: int, peaks: int | None = None) -> np.ndarray:
     """Rows that a frame may carry, evenly; of the column ``peaks`` the largest value of each group is kept."""
     stride = -(-len(rows) // most) or 1
     thin = rows[::stride].copy()

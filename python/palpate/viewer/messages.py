@@ -119,7 +119,7 @@ def numbered(
     arrays: Sequence[Mapping[str, tuple[str, np.ndarray]]], prefix: str = ""
 ) -> dict[str, tuple[str, np.ndarray]]:
     """Arrays of several bodies, or with the prefix ``tools/`` of tools, under the names they have in a message."""
-    return {f"{prefix}{rank}/{name}": array for rank, mine in enumerate(arrays) for name, array in mine.items()}
+    return {f"{prefix}{rank}/{name}": array for rank, own_type in enumerate(arrays) for name, array in own_type.items()}
 
 
 def word(message: Mapping[str, Any], key: str) -> str:

@@ -1,4 +1,4 @@
-"""What the viewer does with a body in motion: strikes, slow motion, the watched node, mode shapes one by one."""
+"""Controls of a body in motion: strikes, slow motion, the watched node, mode shapes one by one."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from palpate.body import free_end
 from palpate.dynamics import ModalBasis
 from palpate.errors import ViewerError
-from palpate.fields import HONEST_STRAIN, SurfaceStrain
-from palpate.palpation.interpolation import node_normals
+from palpate.fields import LINEAR_STRAIN_LIMIT, SurfaceStrain
+from palpate.mesh.triangles import node_normals
 from palpate.scene import StrikeTable
 from palpate.simulation import Contact, Simulation
 from palpate.viewer.messages import vector, whole
@@ -21,7 +21,7 @@ from palpate.viewer.messages import vector, whole
 LISTED_MODES = 20
 # Oscillations of a mode shape in a second of the person's time.
 SHOWN_HZ = 1.0
-# A mode shape swings by this part of the body's size, unless that would strain the body beyond what is honest.
+# A mode shape swings by this part of the body's size, unless the strain would leave the range of linear elasticity.
 MODE_SWING = 0.08
 # Strain of the surface is not linear: it is that of displacements of this part of the size.
 SMALL = 1e-4
@@ -29,7 +29,7 @@ SMALL = 1e-4
 STRIKE_PERIODS = 0.06
 # Strain that the default strike is seen to lead to at instants of the first period (peaks between them are higher, and
 # so are those of other places), how many, and parts the strike is cut into.
-DEFAULT_STRAIN, INSTANTS, STRIKE_PARTS = 0.5 * HONEST_STRAIN, 24, 9
+DEFAULT_STRAIN, INSTANTS, STRIKE_PARTS = 0.5 * LINEAR_STRAIN_LIMIT, 24, 9
 # It is tried where so large a part of the surface follows the first mode less, on at least so many nodes.
 FOLLOWING, NEIGHBOURS = 0.9, 6
 # Impulses go up to this many times the default.
@@ -179,7 +179,7 @@ class MovingBody:
         basis = self._motion.basis
         shape = basis.shapes[self._green.surface_nodes, :, chosen - 1]
         largest = float(np.linalg.norm(shape, axis=1).max())
-        swing = min(MODE_SWING * self._size / largest, HONEST_STRAIN / self._strain_of(shape))
+        swing = min(MODE_SWING * self._size / largest, LINEAR_STRAIN_LIMIT / self._strain_of(shape))
         return _ShownMode(chosen, float(basis.frequencies[chosen - 1]), swing * shape, swing * largest)
 
     def _strain_of(self, displacements: np.ndarray) -> float:
@@ -191,7 +191,7 @@ class MovingBody:
         return float(measure.magnitudes(measure.sample(free + displacements) - measure.sample(free)).max())
 
     def _default_impulse(self) -> float:
-        """Impulse along the normal where the surface follows the first mode well that stays within honest strain, N s.
+        """Impulse along the normal where the surface follows the first mode well within the strain limit, N s.
 
         From rest a short strike `I` gives each mode the velocity `g . I` of its mean shape `g` over the patch, and from
         then on it swings freely; a longer one is a row of short ones. The strain is proportional to the impulse.

@@ -1,4 +1,4 @@
-"""The page's files, and which requests may have them."""
+"""The page's files, and the checks of requests for them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def headers(host: str) -> dict[str, str]:
     }
 
 
-def host_is_ours(header: str | None, bound: str, port: int) -> bool:
+def is_own_host(header: str | None, bound: str, port: int) -> bool:
     """Whether a Host header names this server.
 
     A page elsewhere may point a name of its own at this machine (DNS rebinding): only names known to mean this machine

@@ -1,4 +1,4 @@
-"""Recordings begun from the page: where their files go, how they are doing, and what is told when they end."""
+"""Recordings started from the page: their files, their status, and the message at their end."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class SessionRecorder:
         if status is None:
             return None
         replay = f"palpate replay {shlex.quote(str(status.path))}"
-        return {"type": "recorded", **self._told(status), "replay": replay, "reason": reason}
+        return {"type": "recorded", **self._status_message(status), "replay": replay, "reason": reason}
 
-    def stop_failed(self) -> dict[str, Any] | None:
+    def stop_after_failure(self) -> dict[str, Any] | None:
         """End a recording that cannot go on: the message that tells why."""
         status = self._simulation.recording
         return None if status is None or status.error is None else self.stop()
@@ -62,7 +62,7 @@ class SessionRecorder:
     def header(self) -> dict[str, Any] | None:
         """Part of a frame message: how the recording is doing."""
         status = self._simulation.recording
-        return None if status is None else self._told(status)
+        return None if status is None else self._status_message(status)
 
     def _free_path(self) -> Path:
         stem = f"{self._simulation.scene.name}-{time.strftime('%Y%m%d-%H%M%S')}"
@@ -73,7 +73,7 @@ class SessionRecorder:
             raise ViewerError(f"{self._folder}: too many recordings within this second: try again")
         return free
 
-    def _told(self, status: RecordingStatus) -> dict[str, Any]:
+    def _status_message(self, status: RecordingStatus) -> dict[str, Any]:
         return {
             "path": str(status.path.absolute()),
             "ticks": status.ticks,

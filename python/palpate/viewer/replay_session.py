@@ -1,4 +1,4 @@
-"""A recording in the page: time line, pause, slow motion, and whether every bit is as recorded."""
+"""Session that replays a recording: time line, pause, slow motion, and the comparison of every bit."""
 
 from __future__ import annotations
 
@@ -128,12 +128,12 @@ class ReplaySession(Session):
         if moving is not None and watched is not None and watched[0] == moving.index:
             moving.watched = int(self.built.bodies[moving.index].green.surface_nodes[watched[1]])
 
-    def _keep_log(self) -> None:
+    def _store_log(self) -> None:
         if self._restarts != self._replayed.restarts:
             self._restarts, self._body_time = self._replayed.restarts, 0.0
             self._log.clear()
             self._history.clear()
-        super()._keep_log()
+        super()._store_log()
 
     def _replay_scene(self) -> dict[str, Any]:
         recorded, ticks = self._replayed.recorded, self._replayed.ticks
@@ -146,10 +146,10 @@ class ReplaySession(Session):
             "events": [
                 {"tick": tick + 1, "kind": _kind(what), "text": what} for tick, what in recorded.events if tick < ticks
             ],
-            "note": self._note(),
+            "note": self._recording_note(),
         }
 
-    def _note(self) -> str | None:
+    def _recording_note(self) -> str | None:
         """Say what is to be known about a recording that is not whole."""
         recorded, ticks = self._replayed.recorded, self._replayed.ticks
         if recorded.dropped is None:

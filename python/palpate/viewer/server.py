@@ -1,4 +1,4 @@
-"""The server: who may connect, who controls, and frames as fast as each client takes them."""
+"""The viewer's server: access, control, and frames at the rate of each client."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from palpate.green import BackgroundPrecompute
 from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
 from palpate.viewer.addresses import reachable
-from palpate.viewer.background import LongWork, Worker
+from palpate.viewer.background import CancellableTask, Worker
 from palpate.viewer.computing import Computing
-from palpate.viewer.pages import headers, host_is_ours, load_pages
-from palpate.viewer.session import Session, Wants, choices
+from palpate.viewer.pages import headers, is_own_host, load_pages
+from palpate.viewer.session import ClientView, Session, choices
 from palpate.viewer.surface_map import SurfaceMap
 
 VERSION = version("palpate")
@@ -58,7 +58,7 @@ class Client:
     shown: Session | None = None
     # Of which it was told that its loop does not run.
     refused: Session | None = None
-    wants: Wants = field(default_factory=Wants)
+    wants: ClientView = field(default_factory=ClientView)
     sent: int = 0
     log_seen: tuple[int, int] = (0, 0)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
@@ -127,7 +127,7 @@ class ViewerServer:
         self._models, self._scene_of = list(models), scene_of
         self._clients: list[Client] = []
         self._controller: Client | None = None
-        self._building: LongWork | None = None
+        self._building: CancellableTask | None = None
         self._server: Server | None = None
 
     @property
@@ -203,19 +203,19 @@ class ViewerServer:
 
     def _request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Serve the page, let the websocket through, refuse everything else."""
-        host = _only(request.headers, "Host")
-        if host is None or not host_is_ours(host, self.host, self.port):
+        host = _single_header(request.headers, "Host")
+        if host is None or not is_own_host(host, self.host, self.port):
             return _answer(403, "text/plain", b"wrong Host\n", "")
         path = request.path.partition("?")[0]
         if path == "/socket":
-            if _only(request.headers, "Origin") != f"http://{host}":
+            if _single_header(request.headers, "Origin") != f"http://{host}":
                 return _answer(403, "text/plain", b"wrong Origin\n", host)
             return None
         kind, content = self._pages.get(path, ("text/plain", b"not found\n"))
         return _answer(200 if path in self._pages else 404, kind, content, host)
 
     async def _client(self, connection: ServerConnection) -> None:
-        if not await self._welcome(connection):
+        if not await self._authenticate(connection):
             return
         client = Client(connection)
         self._clients.append(client)
@@ -223,7 +223,7 @@ class ViewerServer:
         try:
             if self._controller is None and self._session.controllable:
                 self._controller = client
-            await self._greet(client)
+            await self._send_greeting(client)
             client.may_send.set()
             sender = asyncio.create_task(self._send_frames(client))
             async for text in connection:
@@ -234,16 +234,16 @@ class ViewerServer:
             if sender is not None:
                 sender.cancel()
             self._clients.remove(client)
-            await self._lose_control(client)
+            await self._release_control(client)
 
-    async def _greet(self, client: Client) -> None:
+    async def _send_greeting(self, client: Client) -> None:
         """Tell a page what it needs to know before its first scene."""
         role = "control" if self._controller is client else "watch"
         models = choices(self._models)
         await client.send({"type": "welcome", "role": role, "version": VERSION, "models": models})
         await client.send(await self._worker.call(self._computing.message, self._session))
 
-    async def _welcome(self, connection: ServerConnection) -> bool:
+    async def _authenticate(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
         try:
             hello = messages.parse(await asyncio.wait_for(connection.recv(), HELLO_TIMEOUT))
@@ -296,13 +296,13 @@ class ViewerServer:
             await self._reshape(message)
         elif message["type"] == "paint":
             await self._worker.call(self._computing.paint, self._session, message)
-            await self._tell_computed()
+            await self._send_computed()
         elif message["type"] == "record":
-            await self._tell_end(await self._worker.call(self._session.record, message))
+            await self._send_recording_end(await self._worker.call(self._session.record, message))
         else:
             session = self._session
             if await self._worker.call(session.handle, message):
-                await self._tell_all(await self._worker.call(session.settings))
+                await self._send_all(await self._worker.call(session.settings))
 
     async def _send_frames(self, client: Client) -> None:
         """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""
@@ -333,7 +333,7 @@ class ViewerServer:
                 await client.connection.send(message)
                 await asyncio.sleep(1.0 / FRAME_RATE)
 
-    async def _lose_control(self, client: Client) -> None:
+    async def _release_control(self, client: Client) -> None:
         """Let go of the body; who has watched longest takes over."""
         if client is not self._controller:
             return
@@ -348,24 +348,24 @@ class ViewerServer:
             controller = self._controller
             if controller is None or time.monotonic() - controller.heard > LOST_AFTER:
                 await self._worker.call(self._session.release)
-            await self._tell_end(await self._worker.call(self._session.recorder.stop_failed))
-            await self._tell_computed()
+            await self._send_recording_end(await self._worker.call(self._session.recorder.stop_after_failure))
+            await self._send_computed()
 
-    async def _tell_computed(self) -> None:
+    async def _send_computed(self) -> None:
         """Give the loop what has become ready, and tell of it."""
         try:
             told = await self._worker.call(self._computing.step, self._session)
         except Error as error:
             told = {"type": "error", "text": str(error)}
         if told is not None:
-            await self._tell_all(told)
+            await self._send_all(told)
 
-    async def _tell_end(self, ended: dict[str, Any] | None) -> None:
+    async def _send_recording_end(self, ended: dict[str, Any] | None) -> None:
         """Tell of a recording that has ended."""
         if ended is not None:
-            await self._tell_all(ended)
+            await self._send_all(ended)
 
-    async def _tell_all(self, message: dict[str, Any]) -> None:
+    async def _send_all(self, message: dict[str, Any]) -> None:
         for client in list(self._clients):
             await client.send(message)
 
@@ -388,35 +388,35 @@ class ViewerServer:
         make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
         building = self._begin_building()
         text = "Preparing the tool: a press goes on with it"
-        self._build_task = asyncio.create_task(self._switch(text, make, self._inherit, building))
+        self._build_task = asyncio.create_task(self._switch(text, make, self._keep_settings, building))
 
-    def _begin_building(self) -> LongWork:
+    def _begin_building(self) -> CancellableTask:
         if self._building is not None:
             raise ViewerError("wait until what is being prepared is ready, or cancel it")
-        self._building = LongWork()
+        self._building = CancellableTask()
         return self._building
 
     async def _switch(
-        self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: LongWork
+        self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: CancellableTask
     ) -> None:
         """Make a session beside the one that runs, and put it in its place."""
         try:
-            await self._tell_all({"type": "status", "text": text, "progress": None, "left_s": None})
+            await self._send_all({"type": "status", "text": text, "progress": None, "left_s": None})
             await self._worker.call(self._session.release)
             session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
             why = "a recording is of one scene, and this one has another now"
-            await self._tell_end(await self._worker.call(self._session.recorder.stop, why))
+            await self._send_recording_end(await self._worker.call(self._session.recorder.stop, why))
             await self._worker.call(exchange, session)
-            await self._tell_all(await self._worker.call(session.settings))
+            await self._send_all(await self._worker.call(session.settings))
         except Exception as error:
             # None of any kind may leave the pages without a word.
             why = str(error) if isinstance(error, Error) else f"a mistake within palpate, please report it: {error!r}"
-            await self._tell_all({"type": "error", "text": why})
-            await self._tell_all(await self._worker.call(self._session.settings))
+            await self._send_all({"type": "error", "text": why})
+            await self._send_all(await self._worker.call(self._session.settings))
         finally:
             self._building = None
-            await self._tell_all({"type": "status", "text": "", "progress": None, "left_s": None})
+            await self._send_all({"type": "status", "text": "", "progress": None, "left_s": None})
 
     def _exchange(self, session: Session) -> None:
         """Put a session in the place of the one that runs, which goes on where the other does not start."""
@@ -435,13 +435,13 @@ class ViewerServer:
             raise
         self._session = session
 
-    def _inherit(self, session: Session) -> None:
+    def _keep_settings(self, session: Session) -> None:
         before = self._session
-        session.take_over(before)
+        session.copy_settings(before)
         self._exchange(session)
         session.press_on(before)
 
-    def _reporter(self, text: str, work: LongWork) -> Callable[[int, int], None]:
+    def _reporter(self, text: str, work: CancellableTask) -> Callable[[int, int], None]:
         """Tell all pages how far a long work is, from any thread; it begins with the first call.
 
         The work stops where a page has cancelled it.
@@ -455,12 +455,12 @@ class ViewerServer:
             part = done / max(total, 1)
             left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None
             status = {"type": "status", "text": text, "progress": part, "left_s": left}
-            loop.call_soon_threadsafe(lambda: loop.create_task(self._tell_all(status)))
+            loop.call_soon_threadsafe(lambda: loop.create_task(self._send_all(status)))
 
         return report
 
 
-def _only(headers: Headers, name: str) -> str | None:
+def _single_header(headers: Headers, name: str) -> str | None:
     """Value of a header that stands there once; None for none, or for several, of which a proxy may see another."""
     values = headers.get_all(name)
     return values[0] if len(values) == 1 else None

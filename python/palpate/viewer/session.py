@@ -1,4 +1,4 @@
-"""What the viewer shows and does, without sockets: the running simulation, its commands, its messages."""
+"""Session of the viewer, without sockets: the running simulation, commands and messages."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from palpate.scene import BuiltScene
 from palpate.scene.tables import ToolTable
 from palpate.simulation import Contact, Frame, Simulation
 from palpate.viewer.fields import Fields
-from palpate.viewer.log_rows import Tail, thinned
+from palpate.viewer.log_rows import RecentRows, downsampled
 from palpate.viewer.messages import encode, index, number, numbered, quaternion, vector, word
 from palpate.viewer.motion import HISTORY_COLUMNS, MovingBody, history
 from palpate.viewer.recorder import SessionRecorder
-from palpate.viewer.shown_body import ShownBody, titled
-from palpate.viewer.surface_map import SurfaceMap, maps_or_none
+from palpate.viewer.shown_body import ShownBody, title_of
+from palpate.viewer.surface_map import SurfaceMap, maps_per_body
 from palpate.viewer.tool_shapes import kind_of, outline, shape_choices, with_shape
 
 # The contact radius slider ends at this part of the body's longest side.
@@ -36,7 +36,7 @@ FRAME_AGE = 0.008
 
 
 @dataclass(frozen=True)
-class Wants:
+class ClientView:
     """What a client looks at: a field by name, the value at which its colours end, and whether it sees the inside."""
 
     field: str = ""
@@ -81,7 +81,7 @@ class Session:
         self.own_tools = scene.tools if own_tools is None else own_tools
         self.simulation = Simulation(built) if simulation is None else simulation
         self.recorder = SessionRecorder(self.simulation, folder)
-        self.maps = maps_or_none(maps, len(built.bodies))
+        self.maps = maps_per_body(maps, len(built.bodies))
         self._bodies = [self._shown(body) for body in range(len(built.bodies))]
         placed = np.vstack([body.points_to_scene(body.green.surface_positions) for body in built.bodies])
         low, high = placed.min(axis=0), placed.max(axis=0)
@@ -93,7 +93,7 @@ class Session:
         self._max_radii = [max(largest, tool.contact_radius) for tool in scene.tools]
         moving = next((body for body, one in enumerate(built.bodies) if one.motion is not None), None)
         self._moving = None if moving is None else MovingBody(self.simulation, self._extent(moving), moving)
-        self._log, self._history = Tail(3), Tail(HISTORY_COLUMNS)
+        self._log, self._history = RecentRows(3), RecentRows(HISTORY_COLUMNS)
         self._body_time = 0.0
         self._frame: Frame | None = None
         self._frame_time = 0.0
@@ -215,7 +215,7 @@ class Session:
         tools = [*scene.tools[:tool], with_shape(own, name, scene.folder), *scene.tools[tool + 1 :]]
         return replace(self.built, scene=scene.model_copy(update={"tools": tools}))
 
-    def take_over(self, other: Session) -> None:
+    def copy_settings(self, other: Session) -> None:
         """Set what the sliders of another session on the same bodies have set."""
         self._set_tools(other._of_tools())
         for rank in range(len(self._bodies)):
@@ -253,7 +253,7 @@ class Session:
         view = scene.view
         return {
             "name": scene.name,
-            "title": titled(scene.name),
+            "title": title_of(scene.name),
             "size": self.size,
             "strain_limit": self.simulation.strain_limit,
             "defaults": self._defaults(),
@@ -274,7 +274,7 @@ class Session:
             "max_contact_radius": self._max_radii[tool],
         }
 
-    def frame_message(self, number: int, log_seen: tuple[int, int], wants: Wants) -> tuple[bytes, tuple[int, int]]:
+    def frame_message(self, number: int, log_seen: tuple[int, int], wants: ClientView) -> tuple[bytes, tuple[int, int]]:
         """Binary message of the latest tick for a client, and up to where it carries log and history."""
         frame = self._latest()
         header = {
@@ -289,7 +289,7 @@ class Session:
         return encode({**header, **told}, arrays), (self._log.end, self._history.end)
 
     def _drawn(
-        self, frame: Frame, log_seen: tuple[int, int], wants: Wants
+        self, frame: Frame, log_seen: tuple[int, int], wants: ClientView
     ) -> tuple[dict[str, Any], dict[str, tuple[str, np.ndarray]]]:
         """Part of a frame message that tells of the bodies, and its arrays."""
         poses = [self._pose(frame, body) for body in range(len(self._bodies))]
@@ -307,7 +307,7 @@ class Session:
             "recording": self.recorder.header(),
             "replay": self._replay_header(),
         }
-        rows = {"log": ("f4", thinned(log, self.log_sent, 2)), "history": ("f4", thinned(moved, self.log_sent))}
+        rows = {"log": ("f4", downsampled(log, self.log_sent, 2)), "history": ("f4", downsampled(moved, self.log_sent))}
         return header, {**numbered([picture.arrays for picture in pictures]), **rows}
 
     def _motion_header(self) -> dict[str, Any] | None:
@@ -446,12 +446,12 @@ class Session:
         now = time.monotonic()
         if self._frame is None or now - self._frame_time > FRAME_AGE:
             self._frame, self._frame_time = self.simulation._read_frame(), now
-            self._keep_log()
+            self._store_log()
             if self._moving is not None:
                 self._moving.follow(self._frame.contacts)
         return self._frame
 
-    def _keep_log(self) -> None:
+    def _store_log(self) -> None:
         rows = self.simulation.drain_log()
         force = np.sqrt(np.einsum("ij,ij->i", rows["force"], rows["force"]))
         self._log.append(np.column_stack([rows["time"], force, rows["compute_us"]]))
@@ -472,7 +472,7 @@ class Session:
 
     def _now(self) -> float:
         """Body time up to this moment."""
-        self._keep_log()
+        self._store_log()
         return self._body_time
 
     def _mode(self, message: Mapping[str, Any]) -> bool:
@@ -493,4 +493,4 @@ class Session:
 
 def choices(names: Sequence[str]) -> list[dict[str, str]]:
     """Entries of the model chooser."""
-    return [{"name": name, "title": titled(name)} for name in names]
+    return [{"name": name, "title": title_of(name)} for name in names]

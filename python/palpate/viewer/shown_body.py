@@ -1,4 +1,4 @@
-"""A body as the page shows it: where it stands, and its part of the scene message."""
+"""A body in the page: its placement, and its part of the scene message."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class ShownBody:
         outer = int(green.surface_nodes.max()) + 1
         return {
             "name": self.built.name,
-            "title": titled(self.built.name),
+            "title": title_of(self.built.name),
             "nodes": len(body.mesh.nodes) if body is not None and green.follows_inside else outer,
             "tets": len(body.mesh.tets) if body is not None and green.follows_inside else 0,
             "surface_nodes": len(green.surface_nodes),
@@ -130,11 +130,11 @@ def regions_of(body: Body) -> tuple[list[dict[str, Any]], np.ndarray]:
     for label, element in zip(labels.tolist(), first, strict=True):
         modulus, ratio, density = body.element_materials[element].tolist()
         unnamed = "Rest of the body" if label == 0 else f"Region {label}"
-        title = titled(names[label]) if label in names else unnamed
+        title = title_of(names[label]) if label in names else unnamed
         entries.append({"title": title, "youngs_modulus": modulus, "poissons_ratio": ratio, "density": density})
     return entries, ranks.ravel()
 
 
-def titled(name: str) -> str:
+def title_of(name: str) -> str:
     """Name as people read it."""
     return name.replace("_", " ").capitalize()

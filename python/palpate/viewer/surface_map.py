@@ -1,4 +1,4 @@
-"""Maps that a palpation has left, as fields of the page: what was written at the nodes of a surface."""
+"""Stiffness maps of a palpation as fields of the page."""
 
 from __future__ import annotations
 
@@ -74,6 +74,6 @@ def _of_body(body: BuiltBody, points: np.ndarray, data: Mapping[str, np.ndarray]
     return SurfaceMap(stiffness, None if ratio is None else 100 * (np.asarray(ratio, dtype=float)[ranks] - 1))
 
 
-def maps_or_none(maps: Sequence[SurfaceMap | None] | None, bodies: int) -> Sequence[SurfaceMap | None]:
+def maps_per_body(maps: Sequence[SurfaceMap | None] | None, bodies: int) -> Sequence[SurfaceMap | None]:
     """One for each body."""
     return [None] * bodies if maps is None else maps

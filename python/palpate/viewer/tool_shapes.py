@@ -1,4 +1,4 @@
-"""Shapes that the page offers for a tool, and what it needs to draw them."""
+"""Tool shapes that the page offers, and their data for drawing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.scene.tables import ToolTable
 from palpate.scene.tool_shape import KEYS, ShapeTable
-from palpate.viewer.shown_body import titled
+from palpate.viewer.shown_body import title_of
 
 # What a tool of any surface file is called in messages.
 SURFACE = "surface"
@@ -29,7 +29,7 @@ def shape_choices(own: ToolTable) -> list[dict[str, str]]:
     """Entries of the page's list of shapes, for a tool as its scene has it: that shape is always among them."""
     offered = dict(TITLES) if own.contact == "local" else {}
     kind = kind_of(own)
-    offered.setdefault(kind, TITLES.get(kind) or titled(Path(own.shape).stem))
+    offered.setdefault(kind, TITLES.get(kind) or title_of(Path(own.shape).stem))
     return [{"name": name, "title": title} for name, title in offered.items()]
 
 

@@ -14,6 +14,8 @@ from palpate.validation.verify.contact.loop import loop_of, sphere
 
 STAGES = ["meshing", "surface", "body", "assembling", "ordering", "factorising", "measuring accuracy", "columns"]
 STAGES += ["writing", "opening", "contact law", "first touch"]
+# What the plan keeps for threads and writing, bytes: a body of 600 tetrahedra hardly uses it.
+SPARE = 16e6
 SETTINGS = scale.Settings(sizes=(600,), touched=100)
 
 
@@ -33,7 +35,7 @@ def test_a_row_tells_of_every_stage(kept):
     assert row.touched == 100
     # Halves: 2 bytes an entry.
     assert row.store >= 2 * 3 * row.touched * 3 * row.surface_nodes
-    assert row.peak / 1.2 <= row.planned <= 1.2 * row.peak
+    assert row.peak / 1.2 <= row.planned <= 1.2 * row.peak + SPARE
     assert 0 < row.tick_median <= row.tick_worst <= row.tick_noisy
     assert row.frame > 0
 

@@ -17,10 +17,15 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
 # A loop that gets no measurement for 50 ms stops: on a machine that computes beside it that can happen.
-REAL_TIME = {"crtk_udp_device"}
+REAL_TIME = {"crtk_udp_device", "keyboard_device"}
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "example",
+    # Campaigns leave a loop in real time less of the processor than other tests do.
+    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem not in REAL_TIME)) for path in EXAMPLES],
+    ids=lambda path: path.stem,
+)
 def test_example(example, tmp_path, shared_cache):
     tries, timeout = (3, 60) if example.stem in REAL_TIME else (1, 280)
     for _ in range(tries):

@@ -21,6 +21,7 @@ EXAMPLES = sorted(
 )  # no scenes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_a_session_of_every_example_is_made_again(example, tmp_path, shared_cache):
     """At rest and in motion, one tool and two."""

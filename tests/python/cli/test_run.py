@@ -31,7 +31,7 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     for word in (
         "80 x 50 x 50 mm",
         "unit mm (--unit; it may also be cm or in)",
-        "z < min + 5mm (--fix)",
+        "z < min + 0.25mm (--fix)",
         "E = 10kPa (-E)",
         "0.45 (--nu)",
     ):
@@ -59,8 +59,8 @@ def test_a_bare_volume_mesh_runs_too(capsys, tmp_path):
     built = built_from(tmp_path / "box.vtu", RunOptions())
     assert "unit mm (--unit;" in capsys.readouterr().out
     assert built.bodies[0].body.mesh.volume == pytest.approx(0.08 * 0.05 * 0.05)
-    with pytest.raises(palpate.MeshError, match="--max-size and --repair are for surfaces"):
-        built_from(tmp_path / "box.vtu", RunOptions(repair=True))
+    with pytest.raises(palpate.MeshError, match="--mesher, --part and --max-volume-loss are for surfaces"):
+        built_from(tmp_path / "box.vtu", RunOptions(part="all"))
 
 
 def test_options_stand_instead_of_what_a_scene_says(tmp_path):
@@ -164,13 +164,13 @@ def test_info_reads_surfaces(tmp_path):
     told = run("info", "ball.ply", cwd=tmp_path).stdout
     assert f"{len(ball.vertices)} vertices, {len(ball.faces)} triangles" in told
     assert "80 x 80 x 80 mm if its unit is mm" in told and f"closed, volume {1e-3 * ball.volume:.4g} cm3" in told
-    assert "palpate mesh ball.ply ball.vtu --unit mm" in told and "--repair" not in told
+    assert "palpate mesh ball.ply ball.vtu --unit mm" in told
     ball.update_faces(np.arange(len(ball.faces)) > 0)
     ball.export(tmp_path / "open.glb")
     told = run("info", "open.glb", "--unit", "cm", cwd=tmp_path).stdout
     assert "800 x 800 x 800 mm if its unit is cm" in told
-    assert "not closed: 3 open edges; it can be filled with --repair" in told
-    assert "palpate mesh open.glb open.vtu --unit cm --repair" in told
+    assert "not closed: 3 open edges; what it encloses is filled all the same" in told
+    assert "palpate mesh open.glb open.vtu --unit cm" in told
 
 
 def test_version():
@@ -195,3 +195,12 @@ def test_the_shell_completes_models_checks_and_units(words, offered):
     environment = {"_PALPATE_COMPLETE": "complete_bash", "COMP_WORDS": given, "COMP_CWORD": str(count)}
     result = CliRunner().invoke(command_line.app, [], env=environment, prog_name="palpate")
     assert set(offered) <= set(result.output.split())
+
+
+def test_a_slender_rod_held_at_one_end_is_noted(tmp_path):
+    box_mesh((12, 2, 2), (0.4, 0.02, 0.02)).to_quadratic().write(tmp_path / "rod.vtu")
+    held = run(
+        "run", "rod.vtu", "--unit", "m", "--fix", "x < 1mm", "--radius", "8mm", "--headless", "0.2", cwd=tmp_path
+    )
+    assert held.returncode == 0, held.stderr
+    assert "is held loosely" in held.stderr

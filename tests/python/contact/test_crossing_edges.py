@@ -133,16 +133,15 @@ def deepest_without_force(crossing: Crossing, path: np.ndarray, forces: np.ndarr
 
 # Not reached yet (docs/accuracy.md): how many times more than allowed a force may jump, and be lost, meanwhile.
 OPEN = {
-    ("ridge", 30, "ellipsoid", "across"): (2, 1),
-    ("ridge", 30, "capsule", "along"): (6, 1),
-    ("ridge", 30, "capsule", "yawed"): (6, 1),
-    ("ridge", 30, "punch", "upright"): (6, 1),
-    ("ridge", 60, "capsule", "across"): (2, 1),
-    ("ridge", 60, "capsule", "along"): (2, 1),
-    ("ridge", 60, "file", "across"): (2, 1),
-    ("ridge", 90, "capsule", "along"): (1.5, 1),
+    ("ridge", 30, "ellipsoid", "across"): (1.2, 1),
+    ("ridge", 30, "capsule", "along"): (4, 1),
+    ("ridge", 30, "capsule", "yawed"): (8, 1),
+    ("ridge", 30, "capsule", "tilted"): (2, 1),
+    ("ridge", 60, "capsule", "along"): (5, 1),
     ("valley", 30, "capsule", "yawed"): (1, 2),
     ("valley", 120, "capsule", "yawed"): (6, 2),
+    ("valley", 120, "capsule", "across"): (6, 2),
+    ("valley", 120, "file", "across"): (6, 2),
 }
 
 

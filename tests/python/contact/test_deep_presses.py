@@ -105,7 +105,7 @@ def press(
 
 
 @pytest.mark.parametrize("tool", ["sphere", "capsule", "punch", pytest.param("file", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", ["star", "cup", "torus"])
+@pytest.mark.parametrize("name", ["torus", *(pytest.param(name, marks=pytest.mark.slow) for name in ("star", "cup"))])
 def test_places_of_deep_presses_stay_on_the_body_and_forces_finite(loops, name, tool):
     wrong = presses(loops, name, tool, range(10))
     assert not wrong, "; ".join(wrong)

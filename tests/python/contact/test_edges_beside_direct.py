@@ -26,13 +26,6 @@ OUT = np.array([1.0, 0.0, 1.0]) / np.sqrt(2)
 # Radius of the round edge, m, and 0 for the sharp one; largest difference from the direct solution.
 ROUND = 6e-3
 TOLERANCES = {ROUND: 0.08, 0.0: 0.10}
-# On the edge itself, and at it, a half-space is stiffer than a wedge (docs/accuracy.md).
-STIFFER = {
-    "a capsule across the edge": 0.25,
-    "a punch on the edge": 0.12,
-    "a punch that stands on the top and overhangs": 0.14,
-}
-
 CAPSULE = {"shape": "capsule", "radius": 3e-3, "length": 18e-3}
 PUNCH = {"shape": "punch", "radius": 6e-3, "rounding": 1.8e-3}
 CAPSULE_SHAPE, PUNCH_SHAPE = edge_block.capsule(3e-3, 18e-3), edge_block.punch(6e-3, 1.8e-3)
@@ -126,8 +119,7 @@ def test_a_tool_on_an_edge_feels_what_the_direct_solution_does(block, name):
     rounding, direct = block[0], np.array(DIRECT[block[0]][name])
     forces = pressed(block, POSES[name])
     off = ", ".join(f"{100 * part:+.1f} %" for part in forces / direct - 1)
-    tolerance = TOLERANCES[rounding] if rounding > 0 else STIFFER.get(name, TOLERANCES[rounding])
-    assert within(forces, direct, tolerance).all(), f"{name}, rounding {rounding} m: {off}"
+    assert within(forces, direct, TOLERANCES[rounding]).all(), f"{name}, rounding {rounding} m: {off}"
 
 
 @pytest.mark.parametrize(("rounding", "tolerance"), TOLERANCES.items())

@@ -63,7 +63,9 @@ def worst(loops: Loops, name: str, tool: str, count: int, seed: int) -> str | No
 
 
 @pytest.mark.parametrize("tool", [pytest.param(tool, marks=[pytest.mark.slow] * (tool == "file")) for tool in HELD])
-@pytest.mark.parametrize("name", ["kidney", "liver", "star"])
+@pytest.mark.parametrize(
+    "name", ["kidney", *(pytest.param(name, marks=pytest.mark.slow) for name in ("liver", "star"))]
+)
 def test_no_first_touch_computes_more_than_three_times_the_force_at_a_millimetre(loops, name, tool):
     wrong = worst(loops, name, tool, 30, seed=len(name) + len(tool))
     assert wrong is None, wrong

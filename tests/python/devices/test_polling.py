@@ -17,7 +17,7 @@ from held_device import Held, unstarved
 
 import palpate
 from palpate.devices import SelfCheck
-from palpate.devices.polling import Polling
+from palpate.devices.polling import PollingThread
 
 RISE = 0.4
 
@@ -78,7 +78,7 @@ def test_what_is_put_out_is_the_latest():
             return [self.force, 0.0, 0.0], [0.0] * 3, 0.0
 
     device = Held()
-    polling = Polling(device, 1000.0)
+    polling = PollingThread(device, 1000.0)
     for force in (0.1, 0.2, 0.3):
         polling._write(Loop(force))
         assert device.written[-1][1][0] == force
@@ -214,7 +214,7 @@ def test_a_tool_may_leave_the_scene():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Polling(Held(), 20.0), "Held: rate must be 50 to 10000 Hz, got 20"),
+        (lambda: PollingThread(Held(), 20.0), "Held: rate must be 50 to 10000 Hz, got 20"),
         (lambda: palpate.DeviceLimits(max_force=-1.0), "max_force must be a number from zero on, got -1"),
         (lambda: palpate.DeviceLimits(max_stiffness=math.nan), "max_stiffness must be a number"),
         (lambda: palpate.DeviceLimits(delay=None), "delay must be a number"),

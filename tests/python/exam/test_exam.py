@@ -15,7 +15,7 @@ from command_line import refused, run
 from exam_files import PLACES, write_exam, write_slab
 
 import palpate
-from palpate.exam import Course, ExamFile, Library, Record, observed_many
+from palpate.exam import Course, ExamFile, Library, Record, simulated_exams
 from palpate.exam.hidden_session import HiddenSession
 from palpate.exam.pressing import forces_at
 from palpate.scene import BuiltScene
@@ -84,12 +84,12 @@ def test_felt_contrasts_are_those_of_bodies_with_the_nodule_in_their_mesh(librar
 @pytest.mark.parametrize("weber_fraction", [0.04, 0.08])
 def test_an_observer_of_known_weber_fraction_is_found(library, weber_fraction):
     exams = of_trials(library, trials=80)
-    found = np.array([one.weber_fraction for one in observed_many(exams, weber_fraction, 40)])
+    found = np.array([one.weber_fraction for one in simulated_exams(exams, weber_fraction, 40)])
     print(np.median(found), np.std(np.log(found)))
     assert np.median(found) == pytest.approx(weber_fraction, rel=0.15)
     assert np.std(np.log(found)) < 0.2
     # A tolerance that can fail: a hand of 1.4 times the fraction is not taken for this one.
-    other = np.array([one.weber_fraction for one in observed_many(exams, 1.4 * weber_fraction, 20)])
+    other = np.array([one.weber_fraction for one in simulated_exams(exams, 1.4 * weber_fraction, 20)])
     assert np.median(other) > 1.15 * weber_fraction
 
 

@@ -7,27 +7,27 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from palpate.exam.library import _Known
+from palpate.exam.library import _ForceCache
 
 
 def test_no_changed_byte_of_kept_forces_is_taken(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    asked = SimpleNamespace(what_is_felt=lambda: "press"), SimpleNamespace(points=np.zeros((2, 3)))
-    _Known(*asked).add("key", [0.25, 0.5])
+    asked = SimpleNamespace(force_settings=lambda: "press"), SimpleNamespace(points=np.zeros((2, 3)))
+    _ForceCache(*asked).add("key", [0.25, 0.5])
     (path,) = tmp_path.rglob("*.felt.palpate")
     content = path.read_bytes()
-    assert _Known(*asked).forces == {"key": [0.25, 0.5]}
+    assert _ForceCache(*asked).forces == {"key": [0.25, 0.5]}
     for at in range(len(content)):
         for change in (0x01, 0x10):
             path.write_bytes(content[:at] + bytes([content[at] ^ change]) + content[at + 1 :])
-            assert _Known(*asked).forces in ({}, {"key": [0.25, 0.5]})
+            assert _ForceCache(*asked).forces in ({}, {"key": [0.25, 0.5]})
 
 
 @pytest.mark.parametrize("text", ["[]", "7", '{"key": [1.0]}'])
 def test_forces_of_another_form_are_made_again(text, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    asked = SimpleNamespace(what_is_felt=lambda: "press"), SimpleNamespace(points=np.zeros((2, 3)))
-    _Known(*asked).add("key", [0.25])
+    asked = SimpleNamespace(force_settings=lambda: "press"), SimpleNamespace(points=np.zeros((2, 3)))
+    _ForceCache(*asked).add("key", [0.25])
     (path,) = tmp_path.rglob("*.felt.palpate")
     path.write_text(text)
-    assert _Known(*asked).forces == {} and not path.exists()
+    assert _ForceCache(*asked).forces == {} and not path.exists()

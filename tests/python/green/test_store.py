@@ -55,6 +55,7 @@ def damaged_in_header(content: bytes) -> list[bytearray]:
     return changed
 
 
+@pytest.mark.slow
 def test_no_changed_byte_of_a_header_is_accepted(store):
     """The description has the elastic constants that contacts are computed with."""
     content = store.read_bytes()

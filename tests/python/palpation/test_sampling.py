@@ -8,13 +8,13 @@ from palpated import HEIGHT, SIDE, TOP, block_body, scene_of
 from scipy.spatial import cKDTree
 
 import palpate
-from palpate.palpation.protocol import Protocol, sites_on
+from palpate.palpation.protocol import Protocol, sample_sites
 from palpate.palpation.runs import probe
 from palpate.simulation import Simulation
 
 
 def sites(scene, spacing, depth=1e-3, on=None):
-    return sites_on(Simulation(probe(scene.build())), Protocol(spacing, depth, 0.01), on)
+    return sample_sites(Simulation(probe(scene.build())), Protocol(spacing, depth, 0.01), on)
 
 
 def test_a_flat_side_gets_a_square_lattice(store):

@@ -39,7 +39,7 @@ def test_tools_take_the_devices_they_name(tmp_path):
     assert kinds(scene) == ["touch", "haply"]
     assert [scene.device_of(tool).max_force for tool in (0, 1)] == [8.0, 5.0] and scene.device.rate == 500
     again = palpate.Scene(**scene.model_dump(mode="json", by_alias=True, exclude_unset=True))
-    assert kinds(again) == kinds(scene) and again.further_devices == scene.further_devices
+    assert kinds(again) == kinds(scene) and again.additional_devices == scene.additional_devices
 
 
 @pytest.mark.parametrize(

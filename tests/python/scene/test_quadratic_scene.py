@@ -13,7 +13,7 @@ from viewer_client import frame_of
 import palpate
 from palpate.fields import SurfaceStrain
 from palpate.viewer.messages import decode
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 
 RADIUS, PATCH = 0.006, 0.012
 TOP = np.array([0.041, 0.026, 0.05])
@@ -125,7 +125,7 @@ def test_viewer_is_sent_flat_triangles_and_tets(built):
         assert arrays["0/tets"].shape == (8 * len(mesh.tets), 4)
         assert np.array_equal(np.unique(arrays["0/tets"]), np.arange(len(mesh.nodes)))
         assert np.array_equal(arrays["0/surface_triangles"], mesh.surface_triangles)
-        header, arrays = frame_of(session, Wants(cutaway=True))
+        header, arrays = frame_of(session, ClientView(cutaway=True))
         assert arrays["0/displacements"].shape == (len(mesh.nodes), 3)
         assert header["strain"] <= 1e-12
     finally:

@@ -18,8 +18,8 @@ from sessions_scene import called, path
 import palpate
 from palpate.scene import BuiltScene
 from palpate.sessions.frames import RecordedFrames, Span
-from palpate.sessions.shapes import tools_of, turning_z_to
-from palpate.vectors import rotated
+from palpate.sessions.shapes import tools_of
+from palpate.vectors import rotated, turning_z_to
 
 RATE = 20.0
 

@@ -123,7 +123,7 @@ def test_the_rest_is_computed_beside_the_loop_and_goes_on_another_time(tmp_path)
     with BackgroundPrecompute(body, first="x > 5cm", precision="f32", path=path) as background:
         first = background.wait()
         assert len(first.touchable_nodes) > 0
-        background.give_way()
+        background.yield_processor()
         surface = body.mesh.surface_nodes
         background.paint(surface[body.mesh.nodes[surface, 0] < 0.01])
     # It may have ended before it could say so.

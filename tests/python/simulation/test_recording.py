@@ -186,6 +186,7 @@ def unchanged(recording: palpate.Recording, whole: palpate.Recording) -> bool:
     return same and (count == len(whole.ticks) or recording.dropped is None)
 
 
+@pytest.mark.slow
 def test_no_changed_byte_of_a_recording_gives_another_one(built, tmp_path):
     whole = palpate.Simulation(built).play(paths()[:60])
     content, path = whole.source, tmp_path / "damaged.mcap"

@@ -81,11 +81,12 @@ def test_only_what_a_tick_reads_is_locked(block, block_green):
     # Mapped by the process, and of no use to a tick.
     mapped, before = np.zeros(2**28, dtype=np.uint8), locked()
     with palpate.Simulation(scene_of(block, block_green)) as simulation:
-        more, granted = locked() - before, simulation.frame().statistics["realtime"][1]
+        now, granted = locked(), simulation.frame().statistics["realtime"][1]
     store = block_green.path.stat().st_size
     # Beside the store the stack of the loop's thread, and the code: 25 MB.
-    assert more <= store + 50e6, f"{more / 1e6:.0f} MB are locked for a store of {store / 1e6:.0f} MB"
-    assert more >= store / 2 or not granted
+    assert now - before <= store + 50e6, f"{(now - before) / 1e6:.0f} MB are locked for a store of {store / 1e6:.0f} MB"
+    # All of it may lie in memory that the loop of another test had locked.
+    assert now >= store / 2 or not granted
     assert mapped.nbytes == 2**28
 
 

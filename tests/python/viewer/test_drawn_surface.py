@@ -19,7 +19,7 @@ from palpate.validation.verify.grids import lattice, mapped
 from palpate.viewer import drawn_surface as module
 from palpate.viewer import messages
 from palpate.viewer.drawn_surface import drawn_surface
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 
 MOST = 3000
 
@@ -120,7 +120,7 @@ def test_what_is_drawn_of_a_touched_body_are_displacements_of_its_nodes(sheet, m
             session.handle({"type": "press", "tool": 0, "position": (top - [0, 0, depth]).tolist(), "grab": True})
             time.sleep(0.3)
         while time.monotonic() < end and np.abs(read["0/displacements"]).max() < 1e-3:
-            message, _ = session.frame_message(1, (0, 0), Wants(cutaway=True))
+            message, _ = session.frame_message(1, (0, 0), ClientView(cutaway=True))
             last, read = messages.decode(message)
         exact = session._latest().bodies[0].displacements if session._latest().time == last["time"] else None
     finally:
@@ -152,7 +152,7 @@ def test_of_a_large_body_the_surface_alone_is_followed(sheet, monkeypatch):
         session.start()
         try:
             header, arrays = messages.decode(session.scene_message())
-            last, _ = messages.decode(session.frame_message(1, (0, 0), Wants(cutaway=True))[0])
+            last, _ = messages.decode(session.frame_message(1, (0, 0), ClientView(cutaway=True))[0])
             strain = session.simulation.strain_measure.largest(pushed)
         finally:
             session.close()

@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, drawn, eventually, opened, press, state, until
+from browser import MARKS, Program, drawn, eventually, opened, press, state, until, wheel
 from PIL import Image
 
 pytestmark = MARKS
+# Colours of single pixels are looked at.
+SHARPNESS = 1.0
 
 # Ends of the colours of a field that is never negative: matplotlib's viridis from a fifth on.
 FIRST, LAST = (65, 68, 135), (253, 231, 37)
@@ -112,7 +114,7 @@ def test_the_scale_bar_is_true_and_follows_the_zoom(page):
     assert 0.6 * length < sides < 1.3 * length
     page.mouse.move(700, 60)
     for _ in range(12):
-        page.mouse.wheel(0, -200)
+        wheel(page, -200)
         drawn(page, 1)
     closer, _, _ = eventually(page, told, lambda seen: seen[0] < metres)
     assert closer < metres
@@ -186,7 +188,7 @@ def test_a_body_at_rest_has_the_colour_of_zero_and_not_its_own(page):
 
 
 def test_regions_and_materials_have_colours_and_names(chromium, layered):
-    with opened(chromium, layered) as page:
+    with opened(chromium, layered, sharpness=SHARPNESS) as page:
         field, groups = page.get_by_test_id("field-select"), page.get_by_test_id("legend-groups")
         assert groups.is_hidden()
         field.select_option(label="Region")
@@ -222,7 +224,7 @@ def test_regions_and_materials_have_colours_and_names(chromium, layered):
 
 def test_a_cut_is_plane_and_closed(chromium, layered):
     """Cut across y the face is a rectangle, whose edges are straight to a pixel, whatever the elements are."""
-    with opened(chromium, layered) as page:
+    with opened(chromium, layered, sharpness=SHARPNESS) as page:
         for key in ("w", "s", "x"):
             page.keyboard.press(key)
         page.locator("#cut-y").click()
@@ -269,7 +271,7 @@ def test_a_cut_is_plane_and_closed(chromium, layered):
 def test_a_store_says_why_it_is_not_cut_open(chromium, block_green, cache):
     started = Program(cache, str(block_green.path), command="run")
     try:
-        with opened(chromium, started) as page:
+        with opened(chromium, started, sharpness=SHARPNESS) as page:
             button = page.locator("#show-cutaway")
             assert button.get_attribute("aria-disabled") == "true"
             assert "surface" in button.get_attribute("title")

@@ -10,7 +10,7 @@ from viewer_client import frame_of
 import palpate
 from palpate.palpation import compare, stiffness_map
 from palpate.viewer import messages
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 from palpate.viewer.surface_map import read_map
 
 
@@ -29,7 +29,7 @@ def palpated(tmp_path_factory):
 def picture(session: Session, **wants):
     session.start()
     try:
-        return frame_of(session, Wants(**wants))
+        return frame_of(session, ClientView(**wants))
     finally:
         session.close()
 

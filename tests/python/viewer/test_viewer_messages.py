@@ -9,7 +9,7 @@ from golden_messages import KINDS, content, stored
 import palpate
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -57,7 +57,7 @@ def test_a_session_sends_messages_of_that_shape(block, block_green, moving):
         session.handle({"type": "press", "tool": 0, "position": [0.04, 0.025, 0.05], "grab": True})
         sent = {
             "scene": session.scene_message(),
-            "frame": session.frame_message(1, (0, 0), Wants(cutaway=True))[0],
+            "frame": session.frame_message(1, (0, 0), ClientView(cutaway=True))[0],
         }
     finally:
         session.close()

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, drag, drawn, opened, press, settled_depth, settled_force, state, until
+from browser import MARKS, Program, drag, drawn, opened, press, settled_depth, settled_force, state, until, wheel
 
 import palpate
 
@@ -121,7 +121,7 @@ def test_the_depth_is_told_by_wheel_second_button_and_shift(page):
     x, y = page.evaluate("window.palpate.pickPoint()")
     press(page)
     first = settled_force(page)
-    page.mouse.wheel(0, 300)
+    wheel(page, 300)
     assert settled_depth(page) == pytest.approx(0.7 * RADIUS, rel=1e-6)
     assert np.linalg.norm(settled_force(page)) > 1.3 * np.linalg.norm(first)
     place = np.array(state(page)["tools"][0]["position"])
@@ -159,7 +159,7 @@ def test_felt_stiffness_is_the_slope_of_force_against_depth(page):
         forces.append(np.linalg.norm(settled_force(page)))
         stiffness.append(shown(page, "stiffness-felt"))
         depths.append(1e3 * state(page)["depth"])
-        page.mouse.wheel(0, 50)
+        wheel(page, 50)
         settled_depth(page)
     page.mouse.up()
     slope = (forces[2] - forces[0]) / (depths[2] - depths[0])
@@ -185,7 +185,7 @@ def test_a_press_is_held_at_the_chosen_strain(page):
     # Where the limit is watched and where the page looks are not the same points: without it the strain is 20 %.
     assert 8 <= float(strain.inner_text()) <= 12
     # Deeper than half a radius below that the pointer is not followed.
-    page.mouse.wheel(0, 2000)
+    wheel(page, 2000)
     assert settled_depth(page) < deep + 0.51 * RADIUS
     assert np.linalg.norm(settled_force(page) - first) < 0.1 * np.linalg.norm(first)
     slide_to(page, "strain-limit", 51)

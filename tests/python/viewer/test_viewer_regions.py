@@ -13,7 +13,7 @@ import palpate
 from palpate.mesh import TetMesh
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
-from palpate.viewer.session import Session, Wants
+from palpate.viewer.session import ClientView, Session
 
 TOP = [0.04, 0.025, 0.05]
 
@@ -100,7 +100,7 @@ def test_an_end_in_one_unit_is_not_taken_for_another_field(built):
     session = Session(built)
     session.start()
     try:
-        header, _ = frame_of(session, Wants(field="unheard-of", full_scale=3.0))
+        header, _ = frame_of(session, ClientView(field="unheard-of", full_scale=3.0))
     finally:
         session.close()
     field = header["fields"][0]

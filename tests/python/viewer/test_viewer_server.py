@@ -17,7 +17,7 @@ from websockets.asyncio.client import connect
 import palpate
 from palpate.scene import BuiltScene
 from palpate.viewer import messages
-from palpate.viewer.pages import host_is_ours
+from palpate.viewer.pages import is_own_host
 from palpate.viewer.server import MAX_MESSAGE, ViewerServer
 
 TOP = [0.04, 0.025, 0.05]
@@ -205,7 +205,7 @@ def test_it_listens_on_this_machine_only(built):
     ],
 )
 def test_host_header(host, bound, ours):
-    assert host_is_ours(host, bound, 80) is ours
+    assert is_own_host(host, bound, 80) is ours
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-// Two fingers are for the camera: it is told of the first one, which it never saw, before it sees the second.
+// Two fingers are for the camera: its controls get the event of the first finger, which they missed, before that of the second.
 
 import type { Place } from "../window_regions";
 

@@ -53,7 +53,7 @@ export function listenToKeys(control: Control, painting: Painting, viewport: Vie
     Escape: () => {
       control.release();
       control.showMode(0);
-      painting.putAway();
+      painting.leavePaintTool();
     },
   };
   window.addEventListener("keydown", (event) => {

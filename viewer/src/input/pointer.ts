@@ -12,7 +12,7 @@ import type { State, Store } from "../store";
 import type { Place } from "../window_regions";
 import { byCamera } from "./hand_over";
 import { GrabGesture, PressGesture, orientationOn } from "./press_geometry";
-import type { CameraAxes, Gesture, HeldTool, Purpose, Sight } from "./press_geometry";
+import type { CameraAxes, Gesture, HeldTool, Purpose, SurfaceHit } from "./press_geometry";
 
 /** So often the tool is told where to go while it moves; a mouse may report four times as often. */
 const SEND_INTERVAL_MS = 4;
@@ -47,7 +47,7 @@ interface Drag {
 }
 
 /** A pointer that is held down, and where. */
-export interface Held {
+export interface PressedPointer {
   down: PointerEvent;
   place: Place;
 }
@@ -69,7 +69,7 @@ export class Pointer {
     });
     store.subscribe(["frame"], ({ frame }) => {
       if (this.drag) this.drag.gesture.hold(frame?.tools[this.drag.tool]?.limited ?? false);
-      this.tellDepth();
+      this.updateDepth();
     });
     // Another place of the tool for the same place of the pointer: the surface is drawn elsewhere.
     store.subscribe(["shownScale"], () => control.letGo(false));
@@ -140,12 +140,12 @@ export class Pointer {
   }
 
   /** The pointer that presses now, for a scene in which the tool is another one. */
-  get held(): Held | null {
+  get held(): PressedPointer | null {
     return this.drag && { down: this.drag.down, place: this.drag.place };
   }
 
   /** Presses where the pointer is held down, with the tool that a new scene has. */
-  pressAgain({ down, place }: Held): void {
+  pressAgain({ down, place }: PressedPointer): void {
     const state = this.store.get();
     const [pick, tool] = [this.pick(place), drivenTool(state)];
     if (this.drag === null && inControl(state) && pick && tool !== null) this.begin(down, place, pick, tool, state);
@@ -172,7 +172,7 @@ export class Pointer {
     const timer = window.setInterval(() => this.advance(), SEND_INTERVAL_MS);
     this.drag = { tool, gesture, down: event, place, movedMs: performance.now(), timer, sent: null };
     if (event.pointerType === "pen") gesture.press(event.pressure);
-    this.tellDepth();
+    this.updateDepth();
     this.send(this.drag);
   }
 
@@ -274,7 +274,7 @@ export class Pointer {
     this.control.press(drag.tool, position.toArray(), drag.gesture.grab, orientation && wxyz(orientation));
   }
 
-  private tellDepth(): void {
+  private updateDepth(): void {
     if (!this.drag) return;
     const { tool, gesture } = this.drag;
     this.store.update({ pressing: { tool, grab: gesture.grab, depth: gesture.depth } });
@@ -294,7 +294,7 @@ export class Pointer {
   }
 
   /** What the pointer meets of a body, as the camera stands. */
-  private sight({ body, shown }: Pick): Sight {
+  private sight({ body, shown }: Pick): SurfaceHit {
     const { viewport, stage } = this;
     return {
       axes: this.cameraAxes(),

@@ -4,7 +4,7 @@ import { describe, expect, it } from "vitest";
 import { originAt, toolShape } from "../scene/tool_shape";
 import type { SurfaceSpot } from "../scene/tool_shape";
 import { GENTLE_DEPTH, GrabGesture, PEN_DEPTH, PressGesture, approach, orientationOn, outline } from "./press_geometry";
-import type { CameraAxes, HeldTool, Sight } from "./press_geometry";
+import type { CameraAxes, HeldTool, SurfaceHit } from "./press_geometry";
 import type { Place } from "../window_regions";
 
 const SIZE = 0.2;
@@ -30,7 +30,7 @@ function onBall([x, y]: Place): SurfaceSpot | null {
   const point = new THREE.Vector3(right, -Math.sqrt(squared), up);
   return { point, normal: point.clone().normalize() };
 }
-const sight: Sight = { axes, metresPerPixel: METRES_PER_PIXEL, surfaceAt: onBall };
+const sight: SurfaceHit = { axes, metresPerPixel: METRES_PER_PIXEL, surfaceAt: onBall };
 
 const ball = toolShape({ shape: "sphere", lengths: [RADIUS, 0, 0] }, NO_SURFACE);
 const BALL_IN_HAND: HeldTool = { shape: ball, radius: RADIUS, orientationOn: () => null };

@@ -21,12 +21,12 @@ const SPEED_MAX = 5;
 const DEPTH_MAX = 0.25;
 const LIFT_MAX = 1;
 /** While the tool is held for strain its depth is taken so much farther, over the tool's radius: turning back is felt at once. */
-const HELD_ROOM = 0.5;
+const LIMITED_MARGIN = 0.5;
 /** A drag for depth goes so much slower than the pointer. */
 const DEPTH_PER_DRAG = 0.25;
 const PULL_MAX = 0.25;
 /** Closer than this, over the radius of the tool, is there. */
-const ARRIVED = 1e-4;
+const GOAL_TOLERANCE = 1e-4;
 /** Halvings that find the outline of a body between two places of the pointer. */
 const HALVINGS = 8;
 
@@ -47,7 +47,7 @@ export interface HeldTool {
 }
 
 /** What the pointer meets of the body that it presses. */
-export interface Sight {
+export interface SurfaceHit {
   axes: CameraAxes;
   metresPerPixel: number;
   /** The point of the untouched surface under a place of the window; null beside the body. */
@@ -79,7 +79,7 @@ export interface Gesture {
 }
 
 /** A value that follows a goal, and its rate. */
-export interface Following {
+export interface SmoothedValue {
   value: number;
   rate: number;
 }
@@ -90,7 +90,7 @@ export interface Following {
  * A goal farther than `2 T rateMax` is taken for one at that distance: then `x'' <= (2 / T) (rateMax - x')`, so that a rate
  * within the bound stays there.
  */
-export function approach({ value, rate }: Following, goal: number, seconds: number, lag: number, rateMax: number): Following {
+export function approach({ value, rate }: SmoothedValue, goal: number, seconds: number, lag: number, rateMax: number): SmoothedValue {
   const reach = 2 * lag * rateMax;
   const near = value + THREE.MathUtils.clamp(goal - value, -reach, reach);
   const [gap, decay] = [value - near, Math.exp(-seconds / lag)];
@@ -130,7 +130,7 @@ export function outline(on: Place, beside: Place, isOn: (place: Place) => boolea
 /** The tool slides on the surface under the pointer; beside the body it goes on across the line of sight, and so rolls off. */
 export class PressGesture implements Gesture {
   readonly grab = false;
-  private following: Following;
+  private following: SmoothedValue;
   private goal: number;
   private readonly dent: number;
   /** Depth at which the tool came to be held. */
@@ -151,7 +151,7 @@ export class PressGesture implements Gesture {
    */
   constructor(
     first: SurfaceSpot & { dent: number },
-    private readonly sight: Sight,
+    private readonly sight: SurfaceHit,
     private readonly size: number,
     private readonly tool: HeldTool,
     { pointer, aim, straight }: { pointer: Place; aim: Place; straight: boolean },
@@ -191,7 +191,7 @@ export class PressGesture implements Gesture {
   }
 
   advance(seconds: number): boolean {
-    const near = ARRIVED * this.tool.radius;
+    const near = GOAL_TOLERANCE * this.tool.radius;
     this.following = approach(this.following, this.goal, seconds, DEPTH_LAG_S, DEPTH_SPEED_MAX * this.tool.radius);
     const deepened = Math.abs(this.goal - this.following.value) < near && Math.abs(this.following.rate) < near;
     if (deepened) this.following = { value: this.goal, rate: 0 };
@@ -210,7 +210,7 @@ export class PressGesture implements Gesture {
   }
 
   private deepen(metres: number): void {
-    const room = this.heldAt === null ? Infinity : this.heldAt + HELD_ROOM * this.tool.radius;
+    const room = this.heldAt === null ? Infinity : this.heldAt + LIMITED_MARGIN * this.tool.radius;
     const deepest = Math.min(DEPTH_MAX * this.size, Math.max(room, this.goal));
     this.goal = THREE.MathUtils.clamp(this.goal + metres, -LIFT_MAX * this.tool.radius, deepest);
   }
@@ -246,7 +246,7 @@ export class GrabGesture implements Gesture {
 
   constructor(
     private readonly held: THREE.Vector3,
-    private readonly sight: Omit<Sight, "surfaceAt">,
+    private readonly sight: Omit<SurfaceHit, "surfaceAt">,
     private readonly size: number,
     private pointer: Place,
     private readonly turned: THREE.Quaternion | null,

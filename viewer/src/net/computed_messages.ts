@@ -1,4 +1,4 @@
-// What the server says of columns that are still computed, and what a page paints to be computed next.
+// Messages about columns that are still computed, and about regions painted to be computed next.
 
 /** How far the columns of every body are, in their order: sent when a page opens, and when it changes. */
 export interface ComputedMessage {

@@ -119,27 +119,26 @@ export interface MotionScene {
  * Geometry of one body, in its frame. Where fewer triangles are drawn than the surface has, nodes are the vertices that are
  * drawn, each a node of the surface, and it has no tetrahedra.
  */
-export interface BodyArrays {
-  nodes: Float32Array;
-  tets: Uint32Array;
+const BODY_ARRAYS = {
+  nodes: Float32Array,
+  tets: Uint32Array,
   /** Of each tetrahedron, among the body's regions. */
-  tet_regions: Uint32Array;
-  surface_triangles: Uint32Array;
+  tet_regions: Uint32Array,
+  surface_triangles: Uint32Array,
   /** Of each triangle, the region behind it among the body's. */
-  triangle_regions: Uint32Array;
-  surface_nodes: Uint32Array;
-  fixed_nodes: Uint32Array;
+  triangle_regions: Uint32Array,
+  surface_nodes: Uint32Array,
+  fixed_nodes: Uint32Array,
   /** Displacements of the surface under the body's own loads, a row for each surface node. */
-  free: Float32Array;
+  free: Float32Array,
   /** For each node of the whole surface the vertex that is drawn in its place; empty where all are drawn. */
-  owners: Uint32Array;
-}
+  owners: Uint32Array,
+};
+export type BodyArrays = ArraysOf<typeof BODY_ARRAYS>;
 
 /** Surface of a tool from a file, in its frame; empty for the other shapes. */
-export interface ToolArrays {
-  vertices: Float32Array;
-  triangles: Uint32Array;
-}
+const TOOL_ARRAYS = { vertices: Float32Array, triangles: Uint32Array };
+export type ToolArrays = ArraysOf<typeof TOOL_ARRAYS>;
 
 export interface ToolFrame {
   position: Vec3;
@@ -240,10 +239,8 @@ export interface SceneData {
 }
 
 /** Of one body: a row of displacements, m, and scalar is a surface node, or any node if the inside is shown. */
-export interface PoseArrays {
-  displacements: Float32Array;
-  scalar: Uint8Array;
-}
+const POSE_ARRAYS = { displacements: Float32Array, scalar: Uint8Array };
+export type PoseArrays = ArraysOf<typeof POSE_ARRAYS>;
 
 export interface FrameData {
   header: FrameMessage;
@@ -321,19 +318,6 @@ export type ClientMessage =
   | SessionCommand;
 
 const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "computed", "error"];
-const BODY_ARRAYS = {
-  nodes: Float32Array,
-  tets: Uint32Array,
-  tet_regions: Uint32Array,
-  surface_triangles: Uint32Array,
-  triangle_regions: Uint32Array,
-  surface_nodes: Uint32Array,
-  fixed_nodes: Uint32Array,
-  free: Float32Array,
-  owners: Uint32Array,
-};
-const TOOL_ARRAYS = { vertices: Float32Array, triangles: Uint32Array };
-const POSE_ARRAYS = { displacements: Float32Array, scalar: Uint8Array };
 
 interface ArrayEntry {
   name: string;
@@ -344,6 +328,8 @@ interface ArrayEntry {
 
 type AnyArray = Float32Array | Uint32Array | Uint8Array;
 type ArrayKind = new (buffer: ArrayBuffer, offset: number, length: number) => AnyArray;
+/** What a table of names and kinds stands for: arrays of these kinds by these names. */
+type ArraysOf<Kinds extends Record<string, ArrayKind>> = { [Name in keyof Kinds]: InstanceType<Kinds[Name]> };
 const KINDS: Record<string, ArrayKind & { BYTES_PER_ELEMENT: number }> = {
   f4: Float32Array,
   u4: Uint32Array,
@@ -412,13 +398,13 @@ function group<Kinds extends Record<string, ArrayKind>>(
   arrays: Map<string, AnyArray>,
   prefix: string,
   kinds: Kinds,
-): { [Name in keyof Kinds]: InstanceType<Kinds[Name]> } {
+): ArraysOf<Kinds> {
   const entries = Object.entries(kinds).map(([name, kind]) => {
     const array = arrays.get(prefix + name);
     if (!(array instanceof kind)) throw new Error(`a message without the array '${prefix}${name}'`);
     return [name, array];
   });
-  return Object.fromEntries(entries) as { [Name in keyof Kinds]: InstanceType<Kinds[Name]> };
+  return Object.fromEntries(entries) as ArraysOf<Kinds>;
 }
 
 function isRecord(value: unknown): value is Record<string, unknown> {

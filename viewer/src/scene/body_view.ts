@@ -10,6 +10,7 @@ import type { FieldUniforms, TISSUE } from "./field_material";
 import { createGroundShadow } from "./ground_shadow";
 import { firstEntry } from "./ray_surface";
 import { regionTexture } from "./region_texture";
+import { release } from "./release";
 import { SectionView } from "./section_view";
 import type { SeenSurface } from "./seen_vertices";
 import { SolidView } from "./solid_view";
@@ -55,7 +56,7 @@ export interface Pose {
 }
 
 /** Colour of the wire frame, seen against the backdrop as against the body, and how dark the shadow is. */
-const LOOKS: Record<Theme, { wire: number; shadow: number }> = {
+const THEME_COLORS: Record<Theme, { wire: number; shadow: number }> = {
   dark: { wire: 0xf2f5fa, shadow: 1 },
   light: { wire: 0x1d2733, shadow: 0.4 },
 };
@@ -188,7 +189,7 @@ export class BodyView {
   }
 
   setTheme(theme: Theme): void {
-    const { wire, shadow } = LOOKS[theme];
+    const { wire, shadow } = THEME_COLORS[theme];
     this.wireframe.lines.material.color.set(wire);
     this.shadow.material.opacity = shadow;
   }
@@ -211,7 +212,7 @@ export class BodyView {
     this.surface.displace(displacements, pose.interior ? arrays.surface_nodes : null, scale);
     // A mode shape is only shown: a tool meets the body at rest.
     if (pose.showsMode) this.surface.settle();
-    else if (!pose.touched) this.surface.keepAsUntouched();
+    else if (!pose.touched) this.surface.storeAsUntouched();
     this.solid.update(pose.interior ? this.ofSurface(scalar) : scalar);
     // Until the server has heard that the inside is seen, frames are without it.
     if (this.cutShown && pose.interior) this.section?.displace({ displacements, scalar, scale });
@@ -250,16 +251,9 @@ export class BodyView {
   }
 
   dispose(): void {
-    this.group.removeFromParent();
-    this.solid.dispose();
+    release(this.group);
     this.bothSides.material.dispose();
-    this.wireframe.dispose();
-    this.supports.dispose();
-    this.section?.dispose();
     this.uniforms.regionColors.value.dispose();
-    this.shadow.material.map?.dispose();
-    this.shadow.material.dispose();
-    this.shadow.geometry.dispose();
   }
 
   private applyCut(): void {

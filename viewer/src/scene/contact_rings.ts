@@ -40,9 +40,4 @@ export class ContactRings {
       ring.scale.setScalar(place.radius);
     });
   }
-
-  dispose(): void {
-    this.geometry.dispose();
-    this.material.dispose();
-  }
 }

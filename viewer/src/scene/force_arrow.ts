@@ -41,8 +41,8 @@ export class ForceArrow {
   }
 
   /** Starts at the surface of the tool, so that the shortest arrow is seen whole. */
-  update(tool: Vec3, toolRadius: number, told: Vec3): void {
-    const force = new THREE.Vector3(...told);
+  update(tool: Vec3, toolRadius: number, forceOnDevice: Vec3): void {
+    const force = new THREE.Vector3(...forceOnDevice);
     const magnitude = force.length();
     this.length = arrowLength(magnitude, this.maxForce) * this.size;
     this.group.visible = this.length > LENGTH_MIN * this.size;
@@ -50,11 +50,6 @@ export class ForceArrow {
     const direction = force.divideScalar(magnitude);
     this.group.quaternion.setFromUnitVectors(UP, direction);
     this.group.position.set(...tool).addScaledVector(direction, toolRadius);
-  }
-
-  dispose(): void {
-    for (const part of [this.shaft, this.head]) part.geometry.dispose();
-    this.shaft.material.dispose();
   }
 
   /** Shrinks the arrow as a whole where it would reach out of the picture. */

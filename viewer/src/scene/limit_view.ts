@@ -50,11 +50,4 @@ export class LimitView {
     places.needsUpdate = true;
     this.line.computeLineDistances();
   }
-
-  dispose(): void {
-    for (const part of [this.ring, this.line]) {
-      part.geometry.dispose();
-      part.material.dispose();
-    }
-  }
 }

@@ -27,11 +27,6 @@ export class PinView {
     this.sprite.renderOrder = 3;
     this.sprite.visible = false;
   }
-
-  dispose(): void {
-    this.sprite.material.map?.dispose();
-    this.sprite.material.dispose();
-  }
 }
 
 /** A drop upside down with a hole, as on maps. */

@@ -60,11 +60,6 @@ export class SectionView {
     this.place();
   }
 
-  dispose(): void {
-    this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
-  }
-
   /** Corners lie where their edges are now: straight edges stay straight. */
   private place(): void {
     const { ends, shares, triangles } = this.section;

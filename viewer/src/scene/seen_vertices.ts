@@ -18,7 +18,7 @@ export interface SeenSurface {
 }
 
 /** What of the camera is needed: where it is, the product of projection and view by columns, and the window in pixels. */
-export interface Eye {
+export interface CameraView {
   position: readonly [number, number, number];
   matrix: ArrayLike<number>;
   left: number;
@@ -35,7 +35,7 @@ export class SeenVertices {
   /** For each surface its vertices, and (x, y) of each. */
   readonly of: { vertices: Uint32Array; places: Float32Array }[];
 
-  constructor(surfaces: readonly SeenSurface[], eye: Eye) {
+  constructor(surfaces: readonly SeenSurface[], eye: CameraView) {
     const projected = surfaces.map((surface) => project(surface.positions, eye));
     const nearest = new Nearest(eye);
     surfaces.forEach((surface, i) => nearest.add(projected[i]!, surface));
@@ -50,7 +50,7 @@ export class SeenVertices {
   }
 }
 
-function project(positions: Float32Array, { matrix: m, left, top, width, height }: Eye): Projected {
+function project(positions: Float32Array, { matrix: m, left, top, width, height }: CameraView): Projected {
   const found = new Float32Array(positions.length);
   for (let i = 0; i < positions.length; i += 3) {
     const [x, y, z] = [positions[i]!, positions[i + 1]!, positions[i + 2]!];
@@ -64,7 +64,7 @@ function project(positions: Float32Array, { matrix: m, left, top, width, height 
   return found;
 }
 
-function seen({ positions, normals, removed }: SeenSurface, projected: Projected, nearest: Nearest, eye: Eye) {
+function seen({ positions, normals, removed }: SeenSurface, projected: Projected, nearest: Nearest, eye: CameraView) {
   const vertices: number[] = [];
   const places: number[] = [];
   const [ex, ey, ez] = eye.position;
@@ -86,7 +86,7 @@ class Nearest {
   private readonly rows: number;
   private readonly cells: Float32Array;
 
-  constructor(private readonly eye: Eye) {
+  constructor(private readonly eye: CameraView) {
     this.columns = Math.ceil(eye.width / CELL);
     this.rows = Math.ceil(eye.height / CELL);
     this.cells = new Float32Array(this.columns * this.rows);

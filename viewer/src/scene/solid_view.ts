@@ -92,11 +92,6 @@ export class SolidView {
     const { normal, offset } = plane ?? { normal: new THREE.Vector3(), offset: 1 };
     this.cutPlane.value.set(...normal.toArray(), offset);
   }
-
-  dispose(): void {
-    this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
-  }
 }
 
 /** Rows of an array with a number of columns, one after the other. */

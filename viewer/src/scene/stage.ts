@@ -193,7 +193,7 @@ export class Stage {
 
   private dispose(): void {
     for (const view of [...this.bodies, ...this.tools]) view.dispose();
-    this.watched?.view.dispose();
+    // Its dot went with its body.
     this.watched = null;
   }
 }

@@ -33,10 +33,4 @@ export class SupportsView {
     this.markers.count = count;
     this.markers.instanceMatrix.needsUpdate = true;
   }
-
-  dispose(): void {
-    this.markers.geometry.dispose();
-    this.markers.material.dispose();
-    this.markers.dispose();
-  }
 }

@@ -78,7 +78,7 @@ describe("displacements that are drawn larger than they are", () => {
     const row = 3 * 7;
     expect(surface.positions[row + 2]).toBeCloseTo(1.02 * surface.rest[row + 2]!, 7);
     expect(surface.shown[row + 2]).toBeCloseTo(1.1 * surface.rest[row + 2]!, 7);
-    surface.keepAsUntouched();
+    surface.storeAsUntouched();
     expect(surface.untouchedAsShown(5)[row + 2]).toBeCloseTo(1.1 * surface.rest[row + 2]!, 7);
     // A ball drawn out by a tenth along z: its normals are those of that ellipsoid.
     const [x, y, z] = [0, 1, 2].map((axis) => surface.shown[row + axis]!) as Vec3;

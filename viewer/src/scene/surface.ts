@@ -67,7 +67,7 @@ export class Surface {
   }
 
   /** Takes the shape now for that of the untouched body. */
-  keepAsUntouched(): void {
+  storeAsUntouched(): void {
     this.untouched.set(this.positions);
     vertexNormals(this.untouched, this.triangles, this.untouchedNormals);
   }

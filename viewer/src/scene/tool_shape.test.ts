@@ -4,10 +4,10 @@ import { describe, expect, it } from "vitest";
 import type { ShapeName, ToolArrays, ToolMessage } from "../net/protocol";
 import { originAt, toolShape } from "./tool_shape";
 
-type Told = Pick<ToolMessage, "shape" | "lengths">;
+type ShapeEntry = Pick<ToolMessage, "shape" | "lengths">;
 const NOTHING: ToolArrays = { vertices: new Float32Array(), triangles: new Uint32Array() };
 const [R, L, ROUNDING] = [0.004, 0.02, 0.0015];
-const CLOSED: Record<Exclude<ShapeName, "surface">, Told> = {
+const CLOSED: Record<Exclude<ShapeName, "surface">, ShapeEntry> = {
   sphere: { shape: "sphere", lengths: [R, 0, 0] },
   ellipsoid: { shape: "ellipsoid", lengths: [0.008, 0.006, 0.005] },
   capsule: { shape: "capsule", lengths: [R, L, 0] },
@@ -74,11 +74,11 @@ describe.each(Object.keys(CLOSED) as (keyof typeof CLOSED)[])("a tool that is a 
 
   it("stands on a point of its own, which does not jump", () => {
     for (const direction of directions(60)) {
-      const foot = shape.footing(direction);
+      const foot = shape.supportPoint(direction);
       expect(foot.dot(direction)).toBeLessThanOrEqual(shape.reach(direction) + 1e-12);
       const [along] = directions(7).map((d) => d.cross(direction));
       const near = direction.clone().addScaledVector(along!, 1e-3).normalize();
-      expect(shape.footing(near).distanceTo(foot)).toBeLessThan(0.02 * (R + L));
+      expect(shape.supportPoint(near).distanceTo(foot)).toBeLessThan(0.02 * (R + L));
     }
   });
 });
@@ -86,24 +86,24 @@ describe.each(Object.keys(CLOSED) as (keyof typeof CLOSED)[])("a tool that is a 
 it("a stylus on its side stands on its middle, upright on its front, and so does a punch", () => {
   const [side, down] = [new THREE.Vector3(1, 0, 0), new THREE.Vector3(0, 0, -1)];
   const capsule = toolShape(CLOSED.capsule, NOTHING);
-  expect(capsule.footing(side).toArray()).toEqual([R, 0, L / 2]);
-  expect(capsule.footing(down).distanceTo(new THREE.Vector3(0, 0, -R))).toBe(0);
+  expect(capsule.supportPoint(side).toArray()).toEqual([R, 0, L / 2]);
+  expect(capsule.supportPoint(down).distanceTo(new THREE.Vector3(0, 0, -R))).toBe(0);
   const punch = toolShape(CLOSED.punch, NOTHING);
-  expect(punch.footing(down).length()).toBeLessThan(1e-18);
-  expect(punch.footing(side).distanceTo(new THREE.Vector3(R, 0, 2 * R))).toBeLessThan(1e-15);
+  expect(punch.supportPoint(down).length()).toBeLessThan(1e-18);
+  expect(punch.supportPoint(side).distanceTo(new THREE.Vector3(R, 0, 2 * R))).toBeLessThan(1e-15);
 });
 
 it("a tool from a file is its surface, and stands on the middle of a face", () => {
   const box = toolShape({ shape: "surface", lengths: [0, 0, 0] }, BOX);
   expect(volume(box.geometry())).toBeCloseTo(0.02 * 0.01 * 0.03, 12);
   expect(box.reach(new THREE.Vector3(0.6, 0, 0.8))).toBeCloseTo(0.6 * 0.01 + 0.8 * 0.03, 8);
-  expect(box.footing(new THREE.Vector3(0, 0, -1)).length()).toBeLessThan(1e-9);
+  expect(box.supportPoint(new THREE.Vector3(0, 0, -1)).length()).toBeLessThan(1e-9);
 });
 
 it("a tool that is turned just touches the plane below, at any depth", () => {
   const spot = { point: new THREE.Vector3(0.1, -0.2, 0.3), normal: new THREE.Vector3(1, 2, 2).divideScalar(3) };
-  for (const told of Object.values(CLOSED)) {
-    const shape = toolShape(told, NOTHING);
+  for (const entry of Object.values(CLOSED)) {
+    const shape = toolShape(entry, NOTHING);
     for (const direction of directions(20)) {
       const turned = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), direction);
       const origin = originAt(shape, turned, spot, 1e-3);

@@ -26,7 +26,7 @@ export interface ToolShape {
    * The point that stands on a surface into which a direction leads. Where a whole line or face does, it is its middle,
    * and it moves smoothly with the direction, so that a tool does not jump when it is turned.
    */
-  footing(direction: THREE.Vector3): THREE.Vector3;
+  supportPoint(direction: THREE.Vector3): THREE.Vector3;
 }
 
 /** A point of a surface, and the outward normal there. */
@@ -59,8 +59,8 @@ export function originAt(
   depth: number,
 ): THREE.Vector3 {
   const direction = normal.clone().negate().applyQuaternion(orientation.clone().invert()).normalize();
-  const footing = shape.footing(direction).applyQuaternion(orientation);
-  const aside = footing.addScaledVector(normal, -footing.dot(normal));
+  const supportPoint = shape.supportPoint(direction).applyQuaternion(orientation);
+  const aside = supportPoint.addScaledVector(normal, -supportPoint.dot(normal));
   return point.clone().sub(aside).addScaledVector(normal, shape.reach(direction) - depth);
 }
 
@@ -70,7 +70,7 @@ function ellipsoid(semiAxes: THREE.Vector3): ToolShape {
     geometry: () => new THREE.SphereGeometry(1, SEGMENTS, RINGS).scale(...semiAxes.toArray()),
     reach,
     // The support: where the outward normal is the direction.
-    footing: (direction) => direction.clone().multiply(semiAxes).multiply(semiAxes).divideScalar(reach(direction)),
+    supportPoint: (direction) => direction.clone().multiply(semiAxes).multiply(semiAxes).divideScalar(reach(direction)),
   };
 }
 
@@ -79,7 +79,7 @@ function capsule(radius: number, length: number): ToolShape {
   return {
     geometry: () => alongZ(new THREE.CapsuleGeometry(radius, length, RINGS / 2, SEGMENTS)).translate(0, 0, length / 2),
     reach: ({ z }) => radius + Math.max(0, z * length),
-    footing: (direction) => direction.clone().multiplyScalar(radius).add(new THREE.Vector3(0, 0, length * behind(direction.z))),
+    supportPoint: (direction) => direction.clone().multiplyScalar(radius).add(new THREE.Vector3(0, 0, length * behind(direction.z))),
   };
 }
 
@@ -100,7 +100,7 @@ function punch(radius: number, rounding: number): ToolShape {
     // All points lie `rounding` from a smaller cylinder with sharp edges.
     reach: ({ x, y, z }) =>
       rounding + flat * Math.hypot(x, y) + (z > 0 ? z * (length - rounding) : z * rounding),
-    footing: ({ x, y, z }) => {
+    supportPoint: ({ x, y, z }) => {
       const across = (flat / Math.max(FLAT_SINE, Math.hypot(x, y))) + rounding;
       const along = rounding + (length - 2 * rounding) * behind(z) + rounding * z;
       return new THREE.Vector3(across * x, across * y, along);
@@ -118,7 +118,7 @@ function surface({ vertices, triangles }: ToolArrays): ToolShape {
       return toCreasedNormals(whole.setIndex(new THREE.BufferAttribute(triangles, 1)), CREASE);
     },
     reach,
-    footing: (direction) => {
+    supportPoint: (direction) => {
       const [farthest, sum] = [reach(direction), new THREE.Vector3()];
       let shares = 0;
       for (const place of places) {

@@ -10,6 +10,7 @@ import { ContactRings } from "./contact_rings";
 import { ForceArrow } from "./force_arrow";
 import { LimitView } from "./limit_view";
 import { PinView } from "./pin_view";
+import { release } from "./release";
 import type { SurfacePoint } from "./surface";
 import { originAt } from "./tool_shape";
 import type { SurfaceSpot, ToolShape } from "./tool_shape";
@@ -116,18 +117,12 @@ export class ToolView {
     if (!shown) return place;
     const turned = this.solid.quaternion;
     const direction = shown.normal.clone().negate().applyQuaternion(turned.clone().invert());
-    const pressing = this.shape.footing(direction).applyQuaternion(turned);
+    const pressing = this.shape.supportPoint(direction).applyQuaternion(turned);
     return pressing.addScaledVector(shown.normal, this.tool.radius).add(new THREE.Vector3(...place)).toArray();
   }
 
   dispose(): void {
-    this.group.removeFromParent();
-    this.limit.dispose();
-    this.pin.dispose();
-    this.arrow.dispose();
-    this.rings.dispose();
-    this.solid.geometry.dispose();
-    this.solid.material.dispose();
+    release(this.group);
   }
 }
 

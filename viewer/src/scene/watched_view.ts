@@ -23,10 +23,4 @@ export class WatchedView {
     this.dot.visible = row !== null;
     if (row !== null) this.dot.position.fromArray(this.surface.shown, 3 * row);
   }
-
-  dispose(): void {
-    this.dot.removeFromParent();
-    this.dot.geometry.dispose();
-    this.dot.material.dispose();
-  }
 }

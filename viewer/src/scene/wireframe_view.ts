@@ -15,11 +15,6 @@ export class WireframeView {
     this.lines = new THREE.LineSegments(geometry, material);
     this.lines.frustumCulled = false;
   }
-
-  dispose(): void {
-    this.lines.geometry.dispose();
-    this.lines.material.dispose();
-  }
 }
 
 /** Each edge once: on a closed surface it is the one that runs upwards in one of its two triangles. */

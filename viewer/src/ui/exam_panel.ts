@@ -1,4 +1,4 @@
-// An exam: which trial it is, the answers, and at the end what it comes to.
+// An exam: the trial, the answers, and at the end the result.
 
 import type { Control } from "../control";
 import type { ExamMessage } from "../net/protocol";

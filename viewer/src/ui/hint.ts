@@ -1,15 +1,15 @@
-// The line that tells what the mouse does, until it is dismissed.
+// The hint line about mouse controls, until it is dismissed.
 
 import { byId } from "./dom";
-import { keep, readKept } from "./kept";
+import { writeStored, readStored } from "./stored";
 
 const KEY = "hint-dismissed";
 
 export function showHint(): void {
   const hint = byId("hint");
-  hint.hidden = readKept(KEY) === "1";
+  hint.hidden = readStored(KEY) === "1";
   byId("hint-close").onclick = () => {
     hint.hidden = true;
-    keep(KEY, "1");
+    writeStored(KEY, "1");
   };
 }

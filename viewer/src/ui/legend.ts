@@ -23,16 +23,16 @@ export class Legend {
   private readonly max = byId<HTMLInputElement>("legend-max");
   private drawn: ColorMap | null = null;
   private field: FieldMessage | null = null;
-  private told = "";
+  private sent = "";
 
   constructor(private readonly store: Store, private readonly control: Control) {
     byId("legend-lock").onclick = () => this.toggleLock();
     this.max.onfocus = () => this.max.select();
-    this.max.onchange = () => this.takeMax();
+    this.max.onchange = () => this.lockMax();
     this.max.onkeydown = ({ key }) => {
       if (key === "Escape") this.max.value = "";
       // What is shown is written anew.
-      this.told = "";
+      this.sent = "";
       if (key === "Enter" || key === "Escape") this.max.blur();
     };
     store.subscribe(["scene", "body"], ({ scene, body }) => {
@@ -66,9 +66,9 @@ export class Legend {
 
   private show(field: FieldMessage, locked: boolean): void {
     // At rest, as in most frames, nothing is written: the browser would lay out again.
-    const told = JSON.stringify([field, locked]);
-    if (told === this.told) return;
-    this.told = told;
+    const sent = JSON.stringify([field, locked]);
+    if (sent === this.sent) return;
+    this.sent = sent;
     this.drawBar(field.signed ? ColorMap.diverging : ColorMap.sequential);
     const { unit, factor } = unitOf(field);
     const [min, max] = [field.min / factor, field.max / factor];
@@ -104,7 +104,7 @@ export class Legend {
   }
 
   /** A number that is typed locks the range there. */
-  private takeMax(): void {
+  private lockMax(): void {
     const { field } = this;
     if (!field) return;
     const { unit, factor } = unitOf(field);

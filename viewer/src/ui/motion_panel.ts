@@ -110,6 +110,6 @@ function impulseSlider(store: Store, control: Control): Slider {
     bounds: () => [WEAKEST * strongest(), strongest()],
     fallback: () => store.get().scene?.motion?.impulse ?? null,
     choose: (impulse) => store.update({ impulse }),
-    complain: (text) => control.notice(text),
+    showError: (text) => control.notice(text),
   });
 }

@@ -1,4 +1,4 @@
-// What the page has to say: progress, errors, faults, and the state of the connection.
+// Notices of the page: progress, errors, faults, and the state of the connection.
 
 import type { Control } from "../control";
 import type { ConnectionState } from "../net/connection";

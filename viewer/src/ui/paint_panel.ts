@@ -1,6 +1,6 @@
 // Which part of the surface can be touched, and what is painted to be computed next.
 
-import { BRUSH_MAX, BRUSH_MIN, LATER, NEVER, PAINTED, READY, WAITING, countStates, isGrowing } from "../painting";
+import { BRUSH_MAX, BRUSH_MIN, NOT_READY, NOT_TOUCHABLE, PAINTED, READY, WAITING, countStates, isGrowing } from "../painting";
 import type { Painting } from "../painting";
 import { inControl } from "../store";
 import type { State, Store } from "../store";
@@ -8,7 +8,7 @@ import { byId, press, setText } from "./dom";
 import { duration } from "./numbers";
 import { Slider } from "./slider";
 
-const STATES = { ready: READY, waiting: WAITING, painted: PAINTED, later: LATER, never: NEVER } as const;
+const STATES = { ready: READY, waiting: WAITING, painted: PAINTED, later: NOT_READY, never: NOT_TOUCHABLE } as const;
 
 export class PaintPanel {
   private readonly brush: Slider;
@@ -23,7 +23,7 @@ export class PaintPanel {
       usual: "px",
       fallback: () => null,
       choose: (radius) => painting.setBrush(radius),
-      complain: () => this.brush.show(store.get().brushRadius),
+      showError: () => this.brush.show(store.get().brushRadius),
     });
     byId("paint-brush").onclick = () => painting.choose("brush");
     byId("paint-lasso").onclick = () => painting.choose("lasso");

@@ -1,7 +1,7 @@
 // The buttons: what is shown, how the pointer touches, and what is done at once.
 
 import type { Control } from "../control";
-import { NO_INSIDE, hasInside, whyWhole } from "../control";
+import { NO_INSIDE, hasInside, noCutReason } from "../control";
 import type { Viewport } from "../scene/viewport";
 import { CUT_SHARE, inControl } from "../store";
 import type { Axis, Layer, Store } from "../store";
@@ -26,7 +26,7 @@ export class Panel {
       usual: "%",
       fallback: () => CUT_SHARE,
       choose: (share) => control.cutShare(share),
-      complain: (text) => control.notice(text),
+      showError: (text) => control.notice(text),
     });
     byId("grab").onclick = () => control.toggleGrab();
     byId("pin").onclick = () => control.togglePin();
@@ -63,7 +63,7 @@ export class Panel {
       // A finger sees no hints: pressed all the same, the button says why.
       const able = scene !== null && hasInside(scene);
       byId("show-cutaway").setAttribute("aria-disabled", String(!able));
-      byId("show-cutaway").title = able ? "Cut open (x)" : whyWhole(scene);
+      byId("show-cutaway").title = able ? "Cut open (x)" : noCutReason(scene);
       const whole = able ? scene.bodies.filter(({ tets }) => tets === 0) : [];
       byId("cut-whole").hidden = whole.length === 0;
       byId("cut-whole").title = NO_INSIDE;

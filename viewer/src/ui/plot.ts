@@ -1,4 +1,4 @@
-// How the plots look, and what makes one.
+// Style and construction of plots.
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
@@ -15,7 +15,7 @@ const GRID = { stroke: () => themeColor("--grid"), width: 1 };
 export type LineColor = `--${string}`;
 
 /** What lies along the plot: its range now, what is written below, and whether uPlot chooses round numbers or fifths are told. */
-export interface Along {
+export interface AxisRange {
   range(): [number, number];
   label(): string;
   round?: boolean;
@@ -24,7 +24,7 @@ export interface Along {
 /** A line that may turn back, drawn over a plot: its points now, along and up, in the plot's units. */
 export type Trail = () => { along: readonly number[]; up: readonly number[] };
 
-export function createPlot(id: string, along: Along, label: string, colors: LineColor[], range: uPlot.Scale.Range, trail?: Trail): uPlot {
+export function createPlot(id: string, along: AxisRange, label: string, colors: LineColor[], range: uPlot.Scale.Range, trail?: Trail): uPlot {
   const box = byId(id);
   const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
   const fifths = {

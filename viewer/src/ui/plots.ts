@@ -59,10 +59,10 @@ export class Plots {
       label: () => "depth (mm)",
       round: true,
     };
-    const upToPressed = (): [number, number] => [0, Math.max(FORCE_SPAN_MIN, 1.15 * this.press.extent().force)];
+    const forceRange = (): [number, number] => [0, Math.max(FORCE_SPAN_MIN, 1.15 * this.press.extent().force)];
     const trail = () => ({ along: this.press.depth, up: this.press.force });
     this.plots = {
-      press: createPlot("plot-press", deep, "force (N)", ["--force"], upToPressed, trail),
+      press: createPlot("plot-press", deep, "force (N)", ["--force"], forceRange, trail),
       force: createPlot("plot-force", recent, "force (N)", ["--force"], above(FORCE_SPAN_MIN)),
       compute: createPlot("plot-compute", recent, "per tick (µs)", ["--line-blue"], above(COMPUTE_SPAN_MIN)),
       displacement: createPlot("plot-displacement", moved, "mm", ["--line-red", "--line-green", "--line-blue"], around),

@@ -1,7 +1,7 @@
 // Force against depth of the press that is shown: one point a frame, from where it began; the next press begins anew.
 
 import type { FrameMessage } from "../net/protocol";
-import { contactsOf, deepest, wholeForce } from "../tool_contacts";
+import { contactsOf, deepest, totalForce } from "../tool_contacts";
 
 /** A minute of frames. */
 const POINTS_MAX = 3600;
@@ -28,7 +28,7 @@ export class PressLog {
       this.force.shift();
     }
     this.depth.push(1000 * depth);
-    this.force.push(Math.hypot(...wholeForce(touching)));
+    this.force.push(Math.hypot(...totalForce(touching)));
   }
 
   clear(): void {

@@ -7,8 +7,8 @@ import { byId, setText } from "./dom";
 import { MINUS, millimetres, newtonsPerMillimetre, percent, signed, threeDigits } from "./numbers";
 
 /** Linear elasticity leaves out the square of the gradient; beyond about 10 % that shows. */
-const STRAIN_HONEST_MAX = 0.1;
-/** Strain is told to a tenth of a per cent: what rounds to the limit is not beyond it. */
+const LINEAR_STRAIN_MAX = 0.1;
+/** Strain is shown to a tenth of a per cent; a value that rounds to the limit is not beyond it. */
 const STRAIN_ROUNDING = 0.0005;
 
 export class Readout {
@@ -74,9 +74,9 @@ export class Readout {
     const limited = frame?.tools.some((tool) => tool.limited) ?? false;
     this.limit.hidden = !limited;
     if (settings && limited) setText(this.limit, `Held at ${percent(settings.strain_limit)} strain`);
-    this.warning.hidden = strain < STRAIN_HONEST_MAX + STRAIN_ROUNDING;
+    this.warning.hidden = strain < LINEAR_STRAIN_MAX + STRAIN_ROUNDING;
     if (!this.warning.hidden) {
-      setText(this.warning, `${Math.round(100 * strain)} % strain: linear elasticity is honest to about 10 %`);
+      setText(this.warning, `${Math.round(100 * strain)} % strain: linear elasticity is accurate up to about 10 %`);
     }
   }
 }

@@ -1,4 +1,4 @@
-// The record button: how a recording is doing, and where it lies when it has ended.
+// The record button: the status of a recording, and its file when it has ended.
 
 import type { Control } from "../control";
 import type { RecordedMessage, RecordingStatus } from "../net/session_messages";

@@ -14,9 +14,9 @@ const BAR_TOP = 92;
 const AXIS_LENGTH = 26;
 const AXES_CENTRE = { x: 36, y: 44 };
 const AXES: [name: string, direction: THREE.Vector3, color: `--${string}`][] = [
-  ["x", new THREE.Vector3(1, 0, 0), "--axis-x"],
-  ["y", new THREE.Vector3(0, 1, 0), "--axis-y"],
-  ["z", new THREE.Vector3(0, 0, 1), "--axis-z"],
+  ["x", new THREE.Vector3(1, 0, 0), "--line-red"],
+  ["y", new THREE.Vector3(0, 1, 0), "--line-green"],
+  ["z", new THREE.Vector3(0, 0, 1), "--line-blue"],
 ];
 
 /** The longest of 1, 2 and 5 times a power of ten that is not above a length. */
@@ -77,7 +77,7 @@ function drawAxes(context: CanvasRenderingContext2D, camera: THREE.Camera): void
 
 function drawBar(context: CanvasRenderingContext2D, width: number, label: string): void {
   const left = 10;
-  context.strokeStyle = context.fillStyle = themeColor("--ink");
+  context.strokeStyle = context.fillStyle = themeColor("--text");
   context.lineWidth = 1.5;
   context.lineCap = "butt";
   context.beginPath();

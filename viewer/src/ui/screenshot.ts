@@ -5,7 +5,7 @@ import { byId } from "./dom";
 import { themeColor } from "./theme";
 
 /** What is written over the picture, but for notices and hints. */
-const CARRIED = ["readout", "legend", "scale", "scale-banner", "mode-banner"];
+const OVERLAY_IDS = ["readout", "legend", "scale", "scale-banner", "mode-banner"];
 
 /** As PNG, null where the browser cannot. */
 export function takePicture(viewport: Viewport): Promise<Blob | null> {
@@ -22,7 +22,7 @@ export function takePicture(viewport: Viewport): Promise<Blob | null> {
   const scale = canvas.width / width;
   context.scale(scale, scale);
   context.translate(-left, -top);
-  for (const id of CARRIED) paint(context, byId(id));
+  for (const id of OVERLAY_IDS) paint(context, byId(id));
   return new Promise((resolve) => picture.toBlob(resolve, "image/png"));
 }
 

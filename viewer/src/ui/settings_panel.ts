@@ -1,4 +1,4 @@
-// What is chosen from lists and by sliders: model, body, field; stiffness, limit of strain, and how large displacements are
+// Lists and sliders: model, body, field; stiffness, limit of strain, and how large displacements are
 // drawn. The tool has a panel of its own.
 
 import type { Control } from "../control";
@@ -44,7 +44,7 @@ export class SettingsPanel {
       units: { x: 1 },
       fallback: () => 1,
       choose: (value) => control.showScaled(value),
-      complain: (text) => control.notice(text),
+      showError: (text) => control.notice(text),
     });
     store.subscribe(["models"], ({ models }) => {
       byId("model-row").hidden = models.length === 0;
@@ -101,7 +101,7 @@ export class SettingsPanel {
     this.moduli = rangeOf(scene.defaults.youngs_modulus[body] ?? null);
     const modulus = settings.youngs_modulus[body] ?? null;
     this.stiffness.show(modulus ?? this.moduli[0], modulus === null ? fixedModulus(state) : null);
-    byId("stiffness-field").title = modulus === null ? whyFixed(state) : "";
+    byId("stiffness-field").title = modulus === null ? fixedModulusReason(state) : "";
   }
 
   private stiffnessSlider(store: Store, control: Control): Slider {
@@ -120,7 +120,7 @@ export class SettingsPanel {
         return scene?.defaults.youngs_modulus[body] ?? null;
       },
       choose: (modulus) => control.setStiffness(modulus),
-      complain: (text) => control.notice(text),
+      showError: (text) => control.notice(text),
     });
   }
 
@@ -146,7 +146,7 @@ function strainSlider(store: Store, control: Control): Slider {
     bounds: () => STRAIN_BOUNDS,
     fallback: () => store.get().scene?.defaults.strain_limit ?? null,
     choose: (limit) => control.setStrainLimit(limit),
-    complain: (text) => control.notice(text),
+    showError: (text) => control.notice(text),
   });
 }
 
@@ -161,7 +161,7 @@ function fixedModulus({ scene, body }: Readonly<State>): string {
   return motion?.body === body && motion.youngs_modulus !== null ? pascals(motion.youngs_modulus) : "several";
 }
 
-function whyFixed({ scene, body }: Readonly<State>): string {
+function fixedModulusReason({ scene, body }: Readonly<State>): string {
   return scene?.motion?.body === body
     ? "Fixed: the modes of a body in motion belong to its stiffness"
     : "Fixed: the body has several materials, or loads";

@@ -23,7 +23,7 @@ export interface SliderOptions {
   fallback(): number | null;
   choose(value: number): void;
   /** Of a number that could not be read. */
-  complain(text: string): void;
+  showError(text: string): void;
 }
 
 export class Slider {
@@ -85,15 +85,15 @@ export class Slider {
     if (value === null) {
       const known = [...Object.keys(units), ...Object.keys(words)];
       const which = known.length > 0 ? `, with ${known.join(", ")} or nothing behind it` : "";
-      return options.complain(`${name}: '${typed}' is not a number${which}`);
+      return options.showError(`${name}: '${typed}' is not a number${which}`);
     }
     const [low, high] = options.bounds?.() ?? [Number(this.input.min), Number(this.input.max)];
     // Of the wrong sign it is a slip of the pen: the end of the range is not what was meant.
     if (low > 0 && value <= 0) {
-      return options.complain(`${name} must be positive: '${typed.trim()}' is not taken, ${this.text} stays`);
+      return options.showError(`${name} must be positive: '${typed.trim()}' is not taken, ${this.text} stays`);
     }
     const taken = Math.min(Math.max(value, low), high);
-    if (taken !== value) options.complain(`${name} goes from ${options.format(low)} to ${options.format(high)}`);
+    if (taken !== value) options.showError(`${name} goes from ${options.format(low)} to ${options.format(high)}`);
     if (taken !== this.value) options.choose(taken);
   }
 }

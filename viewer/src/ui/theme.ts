@@ -3,7 +3,7 @@
 import type { Control } from "../control";
 import type { Store, Theme } from "../store";
 import { byId } from "./dom";
-import { keep, readKept } from "./kept";
+import { writeStored, readStored } from "./stored";
 
 const KEY = "theme";
 const known = new Map<string, string>();
@@ -25,7 +25,7 @@ export function themeColor(property: `--${string}`): string {
 export function followTheme(store: Store, control: Control): void {
   const light = window.matchMedia("(prefers-color-scheme: light)");
   const system = (): Theme => (light.matches ? "light" : "dark");
-  const kept = readKept(KEY);
+  const kept = readStored(KEY);
   let chosen = kept === "dark" || kept === "light";
   control.chooseTheme(kept === "dark" || kept === "light" ? kept : system());
   light.addEventListener("change", () => {
@@ -34,7 +34,7 @@ export function followTheme(store: Store, control: Control): void {
   byId("theme").onclick = () => {
     chosen = true;
     control.chooseTheme(store.get().theme === "dark" ? "light" : "dark");
-    keep(KEY, store.get().theme);
+    writeStored(KEY, store.get().theme);
   };
   store.subscribe(["theme"], ({ theme }) => {
     document.documentElement.dataset["theme"] = theme;

@@ -13,12 +13,12 @@ const SPEEDS: [label: string, speed: number][] = [
   ["1/10x", 1 / 10],
 ];
 /** The handle stays where it was put while the server has not answered, ms. */
-const PATIENCE_MS = 1000;
+const SEEK_TIMEOUT_MS = 1000;
 
 export class TimeLine {
   private readonly place = byId<HTMLInputElement>("timeline-place");
   private readonly speeds: HTMLButtonElement[];
-  private readonly handle = new Handle(PATIENCE_MS);
+  private readonly handle = new Handle(SEEK_TIMEOUT_MS);
   private readonly way = new Way();
 
   constructor(private readonly store: Store, private readonly control: Control) {
@@ -38,7 +38,7 @@ export class TimeLine {
     byId("timeline").addEventListener("click", ({ detail, target }) => {
       if (detail > 0 && target instanceof HTMLButtonElement) target.blur();
     });
-    window.addEventListener("keydown", (event) => this.takeKey(event));
+    window.addEventListener("keydown", (event) => this.onKey(event));
     store.subscribe(["scene"], ({ scene }) => this.setScene(scene?.replay ?? null));
     store.subscribe(["frame"], ({ frame, scene }) => {
       if (frame?.replay && scene?.replay) this.show(frame.replay, scene.replay);
@@ -74,11 +74,11 @@ export class TimeLine {
     setText(play, replay.playing ? "Pause" : "Play");
     play.title = replay.playing ? "Pause (space)" : "Play (space)";
     this.speeds.forEach((button, i) => button.setAttribute("aria-pressed", String(Math.abs(SPEEDS[i]![1] - replay.speed) < 1e-6)));
-    const told = this.way.told(replay, nowMs);
-    byId("timeline-way").hidden = told === null;
-    if (told !== null) byId<HTMLProgressElement>("timeline-progress").value = told;
+    const progress = this.way.seekProgress(replay, nowMs);
+    byId("timeline-way").hidden = progress === null;
+    if (progress !== null) byId<HTMLProgressElement>("timeline-progress").value = progress;
     const badge = byId("timeline-verdict");
-    badge.hidden = told !== null;
+    badge.hidden = progress !== null;
     badge.dataset["state"] = replay.difference ? "bad" : "good";
     badge.title = replay.difference?.text ?? "Each tick that is made again is compared with the recorded one, bit by bit.";
     setText(badge, verdict(replay, scene));
@@ -104,7 +104,7 @@ export class TimeLine {
     this.control.replay({ tick });
   }
 
-  private takeKey(event: KeyboardEvent): void {
+  private onKey(event: KeyboardEvent): void {
     if (!this.store.get().scene?.replay || event.ctrlKey || event.metaKey || event.altKey) return;
     const { target } = event;
     // A button takes the space bar itself, and text takes all keys; the line has arrows of its own.

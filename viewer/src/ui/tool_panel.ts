@@ -22,12 +22,12 @@ export class ToolPanel {
     byId<HTMLInputElement>("tilt").max = String(TILT_MAX);
     this.shape.onchange = () => control.chooseShape(this.shape.value);
     const driven = () => shownTool(store.get()) ?? 0;
-    const complain = (text: string) => control.notice(text);
+    const showError = (text: string) => control.notice(text);
     const posture = () => {
       const header = store.get().scene?.tools[driven()];
       return header ? firstPosture(header.shape) : null;
     };
-    const angle = { format: degrees, units: DEGREES, usual: "°", complain };
+    const angle = { format: degrees, units: DEGREES, usual: "°", showError };
     this.tilt = new Slider({ ...angle, id: "tilt", name: "Tilt", fallback: () => posture()?.tilt ?? null, choose: (tilt) => control.hold({ tilt }) });
     this.turn = new Slider({ ...angle, id: "turn", name: "Turn", fallback: () => posture()?.turn ?? null, choose: (turn) => control.hold({ turn }) });
     this.friction = new Slider({
@@ -36,7 +36,7 @@ export class ToolPanel {
       format: (value) => value.toFixed(2),
       fallback: () => store.get().scene?.defaults.friction[driven()] ?? null,
       choose: (value) => control.setFriction(value),
-      complain,
+      showError,
     });
     this.radius = new Slider({
       id: "radius",
@@ -46,7 +46,7 @@ export class ToolPanel {
       usual: "mm",
       fallback: () => store.get().scene?.defaults.contact_radius[driven()] ?? null,
       choose: (value) => control.setContactRadius(value),
-      complain,
+      showError,
     });
     store.subscribe(["scene", "settings", "pinned", "pressing"], (state) => this.showContact(state));
     store.subscribe(["scene", "settings", "pinned", "pressing", "status"], (state) => this.showShape(state));
@@ -101,6 +101,6 @@ function showDevices(devices: (string | null)[]): void {
   // It tells how the pointer presses.
   if (devices.length > 0 && moved.length === devices.length) byId("hint").hidden = true;
   const several = devices.length > 1;
-  const told = moved.map(({ device, tool }) => (several ? `Tool ${tool + 1}: ${device}` : `Moved by ${device}`));
-  setText(byId("device-line"), told.join(". "));
+  const lines = moved.map(({ device, tool }) => (several ? `Tool ${tool + 1}: ${device}` : `Moved by ${device}`));
+  setText(byId("device-line"), lines.join(". "));
 }

@@ -1,11 +1,11 @@
-//! A change of boundary conditions, put together by columns of the operator and sorted for the solve.
+//! Changed boundary conditions, by column of the operator, in the order in which they are solved.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::green::GreensFunction;
 
 /// Columns with the values of conditions that keep their type, and of those that change it.
-pub type Sorted = (Vec<(usize, f64)>, Vec<(usize, f64)>);
+pub type SplitConditions = (Vec<(usize, f64)>, Vec<(usize, f64)>);
 
 /// What is asked of the columns of the operator.
 #[derive(Clone, Debug, Default)]
@@ -23,7 +23,7 @@ impl Change {
     ///
     /// # Errors
     /// A column with both a force and a displacement that the force would have to move.
-    pub fn sorted(&self, green: &GreensFunction) -> Result<Sorted, usize> {
+    pub fn sorted(&self, green: &GreensFunction) -> Result<SplitConditions, usize> {
         let is_fixed = |column: usize| green.row_is_fixed[green.row_of_column(column)];
         let released = |column: usize| self.released.contains(&column) && is_fixed(column);
         let columns = self.forces.keys().chain(self.displacements.keys()).chain(&self.released);

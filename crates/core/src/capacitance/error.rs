@@ -1,4 +1,4 @@
-//! The error of an answer, estimated from the errors of the entries it is made of ([`crate::green::accuracy`]).
+//! Error estimate of a solution, from the errors of the entries of the operator ([`crate::green::accuracy`]).
 
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};

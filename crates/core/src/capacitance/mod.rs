@@ -14,7 +14,7 @@ mod change;
 mod error;
 mod rigid;
 
-pub use change::{Change, Sorted};
+pub use change::{Change, SplitConditions};
 use error::{Noise, relative_error};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
@@ -29,7 +29,7 @@ const COMPUTED_ERROR: f64 = 1e-11;
 
 /// Supports that move as one take no force, and what is computed is the rounding of their displacements: forces below so
 /// many times what it may come to are compared with this.
-const NO_FORCE: f64 = 2e3;
+const FORCE_ROUNDING_FACTOR: f64 = 2e3;
 
 /// Displacements and forces after a change of boundary conditions.
 pub struct Answer {
@@ -116,9 +116,9 @@ fn error_of(
     let mut least_force = 0.0;
     if let Some(motion) = &relative.motion {
         noise.add_motion(motion.residual, |row| INPUT_ROUNDING * motion.at(green, row).abs());
-        if motion.is_everything {
+        if motion.is_exact {
             let largest = (0..green.rows).filter(|&row| green.row_is_fixed[row]).map(|row| green.magnitude(row));
-            least_force = NO_FORCE * motion.residual * largest.fold(0.0, f64::max);
+            least_force = FORCE_ROUNDING_FACTOR * motion.residual * largest.fold(0.0, f64::max);
         }
     }
     let (of_unknown, mut errors) = noise.errors(&columns, capacitance);

@@ -1,4 +1,4 @@
-//! Supports that move as one carry the body along and strain nothing.
+//! Rigid motions of the supports: they move the whole body and strain nothing.
 //!
 //! A rigid motion `r` of the whole body solves the reference problem without any force. So the known displacements may be
 //! given less `r`, and `r` added to those of the answer: forces stay the same. Where supports move almost as one, the
@@ -17,12 +17,12 @@ const CORRECTIONS: usize = 4;
 const REGULARISATION: f64 = 1e-12;
 /// A motion is taken out where it leaves less than this part of the supports' motion: elsewhere it gains less than a digit,
 /// and may ask for the columns of all supports in place of a few.
-const WORTHWHILE: f64 = 0.1;
+const MAX_RIGID_REMAINDER: f64 = 0.1;
 /// Rounding of a given displacement and of the rigid motion there, as a part of it; what a rigid motion strains in a matrix
 /// whose entries are rounded sums over elements is as much as that of some tens of roundings.
 pub const INPUT_ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// What rounding leaves of supports that move as one, as a part of their motion.
-const AS_ONE: f64 = 1e-12;
+const RIGID_TOLERANCE: f64 = 1e-12;
 
 /// A small rigid motion of the body.
 pub struct RigidMotion {
@@ -31,7 +31,7 @@ pub struct RigidMotion {
     rotation: DVec3,
     origin: DVec3,
     /// Whether it is all that the supports do, but for rounding.
-    pub is_everything: bool,
+    pub is_exact: bool,
     /// Error of taking it out in the energy norm, sqrt(J): displacements are known to a rounding of their own size.
     pub residual: f64,
 }
@@ -91,13 +91,13 @@ impl RigidMotion {
             translation: DVec3::ZERO,
             rotation: DVec3::ZERO,
             origin,
-            is_everything: false,
+            is_exact: false,
             residual: INPUT_ROUNDING * supports.iter().map(|s| (weight(s.0) * s.2).abs()).sum::<f64>(),
         };
         motion.fit(green, &supports)?;
         let (given, left) = (size(&|s| s.2), size(&|s| s.2 - motion.at(green, s.0)));
-        motion.is_everything = left <= AS_ONE * given;
-        (left <= WORTHWHILE * given).then_some((motion, supports))
+        motion.is_exact = left <= RIGID_TOLERANCE * given;
+        (left <= MAX_RIGID_REMAINDER * given).then_some((motion, supports))
     }
 
     /// Least squares of what is left of each support, weighted by what it counts in the error of an answer.

@@ -34,7 +34,7 @@ impl SurfaceQuery {
     pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
         ranges.add(self.mesh.vertices());
         ranges.add(self.mesh.indices());
-        // The hierarchy is one array that shows nothing of itself but its nodes.
+        // The hierarchy is one array; its public interface gives only references to its nodes.
         let nodes = std::cell::Cell::new((usize::MAX, 0));
         let note = |node: &BvhNode| {
             let at = std::ptr::from_ref(node).addr();
@@ -55,10 +55,10 @@ impl SurfaceQuery {
         Ok(Self { mesh })
     }
 
-    /// Calls `found` for every triangle whose box meets that between two corners.
-    pub fn for_each_within(&self, low: DVec3, high: DVec3, found: impl FnMut(u32)) {
+    /// Calls `visit` for every triangle whose box meets that between two corners.
+    pub fn for_each_within(&self, low: DVec3, high: DVec3, visit: impl FnMut(u32)) {
         let around = parry3d_f64::bounding_volume::Aabb::new(low, high);
-        self.mesh.bvh().intersect_aabb(&around).for_each(found);
+        self.mesh.bvh().intersect_aabb(&around).for_each(visit);
     }
 
     /// The surface point closest to `point`; `None` if `point` is not finite.

@@ -1,4 +1,4 @@
-//! A single touch: the compliance `C = W^T Psi W` that a patch feels, three by three, m/N, and the force for a displacement.
+//! A single touch: the 3x3 compliance `C = W^T Psi W` of a patch, m/N, and the force for a given displacement.
 
 use glam::{DMat3, DVec3};
 
@@ -21,7 +21,7 @@ pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
     mean + 2.0 * p * (r.acos() / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3).cos()
 }
 
-/// Answer to a pressed patch.
+/// Response to a pressed patch.
 pub struct Touch {
     /// Force on the body, N.
     pub force: DVec3,
@@ -46,7 +46,7 @@ pub fn touch(green: &GreensFunction, point: DVec3, displacement: [Option<f64>; 3
     let (surface, mut scratch) = (&green.surface, PatchScratch::new(&green.surface));
     let mut patch = TouchPatch::default();
     patch_weights(surface, &PatchGeometry::new(surface), &centre, radius, &mut scratch, &mut weighed)
-        .and_then(|()| patch.admit(green, &weighed))
+        .and_then(|()| patch.set_patch(green, &weighed))
         .map_err(|refusal| refused(green, radius, refusal))?;
     let compliance = patch.own_compliance(green);
     let mut displacements = green.free_displacements();
@@ -55,8 +55,8 @@ pub fn touch(green: &GreensFunction, point: DVec3, displacement: [Option<f64>; 3
     let stiffness = constrained_stiffness(&compliance, prescribed)
         .ok_or_else(|| Error::Invalid("the contact lies on the support, which does not give".into()))?;
     let masked = |v: DVec3| DVec3::from_array(std::array::from_fn(|k| if prescribed[k] { v[k] } else { 0.0 }));
-    let wanted = DVec3::from(displacement.map(|d| d.unwrap_or(0.0)));
-    let force = stiffness * masked(wanted - sag);
+    let target = DVec3::from(displacement.map(|d| d.unwrap_or(0.0)));
+    let force = stiffness * masked(target - sag);
     patch.add_response(green, force, &mut displacements);
     let largest_force = force.length().max((stiffness * masked(sag)).length());
     let error = pressed(green, patch.patch(), stiffness, prescribed, force).error(green.accuracy, green.precision());
@@ -64,7 +64,7 @@ pub fn touch(green: &GreensFunction, point: DVec3, displacement: [Option<f64>; 3
     Ok(Touch { force, displacements, error })
 }
 
-/// Of the force over the largest one, N, or of displacements over the largest one, whichever is larger.
+/// Relative error of the force or of the displacements, whichever is larger.
 fn relative_error(green: &GreensFunction, error: PressedError, largest_force: f64, displacements: &[f64]) -> f64 {
     let free = (0..displacements.len()).filter(|&row| !green.row_is_fixed[row]);
     let magnitude = free.map(|row| green.magnitude(row)).fold(0.0, f64::max);
@@ -72,7 +72,7 @@ fn relative_error(green: &GreensFunction, error: PressedError, largest_force: f6
     relative(error.force, largest_force).max(relative(magnitude * error.elsewhere, moved))
 }
 
-/// A patch as its errors are estimated; supported dofs take no part.
+/// Data of a patch for the error estimate; supported dofs are left out.
 fn pressed(green: &GreensFunction, patch: &Patch, stiffness: DMat3, prescribed: [bool; 3], force: DVec3) -> Pressed {
     let (mut independent, mut coherent) = (DVec3::ZERO, DVec3::ZERO);
     for (node, weight) in patch.iter() {

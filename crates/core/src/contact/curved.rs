@@ -1,8 +1,7 @@
-//! Quadrature on a face, cell by cell.
+//! Quadrature on a curved face, cell by cell.
 //!
-//! Where all parts of a triangle are split to the same depth, and no further, their mid-edges form a lattice that is known
-//! beforehand, and all of them are summed at once. Elsewhere, and where the triangle is much larger than the contact, it is
-//! split cell by cell.
+//! If all parts of a triangle are split to the same depth, their mid-edges form a lattice that is prepared beforehand, and all of
+//! them are summed at once. Otherwise, and if the triangle is much larger than the contact, it is split cell by cell.
 
 use glam::DVec3;
 use pulp::{Arch, NullaryFnOnce};
@@ -10,7 +9,7 @@ use pulp::{Arch, NullaryFnOnce};
 use super::face::FaceGeometry;
 use super::moments::{CELL_SIZE, Coordinates, MAX_DEPTH, Moments, cell_reach, halfway};
 
-/// Points taken at once: sums run in so many parts in a fixed order, whatever the processor's vectors.
+/// Points summed side by side. The order of the sums is fixed, whatever the processor's vectors.
 const LANES: usize = 8;
 /// Depth of the finest lattice.
 pub const DEEPEST: usize = 3;
@@ -208,7 +207,7 @@ pub fn common_depth(squared_edges: &[[f64; 2]; DEEPEST + 1], squared_finest: f64
     squared_edges.get(split).filter(|[_, longest]| *longest <= squared_finest).map(|_| split)
 }
 
-/// Points of a lattice on a cell in space: where they are, and the area that each stands for.
+/// Points of a lattice on a cell in space: their positions, and the area that each represents.
 #[derive(Clone, Copy)]
 pub struct PlacedPoints {
     at: [Lane; 3],
@@ -239,7 +238,7 @@ impl NullaryFnOnce for Sum<'_> {
     }
 }
 
-/// The same over points that are placed already.
+/// The same over points with known positions.
 struct PlacedSum<'a> {
     points: &'a [Points],
     placed: &'a [PlacedPoints],
@@ -303,7 +302,7 @@ fn places(c: &[[f64; 3]; 6], points: &Points) -> [Lane; 3] {
     places
 }
 
-/// Area in space of what the points stand for.
+/// Area in space that the points represent.
 #[inline(always)]
 fn areas(c: &[[f64; 3]; 6], points: &Points) -> Lane {
     let (x, y) = (&points.x, &points.y);

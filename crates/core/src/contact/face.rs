@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::moments::Coordinates;
 
-/// A face whose polynomial bends it by less than this part of its edges is flat to round-off.
+/// Bend of a face, over its edges, below which it is flat up to rounding.
 const FLAT: f64 = 1e-13;
 
 /// A face as a polynomial of its coordinates, `x = c0 + c1 s + c2 t + c3 s^2 + c4 s t + c5 t^2` with corners at (0, 0),
@@ -15,7 +15,7 @@ pub struct FaceGeometry {
     /// Whether the last three vanish.
     pub flat: bool,
     /// Area in space over area in coordinates, where the face is flat.
-    pub stretch: f64,
+    pub area_ratio: f64,
 }
 
 impl FaceGeometry {
@@ -23,7 +23,7 @@ impl FaceGeometry {
     pub fn linear([a, b, c]: [DVec3; 3]) -> Self {
         let zero = DVec3::ZERO;
         let coefficients = [a, b - a, c - a, zero, zero, zero];
-        Self { coefficients, flat: true, stretch: (b - a).cross(c - a).length() }
+        Self { coefficients, flat: true, area_ratio: (b - a).cross(c - a).length() }
     }
 
     /// With six nodes: corners, then the middles of the edges 01, 12, 20.
@@ -34,7 +34,7 @@ impl FaceGeometry {
             return Self::linear([x0, x1, x2]);
         }
         let coefficients = [x0, 4.0 * x01 - 3.0 * x0 - x1, 4.0 * x20 - 3.0 * x0 - x2, bent[0], bent[1], bent[2]];
-        Self { coefficients, flat: false, stretch: 0.0 }
+        Self { coefficients, flat: false, area_ratio: 0.0 }
     }
 
     /// Position of a point.

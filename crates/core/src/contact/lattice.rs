@@ -1,4 +1,4 @@
-//! Quadrature on a flat triangle of any size: only what the ball covers is visited.
+//! Quadrature on a flat triangle of any size; only points inside the ball are visited.
 
 use glam::DVec3;
 
@@ -24,8 +24,8 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Of the triangle with the given corners, positions `ends`, under the mask around `centre`.
-    pub fn new(corners: [Coordinates; 3], [a, b, c]: [DVec3; 3], centre: DVec3, radius: f64, stretch: f64) -> Self {
+    /// Lattice of the triangle with the given corners, positions `ends`, under the mask around `centre`.
+    pub fn new(corners: [Coordinates; 3], [a, b, c]: [DVec3; 3], centre: DVec3, radius: f64, area_ratio: f64) -> Self {
         let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
         let (mut depth, mut squared_edge) = (0, longest);
         let finest = CELL_SIZE * CELL_SIZE * radius * radius;
@@ -50,7 +50,7 @@ impl Lattice {
         let increment = |to: Coordinates| [(to[0] - corners[0][0]) * step, (to[1] - corners[0][1]) * step];
         let (along_i, along_j) = (increment(corners[1]), increment(corners[2]));
         // A cell has `4 step^2` of the triangle's area; the rule gives a third of it to each of its mid-edges.
-        let weight = 2.0 * stretch * 0.5 * doubled_area(corners) * 4.0 * step * step / 3.0;
+        let weight = 2.0 * area_ratio * 0.5 * doubled_area(corners) * 4.0 * step * step / 3.0;
         let start = [0, 1].map(|k| corners[0][k] + along_i[k] * i + along_j[k] * j);
         Self { size, origin, distance, start, along_i, along_j, weight }
     }
@@ -91,7 +91,7 @@ impl Lattice {
         if sums[0] <= 0.0 {
             return;
         }
-        moments.covered = true;
+        moments.overlaps_mask = true;
         let [zeroth, first, second] = sums.map(|sum| self.weight * sum);
         let [s, t] = [0, 1].map(|k| self.start[k] + self.along_j[k] * row as f64);
         let [ds, dt] = self.along_i;

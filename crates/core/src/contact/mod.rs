@@ -2,10 +2,10 @@
 
 mod closest;
 mod compliance;
+mod concavities;
 mod curved;
 mod face;
 pub mod footprint;
-mod hollows;
 mod lattice;
 pub mod local;
 mod moments;
@@ -17,16 +17,16 @@ mod regular_store;
 pub mod shape;
 pub mod smooth;
 mod tessellation;
-mod touchable;
+mod touch_patch;
 
 pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{Touch, smallest_eigenvalue, touch};
-pub use hollows::Hollows;
+pub use concavities::Concavities;
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
 pub use refusal::Refusal;
 pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, known_fans};
-pub use regular_store::forget_kept;
+pub use regular_store::remove_compliance_files;
 pub use tessellation::Tessellation;
-pub use touchable::TouchPatch;
+pub use touch_patch::TouchPatch;

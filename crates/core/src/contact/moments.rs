@@ -11,8 +11,8 @@ pub type Coordinates = [f64; 2];
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moments {
     pub sums: [f64; 6],
-    /// Whether any of the triangle lies under the mask.
-    pub covered: bool,
+    /// Whether any part of the triangle lies under the mask.
+    pub overlaps_mask: bool,
 }
 
 impl Moments {
@@ -31,13 +31,12 @@ impl Moments {
         std::array::from_fn(|k| if N == 3 { linear[k] } else { quadratic[k] })
     }
 
-    /// Adds moments over a cell, in the cell's own coordinates `(x, y)`, of a face whose point `(s, t)` they are at the
-    /// cell's corners.
+    /// Adds moments over a cell, given in the cell's own coordinates `(x, y)`. The corners are in the face's coordinates `(s, t)`.
     pub fn add_cell(&mut self, [a, b, c]: [Coordinates; 3], own: [f64; 6]) {
         if own[0] <= 0.0 {
             return;
         }
-        self.covered = true;
+        self.overlaps_mask = true;
         let [one, x, y, xx, xy, yy] = own;
         let ([s, t], [sx, tx], [sy, ty]) = (a, [b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
         let parts = [

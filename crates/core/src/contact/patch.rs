@@ -22,7 +22,7 @@ use crate::{Error, Result};
 /// Most nodes a patch of the servo may have: its 3x3 compliance costs the square of it, once a contact.
 pub const MAX_PATCH_NODES: usize = 256;
 
-/// The nodes under a contact and their shares.
+/// The nodes under a contact and their weights.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// How many of the arrays' entries are in use.
@@ -168,8 +168,8 @@ fn weights_on<F: Face<N>, const N: usize>(
 }
 
 impl PatchGeometry {
-    /// Refuses a contact radius under which some contact would cover more nodes than a tick can weigh. Contacts lie where
-    /// `green` may be touched; a radius within one that passed before passes at once.
+    /// Rejects a contact radius under which some contact would have more nodes than a patch may have. Contacts lie where `green` is
+    /// touchable. A radius below one that has passed before passes at once.
     ///
     /// # Errors
     /// The radius and the limit.
@@ -266,7 +266,7 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
             let face = &self.geometry.faces[t as usize / F::PARTS.len()];
             let (bulges, ends) = (&self.geometry.triangles[t as usize].bulges, self.surface.corners(t));
             let moments = self.geometry.integrate(t as usize, face, self.centre, self.radius);
-            if moments.covered {
+            if moments.overlaps_mask {
                 for (node, sum) in self.faces[t as usize / F::PARTS.len()].into_iter().zip(moments.of_shapes::<N>()) {
                     if scratch.touched_by[node as usize] != scratch.visit {
                         if scratch.touched.len() == MAX_PATCH_NODES {
@@ -292,7 +292,7 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
         true
     }
 
-    /// Whether an edge comes into the ball. A curved edge bulges from its chord by no more than its middle does.
+    /// Whether an edge intersects the ball. A curved edge bulges from its chord by no more than its middle does.
     fn reaches(&self, ends: [DVec3; 2], bulge: f64) -> bool {
         let reach = self.radius + bulge;
         squared_distance_to_segment(self.centre, ends[0], ends[1]) < reach * reach

@@ -1,8 +1,8 @@
 //! Quadrature of shape functions against the mask `phi = (1 - r^2/a^2)^2` over one drawn triangle of a face.
 //!
 //! The triangle is split until its cells' edges are below a fifth of the contact radius `a`; each cell takes the mid-edge
-//! rule, exact for quadratics. What is summed are the moments `int phi s^m t^n dA` over the face's coordinates, of which
-//! the shape functions' integrals are fixed combinations.
+//! rule, exact for quadratics. The sums are the moments `int phi s^m t^n dA` over the face's coordinates; the
+//! integrals of the shape functions are fixed combinations of them.
 //!
 //! On a flat face with straight edges all cells are alike, so their mid-edges form a lattice, and along a row of it `r^2`
 //! is a quadratic in the running index: the rows and the part of each that the ball of radius `a` covers are known
@@ -21,7 +21,8 @@ use crate::mesh::{Faces, Surface};
 /// Depths whose points are placed beforehand: those of triangles that are not much larger than a fifth of the radius, of which
 /// a contact covers many.
 const PLACED_DEPTHS: usize = 2;
-/// What depends on a drawn triangle alone.
+
+/// Data of a drawn triangle that do not depend on the contact.
 pub struct TriangleGeometry {
     /// In the coordinates of its face.
     pub(super) corners: [Coordinates; 3],
@@ -32,9 +33,9 @@ pub struct TriangleGeometry {
     /// Points of the lattices of the first depths.
     placed: [Vec<PlacedPoints>; PLACED_DEPTHS],
     centroid: DVec3,
-    /// No point of it is farther from the centroid, m.
+    /// Bound on the distance of its points from the centroid, m.
     reach: f64,
-    /// How far the middle of each edge lies off its chord, m.
+    /// Distance of the middle of each edge from its chord, m.
     pub(super) bulges: [f64; 3],
 }
 
@@ -89,7 +90,7 @@ impl PatchGeometry {
                 moments.add_cell(triangle.corners, own);
             }
             None if face.flat => {
-                Lattice::new(triangle.corners, triangle.ends, centre, radius, face.stretch).integrate(&mut moments);
+                Lattice::new(triangle.corners, triangle.ends, centre, radius, face.area_ratio).integrate(&mut moments);
             }
             None => Cell { corners: triangle.corners, ends: triangle.ends }.integrate(
                 face,

@@ -1,6 +1,6 @@
-//! Why no contact begins.
+//! Reasons why no contact begins.
 
-/// Why no contact begins at a place.
+/// Reason why no contact begins at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// A node under the contact lies outside the touch region; its rank among the surface nodes.
@@ -10,7 +10,7 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// One line for people.
+    /// Message of one line.
     pub fn message(self) -> &'static str {
         match self {
             Refusal::NotTouchable(_) => "the contact reaches outside the touch region",

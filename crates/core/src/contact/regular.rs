@@ -17,11 +17,11 @@
 //!
 //! and the tangential one `c_n (1 - nu/2) / (1 - nu)` by Cerruti's solution; normal and tangent do not couple.
 //!
-//! What is hidden below the surface no deeper than `b` is spread over soft tissue beside it. As an integral over a smooth
+//! An inclusion no deeper than `b` is spread over the soft tissue beside it. As an integral over a smooth
 //! field `C_reg` goes with the second moment of `phi`: `C_reg(b) = C_reg(0) + O(b^2)`. In a body of several materials it is
 //! extrapolated from two radii to that of a contact of half the tool's radius, and its change with the square of the contact
-//! radius is kept (`local::widening`). In a body of one material it changes only with the distance to edges
-//! and supports, and extrapolating would but enlarge the error of the elements.
+//! radius is stored (`local::widening`). In a body of one material it changes only with the distance to edges
+//! and supports, and extrapolating would only enlarge the error of the elements.
 
 use glam::DMat3;
 
@@ -37,7 +37,7 @@ use crate::tensor::{outer, symmetric};
 const HALF_SPACE: f64 = 0.766_544;
 /// `b` over the mean spacing of nodes around: at 2 the ripple of a sliding contact is 1 %, at 3 it is 0.03 %.
 const SPACINGS: f64 = 3.0;
-/// The least `b` over that spacing, where a patch is shortened because it would reach outside of what may be touched.
+/// The least `b` over that spacing, if a patch is reduced because it would reach outside the touch region.
 const LEAST_SPACINGS: f64 = 2.0;
 /// Contact radius that `C_reg` is extrapolated to, over the tool's radius.
 const CONTACT: f64 = 0.5;
@@ -45,23 +45,23 @@ const CONTACT: f64 = 0.5;
 const SAME_MOMENT: f64 = 1.6;
 /// Ratio of the two widths from which the regular part is extrapolated; and the least difference of their squares, over that
 /// of the first.
-const SECOND: f64 = 1.5;
+const SECOND_WIDTH: f64 = 1.5;
 const LEAST_APART: f64 = 0.4;
 /// How fast the regular part may fall and rise with the square of the contact radius, over `1 / (E* R^3)`: up to `a = R` the
 /// approach then grows with the force by at least half of what it does on the half-space (see [`super::local::Widening`]).
 const WIDENING_RANGE: [f64; 2] = [-0.11, 7.0];
-/// Where more nodes than a patch takes lie within `b`, it is shortened by this factor until they fit.
-const SHORTER: f64 = 0.9;
+/// Factor by which `b` is reduced until its nodes fit into a patch.
+const SHORTENING: f64 = 0.9;
 /// Stiffest regular part over `1 / (E* R)`: the local compliance of the largest contact, `1 / (2 E* R)`, outweighs it.
 const STIFFEST: f64 = 0.45;
-/// Radius of the patch by which a body in motion is met, over the tool's, at least: within a step a body may be as good as
-/// rigid, and what is left, the local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of
-/// the patch. The second is the half-space that the patch may have beyond the regular part.
-const WIDER: f64 = 1.6;
-const LEAST_WIDE: f64 = 1.55;
+/// Least radius of the patch on a body in motion, over the tool's. Within a step a body may be nearly rigid, and the remainder, the
+/// local law less the half-space of the patch, is monotonic for contact radii up to `1/1.53` of the patch. The second is the radius
+/// of the half-space by which the patch may be softer than the regular part.
+const LEAST_MOTION_WIDTH: f64 = 1.6;
+const LEAST_HALF_SPACE_WIDTH: f64 = 1.55;
 /// A patch on a body in motion is widened by steps of this factor, and by no more than that one.
-const WIDENED: f64 = 1.1;
-const WIDEST: f64 = 3.0;
+const WIDENING_STEP: f64 = 1.1;
+const MOST_WIDENING: f64 = 3.0;
 
 /// Elastic constants at the surface nodes.
 #[derive(Clone, Debug)]
@@ -87,8 +87,8 @@ impl Moduli {
     }
 }
 
-/// What a tool meets at a fan: mean and Gaussian curvature (1/m, 1/m^2), `E/(1 - nu^2)` (Pa) and `nu`, `C_reg` by
-/// `xx, xy, xz, yy, yz, zz` (m/N; zero where nothing can be touched), `b` (m), and how its normal part changes with the square
+/// Fields at a fan: mean and Gaussian curvature (1/m, 1/m^2), `E/(1 - nu^2)` (Pa) and `nu`, `C_reg` by
+/// `xx, xy, xz, yy, yz, zz` (m/N; zero where the body is not touchable), `b` (m), and how its normal part changes with the square
 /// of the contact radius (1/(N m)).
 pub type FanFields = [f64; FIELDS];
 /// Numbers of an entry.
@@ -103,18 +103,18 @@ pub const PLANE_STRAIN: usize = 2;
 pub const POISSON: usize = 3;
 /// Fields of `C_reg`.
 pub const COMPLIANCE: std::ops::Range<usize> = 4..10;
-/// Field of the radius of the patch by which the body is met: `b`, or more where it moves.
+/// Field of the radius of the patch: `b`, or more on a body in motion.
 pub const WIDTH: usize = 10;
 /// Field of the change with the square of the contact radius.
 pub const WIDENING: usize = 11;
 
-/// What a tool of one radius meets of a body.
+/// Regular compliance of a body for tools of one radius.
 pub struct RegularCompliance {
-    /// One entry a fan of the smooth surface.
+    /// One entry for each fan of the smooth surface.
     pub fields: Vec<FanFields>,
 }
 
-/// A body as its regular compliance needs it.
+/// Data of a body for its regular compliance.
 #[derive(Clone, Copy)]
 pub struct CompliantBody<'a> {
     /// Its compliance.
@@ -130,30 +130,30 @@ pub struct CompliantBody<'a> {
 }
 
 impl RegularCompliance {
-    /// For a tool of `radius`, m, on a device that holds contacts up to `max_stiffness`, N/m: near a support the patch's
+    /// For a tool of `radius`, m, on a device that renders up to `max_stiffness`, N/m: near a support the patch's
     /// compliance is raised evenly to what the device can render.
     pub fn new(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
         let count = body.smooth.fans().len();
         let block = |(scratch, patch): &mut (PatchScratch, Patch), fan: usize| {
             if body.smooth.touchable[fan] {
-                at_fan(body, &body.smooth.fans()[fan], radius, max_stiffness, scratch, patch)
+                fan_compliance(body, &body.smooth.fans()[fan], radius, max_stiffness, scratch, patch)
             } else {
-                AtFan::default()
+                FanCompliance::default()
             }
         };
         let memory = || (PatchScratch::new(&body.green.surface), Patch::default());
         #[cfg(feature = "offline")]
-        let found: Vec<_> = {
+        let fan_compliances: Vec<_> = {
             use rayon::prelude::*;
             (0..count).into_par_iter().map_init(memory, block).collect()
         };
         #[cfg(not(feature = "offline"))]
-        let found: Vec<_> = {
+        let fan_compliances: Vec<_> = {
             let mut memory = memory();
             (0..count).map(|fan| block(&mut memory, fan)).collect()
         };
-        let fields = found.into_iter().zip(body.smooth.fans()).map(|(at, fan)| {
-            let AtFan { regular: c, width, widening } = at;
+        let fields = fan_compliances.into_iter().zip(body.smooth.fans()).map(|(at, fan)| {
+            let FanCompliance { regular: c, width, widening } = at;
             let (modulus, poisson) = (body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
             let [x, y, z] = [c.x_axis, c.y_axis, c.z_axis];
             [fan.mean, fan.gauss, modulus, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, widening]
@@ -167,14 +167,14 @@ pub fn compliance_of(fields: &FanFields) -> DMat3 {
     symmetric(std::array::from_fn(|k| fields[COMPLIANCE.start + k]))
 }
 
-/// What is found at one fan.
-struct AtFan {
+/// Regular compliance at one fan, width of its patch, and its change with the square of the contact radius.
+struct FanCompliance {
     regular: DMat3,
     width: f64,
     widening: f64,
 }
 
-impl Default for AtFan {
+impl Default for FanCompliance {
     fn default() -> Self {
         Self { regular: DMat3::ZERO, width: 0.0, widening: 0.0 }
     }
@@ -184,45 +184,44 @@ impl Default for AtFan {
 struct Probe<'a> {
     body: CompliantBody<'a>,
     centre: SurfacePoint,
-    /// Radius down to which a patch may be shortened: such a one may be touched as a whole.
+    /// Radius down to which a patch may be reduced: all nodes of the smallest are touchable.
     least: f64,
     scratch: &'a mut PatchScratch,
     patch: &'a mut Patch,
 }
 
 impl Probe<'_> {
-    /// `W^T Psi W`, and the radius: `wide`, or less where a patch takes no more nodes, or reaches outside of what may be
-    /// touched.
-    fn whole(&mut self, mut wide: f64) -> (DMat3, f64) {
+    /// `W^T Psi W`, and the radius: `wide`, or less if the patch would have too many nodes or reach outside the touch region.
+    fn compliance(&mut self, mut wide: f64) -> (DMat3, f64) {
         let CompliantBody { green, geometry, .. } = self.body;
         while patch_weights(&green.surface, geometry, &self.centre, wide, self.scratch, self.patch)
             == Err(Refusal::TooManyNodes)
-            || (wide > self.least && !lies_inside(green, self.patch))
+            || (wide > self.least && !is_touchable(green, self.patch))
         {
-            wide *= SHORTER;
+            wide *= SHORTENING;
         }
         let mut touched = TouchPatch::default();
-        touched.admit_touchable(green, self.patch);
+        touched.set_touchable_part(green, self.patch);
         (touched.own_compliance(green), wide)
     }
 }
 
-fn at_fan(
+fn fan_compliance(
     body: CompliantBody<'_>,
     fan: &Fan,
     radius: f64,
     max_stiffness: f64,
     scratch: &mut PatchScratch,
     patch: &mut Patch,
-) -> AtFan {
+) -> FanCompliance {
     let spacing = body.smooth.spacing_around(fan);
     let least = LEAST_SPACINGS * spacing;
     let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), least, scratch, patch };
-    let (whole, width) = probe.whole((SPACINGS * spacing).max((SAME_MOMENT * reference_area(radius)).sqrt()));
-    let (mut regular, mut widening) = (whole - half_space(body.moduli, fan, width), 0.0);
+    let (compliance, width) = probe.compliance((SPACINGS * spacing).max((SAME_MOMENT * reference_area(radius)).sqrt()));
+    let (mut regular, mut widening) = (compliance - half_space(body.moduli, fan, width), 0.0);
     let unit = 1.0 / (body.moduli.plane_strain(fan.node) * radius);
     if !body.moduli.homogeneous {
-        let (other, wider) = probe.whole(SECOND * width);
+        let (other, wider) = probe.compliance(SECOND_WIDTH * width);
         let apart = wider * wider - width * width;
         if apart > LEAST_APART * width * width {
             let rate = (other - half_space(body.moduli, fan, wider) - regular) * (1.0 / apart);
@@ -231,14 +230,14 @@ fn at_fan(
             widening = (SAME_MOMENT * fan.normal.dot(rate * fan.normal)).clamp(least, most);
         }
     }
-    let rendered = (1.0 / max_stiffness - smallest_eigenvalue(&whole)).max(0.0);
+    let rendered = (1.0 / max_stiffness - smallest_eigenvalue(&compliance)).max(0.0);
     regular += DMat3::IDENTITY * rendered;
     regular += DMat3::IDENTITY * (-STIFFEST * unit - smallest_eigenvalue(&regular)).max(0.0);
     let (regular, width) = match body.moves {
-        true => met_in_motion(&mut probe, fan, (regular, width), radius),
+        true => widen_for_motion(&mut probe, fan, (regular, width), radius),
         false => (regular, width),
     };
-    AtFan { regular, width, widening }
+    FanCompliance { regular, width, widening }
 }
 
 /// Square of the contact radius that `C_reg` belongs to, m^2, for a tool of `radius`, m.
@@ -246,33 +245,32 @@ pub fn reference_area(radius: f64) -> f64 {
     (CONTACT * radius).powi(2)
 }
 
-/// Widens the patch until it has no more than `regular` and a half-space met over the least radius; where it cannot be
-/// widened, raises `regular` evenly.
-fn met_in_motion(probe: &mut Probe<'_>, fan: &Fan, (regular, wide): (DMat3, f64), radius: f64) -> (DMat3, f64) {
-    let first = wide.max(WIDER * radius);
-    let least = half_space(probe.body.moduli, fan, LEAST_WIDE * radius);
+/// Widens the patch until it is no softer than `regular` plus a half-space of the least radius. If it cannot be widened, raises
+/// `regular` evenly.
+fn widen_for_motion(probe: &mut Probe<'_>, fan: &Fan, (regular, wide): (DMat3, f64), radius: f64) -> (DMat3, f64) {
+    let first = wide.max(LEAST_MOTION_WIDTH * radius);
+    let least = half_space(probe.body.moduli, fan, LEAST_HALF_SPACE_WIDTH * radius);
     let mut wide = first;
     loop {
-        let (whole, found) = probe.whole(wide);
-        let missing = -smallest_eigenvalue(&(regular - whole + least));
+        let (compliance, width) = probe.compliance(wide);
+        let missing = -smallest_eigenvalue(&(regular - compliance + least));
         if missing <= 0.0 {
-            return (regular, found);
+            return (regular, width);
         }
-        if found < wide || wide > WIDEST * first {
-            return (regular + DMat3::IDENTITY * missing, found);
+        if width < wide || wide > MOST_WIDENING * first {
+            return (regular + DMat3::IDENTITY * missing, width);
         }
-        wide *= WIDENED;
+        wide *= WIDENING_STEP;
     }
 }
 
-/// Whether all nodes of a patch may be touched.
-fn lies_inside(green: &GreensFunction, patch: &Patch) -> bool {
+/// Whether all nodes of a patch are touchable.
+fn is_touchable(green: &GreensFunction, patch: &Patch) -> bool {
     patch.iter().all(|(node, _)| green.touchable(node).is_some())
 }
 
-/// The fans at which the regular compliance is known: the nodes around them, as far as the least patch reaches, may all be
-/// touched. What is left of a patch that is cut off by the end of the touch region is smaller and beside its middle: its
-/// compliance is not that of the patch.
+/// The fans at which the regular compliance is known: all nodes of the least patch around them are touchable. A patch cut off at
+/// the border of the touch region is smaller and off its middle: its compliance would be wrong.
 pub fn known_fans(green: &GreensFunction, geometry: &PatchGeometry, smooth: &SmoothSurface) -> Vec<bool> {
     if green.touch.len() == green.surface_count() {
         return vec![true; smooth.fans().len()];
@@ -284,9 +282,9 @@ pub fn known_fans(green: &GreensFunction, geometry: &PatchGeometry, smooth: &Smo
         }
         let (centre, mut wide) = (centre_of(&green.surface, fan), LEAST_SPACINGS * smooth.spacing_around(fan));
         while patch_weights(&green.surface, geometry, &centre, wide, &mut scratch, &mut patch).is_err() {
-            wide *= SHORTER;
+            wide *= SHORTENING;
         }
-        lies_inside(green, &patch)
+        is_touchable(green, &patch)
     };
     smooth.fans().iter().map(&mut known).collect()
 }

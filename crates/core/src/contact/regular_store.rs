@@ -1,4 +1,4 @@
-//! The regular compliance in a file beside the body's store: safetensors, found by content key, replaced only by rename.
+//! Files of the regular compliance beside the body's store: safetensors, found by content key, replaced only by rename.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,21 +7,20 @@ use super::regular::{CompliantBody, FIELDS, RegularCompliance};
 use crate::Result;
 use crate::arrays_file::ArraysKind;
 
-/// Version of what is computed and of the file's layout; part of the key.
+/// Version of the computation and of the file's layout; part of the key.
 const VERSION: u32 = 6;
 const KIND: ArraysKind = ArraysKind { format: "palpate-contact", name: "file of contacts", version: VERSION };
-/// Ending of the files, behind the beginning of the key.
+/// Suffix of the files, after the beginning of the key.
 const ENDING: &str = "contact.palpate";
 /// Digits of the key in the name of a file.
 const DIGITS: usize = 16;
-/// Files that are kept beside a store: each radius and elastic constant that is tried makes one.
-const MOST_KEPT: usize = 16;
+/// Most files beside a store: each radius and elastic constant has one.
+const MAX_FILES: usize = 16;
 
 impl RegularCompliance {
-    /// Takes what stands beside the store of the body, for a tool of `radius`, m, on a device up to `max_stiffness`, N/m;
-    /// otherwise computes it and keeps it there. A file that is damaged is computed again. Where none can be written,
-    /// nothing is kept: the answer is the same.
-    pub fn kept(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
+    /// Reads the file beside the store of the body, for a tool of `radius`, m, on a device up to `max_stiffness`, N/m. Computes and
+    /// writes it if it is missing or damaged. The result is the same if it cannot be written.
+    pub fn load_or_compute(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> Self {
         let Some(store) = &body.green.path else { return Self::new(body, radius, max_stiffness) };
         let key = key(body, radius, max_stiffness);
         let path = store.with_extension(format!("{}.{ENDING}", &key[..DIGITS]));
@@ -36,26 +35,26 @@ impl RegularCompliance {
     }
 }
 
-/// Removes all that is kept beside a store.
-pub fn forget_kept(store: &Path) {
+/// Removes all such files of a store.
+pub fn remove_compliance_files(store: &Path) {
     files_of(store).into_iter().for_each(remove);
 }
 
-/// Removes what was written first, as long as there is too much.
+/// Removes the oldest files beyond the limit.
 fn remove_oldest(store: &Path) {
     let mut files = files_of(store);
     let written = |file: &PathBuf| fs::metadata(file).and_then(|metadata| metadata.modified()).ok();
     files.sort_by_cached_key(written);
-    files.truncate(files.len().saturating_sub(MOST_KEPT));
+    files.truncate(files.len().saturating_sub(MAX_FILES));
     files.into_iter().for_each(remove);
 }
 
-/// Another process may have removed it before.
+/// Removes a file; another process may have removed it already.
 fn remove(file: PathBuf) {
     drop(fs::remove_file(file));
 }
 
-/// Files beside a store that are its own: those of `organ.left.palpate` begin as those of `organ.palpate` do.
+/// Files that belong to a store. The files of `organ.left.palpate` begin like those of `organ.palpate`.
 fn files_of(store: &Path) -> Vec<PathBuf> {
     let folder = store.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let stem = store.file_stem().unwrap_or_default().to_string_lossy();
@@ -88,7 +87,7 @@ fn save(computed: &RegularCompliance, path: &Path, key: &str) -> Result<()> {
     KIND.write(path, &[("key", key)], &[("fields", shape, computed.fields.as_flattened())])
 }
 
-/// None for a file that is not there, of another key, damaged, or of another surface.
+/// None for a file that is missing, damaged, or of another key or surface.
 fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
     let mut file = KIND.read(path).ok()?;
     let (shape, numbers) = file.take("fields").ok()?;
@@ -106,7 +105,7 @@ mod tests {
         fs::create_dir_all(&folder).expect("a writable folder");
         let key = |k: usize| format!("{k:016x}");
         let of = |stem: &str, k: usize| folder.join(format!("{stem}.{}.contact.palpate", key(k)));
-        for k in 0..MOST_KEPT + 3 {
+        for k in 0..MAX_FILES + 3 {
             fs::write(of("organ", k), b"").expect("a writable folder");
             fs::write(of("organ.left", k), b"").expect("a writable folder");
             // The clock of a file system may be coarse.
@@ -114,11 +113,11 @@ mod tests {
         }
         let store = folder.join("organ.palpate");
         remove_oldest(&store);
-        let left: Vec<bool> = (0..MOST_KEPT + 3).map(|k| of("organ", k).exists()).collect();
-        assert_eq!(left, (0..MOST_KEPT + 3).map(|k| k >= 3).collect::<Vec<_>>());
-        forget_kept(&store);
+        let left: Vec<bool> = (0..MAX_FILES + 3).map(|k| of("organ", k).exists()).collect();
+        assert_eq!(left, (0..MAX_FILES + 3).map(|k| k >= 3).collect::<Vec<_>>());
+        remove_compliance_files(&store);
         assert!(files_of(&store).is_empty());
-        assert_eq!(files_of(&folder.join("organ.left.palpate")).len(), MOST_KEPT + 3);
+        assert_eq!(files_of(&folder.join("organ.left.palpate")).len(), MAX_FILES + 3);
         fs::remove_dir_all(&folder).expect("the folder");
     }
 }

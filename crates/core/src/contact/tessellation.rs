@@ -1,4 +1,4 @@
-//! The smooth surface as small flat pieces: what tools that are no spheres are pressed on.
+//! Tessellation of the smooth surface into small flat pieces, for tools that are not spheres.
 //!
 //! Each drawn triangle is divided into `n^2` pieces whose vertices lie on the smooth surface. Nodes and edges of creases stay
 //! where they are drawn, so that pieces of two sides meet without a gap. Heights over a plane are then known everywhere, over
@@ -13,8 +13,10 @@ use crate::mesh::Surface;
 
 /// Most divisions of an edge.
 const MOST_DIVISIONS: usize = 6;
-/// A vertex that would move farther than this from the drawn surface, over the edge of its triangle, stays on it.
+/// Largest distance of a vertex from the drawn surface, over the edge of its triangle; a farther one stays on it.
 const FARTHEST: f64 = 0.3;
+/// Three edges bent alike raise a piece's middle by a third of the bend, each edge itself by a quarter.
+const EDGE_TO_MIDDLE: f64 = 4.0 / 3.0;
 
 /// A surface in pieces.
 pub struct Tessellation {
@@ -27,14 +29,16 @@ pub struct Tessellation {
     normals: Vec<DVec3>,
     /// Ranks of the corners of each piece among the vertices of its triangle.
     corners: Vec<[u8; 3]>,
-    /// Where the middle of each piece lies in its triangle.
+    /// Barycentric coordinates of each piece's middle in its triangle.
     barycentric: Vec<[f64; 3]>,
     /// The piece across each edge of a piece, for all triangles; `u32::MAX` where there is none.
     across: Vec<[u32; 3]>,
-    /// Which of these edges lie on a crease.
+    /// Whether each of these edges lies on a crease.
     creases: Vec<[bool; 3]>,
     /// A ball around each triangle's vertices.
     balls: Vec<(DVec3, f64)>,
+    /// The largest of all [`Self::bulges`], m.
+    largest_bulge: f64,
 }
 
 impl Tessellation {
@@ -62,7 +66,7 @@ impl Tessellation {
             let centre = vertices.iter().map(|v| v.0).sum::<DVec3>() / vertices.len() as f64;
             (centre, vertices.iter().map(|v| v.0.distance(centre)).fold(0.0, f64::max))
         };
-        Self {
+        let pieces = Self {
             divisions,
             edge: mean / divisions as f64,
             balls: vertices.iter().map(ball).collect(),
@@ -72,7 +76,30 @@ impl Tessellation {
             barycentric: lattice.middles(),
             across: lattice.across(surface),
             creases: lattice.creases(surface.triangles.len(), smooth),
-        }
+            largest_bulge: 0.0,
+        };
+        let count = (surface.triangles.len() * pieces.pieces_of_triangle()) as u32;
+        let largest_bulge = (0..count).flat_map(|piece| pieces.bulges(piece)).fold(0.0, f64::max);
+        Self { largest_bulge, ..pieces }
+    }
+
+    /// The highest points of a piece, m, that may be higher than its corners: for each edge the place and how far the surface lies
+    /// over it along a direction of unit length. No point of the piece is higher than the highest of them: for equal corners and
+    /// bends `b` that is `b/3`, in its middle.
+    pub fn highest_points(&self, piece: u32, corners: [DVec3; 3], direction: DVec3) -> [(DVec3, f64); 3] {
+        let bulges = self.bulges(piece);
+        std::array::from_fn(|k| {
+            let (from, to) = (corners[k], corners[(k + 1) % 3]);
+            let (rise, bend) = ((to - from).dot(direction), EDGE_TO_MIDDLE * bulges[k]);
+            let part =
+                if bend > 0.0 { (0.5 + 0.5 * rise / bend).clamp(0.0, 1.0) } else { f64::from(u8::from(rise > 0.0)) };
+            (from.lerp(to, part), part * (1.0 - part) * bend.max(0.0))
+        })
+    }
+
+    /// Largest height of a piece over its corners, m.
+    pub fn most_over_corners(&self) -> f64 {
+        0.25 * EDGE_TO_MIDDLE * self.largest_bulge
     }
 
     /// Pieces of a triangle.
@@ -99,7 +126,7 @@ impl Tessellation {
 
     /// For each edge `(k, k + 1)` of a piece how much the surface bulges over it, four times over its middle, m: with the normals
     /// at its ends `(n_1 - n_0).(x_1 - x_0) / 2`.
-    pub fn bends(&self, piece: u32) -> [f64; 3] {
+    pub fn bulges(&self, piece: u32) -> [f64; 3] {
         let ranks = self.ranks(piece);
         std::array::from_fn(|k| {
             let (from, to) = (ranks[k], ranks[(k + 1) % 3]);

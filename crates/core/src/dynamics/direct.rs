@@ -29,7 +29,7 @@ pub enum Solver {
     Inverse,
 }
 
-enum Solved {
+enum StepSolver {
     Factor(Box<Factor>),
     Inverse(Vec<f64>),
 }
@@ -41,7 +41,7 @@ pub struct Direct {
     supports: Supports,
     scheme: Newmark,
     rayleigh: Rayleigh,
-    solved: Solved,
+    solved: StepSolver,
 }
 
 /// Where the motion is; all dofs, those of supports zero.
@@ -89,8 +89,8 @@ impl Direct {
         let of_stiffness = delta * dt * rayleigh.stiffness + alpha * dt * dt;
         let factor = Factor::new(&combination(&mass, of_mass, &stiffness, of_stiffness)?, &supports, Par::rayon(0))?;
         let solved = match solver {
-            Solver::Factor => Solved::Factor(Box::new(factor)),
-            Solver::Inverse => Solved::Inverse(inverse(&factor)),
+            Solver::Factor => StepSolver::Factor(Box::new(factor)),
+            Solver::Inverse => StepSolver::Inverse(inverse(&factor)),
         };
         Ok(Self { stiffness, mass, supports, scheme, rayleigh, solved })
     }
@@ -138,8 +138,8 @@ impl Direct {
     pub fn scratch(&self) -> DirectScratch {
         let (n, free) = (self.stiffness.dimension, self.supports.free.len());
         let memory = match &self.solved {
-            Solved::Factor(factor) => factor.solve_scratch(1),
-            Solved::Inverse(_) => MemBuffer::new(faer::dyn_stack::StackReq::EMPTY),
+            StepSolver::Factor(factor) => factor.solve_scratch(1),
+            StepSolver::Inverse(_) => MemBuffer::new(faer::dyn_stack::StackReq::EMPTY),
         };
         DirectScratch {
             mean_velocity: vec![0.0; n],
@@ -212,11 +212,11 @@ impl Direct {
     fn solve(&self, scratch: &mut DirectScratch) {
         let n = scratch.solution.len();
         match &self.solved {
-            Solved::Factor(factor) => {
+            StepSolver::Factor(factor) => {
                 let right = MatMut::from_column_major_slice_mut(&mut scratch.solution, n, 1);
                 factor.solve_in_place(right, &mut scratch.memory);
             }
-            Solved::Inverse(inverse) => {
+            StepSolver::Inverse(inverse) => {
                 scratch.right[..n].copy_from_slice(&scratch.solution);
                 scratch.solution.fill(0.0);
                 for (column, &r) in inverse.chunks_exact(n).zip(&scratch.right) {

@@ -1,4 +1,4 @@
-//! Where the energy of a motion is, and what went in and out.
+//! Energies of a motion: kinetic, strain, dissipated, and work done.
 
 /// Energies, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! Which step the modes take, and how forces act between its ends.
+//! Time integration of the modes: the scheme, and how forces vary within a step.
 
 use super::exponential::{exact_step, held_step};
 use super::scheme::{ModeStep, Newmark};

@@ -1,4 +1,4 @@
-//! How far the entries of a store are from those of its body, and what that does to a touch.
+//! Errors of the stored entries, and the errors of contact forces that follow from them.
 //!
 //! Write `s_i^2` for the compliance `Psi_ii` of a free dof and the stiffness `K_ii` of a supported one; then
 //! `|Psi_ij| <= s_i s_j` (see `precompute::scales`), and `s_i` is stored for every row. An entry has two errors, which

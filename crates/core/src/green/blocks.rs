@@ -6,8 +6,8 @@
 use glam::{DMat3, DVec3};
 
 use super::entries::Entries;
+use super::node_order::TouchNode;
 use super::numbers::{Gather, Kernel, Stored, WeightedRow, column_sums};
-use super::places::TouchNode;
 
 /// Nodes whose weighted rows are prepared at a time, on the stack.
 const TILE: usize = 64;
@@ -45,7 +45,7 @@ impl Entries {
     ) -> DMat3 {
         let mut sum = DMat3::ZERO;
         for (&node, &weight) in nodes.iter().zip(node_weights).filter(|(node, _)| !self.is_resident(**node as usize)) {
-            let place = self.places.place(node as usize);
+            let place = self.node_order.place(node as usize);
             let [x, y, z, _] = self.free[place];
             for (column, &other) in columns.iter().zip(column_weights) {
                 let factors = self.free[column.place()];
@@ -60,7 +60,7 @@ impl Entries {
 
     /// The entries between nodes; see [`super::GreensFunction::block`].
     pub fn block(&self, rows: &[u32], columns: &[TouchNode], out: &mut [f64]) {
-        let places: Vec<usize> = rows.iter().map(|&node| 3 * self.places.place(node as usize)).collect();
+        let places: Vec<usize> = rows.iter().map(|&node| 3 * self.node_order.place(node as usize)).collect();
         let columns: Vec<usize> = columns.iter().flat_map(|c| (0..3).map(|axis| 3 * c.place() + axis)).collect();
         let starts: Vec<usize> = columns.iter().map(|column| column * self.resident).collect();
         // Rows that are not in memory: first the column's head, which is, in their place.
@@ -155,7 +155,7 @@ impl Kernel for Weighted<'_> {
         for (nodes, weights) in self.nodes.chunks(TILE).zip(self.node_weights.chunks(TILE)) {
             let mut count = 0;
             for (&node, &weight) in nodes.iter().zip(weights) {
-                let place = self.entries.places.place(node as usize);
+                let place = self.entries.node_order.place(node as usize);
                 if 3 * place < self.entries.resident {
                     rows[count] = self.entries.weighted_row(place, weight);
                     count += 1;

@@ -27,14 +27,14 @@ pub fn sums_while_reading(file: &File, at: u64, bytes: &mut [u8]) -> Result<Vec<
 
 /// The first bytes of every column.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Heads {
+pub struct ColumnHeads {
     /// Bytes of a column.
     pub column: usize,
     /// Bytes of its head.
     pub head: usize,
 }
 
-impl Heads {
+impl ColumnHeads {
     /// Bytes of heads before byte `at` of the columns.
     fn before(&self, at: usize) -> usize {
         if self.head == 0 { 0 } else { at / self.column * self.head + (at % self.column).min(self.head) }
@@ -62,11 +62,11 @@ impl Heads {
 ///
 /// # Errors
 /// The operating system's.
-pub fn sums_in_passing(
+pub fn sums_keeping_heads(
     file: &File,
     at: u64,
     length: usize,
-    heads: &Heads,
+    heads: &ColumnHeads,
     mut kept: &mut [u8],
 ) -> Result<Vec<[u8; SUM]>> {
     let mut pieces = Vec::with_capacity(block_count(length));
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn heads_across_blocks_are_those_of_the_columns() {
-        let heads = Heads { column: 7, head: 3 };
+        let heads = ColumnHeads { column: 7, head: 3 };
         let bytes: Vec<u8> = (0..70).collect();
         let expected: Vec<u8> = bytes.chunks(7).flat_map(|column| &column[..3]).copied().collect();
         for block in [1, 2, 5, 9, 64, 70] {

@@ -1,6 +1,6 @@
-//! The stored numbers of `Psi`, and the only ways to read them.
+//! Entries of `Psi` in memory or in the file, and the functions that read them.
 //!
-//! Rows and columns lie in the order of [`Places`]; numbers are `f32`, `f64`, or 16-bit integers `q` with
+//! Rows and columns lie in the order of [`NodeOrder`]; numbers are `f32`, `f64`, or 16-bit integers `q` with
 //! `Psi_ij = s_i s_j q_ij` and one scale a dof. Nobody outside sees either: every question names nodes, dispatches once
 //! on the format, and is answered in f64.
 //!
@@ -14,8 +14,8 @@ use glam::DVec3;
 use pulp::Arch;
 
 use super::columns_file::ColumnsFile;
+use super::node_order::{NodeOrder, TouchNode};
 use super::numbers::{AddColumns, COLUMNS_AT_ONCE, Numbers, One};
-use super::places::{Places, TouchNode};
 use super::precision::Precision;
 use crate::Result;
 use crate::memory::Ranges;
@@ -32,7 +32,7 @@ pub fn scales(precision: Precision, magnitude: &[f64]) -> Vec<f64> {
 /// The numbers of a Green's function.
 pub struct Entries {
     pub(super) arch: Arch,
-    pub(super) places: Places,
+    pub(super) node_order: NodeOrder,
     /// Numbers of a column.
     rows: usize,
     /// Numbers of a column that are in memory: all, or those of the touchable nodes.
@@ -55,14 +55,14 @@ impl Entries {
         ranges.add(&self.magnitude);
         ranges.add(&self.scale);
         ranges.add(&self.free);
-        ranges.add(self.places.nodes());
+        ranges.add(self.node_order.nodes());
     }
 
     /// Numbers of columns of which the first rows, as many as fit, are in memory, and all in `file` if there is one.
     ///
     /// `magnitude` is by stored row; `row_is_fixed` is in the user's order.
     pub(super) fn new(
-        places: Places,
+        node_order: NodeOrder,
         row_is_fixed: &[bool],
         magnitude: Vec<f64>,
         numbers: Numbers,
@@ -70,15 +70,15 @@ impl Entries {
     ) -> Self {
         let scale = scales(numbers.precision(), &magnitude);
         let free = |place: usize| {
-            let node = places.nodes()[place] as usize;
+            let node = node_order.nodes()[place] as usize;
             let of_axis = |axis| scale.get(3 * place + axis).copied().unwrap_or(1.0);
             let dof = |axis| if axis == 3 || row_is_fixed[3 * node + axis] { 0.0 } else { of_axis(axis) };
             std::array::from_fn(dof)
         };
         let rows = row_is_fixed.len();
-        let resident = if file.is_some() { 3 * places.touchable_count() } else { rows };
-        let free = (0..places.nodes().len()).map(free).collect();
-        Self { arch: Arch::new(), rows, resident, numbers, magnitude, scale, free, file, places }
+        let resident = if file.is_some() { 3 * node_order.touchable_count() } else { rows };
+        let free = (0..node_order.nodes().len()).map(free).collect();
+        Self { arch: Arch::new(), rows, resident, numbers, magnitude, scale, free, file, node_order }
     }
 
     /// Number format.
@@ -87,8 +87,8 @@ impl Entries {
     }
 
     /// Where the nodes are.
-    pub(super) fn places(&self) -> &Places {
-        &self.places
+    pub(super) fn node_order(&self) -> &NodeOrder {
+        &self.node_order
     }
 
     /// Bounds of the stored rows.
@@ -98,14 +98,14 @@ impl Entries {
 
     /// Bound `s_i` of a row in the user's order.
     pub fn magnitude(&self, row: usize) -> f64 {
-        self.magnitude.get(self.places.stored_row(row)).copied().unwrap_or(0.0)
+        self.magnitude.get(self.node_order.stored_row(row)).copied().unwrap_or(0.0)
     }
 
     /// Hands the bytes of all columns to `put`, as first column and bytes.
     pub(super) fn each_bytes(&self, put: &mut dyn FnMut(usize, &[u8]) -> Result<()>) -> Result<()> {
         let Some(file) = &self.file else { return put(0, self.numbers.bytes()) };
         let mut column = vec![0; self.rows * self.precision().bytes()];
-        for index in 0..3 * self.places.touchable_count() {
+        for index in 0..3 * self.node_order.touchable_count() {
             file.read(index, 0, &mut column)?;
             put(index, &column)?;
         }
@@ -127,12 +127,12 @@ impl Entries {
 
     /// Whether the rows of a surface node are in memory.
     pub fn is_resident(&self, node: usize) -> bool {
-        3 * self.places.place(node) < self.resident
+        3 * self.node_order.place(node) < self.resident
     }
 
     /// Entry of a row and a column in the user's order.
     pub fn entry(&self, row: usize, column: TouchNode, axis: usize) -> f64 {
-        let (row, column) = (self.places.stored_row(row), 3 * column.place() + axis);
+        let (row, column) = (self.node_order.stored_row(row), 3 * column.place() + axis);
         let value = if row < self.resident {
             self.numbers.run(self.arch, One(column * self.resident + row))
         } else {
@@ -148,7 +148,7 @@ impl Entries {
         let mut sums = vec![0.0; self.rows];
         self.add_columns(&[(column, factor * self.scale_of(column))], &mut sums);
         let (surface, inside) = sums.split_at(3 * self.free.len());
-        for (place, (&node, sums)) in self.places.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
+        for (place, (&node, sums)) in self.node_order.nodes().iter().zip(surface.chunks_exact(3)).enumerate() {
             for (axis, sum) in sums.iter().enumerate() {
                 out[3 * node as usize + axis] += self.scale_of(3 * place + axis) * sum;
             }
@@ -168,7 +168,7 @@ impl Entries {
         let columns: Vec<(usize, f64)> = forces.iter().flat_map(of_node).filter(|&(_, factor)| factor != 0.0).collect();
         let mut sums = vec![0.0; 3 * self.free.len()];
         self.add_columns(&columns, &mut sums);
-        for (place, (&node, sums)) in self.places.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
+        for (place, (&node, sums)) in self.node_order.nodes().iter().zip(sums.chunks_exact(3)).enumerate() {
             for axis in 0..3 {
                 out[3 * node as usize + axis] += self.free[place][axis] * sums[axis];
             }

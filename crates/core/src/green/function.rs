@@ -1,4 +1,4 @@
-//! The precomputed operator `Psi` of a body, and what is asked of it.
+//! The precomputed operator `Psi` of a body, and queries on it.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::accuracy::Accuracy;
 use super::entries::Entries;
-use super::places::TouchNode;
+use super::node_order::TouchNode;
 use super::precision::Precision;
 use crate::Result;
 use crate::memory::Ranges;
@@ -76,7 +76,7 @@ impl GreensFunction {
 
     /// The columns of surface node `node`; `None` if it may not be touched.
     pub fn touchable(&self, node: usize) -> Option<TouchNode> {
-        self.entries.places().touchable(node)
+        self.entries.node_order().touchable(node)
     }
 
     /// Whether the rows of surface node `node` are in memory, so that a tick may ask for them; those of touchable nodes are.
@@ -163,6 +163,6 @@ impl GreensFunction {
     }
 
     fn node_of_column(&self, column: usize) -> TouchNode {
-        self.entries.places().touch_node(self.touch[column / 3])
+        self.entries.node_order().touch_node(self.touch[column / 3])
     }
 }

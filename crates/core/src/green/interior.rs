@@ -1,4 +1,4 @@
-//! Displacements inside the body from those of its surface, for whoever wants to see or measure there.
+//! Displacements inside the body from those of its surface, for drawing and for strain and stress.
 //!
 //! The equilibrium of the inner dofs `I` given the surface dofs `S` and the reference loads is `K_II u_I = F_I - K_IS u_S`:
 //! the finite element solution itself, for any contact and any supports on the surface. It costs one sparse solve with

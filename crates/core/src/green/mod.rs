@@ -20,8 +20,8 @@ mod function;
 #[cfg(feature = "offline")]
 mod interior;
 mod key;
+mod node_order;
 mod numbers;
-mod places;
 mod precision;
 #[cfg(feature = "offline")]
 mod precompute;
@@ -32,10 +32,10 @@ pub use function::GreensFunction;
 #[cfg(feature = "offline")]
 pub use interior::Interior;
 pub use key::FORMAT_VERSION;
-pub use places::TouchNode;
+pub use node_order::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]
 pub use precompute::{
-    Claim, ColumnStore, Columns, Found, Growth, Listener, Measurement, Parts, Phase, Plan, Problem, Progress, Target,
-    Wanted, Working, checksum, plan, precompute, precompute_to, products,
+    AssembledProblem, Claim, ColumnStore, Columns, Growth, Measurement, Phase, PhaseCallback, Plan, PreviousWork,
+    Problem, Progress, RequestedPrecision, Target, TaskMemory, checksum, plan, precompute, precompute_to, products,
 };

@@ -54,9 +54,9 @@ pub trait Kernel {
     fn run<T: Stored>(self, numbers: &[T]) -> Self::Output;
 }
 
-struct Dispatched<'a, K, T>(K, &'a [T]);
+struct KernelCall<'a, K, T>(K, &'a [T]);
 
-impl<K: Kernel, T: Stored> NullaryFnOnce for Dispatched<'_, K, T> {
+impl<K: Kernel, T: Stored> NullaryFnOnce for KernelCall<'_, K, T> {
     type Output = K::Output;
     #[inline(always)]
     fn call(self) -> K::Output {
@@ -132,9 +132,9 @@ impl Numbers {
     /// Runs a loop over them, padding included.
     pub fn run<K: Kernel>(&self, arch: Arch, kernel: K) -> K::Output {
         match self {
-            Numbers::F16(v) => arch.dispatch(Dispatched(kernel, v)),
-            Numbers::F32(v) => arch.dispatch(Dispatched(kernel, v)),
-            Numbers::F64(v) => arch.dispatch(Dispatched(kernel, v)),
+            Numbers::F16(v) => arch.dispatch(KernelCall(kernel, v)),
+            Numbers::F32(v) => arch.dispatch(KernelCall(kernel, v)),
+            Numbers::F64(v) => arch.dispatch(KernelCall(kernel, v)),
         }
     }
 }

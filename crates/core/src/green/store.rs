@@ -18,13 +18,13 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 
 use super::accuracy::Accuracy;
-use super::checksums::{Heads, SUM, block_count, sums_in_passing, sums_while_reading};
+use super::checksums::{ColumnHeads, SUM, block_count, sums_keeping_heads, sums_while_reading};
 use super::columns_file::ColumnsFile;
 use super::entries::Entries;
 use super::function::GreensFunction;
 use super::key::FORMAT_VERSION;
+use super::node_order::NodeOrder;
 use super::numbers::Numbers;
-use super::places::Places;
 use super::precision::Precision;
 use super::store_writer::small_checksum;
 use crate::header::{HEADER_BYTES, is_sealed};
@@ -171,9 +171,9 @@ impl<'a> Reader<'a> {
         let row_is_fixed: Vec<bool> = row_is_fixed.into_iter().map(|b| b != 0).collect();
         let surface_nodes: Vec<u32> = self.numbers("surface_nodes")?;
         let touch: Vec<u32> = self.numbers("touch")?;
-        let places = Places::from_nodes(self.numbers("stored_nodes")?, &touch);
-        let places = places.filter(|places| places.nodes().len() == surface_nodes.len());
-        let places = places.ok_or_else(|| self.damaged("the order of the nodes"))?;
+        let node_order = NodeOrder::from_nodes(self.numbers("stored_nodes")?, &touch);
+        let node_order = node_order.filter(|node_order| node_order.nodes().len() == surface_nodes.len());
+        let node_order = node_order.ok_or_else(|| self.damaged("the order of the nodes"))?;
         if row_is_fixed.len() < 3 * surface_nodes.len() {
             return Err(self.damaged("rows are missing"));
         }
@@ -184,7 +184,7 @@ impl<'a> Reader<'a> {
         }
         let accuracy = Accuracy::from_slice(&self.numbers::<f64>("accuracy")?);
         let accuracy = accuracy.ok_or_else(|| self.damaged("its accuracy"))?;
-        let entries = Entries::new(places, &row_is_fixed, magnitude, Numbers::zeros(precision, 0), None);
+        let entries = Entries::new(node_order, &row_is_fixed, magnitude, Numbers::zeros(precision, 0), None);
         let mut green = GreensFunction {
             surface: Surface::new(positions, self.faces()?)?,
             surface_nodes,
@@ -229,7 +229,7 @@ impl<'a> Reader<'a> {
         if psi.shape != [columns, green.rows] {
             return Err(self.damaged("the operator's shape does not match the body"));
         }
-        let (places, magnitude) = (green.entries.places().clone(), green.entries.magnitudes().to_vec());
+        let (node_order, magnitude) = (green.entries.node_order().clone(), green.entries.magnitudes().to_vec());
         let at = self.start + psi.data_offsets.0 as u64;
         let (column, head) = (green.rows * precision.bytes(), columns * precision.bytes());
         let length = columns * column;
@@ -238,13 +238,13 @@ impl<'a> Reader<'a> {
         let bytes = numbers.bytes_mut();
         let sums = match whole {
             true => sums_while_reading(&self.file, at, bytes),
-            false => sums_in_passing(&self.file, at, length, &Heads { column, head }, bytes),
+            false => sums_keeping_heads(&self.file, at, length, &ColumnHeads { column, head }, bytes),
         };
         self.compare(length, &sums.map_err(|e| self.io(e))?)?;
         let Self { file, length, .. } = self;
         let path = self.path.to_owned();
         let file = (!whole).then_some(ColumnsFile { file, path, length, at, column });
-        Ok(Entries::new(places, &green.row_is_fixed, magnitude, numbers, file))
+        Ok(Entries::new(node_order, &green.row_is_fixed, magnitude, numbers, file))
     }
 
     /// Compares sums with those that were written down.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use safetensors::tensor::Dtype;
 
-use super::checksums::{Heads, SUM, block_count, sums_in_passing};
+use super::checksums::{ColumnHeads, SUM, block_count, sums_keeping_heads};
 use super::function::GreensFunction;
 use super::key::FORMAT_VERSION;
 use super::precision::Precision;
@@ -81,8 +81,8 @@ impl StoreWriter {
     /// # Errors
     /// The operating system's, with nothing left behind.
     pub fn finish(mut self) -> Result<()> {
-        let sums =
-            sums_in_passing(&self.file, self.at, self.length, &Heads::default(), &mut []).map_err(|e| self.io(e))?;
+        let sums = sums_keeping_heads(&self.file, self.at, self.length, &ColumnHeads::default(), &mut [])
+            .map_err(|e| self.io(e))?;
         self.write(self.at + self.length as u64, sums.as_flattened())?;
         self.file.sync_all().and_then(|()| fs::rename(&self.beside, &self.target)).map_err(|e| self.io(e))?;
         self.finished = true;
@@ -163,7 +163,7 @@ impl GreensFunction {
         let s = &self.surface;
         let (faces, face_nodes) = (s.faces.as_flattened(), s.faces.nodes_per_face());
         let fixed: Vec<u8> = self.row_is_fixed.iter().map(|&b| u8::from(b)).collect();
-        let stored = self.entries.places().nodes();
+        let stored = self.entries.node_order().nodes();
         let mut tensors = vec![
             ("surface_nodes", Dtype::U32, vec![self.surface_nodes.len()], bytes(&self.surface_nodes)),
             ("surface_positions", Dtype::F64, vec![s.positions.len(), 3], bytemuck::cast_slice(&s.positions).to_vec()),

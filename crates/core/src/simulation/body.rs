@@ -1,4 +1,4 @@
-//! A body as the tick sees it: its Green's function, its surface prepared for contact, what moves it.
+//! A body of a simulation: its Green's function, its surface prepared for contact, its dynamics.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use crate::memory::Ranges;
 use crate::mesh::Surface;
 use crate::{Error, Result};
 
-/// Shortest and longest time step, s: a tick makes at most ten of the one, and feels the other.
+/// Shortest and longest time step, s. A tick makes at most ten of the shortest; the longest is ten ticks.
 pub(super) const TIME_STEPS: std::ops::RangeInclusive<f64> = 1e-4..=1e-2;
 
-/// What sets a body in motion: its modes at the surface dofs, and the coupling to a tool.
+/// Dynamics of a body: its modes at the surface dofs, and the coupling to a tool.
 pub struct BodyDynamics {
     pub(crate) modes: ModalModel,
     /// Spring between a patch and its tool, N/m.
@@ -27,7 +27,7 @@ impl BodyDynamics {
     /// `modes` has a row for every surface dof.
     ///
     /// # Errors
-    /// A time step that ticks cannot make, or a coupling that is not positive.
+    /// A time step out of range, or a coupling that is not positive.
     pub fn new(modes: ModalModel, coupling: f64) -> Result<Self> {
         if !TIME_STEPS.contains(&modes.dt) {
             let (low, high) = (TIME_STEPS.start(), TIME_STEPS.end());
@@ -40,7 +40,7 @@ impl BodyDynamics {
     }
 }
 
-/// What the local law needs of a body.
+/// Surface of a body prepared for the local law.
 pub struct LocalSurface {
     /// The surface under the reference loads, smooth between the nodes.
     pub smooth: SmoothSurface,
@@ -52,29 +52,29 @@ pub struct LocalSurface {
     pub bounds: [DVec3; 2],
 }
 
-/// A body of a scene. Copies share what was prepared.
+/// A body of a scene. Copies share the prepared data.
 #[derive(Clone)]
 pub struct BodyModel {
-    /// Where it stands.
+    /// Position and rotation in the world.
     pub placement: Placement,
     prepared: Arc<PreparedBody>,
 }
 
-/// What is prepared of a body, in its own frame.
+/// Prepared data of a body, in its own frame.
 pub struct PreparedBody {
     pub(crate) green: Arc<GreensFunction>,
-    /// Displacements of the surface under the reference loads, m (3s): the shape that tools meet.
+    /// Displacements of the surface under the reference loads, m (3s).
     pub(super) free: Vec<f64>,
     pub(super) query: SurfaceQuery,
     /// The surface under the reference loads.
     pub(super) loaded: Surface,
     /// Faces at rest, prepared for the quadrature of contact weights.
     pub(crate) geometry: PatchGeometry,
-    /// What moves the body; none answers as if it came to rest within each tick.
+    /// Dynamics; without them the body is at rest in each tick.
     pub(super) dynamics: Option<BodyDynamics>,
     /// Mean length of the edges of the drawn triangles, m.
     pub(super) mean_edge: f64,
-    /// What the local law needs; without it only patches and nodes can touch the body.
+    /// Data of the local law; without them only the laws `patch` and `node` can be used.
     pub(super) local: Option<LocalSurface>,
 }
 
@@ -130,19 +130,19 @@ impl BodyModel {
         self.preparing(|prepared| prepared.dynamics = Some(dynamics))
     }
 
-    /// Completes what is prepared, before it is shared.
+    /// Adds prepared data, before they are shared.
     fn preparing(mut self, complete: impl FnOnce(&mut PreparedBody)) -> Result<Self> {
         let shared = || Error::Invalid("the body is part of a scene already: it cannot be changed".into());
         complete(Arc::get_mut(&mut self.prepared).ok_or_else(shared)?);
         Ok(self)
     }
 
-    /// The same body elsewhere.
+    /// The same body at another placement.
     pub fn placed(&self, placement: Placement) -> Self {
         Self { placement, ..self.clone() }
     }
 
-    /// Whether the other is the same body, wherever they stand.
+    /// Whether both are the same body, whatever their placements.
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.prepared, &other.prepared)
     }
@@ -173,7 +173,7 @@ impl PreparedBody {
         }
     }
 
-    /// The Green's function behind the body.
+    /// The body's Green's function.
     pub fn green(&self) -> &GreensFunction {
         &self.green
     }
@@ -188,8 +188,8 @@ impl PreparedBody {
         &self.free
     }
 
-    /// Closest point of the smooth surface that the local law meets, in the body's frame; `None` without that law, or for a
-    /// point that is not finite.
+    /// Closest point of the smooth surface of the local law, in the body's frame. `None` without that law, or for a point that is
+    /// not finite.
     pub fn foot(&self, point: DVec3) -> Option<FootPoint> {
         let smooth = &self.local.as_ref()?.smooth;
         smooth.foot_anywhere(self.drawn(), point, &mut Neighbourhood::new(std::iter::once(smooth)))
@@ -200,7 +200,7 @@ impl PreparedBody {
         DrawnSurface { surface: &self.loaded, query: &self.query }
     }
 
-    /// A foot as a point of the drawn triangle below it.
+    /// The point of the drawn triangle at a foot.
     pub(super) fn surface_point(&self, foot: &FootPoint) -> SurfacePoint {
         let [of_a, of_b, _] = barycentric(self.loaded.corners(foot.triangle), foot.position);
         let of_a = of_a.clamp(0.0, 1.0);
@@ -219,15 +219,15 @@ impl PreparedBody {
         self.query.closest(&self.loaded, point)
     }
 
-    /// Where the material under a point of the loaded surface is in the unloaded body. Weights are taken there, so that
-    /// a contact carries the same nodes whatever the loads.
+    /// Position in the unloaded body of the material at a point of the loaded surface. Weights are taken there, so that a contact
+    /// has the same nodes whatever the loads.
     pub(super) fn material_point(&self, loaded: &SurfacePoint) -> SurfacePoint {
         let corners = self.green.surface.corners(loaded.triangle);
         let position = corners.into_iter().zip(loaded.barycentric).map(|(p, n)| n * p).sum();
         SurfacePoint { position, ..*loaded }
     }
 
-    /// Refuses a contact radius under which some contact could cover more nodes than a tick can weigh.
+    /// Rejects a contact radius under which some contact could have more nodes than a patch may have.
     ///
     /// # Errors
     /// The radius, with the largest that is allowed.

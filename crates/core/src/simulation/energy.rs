@@ -1,14 +1,14 @@
-//! Account of the energy of a body in motion: what it holds, what tools put in, what damping took out.
+//! Energy balance of a body in motion: stored energy, work of the tools, dissipation.
 //!
 //! The force `f` of a contact does the work of a step with its mean, `(1 - w) f0 + w f1` (`dynamics::Integration::weight`). Then
-//! a spring of the extensions `e0`, `e1` takes up `(w - 1/2) k_c (e1 - e0)^2` less than it is given. A contact that begins or
-//! ends touches for an unknown part of the step: its tool's work there is what body and contact take up,
+//! a spring of the extensions `e0`, `e1` stores `(w - 1/2) k_c (e1 - e0)^2` less than the work done on it. A contact that begins or
+//! ends touches for an unknown part of the step. The work of its tool in that step is taken from the energy of body and contact,
 //!
 //! ```text
 //! (mean of f) . (change of W^T u) + (change of f^2 / 2 k_c + indentation + f^T R f / 2)
 //! ```
 //!
-//! With the tool's whole way in that step instead, or with none of it, the account would be off by the force times that way.
+//! With the tool's whole motion in that step, or with none of it, the error would be the force times that motion.
 
 use glam::{DMat3, DVec3};
 
@@ -16,47 +16,47 @@ use super::MAX_CONTACTS;
 use super::contacts::{Contacts, Mode, REVISIONS};
 use crate::dynamics::{Energy, StepEnergy};
 
-/// A contact as it was booked last.
+/// A contact at the end of the previous step.
 #[derive(Clone, Copy, Debug, Default)]
-struct Booked {
-    /// Which one.
-    begun: u64,
+struct PreviousContact {
+    /// Its number among all contacts since the start.
+    number: u64,
     /// Force on the body, N.
     force: DVec3,
     /// Displacement of the tool, m.
     displacement: DVec3,
-    /// What its spring, its indentation and the modes left out hold under its own force, J.
+    /// Energy of its spring, of its indentation and of the modes left out under its own force, J.
     stored: f64,
 }
 
-/// Energies so far, and what the next booking starts from.
+/// Energies since the start, and the contacts at the end of the previous step.
 #[derive(Clone, Debug, Default)]
-pub struct Account {
-    /// Where the energy is.
+pub struct EnergyBalance {
+    /// Energies by kind.
     pub energy: Energy,
     /// The contacts at the end of the last step.
-    last: [Option<Booked>; MAX_CONTACTS],
+    previous: [Option<PreviousContact>; MAX_CONTACTS],
 }
 
-impl Account {
-    /// Whether a contact of the body begins or ends in a slot within the step that is being made.
-    pub fn changes(&self, contacts: &Contacts, body: usize, slot: usize) -> bool {
-        self.last[slot].map(|booked| booked.begun) != begun(contacts, body, slot)
+impl EnergyBalance {
+    /// Whether a contact of the body begins or ends in a slot within the current step.
+    pub fn begins_or_ends(&self, contacts: &Contacts, body: usize, slot: usize) -> bool {
+        self.previous[slot].map(|contact| contact.number) != contact_number(contacts, body, slot)
     }
 
     /// Force on the body in a slot at the end of the last step, N.
     pub fn last_force(&self, slot: usize) -> DVec3 {
-        self.last[slot].map_or(DVec3::ZERO, |booked| booked.force)
+        self.previous[slot].map_or(DVec3::ZERO, |contact| contact.force)
     }
 
-    /// Books what the modes hold at a step's end, and what damping took out within it.
-    pub fn book_step(&mut self, step: &StepEnergy) {
+    /// Records the energy of the modes at the end of a step and its dissipation.
+    pub fn add_step(&mut self, step: &StepEnergy) {
         (self.energy.kinetic, self.energy.strain) = (step.kinetic, step.strain);
         self.energy.dissipated += step.dissipated;
     }
 
-    /// Books what springs, indentations and the modes left out hold.
-    pub fn book_contacts(
+    /// Records the energy of springs, indentations and the modes left out.
+    pub fn add_contacts(
         &mut self,
         contacts: &Contacts,
         slots: &[usize],
@@ -66,16 +66,16 @@ impl Account {
         self.energy.coupling = 0.0;
         for &a in slots {
             let force = contacts.slots[a].force;
-            self.energy.coupling += in_contact(contacts, a, coupling);
-            self.energy.dissipated += contacts.slots[a].local.dissipated;
+            self.energy.coupling += contact_energy(contacts, a, coupling);
+            self.energy.dissipated += contacts.slots[a].dissipated;
             let beyond: DVec3 = slots.iter().map(|&b| residual[a][b] * contacts.slots[b].force).sum();
             self.energy.strain += 0.5 * force.dot(beyond);
         }
     }
 
-    /// Books the work of the tools, given how far the patches of contacts that begin or end have `moved` in the step, m. Of that
-    /// of the others a slip of the anchor takes its part out.
-    pub fn book_work(
+    /// Records the work of the tools. `moved` is the displacement in the step of the patches of contacts that begin or end, m. A
+    /// slip of the anchor dissipates its part of the work of the other contacts.
+    pub fn add_work(
         &mut self,
         (contacts, body): (&Contacts, usize),
         (coupling, weight): (f64, f64),
@@ -83,38 +83,39 @@ impl Account {
         moved: &[DVec3; MAX_CONTACTS],
     ) {
         for slot in 0..MAX_CONTACTS {
-            let changes = self.changes(contacts, body, slot);
-            let (contact, before) = (&contacts.slots[slot], self.last[slot]);
-            let now = begun(contacts, body, slot).map(|begun| Booked {
-                begun,
+            let begins_or_ends = self.begins_or_ends(contacts, body, slot);
+            let (contact, before) = (&contacts.slots[slot], self.previous[slot]);
+            let now = contact_number(contacts, body, slot).map(|number| PreviousContact {
+                number,
                 force: contact.force,
                 displacement: contact.displacement,
-                stored: in_contact(contacts, slot, coupling)
+                stored: contact_energy(contacts, slot, coupling)
                     + 0.5 * contact.force.dot(residual[slot][slot] * contact.force),
             });
-            let [f0, f1] = [before, now].map(|booked| booked.map_or(DVec3::ZERO, |booked| booked.force));
+            let [f0, f1] = [before, now].map(|contact| contact.map_or(DVec3::ZERO, |contact| contact.force));
             let mean = f0 + (f1 - f0) * weight;
-            if changes {
-                let [held, holds] = [before, now].map(|booked| booked.map_or(0.0, |booked| booked.stored));
-                self.energy.work += mean.dot(moved[slot]) + holds - held;
+            if begins_or_ends {
+                let [stored_before, stored_now] =
+                    [before, now].map(|contact| contact.map_or(0.0, |contact| contact.stored));
+                self.energy.work += mean.dot(moved[slot]) + stored_now - stored_before;
             } else if let Some(before) = before {
                 self.energy.work += mean.dot(contact.displacement + contact.slipped - before.displacement);
                 self.energy.dissipated += mean.dot(contact.slipped);
             }
-            self.last[slot] = now;
+            self.previous[slot] = now;
         }
     }
 }
 
-/// Which contact of the body a slot has. One that waits without a force is none yet.
-fn begun(contacts: &Contacts, body: usize, slot: usize) -> Option<u64> {
+/// Number of the contact that a body has in a slot. A pending one without a force does not count.
+fn contact_number(contacts: &Contacts, body: usize, slot: usize) -> Option<u64> {
     let contact = &contacts.slots[slot];
     let touches = contact.mode != Mode::Free && contact.body == body && contact.force != DVec3::ZERO;
     touches.then_some(contact.serial >> REVISIONS)
 }
 
-/// What spring and indentation of a contact hold, J.
-fn in_contact(contacts: &Contacts, slot: usize, coupling: f64) -> f64 {
+/// Energy of spring and indentation of a contact, J.
+fn contact_energy(contacts: &Contacts, slot: usize, coupling: f64) -> f64 {
     let contact = &contacts.slots[slot];
-    0.5 * contact.force.length_squared() / coupling + contact.local.energy
+    0.5 * contact.force.length_squared() / coupling + contact.energy
 }

@@ -1,11 +1,11 @@
-//! What hands and settings say at a tick, and what the tick answers.
+//! Inputs of a tick (tools, settings) and its outputs.
 
 use glam::{DMat3, DQuat, DVec3};
 
 use super::rotation::rotation_vector;
 use super::{MAX_BODIES, MAX_TOOLS};
 
-/// Place and direction of a rigid tool.
+/// Position and orientation of a rigid tool.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Of the tip, m, in the world.
@@ -15,7 +15,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// At a place, not turned.
+    /// At a position, without rotation.
     pub fn at(position: DVec3) -> Self {
         Self { position, orientation: DQuat::IDENTITY }
     }
@@ -49,35 +49,35 @@ pub struct Wrench {
     pub torque: DVec3,
 }
 
-/// What one device says at a tick.
+/// Input of a tick from one device.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ToolInput {
-    /// Where the tool is.
+    /// Pose of the tool.
     pub pose: Pose,
-    /// How it moves.
+    /// Its velocity.
     pub twist: Twist,
-    /// Whether the tool is in the scene at all.
+    /// Whether the tool is in the scene.
     pub active: bool,
-    /// Whether it holds on to the surface it touches.
+    /// Whether it grabs the surface that it touches.
     pub grab: bool,
 }
 
 /// An impulse for a body in motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Strike {
-    /// Which body.
+    /// Index of the body.
     pub body: usize,
-    /// Where, m, in the world; the closest surface point is struck.
+    /// Point in the world, m; the strike acts on the closest surface point.
     pub point: DVec3,
     /// Impulse on the body, N s, in the world.
     pub impulse: DVec3,
-    /// Radius of the patch that is struck, m.
+    /// Radius of the patch that it acts on, m.
     pub radius: f64,
-    /// How long it takes, s of the body's time: the force is half a wave, and lasts one step at least.
+    /// Duration in the body's time, s. The force is half a sine wave of at least one step.
     pub duration: f64,
 }
 
-/// What settings say at a tick.
+/// Settings of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Controls {
     /// Contact radius of each tool's contacts that begin now, m.
@@ -86,11 +86,11 @@ pub struct Controls {
     pub friction: [f64; MAX_TOOLS],
     /// Young's modulus of each body over that of its Green's function: it only scales forces.
     pub stiffness_scale: [f64; MAX_BODIES],
-    /// Largest strain to which tools may take each body; zero for any.
+    /// Limit of each body's strain; zero for none.
     pub strain_limit: [f64; MAX_BODIES],
-    /// Let go of everything, and bring moving bodies to rest.
+    /// Ends all contacts and brings moving bodies to rest.
     pub reset: bool,
-    /// How far bodies in motion advance in this tick, s.
+    /// Time by which bodies in motion advance in this tick, s.
     pub advance: f64,
     /// A strike that begins now.
     pub strike: Option<Strike>,
@@ -110,31 +110,32 @@ impl Default for Controls {
     }
 }
 
-/// Everything that comes into a tick.
+/// All inputs of a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Input {
-    /// What the devices say.
+    /// From the devices.
     pub tools: [ToolInput; MAX_TOOLS],
-    /// What the settings say.
+    /// Settings.
     pub controls: Controls,
 }
 
-/// What the tick answers.
+/// Outputs of a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Output {
-    /// On each device: minus what the tool does to the bodies. Not yet made safe.
+    /// Wrench on each device: minus that of the tool on the bodies. It has not passed the safety stage.
     pub wrench_on_device: [Wrench; MAX_TOOLS],
-    /// The same before the limit of strain took from the forces of contacts that slide: what follows from one energy.
+    /// The same before the strain limit reduces the forces of sliding contacts: the part that follows from one energy.
     pub unlimited: [Wrench; MAX_TOOLS],
     /// Whether each tool touches.
     pub in_contact: [bool; MAX_TOOLS],
-    /// Whether the limit of strain keeps each tool from following its device.
+    /// Whether the strain limit keeps each tool from following its device.
     pub limited: [bool; MAX_TOOLS],
-    /// Whether a contact of each tool is not on its body, not at the tool, or stronger than the tool can be: its wrench is zero.
+    /// Whether a contact of each tool fails the last check: it lies off its body or its tool, or its force is too large. The wrench
+    /// of that tool is zero.
     pub unsound: [bool; MAX_TOOLS],
 }
 
-/// Where a body stands in the world.
+/// Position and rotation of a body in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Of the body's origin, m.

@@ -1,48 +1,48 @@
-//! The limit of strain: a tool's displacement counts only as far as the body stays within what linear elasticity can say.
+//! Strain limit: a tool's displacement counts only as far as strain stays in the range of linear elasticity.
 //!
-//! Beyond about 10 % strain a linear solution balloons. While contacts stick, strain follows from their forces, and forces
-//! at rest are linear in the displacements `d` of the tools from their anchors. The tools count as displaced by the closest
-//! displacements under which no place passes the limit (`admissible`), found from a few places
-//! ([`crate::strain::StrainResponse`]) that are prepared once a set of contacts off the tick. However far a hand goes on, the
+//! Beyond about 10 % strain a linear solution overestimates volumes: bodies balloon. While contacts stick, strain follows from
+//! their forces, and forces at rest are linear in the displacements `d` of the tools from their anchors. The tools count as
+//! displaced by the closest displacements under which no place passes the limit (`strain_projection`), found from a few places
+//! ([`crate::strain::StrainResponse`]) that another thread prepares once for each set of contacts. However far a tool moves on, the
 //! force stays that of these displacements.
 //!
-//! A contact that has just begun is not prepared for yet. Until it is, its displacement from where it met the patch stays
-//! below [`provisional_displacement`], which surely keeps its own strain within the limit; from then on that bound opens tick by
-//! tick.
+//! A new contact has no prepared response. Until it has one, its displacement since it began stays below
+//! [`provisional_displacement`], which surely keeps its own strain within the limit; from then on that bound grows tick by tick.
 
 use glam::DVec3;
 
 use super::MAX_CONTACTS;
-use super::admissible::{Contacts, Vectors, closest};
 use super::contacts::Mode;
+use super::law::law_of;
 use super::model::Model;
 use super::scratch::Scratch;
-use super::solve::{gather, solve_with};
+use super::solve::{contact_displacement, linear_slots, own_compliance, solve_with};
 use super::state::{BodyState, State};
+use super::strain_projection::{StrainConstraint, Vectors, project};
 use super::strain_watch::StrainWatch;
-use super::tool::LawKind;
+use super::system::System;
 use crate::contact::MAX_PATCH_NODES;
 use crate::strain::{MAX_CONTACTS_WATCHED, provisional_displacement};
 
-/// Growth a tick of the share of a force that is let through, and where it begins.
-const GROWTH: f64 = 1.05;
+/// Growth in a tick of the share of a force, and its least value.
+const SHARE_GROWTH: f64 = 1.05;
 const LEAST_SHARE: f64 = 1e-3;
-/// Growth a tick of the bound of a contact that has been prepared for.
-const OPENING: f64 = 1.3;
-/// Way along the surface after which strain is asked for anew, over the mean length of its edges: of a contact within the
-/// limit, and of one at it. The strain of a newton on a contact that slides changes by a third from node to node and back.
-const ASKED_ANEW: [f64; 2] = [1.0, 0.1];
-/// Bounds the displacement of the contact that has just begun in `slot`; one under the local law is bounded where its nodes
-/// are known.
+/// Growth in a tick of the bound of a contact with a prepared response.
+const BOUND_GROWTH: f64 = 1.3;
+/// Distance of sliding after which strain is requested again, over the mean length of edges: for a contact within the limit, and
+/// for one at it. The strain per newton of a sliding contact changes by a third from node to node and back.
+const NEW_REQUEST: [f64; 2] = [1.0, 0.1];
+
+/// Bounds the displacement of the new contact in `slot`. A nonlinear one is bounded later, when its nodes are known.
 pub(super) fn begin(model: &Model, state: &mut State, slot: usize, limit: f64) {
-    if limit <= 0.0 || state.contacts.slots[slot].law == LawKind::Local {
+    if limit <= 0.0 || state.contacts.slots[slot].nonlinear {
         state.contacts.slots[slot].bound = f64::INFINITY;
         return;
     }
     state.contacts.slots[slot].bound = provisional_bound(model, state, slot, limit);
 }
 
-/// Displacement of a patch under which its own strain surely keeps the limit, m.
+/// Displacement of a patch up to which its own strain surely stays within the limit, m.
 fn provisional_bound(model: &Model, state: &State, slot: usize, limit: f64) -> f64 {
     let body = &model.bodies[state.contacts.slots[slot].body];
     let patch = state.contacts.patches[slot].patch();
@@ -55,41 +55,41 @@ fn provisional_bound(model: &Model, state: &State, slot: usize, limit: f64) -> f
     provisional_displacement(weights, positions, body.mean_edge, limit)
 }
 
-/// Lets through of the forces under the local law what the limit of strain allows: all of them by the share that is within it,
-/// for they slide, and there is no anchor to hold them to. A contact that is not prepared for yet is bounded by the
-/// displacement of the body under it. Where a contact has slid on by a part of an edge, its strain is asked for anew.
+/// Reduces nonlinear forces to the strain limit: all of them by the share that is within it, for these contacts slide and have no
+/// anchor whose displacement could be limited. A contact without a prepared response is bounded by the displacement of the body
+/// under it. A contact that has slid by a part of an edge requests its strain again.
 ///
-/// A share of a force is not the gradient of an energy, and what is within the limit changes from place to place: over a
-/// closed path beyond it a hand would get back more than it has put in (5 % of the peak on a block). What is withheld here is
-/// balanced at the port of the device, as what ramp and slew withhold is: the forces before it follow from one energy.
-pub(super) fn let_through(model: &Model, state: &mut State, body: usize, limit: f64) {
+/// A share of a force is not the gradient of an energy, and the share changes from place to place: a closed path beyond the limit
+/// would release more energy than was put in (5 % of the peak on a block). The difference is balanced at the device's port, as
+/// that of ramp and slew limit is: the forces before the reduction follow from one energy.
+pub(super) fn limit_sliding_forces(model: &Model, state: &mut State, body: usize, limit: f64) {
     let share = share_within(state, body, limit);
     for slot in 0..MAX_CONTACTS {
         let contact = &state.contacts.slots[slot];
-        if contact.mode == Mode::Free || contact.body != body || contact.law != LawKind::Local {
+        if contact.mode == Mode::Free || contact.body != body || !contact.nonlinear {
             continue;
         }
         let covered = StrainWatch::covers(state.bodies[body].strain.as_deref(), contact);
         let first = contact.bound == 0.0 && limit > 0.0;
         let bound = if first { provisional_bound(model, state, slot, limit) } else { contact.bound };
         let contact = &mut state.contacts.slots[slot];
-        let carried = contact.local.tool.distance(contact.local.relative);
+        let displacement = law_of(contact.law).body_displacement(contact);
         let mut own = share;
         if limit > 0.0 {
-            contact.bound = if covered { bound * OPENING } else { bound };
-            own = own.min(contact.bound / carried.max(f64::MIN_POSITIVE));
+            contact.bound = if covered { bound * BOUND_GROWTH } else { bound };
+            own = own.min(contact.bound / displacement.max(f64::MIN_POSITIVE));
         }
-        // What a new response allows more is let in over some hundredths of a second.
-        let own = own.min(contact.local.share * GROWTH).clamp(LEAST_SHARE, 1.0);
-        contact.local.share = own;
+        // A larger share by a new response is approached over some hundredths of a second.
+        let own = own.min(contact.share * SHARE_GROWTH).clamp(LEAST_SHARE, 1.0);
+        contact.share = own;
         contact.limited = own < 1.0;
         contact.force *= own;
-        contact.local.torque *= own;
-        contact.ask_anew(ASKED_ANEW[usize::from(contact.limited)] * model.bodies[body].mean_edge);
+        contact.torque *= own;
+        contact.request_strain_after(NEW_REQUEST[usize::from(contact.limited)] * model.bodies[body].mean_edge);
     }
 }
 
-/// Share of the forces under the local law that is within the limit.
+/// Share of these forces that is within the limit.
 fn share_within(state: &mut State, body: usize, limit: f64) -> f64 {
     let State { bodies, contacts, .. } = state;
     let BodyState { strain, limit_share, stiffness_scale, .. } = &mut bodies[body];
@@ -97,42 +97,44 @@ fn share_within(state: &mut State, body: usize, limit: f64) -> f64 {
     let mut forces = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
     let mut covered = contacts.on(body).filter_map(|slot| {
         let contact = &contacts.slots[slot];
-        let place = watch.place_of(contact)?;
-        forces[place] = contact.force / *stiffness_scale;
-        Some((contact, watch.serials[place]))
+        let rank = watch.rank_of(contact)?;
+        forces[rank] = contact.force / *stiffness_scale;
+        Some((contact, watch.serials[rank]))
     });
     let (first, second) = (covered.next(), covered.next());
     covered.for_each(drop);
     let share = watch.response.share(&forces, limit);
-    // Several contacts would need to be told apart.
-    let slid = first.filter(|_| second.is_none()).map(|(contact, serial)| (contact.asked_at(serial), contact.point));
-    limit_share.follow(&watch.serials, share, slid)
+    // With several contacts it is unknown which of them changes the share.
+    let path = first
+        .filter(|_| second.is_none())
+        .map(|(contact, serial)| (contact.strain_requested_at(serial), contact.point));
+    limit_share.update(&watch.serials, share, path)
 }
 
-/// Brings the displacements of the contacts of a body to what the limit of strain lets pass; zero is no limit.
+/// Reduces the displacements of the contacts of a body to the strain limit; zero is no limit.
 pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, limit: f64) {
     let mut slots = [0; MAX_CONTACTS];
-    let count = gather(state, body, &mut slots);
+    let count = linear_slots(state, body, &mut slots);
     let slots = &slots[..count];
-    let State { bodies, contacts, compliance, .. } = state;
-    let (watch, scale) = (bodies[body].strain.as_deref(), bodies[body].stiffness_scale);
+    let State { bodies, contacts, .. } = state;
+    let together = count > 1 && !model.bodies[body].moves();
     for &slot in slots {
-        // Where the patch was met, and what the others' forces of the tick before make of it, is not this contact's own.
-        let others = slots.iter().filter(|&&other| other != slot && !model.bodies[body].moves());
-        let dent: DVec3 = others.map(|&other| compliance[slot][other] * contacts.slots[other].force / scale).sum();
         let contact = &mut contacts.slots[slot];
-        let found = contact.met + dent;
         contact.limited = false;
         if limit > 0.0 {
-            if StrainWatch::covers(watch, contact) {
-                contact.bound *= OPENING;
+            if StrainWatch::covers(bodies[body].strain.as_deref(), contact) {
+                contact.bound *= BOUND_GROWTH;
             }
-            let own = contact.displacement - found;
-            if own.length() > contact.bound {
-                contact.displacement = found + own * (contact.bound / own.length());
+            // The displacement of the patch when the contact began is not its own.
+            let own = contact.displacement - contact.start_displacement;
+            if !together && own.length() > contact.bound {
+                contact.displacement = contact.start_displacement + own * (contact.bound / own.length());
                 contact.limited = true;
             }
         }
+    }
+    if together && limit > 0.0 {
+        bound_displacements(model, state, &mut scratch.system, slots);
     }
     if limit <= 0.0 || count == 0 {
         return;
@@ -142,19 +144,65 @@ pub(super) fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, bod
     for (displacement, &slot) in displacements.iter_mut().zip(slots) {
         *displacement = state.contacts.slots[slot].displacement;
     }
-    let mut at_rest = AtRest { model, state, scratch, body, slots, watch, limit };
-    if let Some(admissible) = closest(&mut at_rest, &displacements) {
-        for (displacement, &slot) in admissible.iter().zip(slots) {
+    let mut at_rest = StaticContacts { model, state, scratch, body, slots, watch, limit };
+    if let Some(projected) = project(&mut at_rest, &displacements) {
+        for (displacement, &slot) in projected.iter().zip(slots) {
             let contact = &mut state.contacts.slots[slot];
-            // Those of contacts that have no part in it come back to the last digit.
+            // Displacements of contacts that the limit does not concern come back up to rounding.
             contact.limited |= displacement.distance(contact.displacement) > 1e-9 * contact.displacement.length();
             contact.displacement = *displacement;
         }
     }
 }
 
+/// Keeps the displacement of the patch under each of several contacts by its own force (force times own compliance) within its
+/// bound. Displacements by the other contacts do not count.
+///
+/// The forces are found together, those beyond their bounds shortened, and the rest found again under these. The forces of the
+/// previous tick must not be used here: contacts close to each other would grow from tick to tick without end.
+fn bound_displacements(model: &Model, state: &mut State, system: &mut System, slots: &[usize]) {
+    let current = &*state;
+    let scale = current.bodies[current.contacts.slots[slots[0]].body].stiffness_scale;
+    let compliance = |a: usize, b: usize| current.compliance[a][b] * (1.0 / scale);
+    let sliding = |slot: usize| contact_displacement(model, current, slot, |other| other.nonlinear);
+    let (mut forces, mut short) = ([DVec3::ZERO; MAX_CONTACTS], [false; MAX_CONTACTS]);
+    for _ in slots {
+        let (mut rest, mut count) = ([0; MAX_CONTACTS], 0);
+        for &slot in slots.iter().filter(|&&slot| !short[slot]) {
+            rest[count] = slot;
+            count += 1;
+        }
+        let rest = &rest[..count];
+        solve_with(model, current, system, rest, compliance, |slot| {
+            let shortened = slots.iter().filter(|&&other| short[other]);
+            let displacement_by_others: DVec3 = shortened.map(|&other| compliance(slot, other) * forces[other]).sum();
+            current.contacts.slots[slot].displacement - sliding(slot) - displacement_by_others
+        });
+        for (&slot, force) in rest.iter().zip(system.right.chunks_exact(3)) {
+            let (force, bound) = (DVec3::from_slice(force), current.contacts.slots[slot].bound);
+            let own = (own_compliance(model, current, slot) * force).length();
+            short[slot] = own > bound;
+            forces[slot] = if short[slot] { force * (bound / own) } else { force };
+        }
+        if !rest.iter().any(|&slot| short[slot]) {
+            break;
+        }
+    }
+    let displaced = |slot: usize| {
+        let others = slots.iter().filter(|&&other| other != slot);
+        let displacement_by_others: DVec3 = others.map(|&other| compliance(slot, other) * forces[other]).sum();
+        own_compliance(model, current, slot) * forces[slot] + displacement_by_others + sliding(slot)
+    };
+    let mut displacements = [DVec3::ZERO; MAX_CONTACTS];
+    slots.iter().filter(|&&slot| short[slot]).for_each(|&slot| displacements[slot] = displaced(slot));
+    for &slot in slots.iter().filter(|&&slot| short[slot]) {
+        let contact = &mut state.contacts.slots[slot];
+        (contact.displacement, contact.limited) = (displacements[slot], true);
+    }
+}
+
 /// The contacts of a body as if it came to rest under them.
-struct AtRest<'a> {
+struct StaticContacts<'a> {
     model: &'a Model,
     state: &'a State,
     scratch: &'a mut Scratch,
@@ -164,26 +212,26 @@ struct AtRest<'a> {
     limit: f64,
 }
 
-impl AtRest<'_> {
-    /// For each contact its place in the watch.
-    fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+impl StaticContacts<'_> {
+    /// For each contact its rank in the strain response.
+    fn ranks(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.slots.iter().enumerate().filter_map(|(i, &slot)| {
-            let place = self.watch.place_of(&self.state.contacts.slots[slot]);
-            place.map(|place| (i, place))
+            let rank = self.watch.rank_of(&self.state.contacts.slots[slot]);
+            rank.map(|rank| (i, rank))
         })
     }
 
-    /// Forces at the Green's function's own stiffness, in the order of the watch.
-    fn watched(&self, forces: &Vectors) -> [DVec3; MAX_CONTACTS_WATCHED] {
+    /// Forces at the Green's function's own stiffness, in the order of the strain response.
+    fn in_watch_order(&self, forces: &Vectors) -> [DVec3; MAX_CONTACTS_WATCHED] {
         let mut watched = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
-        for (i, place) in self.places() {
-            watched[place] = forces[i] / self.state.bodies[self.body].stiffness_scale;
+        for (i, rank) in self.ranks() {
+            watched[rank] = forces[i] / self.state.bodies[self.body].stiffness_scale;
         }
         watched
     }
 }
 
-impl Contacts for AtRest<'_> {
+impl StrainConstraint for StaticContacts<'_> {
     fn forces(&mut self, displacements: &Vectors) -> Vectors {
         let (state, slots, scale) = (self.state, self.slots, self.state.bodies[self.body].stiffness_scale);
         let compliance = |a: usize, b: usize| state.compliance[a][b] * (1.0 / scale);
@@ -198,15 +246,66 @@ impl Contacts for AtRest<'_> {
     }
 
     fn share(&self, forces: &Vectors) -> f64 {
-        self.watch.response.share(&self.watched(forces), self.limit)
+        self.watch.response.share(&self.in_watch_order(forces), self.limit)
     }
 
     fn gradient(&self, forces: &Vectors) -> Vectors {
-        let watched = self.watch.response.gradient(&self.watched(forces));
+        let watched = self.watch.response.gradient(&self.in_watch_order(forces));
         let mut gradient = [DVec3::ZERO; MAX_CONTACTS];
-        for (i, place) in self.places() {
-            gradient[i] = watched[place];
+        for (i, rank) in self.ranks() {
+            gradient[i] = watched[rank];
         }
         gradient
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::contact::shape::ToolShape;
+    use crate::green::{Precision, precompute};
+    use crate::simulation::law::bodies;
+    use crate::simulation::{
+        BodyModel, Input, LawKind, MAX_TOOLS, Placement, Pose, Scratch, ToolInput, ToolModel, step,
+    };
+
+    const RADIUS: f64 = 0.01;
+
+    /// Largest force of a tick, N, of tools side by side that are pressed to 3 mm and held there.
+    fn most(limit: f64, places: &[f64]) -> f64 {
+        let green = precompute(&bodies::cube(4), Precision::F64, &|_, _| true).expect("a solvable cube");
+        let body = BodyModel::new(Arc::new(green), Placement::default()).expect("a body");
+        let shape = ToolShape::sphere(RADIUS).expect("a sphere");
+        let tool =
+            ToolModel { shape, radius: RADIUS, law: LawKind::PATCH, pad_youngs_modulus: None, max_stiffness: 5000.0 };
+        let model = Model::new(vec![body], vec![tool; places.len()]).expect("a scene");
+        let (mut state, mut scratch, mut input) = (State::new(&model), Scratch::new(&model), Input::default());
+        input.controls.contact_radius = [0.02; MAX_TOOLS];
+        input.controls.strain_limit.fill(limit);
+        let mut most = 0.0f64;
+        for tick in 0..400 {
+            let depth = 3e-3 * (f64::from(tick) / 100.0).min(1.0);
+            for (tool, &x) in places.iter().enumerate() {
+                let pose = Pose::at(DVec3::new(x, 0.05, 0.1 + RADIUS - depth));
+                input.tools[tool] = ToolInput { pose, active: true, ..ToolInput::default() };
+            }
+            let output = step(&model, &mut state, &mut scratch, &input);
+            most = (0..places.len()).map(|tool| output.wrench_on_device[tool].force.length()).fold(most, f64::max);
+        }
+        most
+    }
+
+    /// Before their strain is known contacts are bounded by what they do to the body by themselves. Side by side each has no more
+    /// force than alone under the limit, and less than without one.
+    #[test]
+    fn contacts_side_by_side_have_no_more_force_under_the_limit_than_one_alone() {
+        let alone = most(0.01, &[0.05]);
+        assert!(alone > 0.0 && alone < 0.5 * most(0.0, &[0.05]));
+        for apart in [0.002, 0.01, 0.03] {
+            let together = most(0.01, &[0.05 - 0.5 * apart, 0.05 + 0.5 * apart]);
+            assert!(together > 0.0 && together < 1.2 * alone, "{apart}: {together} N, {alone} N alone");
+        }
     }
 }

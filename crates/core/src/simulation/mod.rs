@@ -1,44 +1,42 @@
 //! Chapter 10 of docs/theory.md: the tick. `step(&Model, &mut State, &mut Scratch, &Input) -> Output` never allocates,
 //! locks, reads a clock or panics on bad numbers; the same input gives the same bits.
 //!
-//! `input` is what comes from outside, `model` what is fixed, `state` what evolves. `law` says when a contact begins, how it
-//! follows its tool and when it ends; `limit` keeps strain within what linear elasticity can say; `solve` finds the forces of
-//! all contacts of a body together. A body that moves has a
-//! `motion`, which a `strike` may set going, and an `energy` that is accounted for; on one at rest `passivity` keeps contacts from
-//! giving out more than was put in. `snapshot` is what is drawn.
+//! `input` has the inputs of a tick, `model` the constant data, `state` the data that evolve. A `law` begins, follows and ends a
+//! contact and finds its force. `limit` keeps the strain in the range of linear elasticity. `solve` finds the forces of all linear
+//! contacts of a body together. A body in motion has a `motion`, which a `strike` may start, and an `energy` balance. On a body at
+//! rest `passivity` prevents contacts from releasing more energy than tools have put in. `snapshot` has the data to draw.
 
-mod admissible;
 mod body;
+mod contact_check;
 mod contacts;
-mod covering;
 mod energy;
-mod further;
 mod input;
-mod kept;
 mod law;
 mod limit;
 mod model;
 mod motion;
 mod passivity;
+mod previous_ranks;
 mod rotation;
 mod scratch;
 mod slip;
 mod snapshot;
 mod solve;
-mod sound;
 mod state;
 mod step;
+mod strain_projection;
 mod strain_watch;
 mod strike;
 mod system;
 mod time;
 mod tool;
+mod weight_scratch;
 
 pub use body::{BodyDynamics, BodyModel, PreparedBody};
 pub use contacts::{Contact, Contacts, Mode};
 pub use input::{Controls, Input, Output, Placement, Pose, Strike, ToolInput, Twist, Wrench};
-pub use kept::Kept;
 pub use model::Model;
+pub use previous_ranks::PreviousRanks;
 pub use scratch::Scratch;
 pub use snapshot::Snapshot;
 pub use state::{BodyState, State, ToolState};
@@ -50,9 +48,9 @@ pub use tool::{LawKind, ToolModel, contact_size};
 pub const MAX_TOOLS: usize = 4;
 /// Most bodies a simulation may have.
 pub const MAX_BODIES: usize = 4;
-/// Most places at which a tool may touch a body at once.
+/// Most contacts of a tool with a body at once.
 pub const MAX_PLACES: usize = 3;
-/// Most contacts at once: each tool may touch each body, and some of them at further places.
-pub const MAX_CONTACTS: usize = MAX_TOOLS * MAX_BODIES + MAX_FURTHER;
-/// Most contacts at further places, and contacts that fade, of all tools together.
-const MAX_FURTHER: usize = 8;
+/// Most contacts at once: one of each tool with each body, and additional ones.
+pub const MAX_CONTACTS: usize = MAX_TOOLS * MAX_BODIES + MAX_ADDITIONAL;
+/// Most additional and fading contacts of all tools together.
+const MAX_ADDITIONAL: usize = 8;

@@ -1,14 +1,13 @@
-//! What is fixed while a simulation runs.
+//! Model of a simulation: bodies, tools and all that is prepared of them before the loop runs.
 
 use std::sync::Arc;
 
 use super::body::BodyModel;
-use super::law::takes_cells;
-use super::tool::{LawKind, ToolModel};
+use super::tool::ToolModel;
 use super::{MAX_BODIES, MAX_TOOLS};
 use crate::contact::footprint::PressedSurface;
 use crate::contact::shape::ToolShape;
-use crate::contact::{CompliantBody, Hollows, RegularCompliance};
+use crate::contact::{CompliantBody, Concavities, RegularCompliance};
 use crate::memory::Ranges;
 use crate::{Error, Result};
 
@@ -16,46 +15,47 @@ use crate::{Error, Result};
 pub struct Model {
     /// The bodies.
     pub bodies: Vec<BodyModel>,
-    /// The tools; one a device.
+    /// The tools, one for each device.
     pub tools: Vec<ToolModel>,
-    /// For each tool under the local law and each body what the tool meets beyond the half-space.
-    pub(super) regular: Vec<Vec<Option<Arc<RegularCompliance>>>>,
-    /// For each such tool that is no sphere the surface that it is pressed on.
-    pub(super) pressed: Vec<Vec<Option<Arc<PressedSurface>>>>,
-    /// For each that is one where it may touch at several places.
-    pub(super) hollows: Vec<Vec<Hollows>>,
+    /// By tool and body, for tools under the local law: the compliance of the body beyond the half-space.
+    pub(super) regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>>,
+    /// By tool and body, for such tools that are not spheres: the surface divided into pieces.
+    pub(super) pressed_surfaces: Vec<Vec<Option<Arc<PressedSurface>>>>,
+    /// By tool and body, for spheres: where the tool may touch at several places.
+    pub(super) concavities: Vec<Vec<Concavities>>,
 }
 
 impl Model {
-    /// The memory that a tick reads of it. What a tick writes is not in it: pages written a thousand times a second stay.
+    /// The memory that a tick reads. Memory that a tick writes is left out: the system keeps pages that are written a thousand
+    /// times a second.
     pub fn memory(&self) -> Ranges {
         let mut ranges = Ranges::default();
         self.bodies.iter().for_each(|body| body.add_memory(&mut ranges));
-        for regular in self.regular.iter().flatten().flatten() {
-            ranges.add(&regular.fields);
+        for compliance in self.regular_compliances.iter().flatten().flatten() {
+            ranges.add(&compliance.fields);
         }
-        self.pressed.iter().flatten().flatten().for_each(|pressed| pressed.add_memory(&mut ranges));
-        self.hollows.iter().flatten().for_each(|hollows| hollows.add_memory(&mut ranges));
+        self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
+        self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
         ranges
     }
 
-    /// Puts bodies and tools together.
+    /// Prepares bodies and tools.
     ///
     /// # Errors
     /// Too many of either, or none; a radius or stiffness that is not positive and finite.
     pub fn new(bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
-        Self::assembled(None, bodies, tools)
+        Self::assemble(None, bodies, tools)
     }
 
-    /// Other bodies and tools; what is known here of those that stay is taken over.
+    /// A model with other bodies and tools. Prepared data of those that stay are reused.
     ///
     /// # Errors
     /// As of [`Model::new`].
     pub fn changed(&self, bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
-        Self::assembled(Some(self), bodies, tools)
+        Self::assemble(Some(self), bodies, tools)
     }
 
-    fn assembled(known: Option<&Self>, bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
+    fn assemble(previous: Option<&Self>, bodies: Vec<BodyModel>, tools: Vec<ToolModel>) -> Result<Self> {
         for (what, count, most) in [("bodies", bodies.len(), MAX_BODIES), ("tools", tools.len(), MAX_TOOLS)] {
             if !(1..=most).contains(&count) {
                 return Err(Error::Invalid(format!("a simulation takes 1 to {most} {what}, got {count}")));
@@ -68,41 +68,42 @@ impl Model {
                 }
             }
         }
-        let mut regular: Vec<Vec<Option<Arc<RegularCompliance>>>> = Vec::new();
+        let mut regular_compliances: Vec<Vec<Option<Arc<RegularCompliance>>>> = Vec::new();
         for (rank, tool) in tools.iter().enumerate() {
-            let of_tool = match tools[..rank].iter().position(|other| meets_the_same(other, tool)) {
-                Some(twin) => regular[twin].clone(),
+            let of_tool = match tools[..rank].iter().position(|other| has_same_compliance(other, tool)) {
+                Some(twin) => regular_compliances[twin].clone(),
                 None => {
-                    let of_body = |body: &BodyModel| match known.and_then(|known| known.regular_of(body, tool)) {
-                        Some(known) => Ok(Some(known)),
+                    let of_body = |body: &BodyModel| match previous.and_then(|previous| previous.regular_of(body, tool))
+                    {
+                        Some(previous) => Ok(Some(previous)),
                         None => regular_compliance(body, tool),
                     };
                     bodies.iter().map(of_body).collect::<Result<_>>()?
                 }
             };
-            regular.push(of_tool);
+            regular_compliances.push(of_tool);
         }
-        let hollows_of = |tool: &ToolModel, body: &BodyModel| match (&body.local, &tool.shape, tool.law) {
-            (Some(local), &ToolShape::Sphere { radius }, LawKind::Local) => Hollows::new(&local.smooth, radius),
-            _ => Hollows::default(),
+        let hollows_of = |tool: &ToolModel, body: &BodyModel| match (&body.local, &tool.shape, tool.law.needs_moduli) {
+            (Some(local), &ToolShape::Sphere { radius }, true) => Concavities::new(&local.smooth, radius),
+            _ => Concavities::default(),
         };
-        let hollows = tools.iter().map(|tool| bodies.iter().map(|body| hollows_of(tool, body)).collect()).collect();
-        let pressed_of = |(rank, tool): (usize, &ToolModel)| {
-            let of_body = |(regular, body)| pressed_surface(body, tool, regular);
-            regular[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
+        let concavities = tools.iter().map(|tool| bodies.iter().map(|body| hollows_of(tool, body)).collect()).collect();
+        let pressed_of_tool = |(rank, tool): (usize, &ToolModel)| {
+            let of_body = |(compliance, body)| pressed_surface(body, tool, compliance);
+            regular_compliances[rank].iter().map(Option::as_deref).zip(&bodies).map(of_body).collect()
         };
-        let pressed = tools.iter().enumerate().map(pressed_of).collect();
-        Ok(Self { bodies, tools, regular, pressed, hollows })
+        let pressed_surfaces = tools.iter().enumerate().map(pressed_of_tool).collect();
+        Ok(Self { bodies, tools, regular_compliances, pressed_surfaces, concavities })
     }
 
-    /// What such a tool meets of a body, if some tool here does.
+    /// The regular compliance of such a tool and body, if this model has it.
     fn regular_of(&self, body: &BodyModel, tool: &ToolModel) -> Option<Arc<RegularCompliance>> {
-        let body = self.bodies.iter().position(|known| known.is_same(body))?;
-        let tool = self.tools.iter().position(|known| meets_the_same(known, tool))?;
-        self.regular[tool][body].clone()
+        let body = self.bodies.iter().position(|previous| previous.is_same(body))?;
+        let tool = self.tools.iter().position(|previous| has_same_compliance(previous, tool))?;
+        self.regular_compliances[tool][body].clone()
     }
 
-    /// Refuses a contact radius that some body cannot take.
+    /// Rejects a contact radius that is too large for some body.
     ///
     /// # Errors
     /// See [`PreparedBody::check_contact_radius`](super::PreparedBody::check_contact_radius).
@@ -111,26 +112,26 @@ impl Model {
     }
 }
 
-/// Whether two tools meet the same regular compliance.
-fn meets_the_same(one: &ToolModel, other: &ToolModel) -> bool {
+/// Whether two tools have the same regular compliance on a body.
+fn has_same_compliance(one: &ToolModel, other: &ToolModel) -> bool {
     other.law == one.law && other.radius == one.radius && other.max_stiffness == one.max_stiffness
 }
 
 fn pressed_surface(
     body: &BodyModel,
     tool: &ToolModel,
-    regular: Option<&RegularCompliance>,
+    compliance: Option<&RegularCompliance>,
 ) -> Option<Arc<PressedSurface>> {
-    let (local, regular) = (body.local.as_ref()?, regular?);
-    if !takes_cells(&tool.shape) {
+    let (local, compliance) = (body.local.as_ref()?, compliance?);
+    if !tool.shape.needs_cells() {
         return None;
     }
     let thickness = tool.shape.thickness();
-    Some(Arc::new(PressedSurface::new(&body.loaded, &body.query, &local.smooth, &regular.fields, thickness)))
+    Some(Arc::new(PressedSurface::new(&body.loaded, &body.query, &local.smooth, &compliance.fields, thickness)))
 }
 
 fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<RegularCompliance>>> {
-    if tool.law != LawKind::Local {
+    if !tool.law.needs_moduli {
         return Ok(None);
     }
     let local = body.local.as_ref().ok_or_else(|| {
@@ -139,5 +140,5 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
     let (green, geometry) = (&*body.green, &body.geometry);
     let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
     let compliant = CompliantBody { green, geometry, smooth, moduli, moves };
-    Ok(Some(Arc::new(RegularCompliance::kept(compliant, tool.radius, tool.max_stiffness))))
+    Ok(Some(Arc::new(RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness))))
 }

@@ -1,4 +1,4 @@
-//! The body in motion under the same contacts: the compliance of one step in place of the static one, and a spring.
+//! Motion of a body under contacts: the compliance of one step instead of the static one, and a spring to each tool.
 //!
 //! A step moves a patch to `d_free + C f`, `d_free = G q` being the free motion at the step's end (`dynamics::modal`) and
 //!
@@ -15,12 +15,12 @@ use glam::{DMat3, DVec3};
 use super::MAX_CONTACTS;
 use super::body::BodyModel;
 use super::contacts::Contacts;
-use super::energy::Account;
-use super::strike::{STRIKES_AT_ONCE, StrikeInProgress, gather};
+use super::energy::EnergyBalance;
+use super::strike::{STRIKES_AT_ONCE, StrikeInProgress, gather_rows};
 use crate::contact::{Patch, SurfacePoint};
 use crate::dynamics::{Energy, Lanes, LoadedPatch, ModalModel, PredictedState, Projection};
 
-/// How a body moves.
+/// Motion of a body.
 #[derive(Clone, Debug)]
 pub struct Motion {
     predicted: PredictedState,
@@ -30,13 +30,13 @@ pub struct Motion {
     /// `C` and `R` between the patches, m/N.
     compliance: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
     residual: Box<[[DMat3; MAX_CONTACTS]; MAX_CONTACTS]>,
-    /// The node that is watched.
+    /// Rows of the modes at a node whose displacement is requested.
     watched: Projection,
-    /// Motion less what one contact does to the body at rest, and a modal force.
+    /// Modal displacements without the static response to one contact, and a modal force.
     remainder: [Vec<Lanes>; 2],
-    /// Strikes, over or under way.
+    /// Strikes, over or in progress.
     strikes: [StrikeInProgress; STRIKES_AT_ONCE],
-    account: Account,
+    balance: EnergyBalance,
     /// Body time not yet stepped through, s.
     pub(super) due: f64,
     /// Body time since the start, s.
@@ -56,24 +56,24 @@ impl Motion {
             watched: Projection::new(modes),
             remainder: [modes.state().q, modes.state().q],
             strikes: std::array::from_fn(|_| StrikeInProgress::new(modes)),
-            account: Account::default(),
+            balance: EnergyBalance::default(),
             due: 0.0,
             time: 0.0,
         }
     }
 
-    /// Brings the body to rest. A step is made due, for contacts begin and end only within steps.
-    pub(super) fn rest(&mut self, modes: &ModalModel) {
+    /// Brings the body to rest. One step becomes due, for contacts begin and end only within steps.
+    pub(super) fn bring_to_rest(&mut self, modes: &ModalModel) {
         self.predicted.rest();
         self.free = Default::default();
         self.strikes.iter_mut().for_each(StrikeInProgress::end);
-        self.account = Account::default();
+        self.balance = EnergyBalance::default();
         self.due = modes.dt;
     }
 
-    /// Where the energy is.
+    /// Energies by kind.
     pub fn energy(&self) -> Energy {
-        self.account.energy
+        self.balance.energy
     }
 
     /// Modal displacements now.
@@ -81,7 +81,7 @@ impl Motion {
         &self.predicted.q
     }
 
-    /// Displacement of a surface node by the modes, less what the contacts do to it at rest, m: `q - p / k` at its rows.
+    /// Displacement of a surface node by the modes beyond the static response to the contacts, m: `q - p / k` at its rows.
     pub(super) fn beyond_static(&mut self, modes: &ModalModel, contacts: &Contacts, body: usize, node: usize) -> DVec3 {
         self.watched.gather(modes, std::iter::once((3 * node, 1.0)));
         let mut moved = self.watched.read(modes, &self.predicted.q);
@@ -110,7 +110,7 @@ impl Motion {
         whole: &[[DMat3; MAX_CONTACTS]; MAX_CONTACTS],
         slot: usize,
     ) {
-        gather(&mut self.projections[slot], modes, contacts.patches[slot].patch());
+        gather_rows(&mut self.projections[slot], modes, contacts.patches[slot].patch());
         self.free[slot] = self.projections[slot].read(modes, &self.predicted.free_q);
         for other in contacts.on(contacts.slots[slot].body) {
             let (a, b) = (&self.projections[slot], &self.projections[other]);
@@ -131,16 +131,16 @@ impl Motion {
         moved.into()
     }
 
-    /// Takes up where the patch of a contact that slides is now.
+    /// Updates the projection of a sliding contact to its present patch.
     pub(super) fn follow_contact(&mut self, modes: &ModalModel, contacts: &Contacts, slot: usize) {
-        gather(&mut self.projections[slot], modes, contacts.patches[slot].patch());
+        gather_rows(&mut self.projections[slot], modes, contacts.patches[slot].patch());
         self.free[slot] = self.projections[slot].read(modes, &self.predicted.free_q);
     }
 
-    /// Takes the motion at the end of the step as it is under the forces of the last one, less what that in a slot does to the
-    /// modes at rest. Of the free motion alone, a body at rest would have what its forces do within a step left out, and a
-    /// press would settle at an inclination that depends on the scheme.
-    pub(super) fn leave_out_static(&mut self, modes: &ModalModel, contacts: &Contacts, slot: usize) {
+    /// Sets the remainder: the motion at the end of the step under the forces of the previous one, less the static response of the
+    /// modes to the contact in a slot. The free motion alone would lack the response to the forces within a step, and a press would
+    /// settle at an inclination that depends on the scheme.
+    pub(super) fn subtract_static(&mut self, modes: &ModalModel, contacts: &Contacts, slot: usize) {
         let [remainder, load] = &mut self.remainder;
         remainder.copy_from_slice(&self.predicted.free_q);
         load.fill(Lanes::default());
@@ -153,21 +153,21 @@ impl Motion {
         modes.add_static(load, remainder);
     }
 
-    /// Displacement of a surface node in what [`Motion::leave_out_static`] took, m.
+    /// Displacement of a surface node in the remainder of [`Motion::subtract_static`], m.
     pub(super) fn remaining_displacement(&self, modes: &ModalModel, node: u32) -> DVec3 {
         let mut moved = [0.0; 3];
         modes.read(&self.remainder[0], 3 * node as usize.., &mut moved);
         moved.into()
     }
 
-    /// Compliance of one step between the patches in two slots less that at rest, as far as the modes carry it, m/N.
-    pub(super) fn change_in_a_step(&self, modes: &ModalModel, a: usize, b: usize) -> DMat3 {
+    /// Compliance of one step less the static one, of the modes, between the patches in two slots, m/N.
+    pub(super) fn step_compliance_change(&self, modes: &ModalModel, a: usize, b: usize) -> DMat3 {
         let (a, b) = (&self.projections[a], &self.projections[b]);
         a.step_compliance(modes, b) - a.static_compliance(modes, b)
     }
 
-    /// Takes up what a contact gives beyond the modes, for the account of energy.
-    pub(super) fn keep_residual(&mut self, modes: &ModalModel, slot: usize, regular: &DMat3) {
+    /// Sets the compliance of a contact beyond the modes, for the energy balance.
+    pub(super) fn set_residual_compliance(&mut self, modes: &ModalModel, slot: usize, regular: &DMat3) {
         let own = &self.projections[slot];
         self.residual[slot] = [DMat3::ZERO; MAX_CONTACTS];
         self.residual.iter_mut().for_each(|row| row[slot] = DMat3::ZERO);
@@ -184,18 +184,18 @@ impl Motion {
         self.free[slot]
     }
 
-    /// How far the forces that other contacts already exert move a patch beyond its modes, m.
+    /// Displacement of a patch beyond its modes by the present forces of other contacts, m.
     pub(super) fn residual_displacement(&self, contacts: &Contacts, slot: usize) -> DVec3 {
         let others = contacts.on(contacts.slots[slot].body).filter(|&other| other != slot);
         others.map(|other| self.residual[slot][other] * contacts.slots[other].force).sum()
     }
 
-    /// Whether another strike may begin before those under way are over.
+    /// Whether another strike may begin before those in progress end.
     pub(super) fn has_room_for_strike(&self) -> bool {
         self.strikes.iter().any(StrikeInProgress::is_over)
     }
 
-    /// Readies a strike from the next step on; nothing where there is no room for it.
+    /// Starts a strike at the next step, if there is room for it.
     pub(super) fn begin_strike(&mut self, modes: &ModalModel, patch: &Patch, impulse: DVec3, duration: f64) {
         if let Some(strike) = self.strikes.iter_mut().find(|strike| strike.is_over()) {
             strike.begin(modes, &self.predicted.q, patch, impulse, duration);
@@ -204,18 +204,18 @@ impl Motion {
 
     /// Force of a contact on the body at the end of the last step, N; none for one that begins.
     pub(super) fn last_force(&self, contacts: &Contacts, slot: usize) -> DVec3 {
-        match self.account.changes(contacts, contacts.slots[slot].body, slot) {
+        match self.balance.begins_or_ends(contacts, contacts.slots[slot].body, slot) {
             true => DVec3::ZERO,
-            false => self.account.last_force(slot),
+            false => self.balance.last_force(slot),
         }
     }
 
-    /// Ends the step by the forces of contacts and strikes, predicts the next, and keeps account of the energy.
+    /// Ends the step with the forces of contacts and strikes, predicts the next, and updates the energy balance.
     pub(super) fn advance(&mut self, modes: &ModalModel, coupling: f64, contacts: &Contacts, body: usize) {
         self.strikes.iter_mut().for_each(StrikeInProgress::advance);
-        let changed = std::array::from_fn(|slot| self.account.changes(contacts, body, slot));
-        let before = self.patches(modes, &changed, |account, other| account.last_force(other));
-        // Filled with any of them: what is not written below is not used.
+        let changed = std::array::from_fn(|slot| self.balance.begins_or_ends(contacts, body, slot));
+        let before = self.patches(modes, &changed, |balance, other| balance.last_force(other));
+        // Initial values; only the entries written below are used.
         let mut loaded = [self.strikes[0].loaded(); MAX_CONTACTS + STRIKES_AT_ONCE];
         let mut slots = [0; MAX_CONTACTS];
         let mut count = 0;
@@ -238,27 +238,27 @@ impl Motion {
         let after = self.patches(modes, &changed, |_, other| force(other));
         let moved = std::array::from_fn(|slot| after[slot] - before[slot]);
         let weight = modes.integration.weight();
-        self.account.book_step(&step);
-        self.account.book_contacts(contacts, slots, coupling, &self.residual);
-        self.account.book_work((contacts, body), (coupling, weight), &self.residual, &moved);
+        self.balance.add_step(&step);
+        self.balance.add_contacts(contacts, slots, coupling, &self.residual);
+        self.balance.add_work((contacts, body), (coupling, weight), &self.residual, &moved);
         for strike in &mut self.strikes {
-            self.account.energy.work += strike.work(modes, &self.predicted.q);
+            self.balance.energy.work += strike.work(modes, &self.predicted.q);
         }
     }
 
-    /// Mean displacements of some patches, m, without what their own forces do beyond the modes.
+    /// Mean displacements of some patches, m, without the response to their own forces beyond the modes.
     fn patches(
         &self,
         modes: &ModalModel,
         which: &[bool; MAX_CONTACTS],
-        force: impl Fn(&Account, usize) -> DVec3,
+        force: impl Fn(&EnergyBalance, usize) -> DVec3,
     ) -> [DVec3; MAX_CONTACTS] {
         std::array::from_fn(|slot| {
             if !which[slot] {
                 return DVec3::ZERO;
             }
             let others = (0..MAX_CONTACTS).filter(|&other| other != slot);
-            let beyond: DVec3 = others.map(|other| self.residual[slot][other] * force(&self.account, other)).sum();
+            let beyond: DVec3 = others.map(|other| self.residual[slot][other] * force(&self.balance, other)).sum();
             self.projections[slot].read(modes, &self.predicted.q) + beyond
         })
     }

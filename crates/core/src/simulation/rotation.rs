@@ -1,4 +1,4 @@
-//! From one orientation to another.
+//! Rotation vector between two orientations.
 
 use glam::{DQuat, DVec3};
 

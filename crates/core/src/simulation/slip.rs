@@ -1,7 +1,7 @@
-//! Contacts that stick slip where they are hardly pressed.
+//! Slip of sticking contacts beyond Coulomb's cone.
 //!
-//! A sticking contact carries any tangential force until it lets go, and lets go where it would pull: lifted from a drag it
-//! drops all of that force within one tick. So a law may bound the tangential force `t` by `mu` times the pressing force `n`
+//! A sticking contact carries any tangential force until it ends, and ends where it would pull: lifted after a drag, it would lose
+//! all of that force within one tick. So a law may bound the tangential force `t` by `mu` times the pressing force `n`
 //! (`Law::cone`): where it would be more, the anchor slips along `t` until `|t| = mu n`. Both then end at zero together.
 //!
 //! Forces are affine in the anchor of one contact, all others held: with a slip of length `s` along `e = t/|t|`
@@ -13,18 +13,18 @@
 //! a quadratic in `s` whose least positive root is the slip. `g` comes from one solve with a trial slip, so that it holds
 //! whatever the contacts share, at rest and in motion.
 //!
-//! Beside edges a slip takes pressing force away as well, `g_n > 0`. While a tool is lifted at a rate `n'` the slip goes on at
+//! Beside edges a slip reduces the pressing force as well, `g_n > 0`. A tool that is lifted at a rate `n'` slips at the rate
 //! `s' = mu n' / (g_t . e - mu g_n)`: where `mu` comes near `g_t . e / g_n` a slip takes away the force that bounds it,
 //! and the contact is gone at once. So `mu` is at most half of that ratio, which doubles the slip and no more; but it is at least
-//! [`SHALLOWEST`], so that a contact loaded evenly sticks everywhere. The ratio is the contact's own, the forces of others
+//! [`LEAST_COEFFICIENT`], so that a contact loaded evenly sticks everywhere. The ratio is the contact's own, the forces of others
 //! held: it does not change when one of them ends.
 //!
-//! A contact that lands in the dent of another tool finds material that is displaced along the surface, and force along it before
-//! there is any into it. That is what sticking there means; it slips only after its force has once been within the cone.
+//! A contact that begins where another tool has displaced the surface along itself has a tangential force before a pressing one.
+//! That follows from sticking there; it slips only after its force has once been within the cone.
 //!
-//! A slip only takes energy out. With the tool where it is the contacts hold `s (|t| + t(s) . e) / 2` less, and `t(s) . e` is
-//! kept from turning negative. On a body in motion it takes the mean force of the step along the slip, `(1 - w) t0 + w t(s)`
-//! (`energy`): where the force has just turned round, `t(s) . e` is kept above `-(1 - w) t0 . e / w`. A contact within its cone
+//! A slip only dissipates energy. At a fixed tool the stored energy falls by `s (|t| + t(s) . e) / 2`, and `t(s) . e` is not
+//! allowed to become negative. On a body in motion a slip takes the mean force of the step along the slip, `(1 - w) t0 + w t(s)`
+//! (`energy`): where the force has just reversed, `t(s) . e` is kept above `-(1 - w) t0 . e / w`. A contact within its cone
 //! keeps every bit.
 
 use glam::DVec3;
@@ -37,18 +37,18 @@ use super::solve::{contact_forces, own_compliance};
 use super::state::State;
 use super::system::System;
 
-/// No coupling of pressing and sliding makes a cone less steep than this: a contact then may let go with a jump, where
-/// dragging presses as much as it pulls along.
-const SHALLOWEST: f64 = 1.0;
+/// Least coefficient of a cone, whatever the coupling of pressing and sliding. Where dragging presses as much as it pulls along, a
+/// contact then may end with a jump.
+const LEAST_COEFFICIENT: f64 = 1.0;
 
-/// Sweeps over the contacts of a body in which those slip that others have pushed out of their cones; what is left after
-/// them, a thousandth where two tools are a patch apart, waits for the next tick.
+/// Sweeps over the contacts of a body: a slip of one may move the force of another out of its cone. The rest after these sweeps, a
+/// thousandth where two tools are a patch apart, is left to the next tick.
 const SWEEPS: usize = 4;
 
-/// Part of the cone within which a contact that has just slipped onto it is left alone.
+/// Tolerance of the cone for a contact that has just slipped onto it.
 const ROUNDING: f64 = 1e-9;
 
-/// Lets contacts of a body slip whose forces, just found, leave their cones; the forces of all are found again.
+/// Lets contacts of a body slip whose forces lie outside their cones, and finds the forces of all again.
 pub fn slip(model: &Model, state: &mut State, system: &mut System, body: usize) {
     for _ in 0..SWEEPS {
         if !sweep(model, state, system, body) {
@@ -57,7 +57,7 @@ pub fn slip(model: &Model, state: &mut State, system: &mut System, body: usize) 
     }
 }
 
-/// Each contact once; whether any slipped.
+/// One sweep over the contacts; returns whether any slipped.
 fn sweep(model: &Model, state: &mut State, system: &mut System, body: usize) -> bool {
     let mut slipped = false;
     for slot in 0..MAX_CONTACTS {
@@ -65,69 +65,69 @@ fn sweep(model: &Model, state: &mut State, system: &mut System, body: usize) -> 
         if contact.mode == Mode::Free || contact.body != body {
             continue;
         }
-        let Some(steepest) = law_of(contact.law).cone(contact) else { continue };
+        let Some(largest_coefficient) = law_of(contact.law).cone(contact) else { continue };
         let contact = *contact;
-        let force = Parts::along(contact.force, contact.normal);
-        let Some(direction) = force.beyond(SHALLOWEST) else {
-            state.contacts.slots[slot].settled |= force.pressing > 0.0;
+        let force = ForceParts::of(contact.force, contact.normal);
+        let Some(direction) = force.direction_beyond(LEAST_COEFFICIENT) else {
+            state.contacts.slots[slot].was_in_cone |= force.pressing > 0.0;
             continue;
         };
         let own = own_compliance(model, state, slot).inverse() * direction;
-        let coefficient = Parts::along(own, contact.normal).coefficient(direction, steepest);
-        let outside = force.beyond(coefficient * (1.0 + ROUNDING)).is_some();
-        state.contacts.slots[slot].settled |= !outside;
-        if !(outside && contact.settled) {
+        let coefficient = ForceParts::of(own, contact.normal).coefficient(direction, largest_coefficient);
+        let outside = force.direction_beyond(coefficient * (1.0 + ROUNDING)).is_some();
+        state.contacts.slots[slot].was_in_cone |= !outside;
+        if !(outside && contact.was_in_cone) {
             continue;
         }
-        // Any length will do: the forces are affine in it.
+        // The forces are affine in the length, so that any trial length serves.
         let trial = model.tools[contact.tool].radius;
-        shift(&mut state.contacts.slots[slot], direction * trial);
+        shift_anchor(&mut state.contacts.slots[slot], direction * trial);
         contact_forces(model, state, system, body);
-        let after = Parts::along(state.contacts.slots[slot].force, contact.normal);
-        let rate = Parts {
+        let after = ForceParts::of(state.contacts.slots[slot].force, contact.normal);
+        let rate = ForceParts {
             pressing: (force.pressing - after.pressing) / trial,
             tangential: (force.tangential - after.tangential) / trial,
         };
-        let most =
-            (force.tangential.length() - kept(model, state, slot, direction)).max(0.0) / rate.tangential.dot(direction);
+        let most = (force.tangential.length() - least_tangential(model, state, slot, direction)).max(0.0)
+            / rate.tangential.dot(direction);
         let length = slip_length(&force, &rate, coefficient, most);
-        shift(&mut state.contacts.slots[slot], direction * (length - trial));
+        shift_anchor(&mut state.contacts.slots[slot], direction * (length - trial));
         contact_forces(model, state, system, body);
         slipped = true;
     }
     slipped
 }
 
-/// A force of a contact on the body, into it and along it, N, or its decrease with the slip, N/m.
-struct Parts {
+/// Pressing and tangential part of the force of a contact on the body, N, or of its decrease with the slip, N/m.
+struct ForceParts {
     pressing: f64,
     tangential: DVec3,
 }
 
-impl Parts {
-    /// Of a vector beside a surface.
-    fn along(vector: DVec3, normal: DVec3) -> Self {
+impl ForceParts {
+    /// Parts of a vector at a surface.
+    fn of(vector: DVec3, normal: DVec3) -> Self {
         let pressing = -vector.dot(normal);
         Self { pressing, tangential: vector + normal * pressing }
     }
 
-    /// Direction of the tangential force, if it is more than `coefficient` times the pressing one. A contact that pulls is
-    /// not for slipping: it ends.
-    fn beyond(&self, coefficient: f64) -> Option<DVec3> {
+    /// Direction of the tangential force, if it is more than `coefficient` times the pressing one. A contact that pulls does not
+    /// slip: it ends.
+    fn direction_beyond(&self, coefficient: f64) -> Option<DVec3> {
         let outside = self.pressing > 0.0 && self.tangential.length() > coefficient * self.pressing;
         if outside { self.tangential.try_normalize() } else { None }
     }
 
-    /// Of a decrease with the slip: the coefficient of the cone, see the module's header.
-    fn coefficient(&self, direction: DVec3, steepest: f64) -> f64 {
+    /// Coefficient of the cone from the decrease with the slip, see the module's header.
+    fn coefficient(&self, direction: DVec3, largest_coefficient: f64) -> f64 {
         let along = self.tangential.dot(direction);
-        let coupled = if self.pressing > 0.0 { 0.5 * along / self.pressing } else { steepest };
-        coupled.clamp(SHALLOWEST, steepest)
+        let coupled = if self.pressing > 0.0 { 0.5 * along / self.pressing } else { largest_coefficient };
+        coupled.clamp(LEAST_COEFFICIENT, largest_coefficient)
     }
 }
 
-/// Tangential force along the slip that it leaves at least, N: on a body in motion what makes the mean of the step none.
-fn kept(model: &Model, state: &State, slot: usize, direction: DVec3) -> f64 {
+/// Least tangential force along the slip that remains, N. On a body in motion the mean of the step is then zero.
+fn least_tangential(model: &Model, state: &State, slot: usize, direction: DVec3) -> f64 {
     let body = state.contacts.slots[slot].body;
     let (Some(motion), Some(dynamics)) = (&state.bodies[body].motion, &model.bodies[body].dynamics) else { return 0.0 };
     let weight = dynamics.modes.integration.weight();
@@ -136,7 +136,7 @@ fn kept(model: &Model, state: &State, slot: usize, direction: DVec3) -> f64 {
 }
 
 /// Length of the slip that ends on the cone, at most `most`.
-fn slip_length(force: &Parts, rate: &Parts, coefficient: f64, most: f64) -> f64 {
+fn slip_length(force: &ForceParts, rate: &ForceParts, coefficient: f64, most: f64) -> f64 {
     let squared = coefficient * coefficient;
     let a = rate.tangential.length_squared() - squared * rate.pressing * rate.pressing;
     let b = force.tangential.dot(rate.tangential) - squared * force.pressing * rate.pressing;
@@ -148,9 +148,9 @@ fn slip_length(force: &Parts, rate: &Parts, coefficient: f64, most: f64) -> f64 
 }
 
 /// Moves the anchor of a contact.
-fn shift(contact: &mut Contact, by: DVec3) {
+fn shift_anchor(contact: &mut Contact, by: DVec3) {
     contact.anchor += by;
     contact.displacement -= by;
-    contact.wanted -= by;
+    contact.tool_displacement -= by;
     contact.slipped += by;
 }

@@ -1,4 +1,4 @@
-//! What the frame side needs to draw a tick; its memory is sized once.
+//! Snapshot of a tick for drawing; its memory is allocated once.
 
 use glam::DVec3;
 
@@ -7,10 +7,10 @@ use super::body::BodyModel;
 use super::contacts::Contacts;
 use super::model::Model;
 use super::state::{State, ToolState};
-use super::strike::gather;
+use super::strike::gather_rows;
 use crate::dynamics::{Energy, Lanes, Projection};
 
-/// What a tick left of one body.
+/// Snapshot of a body.
 #[derive(Clone, Debug, Default)]
 struct BodySnapshot {
     energy: Option<Energy>,
@@ -20,18 +20,18 @@ struct BodySnapshot {
     modal: Vec<Lanes>,
 }
 
-/// What is drawn of a tick.
+/// State of a simulation after a tick, as it is drawn.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// The contacts.
     pub contacts: Contacts,
-    /// What the tools remember.
+    /// The tools.
     pub tools: [ToolState; MAX_TOOLS],
     bodies: Vec<BodySnapshot>,
 }
 
 impl State {
-    /// Copies what is drawn; nothing is allocated where the snapshot is one of this model's.
+    /// Copies the state into a snapshot; nothing is allocated if the snapshot is of the same model.
     pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
         snapshot.contacts.copy_from(&self.contacts);
         snapshot.tools = self.tools;
@@ -46,7 +46,7 @@ impl State {
 }
 
 impl Snapshot {
-    /// Of bodies at rest.
+    /// Bodies at rest, without contacts.
     pub fn new(model: &Model) -> Self {
         let body = |body: &BodyModel| BodySnapshot {
             energy: body.dynamics.as_ref().map(|_| Energy::default()),
@@ -61,23 +61,23 @@ impl Snapshot {
         }
     }
 
-    /// Where the energy of a body in motion is.
+    /// Energy of a body in motion.
     pub fn energy(&self, body: usize) -> Option<Energy> {
         self.bodies.get(body).and_then(|body| body.energy)
     }
 
-    /// Time that a body in motion has gone through since the start, s.
+    /// Time of a body in motion since the start, s.
     pub fn body_time(&self, body: usize) -> f64 {
         self.bodies.get(body).map_or(0.0, |body| body.time)
     }
 
     /// Displacements of some surface nodes of a body, m, in its frame.
     pub fn displacements_of(&self, model: &Model, body: usize, nodes: &[u32]) -> Vec<DVec3> {
-        let moving = self.moving(model, body);
-        nodes.iter().map(|&node| self.displacement_of(model, body, &moving, node)).collect()
+        let modal_beyond_static = self.modal_beyond_static(model, body);
+        nodes.iter().map(|&node| self.displacement_of(model, body, &modal_beyond_static, node)).collect()
     }
 
-    fn displacement_of(&self, model: &Model, body: usize, moving: &[Lanes], node: u32) -> DVec3 {
+    fn displacement_of(&self, model: &Model, body: usize, modal_beyond_static: &[Lanes], node: u32) -> DVec3 {
         let (fixed, first) = (&model.bodies[body], 3 * node as usize);
         let mut sum = DVec3::from_slice(&fixed.free[first..first + 3]);
         for slot in self.contacts.on(body) {
@@ -86,7 +86,7 @@ impl Snapshot {
         }
         if let Some(dynamics) = &fixed.dynamics {
             let mut moved = [0.0; 3];
-            dynamics.modes.read(moving, first.., &mut moved);
+            dynamics.modes.read(modal_beyond_static, first.., &mut moved);
             sum += DVec3::from(moved);
         }
         sum
@@ -103,22 +103,22 @@ impl Snapshot {
         }
         if let Some(dynamics) = &fixed.dynamics {
             let mut moved = vec![0.0; displacements.len()];
-            dynamics.modes.read(&self.moving(model, body), 0.., &mut moved);
+            dynamics.modes.read(&self.modal_beyond_static(model, body), 0.., &mut moved);
             displacements.iter_mut().zip(&moved).for_each(|(u, m)| *u += m);
         }
         displacements
     }
 
-    /// Modal displacements of what is drawn beside `Psi W f`, so that the modes left out are there too: `q - p / k`, `p`
-    /// being the modal force `Phi^T W f`.
-    fn moving(&self, model: &Model, body: usize) -> Vec<Lanes> {
+    /// Modal displacements beyond the static ones, `q - p / k` with the modal force `p = Phi^T W f`. `Psi W f` has the static part
+    /// of all modes, those left out included.
+    fn modal_beyond_static(&self, model: &Model, body: usize) -> Vec<Lanes> {
         let Some(dynamics) = &model.bodies[body].dynamics else { return Vec::new() };
         let modes = &dynamics.modes;
-        let (mut projection, mut moving) = (Projection::new(modes), self.bodies[body].modal.clone());
+        let (mut projection, mut modal_beyond_static) = (Projection::new(modes), self.bodies[body].modal.clone());
         for slot in self.contacts.on(body) {
-            gather(&mut projection, modes, self.contacts.patches[slot].patch());
-            projection.take_static(modes, self.contacts.slots[slot].force, &mut moving);
+            gather_rows(&mut projection, modes, self.contacts.patches[slot].patch());
+            projection.take_static(modes, self.contacts.slots[slot].force, &mut modal_beyond_static);
         }
-        moving
+        modal_beyond_static
     }
 }

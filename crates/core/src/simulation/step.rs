@@ -1,136 +1,137 @@
 //! The tick, in stages.
 
-use super::contacts::{Contact, Mode};
+use super::contact_check::is_sound;
+use super::contacts::Mode;
 use super::input::{Controls, Input, Output};
-use super::law::{Approach, law_of};
+use super::law::{Approach, LAWS, law_of};
 use super::model::Model;
 use super::scratch::Scratch;
 use super::slip::slip;
-use super::sound::is_sound;
-use super::state::{Entry, State};
+use super::state::{EntryDepth, State};
 use super::tool::LawKind;
-use super::{MAX_CONTACTS, further, limit, solve, time};
+use super::{MAX_CONTACTS, limit, solve, time};
 
 /// Advances the contacts of all tools, and the bodies that move, by one tick; returns the wrenches on the devices.
 pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Input) -> Output {
     for body in 0..model.bodies.len() {
         state.bodies[body].stiffness_scale = stiffness_scale(model, body, input);
 
-        // 1. A body that moves makes as many time steps as have come due; one that does not answers at once.
+        // 1. A body in motion makes as many time steps as are due; a body at rest makes one static solve.
         time::begin_strike(model, state, scratch, body, input);
         time::pass_time(model, state, body, &input.controls);
         while time::begin_step(model, state, body) {
-            // 2. Contacts begin, follow their tools, and push.
+            // 2. Contacts begin and follow their tools; their forces are found.
             follow_tools(model, state, scratch, body, input);
             limit::apply(model, state, scratch, body, input.controls.strain_limit[body]);
-            push(model, state, scratch, body, &input.controls);
-            further::find_wall(model, state, scratch, body);
+            find_forces(model, state, scratch, body, &input.controls);
+            for law in LAWS {
+                law.find_additional_by_force(model, state, scratch.memory(), body);
+            }
 
-            // 3. Their forces go into the motion.
+            // 3. The forces act on the motion.
             if !time::end_step(model, state, body) {
                 break;
             }
         }
     }
 
-    for (tool, said) in state.tools.iter_mut().zip(&input.tools) {
-        tool.has_left = (tool.has_left || (tool.before.is_some() && !said.active)) && !input.controls.reset;
-        tool.before = (said.active && said.pose.is_finite()).then_some(said.pose);
+    for (tool, tool_input) in state.tools.iter_mut().zip(&input.tools) {
+        tool.has_left =
+            (tool.has_left || (tool.previous_pose.is_some() && !tool_input.active)) && !input.controls.reset;
+        tool.previous_pose = (tool_input.active && tool_input.pose.is_finite()).then_some(tool_input.pose);
     }
 
-    // 4. The device feels minus what the bodies feel.
-    answer(model, state)
+    // 4. The wrench on a device is minus that on the bodies.
+    output_wrenches(model, state)
 }
 
 /// Contacts of a body begin, follow their tools, or end, by geometry and buttons.
 fn follow_tools(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, input: &Input) {
     for (tool, tool_model) in model.tools.iter().enumerate() {
-        let said = &input.tools[tool];
-        let (places, count) = gather(state, tool, body);
-        let places = &places[..count];
-        let law_of_contact = places.first().map(|&slot| state.contacts.slots[slot].law);
-        let law = law_of(law_now(tool_model.law, law_of_contact, said.grab));
+        let tool_input = &input.tools[tool];
+        let (slots, count) = contact_slots(state, tool, body);
+        let slots = &slots[..count];
+        let law_of_contact = slots.first().map(|&slot| state.contacts.slots[slot].law);
+        let law = law_of(contact_law(tool_model.law, law_of_contact, tool_input.grab));
         let was_refused = state.tools[tool].refused[body].take();
-        if !said.active || input.controls.reset || !said.pose.is_finite() {
-            state.tools[tool].entry[body] = Entry::default();
-            places.iter().for_each(|&slot| state.contacts.clear(slot));
+        if !tool_input.active || input.controls.reset || !tool_input.pose.is_finite() {
+            state.tools[tool].entry[body] = EntryDepth::default();
+            slots.iter().for_each(|&slot| state.contacts.clear(slot));
             continue;
         }
-        let known = state.tools[tool];
-        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), (tool, body), &known, input);
+        let tool_state = state.tools[tool];
+        let approach = Approach::new(model, state.bodies[body].motion.as_ref(), (tool, body), &tool_state, input);
         let mut lasts = false;
-        for &slot in places {
+        for &slot in slots {
             if law.update(&approach, &mut state.contacts.slots[slot]) {
-                lasts |= !state.contacts.slots[slot].local.held;
+                lasts |= law.persists(&state.contacts.slots[slot]);
             } else {
                 let depth = approach.depth();
-                state.tools[tool].entry[body] = Entry { depth, reached: depth };
+                state.tools[tool].entry[body] = EntryDepth { threshold: depth, previous: depth };
                 state.contacts.clear(slot);
             }
         }
         if count > 0 {
             if lasts {
-                // Walls beside a tool that is no sphere show when it has been pressed.
-                if approach.pressed.is_none() {
-                    further::find(model, state, scratch, (tool, body));
-                }
+                law.find_additional(model, state, scratch.memory(), (tool, body));
                 continue;
             }
-            if places.iter().any(|&slot| state.contacts.slots[slot].mode == Mode::Free) {
+            if slots.iter().any(|&slot| state.contacts.slots[slot].mode == Mode::Free) {
                 continue;
             }
         }
-        match law.begin(&approach, &mut state.tools[tool].entry[body], &mut scratch.covering) {
-            Ok(Some(begun)) => {
-                if let Some(slot) = solve::add_contact(model, state, begun, &scratch.covering) {
+        match law.begin(&approach, &mut state.tools[tool].entry[body], &mut scratch.weight_scratch) {
+            Ok(Some(new_contact)) => {
+                if let Some(slot) = law.add(model, state, new_contact, &scratch.weight_scratch) {
                     limit::begin(model, state, slot, input.controls.strain_limit[body]);
                 }
             }
-            // It is still as deep as where it was refused, or where it has gone since.
-            Ok(None) if state.tools[tool].entry[body].reached > 0.0 => state.tools[tool].refused[body] = was_refused,
+            // The tool is still in the body: the reason of the last refusal stays.
+            Ok(None) if state.tools[tool].entry[body].previous > 0.0 => state.tools[tool].refused[body] = was_refused,
             Ok(None) => {}
             Err(refusal) => state.tools[tool].refused[body] = Some(refusal),
         }
     }
 }
 
-/// Slots of a tool's contacts with a body, and how many there are. A tool that presses nowhere waits nowhere.
-fn gather(state: &mut State, tool: usize, body: usize) -> ([usize; MAX_CONTACTS], usize) {
-    let mut places = [0; MAX_CONTACTS];
+/// Slots of a tool's contacts with a body, and their number. If none of them presses, the pending ones end.
+fn contact_slots(state: &mut State, tool: usize, body: usize) -> ([usize; MAX_CONTACTS], usize) {
+    let mut slots = [0; MAX_CONTACTS];
     let mut count = 0;
     for slot in state.contacts.of(tool, body) {
-        places[count] = slot;
+        slots[count] = slot;
         count += 1;
     }
-    if places[..count].iter().all(|&slot| state.contacts.slots[slot].waits()) {
-        places[..count].iter().for_each(|&slot| state.contacts.clear(slot));
+    if slots[..count].iter().all(|&slot| state.contacts.slots[slot].is_pending()) {
+        slots[..count].iter().for_each(|&slot| state.contacts.clear(slot));
         count = 0;
     }
-    (places, count)
+    (slots, count)
 }
 
-/// The law of a tool's contact: a tool that holds on does so by a patch, whatever its law.
-fn law_now(of_tool: LawKind, of_contact: Option<LawKind>, grab: bool) -> LawKind {
+/// The law of a tool's contact.
+fn contact_law(of_tool: LawKind, of_contact: Option<LawKind>, grab: bool) -> LawKind {
     match of_contact {
         Some(law) => law,
-        None if grab && of_tool == LawKind::Local => LawKind::Patch,
+        None if grab => law_of(of_tool).grab_law(),
         None => of_tool,
     }
 }
 
-/// Forces of all contacts of a body together; a contact whose law ends it by its force is let go, and the rest solved
+/// Forces of all contacts of a body together. A contact that its law ends by its force is removed, and the others are solved
 /// again.
-fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
-    // Contacts that stick are pushed by those that slide, and these by them. Each kind is solved for by itself, given the other's
-    // forces: first those that stick under the sliding forces of the tick before, which is off by the product of both
-    // couplings, below a thousandth of what a tick changes; without that they were felt a whole tick late.
-    let sticks = |slot: usize| state.contacts.slots[slot].law != LawKind::Local;
-    if state.contacts.on(body).any(sticks) && !state.contacts.on(body).all(sticks) {
+fn find_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, controls: &Controls) {
+    // Linear and nonlinear contacts displace each other. Each kind is solved given the forces of the other: first the linear ones
+    // under the nonlinear forces of the previous tick. The error is the product of both couplings, below a thousandth of the change
+    // in a tick. Without this first solve the nonlinear contacts would respond to the linear ones one tick late.
+    let linear = |slot: usize| !state.contacts.slots[slot].nonlinear;
+    if state.contacts.on(body).any(linear) && !state.contacts.on(body).all(linear) {
         solve::contact_forces(model, state, &mut scratch.system, body);
     }
-    let Scratch { covering, local, system } = scratch;
-    solve::local_forces(model, state, solve::Memory { covering, local, system }, body, controls);
-    limit::let_through(model, state, body, controls.strain_limit[body]);
+    for law in LAWS {
+        law.find_forces(model, state, scratch.memory(), body, controls);
+    }
+    limit::limit_sliding_forces(model, state, body, controls.strain_limit[body]);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);
         slip(model, state, &mut scratch.system, body);
@@ -140,13 +141,14 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, co
             if contact.mode == Mode::Free || contact.body != body {
                 continue;
             }
-            if law_of(contact.law).end(contact) {
+            let law = law_of(contact.law);
+            if law.ends(contact) {
                 let contact = *contact;
                 state.contacts.clear(slot);
-                remember(model, state, &contact);
+                law.store_entry_depth(model, state, &contact);
                 ended = true;
             } else {
-                contact.pressed = true;
+                contact.has_pressed = true;
             }
         }
         if !ended {
@@ -155,31 +157,12 @@ fn push(model: &Model, state: &mut State, scratch: &mut Scratch, body: usize, co
     }
 }
 
-/// What a tool remembers of a contact that its force has ended: how deep it is, so that the next one starts from zero. On a
-/// body at rest a contact that has never pressed is forgotten: the tool is in a dent that others have made, and begins anew
-/// until it has come through it.
-fn remember(model: &Model, state: &mut State, contact: &Contact) {
-    let (tool, body) = (contact.tool, contact.body);
-    let moves = model.bodies[body].moves();
-    let entry = &mut state.tools[tool].entry[body];
-    if contact.law == LawKind::Local {
-        entry.reached = contact.local.depth.max(0.0);
-        return;
-    }
-    if !moves && !contact.pressed {
-        return;
-    }
-    let position = contact.anchor + contact.wanted;
-    let motion = state.bodies[body].motion.as_ref();
-    state.tools[tool].entry[body].depth = Approach::at(model, motion, tool, body, position).depth();
-}
-
-pub(super) fn answer(model: &Model, state: &State) -> Output {
+pub(super) fn output_wrenches(model: &Model, state: &State) -> Output {
     let mut output = Output::default();
     for (contact, _) in state.contacts.iter() {
         let placement = &model.bodies[contact.body].placement;
-        let (force, torque) = (contact.force, contact.local.torque);
-        let whole = if contact.law == LawKind::Local { 1.0 / contact.local.share } else { 1.0 };
+        let (force, torque) = (contact.force, contact.torque);
+        let whole = 1.0 / contact.share;
         for (wrench, scale) in [(&mut output.wrench_on_device, 1.0), (&mut output.unlimited, whole)] {
             wrench[contact.tool].force -= placement.vector_to_world(force * scale);
             wrench[contact.tool].torque += placement.vector_to_world(torque * scale);
@@ -194,7 +177,7 @@ pub(super) fn answer(model: &Model, state: &State) -> Output {
     output
 }
 
-/// A body in motion keeps the stiffness that its modes belong to.
+/// Stiffness scale of a body; a body in motion keeps the stiffness of its modes.
 fn stiffness_scale(model: &Model, body: usize, input: &Input) -> f64 {
     let scale = input.controls.stiffness_scale[body];
     if scale > 0.0 && scale.is_finite() && !model.bodies[body].moves() { scale } else { 1.0 }

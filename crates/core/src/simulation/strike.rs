@@ -8,10 +8,10 @@ use crate::dynamics::{Lanes, LoadedPatch, ModalModel, Projection};
 /// A strike takes no more steps than this: a second at the usual time step.
 const STEPS_MAX: f64 = 1000.0;
 
-/// So many strikes of one body may be under way at once; their forces add up.
+/// Most strikes of one body in progress at once; their forces add up.
 pub(super) const STRIKES_AT_ONCE: usize = 4;
 
-/// The strike of a body, over or under way: forces `a sin(pi k / (n + 1))` at the ends of `n` steps, `dt` times their sum
+/// A strike of a body, over or in progress: forces `a sin(pi k / (n + 1))` at the ends of `n` steps, `dt` times their sum
 /// being the impulse. With `n = 1` it rises to `impulse / dt` and falls in the step after.
 #[derive(Clone, Debug)]
 pub struct StrikeInProgress {
@@ -28,7 +28,7 @@ pub struct StrikeInProgress {
 }
 
 impl StrikeInProgress {
-    /// None under way.
+    /// None in progress.
     pub fn new(modes: &ModalModel) -> Self {
         let (zero, patch) = (DVec3::ZERO, Projection::new(modes));
         Self { patch, amplitude: zero, steps: 0, next: 0, force: [zero; 2], displacement: zero }
@@ -44,9 +44,9 @@ impl StrikeInProgress {
         self.next == 0 && self.force == [DVec3::ZERO; 2]
     }
 
-    /// Readies a strike from the next step on.
+    /// Starts a strike at the next step.
     pub fn begin(&mut self, modes: &ModalModel, q: &[Lanes], patch: &Patch, impulse: DVec3, duration: f64) {
-        gather(&mut self.patch, modes, patch);
+        gather_rows(&mut self.patch, modes, patch);
         self.displacement = self.patch.read(modes, q);
         self.steps = (duration / modes.dt).round().clamp(1.0, STEPS_MAX) as u32;
         // The sum of sin(pi k / (n + 1)) over k = 1..n is the cotangent of pi / (2 (n + 1)).
@@ -55,7 +55,7 @@ impl StrikeInProgress {
         self.next = 1;
     }
 
-    /// Goes on to the force at the end of this step.
+    /// Advances to the force at the end of this step.
     pub fn advance(&mut self) {
         self.force[0] = DVec3::ZERO;
         if self.next == 0 {
@@ -91,6 +91,6 @@ impl StrikeInProgress {
 }
 
 /// Gathers the rows of the modes at a patch.
-pub(super) fn gather(projection: &mut Projection, modes: &ModalModel, patch: &Patch) {
+pub(super) fn gather_rows(projection: &mut Projection, modes: &ModalModel, patch: &Patch) {
     projection.gather(modes, patch.iter().map(|(node, weight)| (3 * node, weight)));
 }

@@ -1,4 +1,4 @@
-//! Memory that fronts hand on to each other.
+//! Pool of buffers that are reused by successive fronts.
 //!
 //! A million tetrahedra take 100 GB of fronts one after the other, a few at a time. What is given back to the system is
 //! cleared by it before it is used again, and taken from the page tables of all threads: a fifth of a factorisation's time.
@@ -17,20 +17,20 @@ pub fn buffer_numbers(count: usize) -> usize {
     }
 }
 
-/// Buffers that wait for their next use.
+/// Buffers for reuse.
 pub struct Buffers {
-    waiting: Mutex<Waiting>,
+    pool: Mutex<Pool>,
     /// Numbers that may wait.
     limit: usize,
 }
 
 #[derive(Default)]
-struct Waiting {
+struct Pool {
     by_numbers: BTreeMap<usize, Vec<Vec<f64>>>,
     numbers: usize,
 }
 
-impl Waiting {
+impl Pool {
     /// One of exactly so many numbers.
     fn take(&mut self, numbers: usize) -> Option<Vec<f64>> {
         let same = self.by_numbers.get_mut(&numbers)?;
@@ -46,14 +46,14 @@ impl Waiting {
 impl Buffers {
     /// Of which so many numbers may wait, none so far.
     pub fn new(limit: usize) -> Self {
-        Self { waiting: Mutex::new(Waiting::default()), limit }
+        Self { pool: Mutex::new(Pool::default()), limit }
     }
 
     /// At least so many numbers, of any value.
     pub fn take(&self, count: usize) -> Vec<f64> {
         let numbers = buffer_numbers(count);
-        let waiting = (numbers >= LEAST).then(|| self.waiting.lock().ok()?.take(numbers)).flatten();
-        waiting.unwrap_or_else(|| vec![0.0; numbers])
+        let pool = (numbers >= LEAST).then(|| self.pool.lock().ok()?.take(numbers)).flatten();
+        pool.unwrap_or_else(|| vec![0.0; numbers])
     }
 
     /// Takes one back. The smallest that wait are let go of where there are too many: they cost least.
@@ -62,12 +62,12 @@ impl Buffers {
             return;
         }
         let mut dropped = Vec::new();
-        if let Ok(mut waiting) = self.waiting.lock() {
-            waiting.numbers += buffer.len();
-            waiting.by_numbers.entry(buffer.len()).or_default().push(buffer);
-            while waiting.numbers > self.limit {
-                let smallest = waiting.by_numbers.first_key_value().map(|(&numbers, _)| numbers);
-                dropped.extend(smallest.and_then(|numbers| waiting.take(numbers)));
+        if let Ok(mut pool) = self.pool.lock() {
+            pool.numbers += buffer.len();
+            pool.by_numbers.entry(buffer.len()).or_default().push(buffer);
+            while pool.numbers > self.limit {
+                let smallest = pool.by_numbers.first_key_value().map(|(&numbers, _)| numbers);
+                dropped.extend(smallest.and_then(|numbers| pool.take(numbers)));
             }
         }
     }
@@ -99,8 +99,8 @@ mod tests {
         for numbers in [LEAST, 3 * LEAST, LEAST, LEAST] {
             buffers.give(vec![1.0; numbers]);
         }
-        let waiting = buffers.waiting.lock().unwrap();
-        assert_eq!(waiting.numbers, 4 * LEAST);
-        assert_eq!(waiting.by_numbers.keys().copied().collect::<Vec<_>>(), [LEAST, 3 * LEAST]);
+        let pool = buffers.pool.lock().unwrap();
+        assert_eq!(pool.numbers, 4 * LEAST);
+        assert_eq!(pool.by_numbers.keys().copied().collect::<Vec<_>>(), [LEAST, 3 * LEAST]);
     }
 }

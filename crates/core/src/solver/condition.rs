@@ -1,4 +1,4 @@
-//! Condition number of a factorised stiffness, and where the body gives most.
+//! Condition number of a factorised stiffness, and the most compliant node.
 //!
 //! Rounding perturbs an answer by up to `eps * condition` of itself, so a large enough number means that no digit is
 //! right: a part of the body moves without deforming, though round-off left every pivot positive. The number is that of

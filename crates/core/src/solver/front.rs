@@ -55,8 +55,8 @@ impl Eliminated {
     }
 }
 
-/// What a child adds to a front.
-pub struct Addend {
+/// Update matrix of a child, which is added to the front of its parent.
+pub struct UpdateMatrix {
     update: Update,
     /// Places of its boundary in the front, ascending.
     places: Vec<u32>,
@@ -64,7 +64,7 @@ pub struct Addend {
     runs: Vec<Range<usize>>,
 }
 
-impl Addend {
+impl UpdateMatrix {
     /// The update of a child, whose boundary has the ascending `places` in the front.
     pub fn new(update: Update, places: Vec<u32>) -> Self {
         let mut from = 0;
@@ -85,7 +85,7 @@ impl Addend {
 
 /// Columns of an addend that are not added yet.
 struct Rest<'a> {
-    of: &'a Addend,
+    of: &'a UpdateMatrix,
     column: usize,
     runs: &'a [Range<usize>],
 }
@@ -93,7 +93,7 @@ struct Rest<'a> {
 impl Rest<'_> {
     /// Adds to the column of a place, whose rows begin with that of place `first`; all places are asked for in turn.
     fn add(&mut self, place: usize, first: usize, target: &mut [f64]) {
-        let Addend { update, places, .. } = self.of;
+        let UpdateMatrix { update, places, .. } = self.of;
         if places.get(self.column).is_none_or(|&next| next as usize != place) {
             return;
         }
@@ -125,13 +125,19 @@ pub fn front_numbers(size: usize, boundary: usize) -> (usize, usize) {
     (numbers(0), numbers(size))
 }
 
-/// Tells the entries of a column of the supernode: places of their rows, and values.
-pub type Own<'a> = &'a (dyn Fn(usize, &mut dyn FnMut(usize, f64)) + Sync);
+/// Visits the entries of a column of the supernode: positions of their rows, and values.
+pub type ColumnEntries<'a> = &'a (dyn Fn(usize, &mut dyn FnMut(usize, f64)) + Sync);
 
 impl Front {
     /// The sum of the supernode's columns of the matrix, whose rows on and below the diagonal `own` tells by their places,
     /// and the updates of the children.
-    pub fn new(size: usize, boundary: usize, own: Own<'_>, children: Vec<Addend>, buffers: &Buffers) -> Self {
+    pub fn new(
+        size: usize,
+        boundary: usize,
+        own: ColumnEntries<'_>,
+        children: Vec<UpdateMatrix>,
+        buffers: &Buffers,
+    ) -> Self {
         let rows = size + boundary;
         let block = |(first, width): (usize, usize)| {
             BlockColumn::new(first, width, rows - first, buffers.take(width * (rows - first)))

@@ -14,7 +14,7 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use rayon::prelude::*;
 
 use super::buffers::Buffers;
-use super::front::{Addend, Eliminated, Front, Update, front_numbers};
+use super::front::{Eliminated, Front, Update, UpdateMatrix, front_numbers};
 use crate::{Error, Result};
 
 /// A subtree of less than this part of all operations is shared by the threads, one of less than a sixteenth of that is
@@ -101,7 +101,7 @@ impl Schedule {
         threads: usize,
         kept: &dyn Fn(usize) -> usize,
     ) -> usize {
-        let mut account = Account { schedule: self, structure, kept, held: 0, peak: 0 };
+        let mut account = MemoryCount { schedule: self, structure, kept, held: 0, peak: 0 };
         for unit in &self.units {
             let before = account.held;
             let mut tops = Vec::new();
@@ -126,17 +126,17 @@ impl Schedule {
         (0..self.parents.len()).map(|s| numbers(structure, s).0).max().unwrap_or(0)
     }
 
-    /// Eliminates everything; `keep` is handed the columns of each supernode, `go_on` asked now and then.
+    /// Eliminates everything; `keep` is handed the columns of each supernode, `interrupt` asked now and then.
     ///
     /// # Errors
-    /// A pivot that is not positive, or that of `go_on`.
-    pub fn run<Kept: Send>(
+    /// A pivot that is not positive, or that of `interrupt`.
+    pub fn run<PreviousRanks: Send>(
         &self,
         structure: &SymbolicSupernodalCholesky<usize>,
         columns: &dyn Columns,
-        keep: &(dyn Fn(&Eliminated) -> Kept + Sync),
-        go_on: &(dyn Fn() -> Result<()> + Sync),
-    ) -> Result<Vec<Kept>> {
+        keep: &(dyn Fn(&Eliminated) -> PreviousRanks + Sync),
+        interrupt: &(dyn Fn() -> Result<()> + Sync),
+    ) -> Result<Vec<PreviousRanks>> {
         let run = Run {
             schedule: self,
             structure,
@@ -148,12 +148,12 @@ impl Schedule {
         };
         let mut places = vec![0; structure.supernode_end().last().copied().unwrap_or(0)];
         for unit in &self.units {
-            go_on()?;
+            interrupt()?;
             let groups = unit.groups.par_iter().with_max_len(1);
             let memory = || vec![0; places.len()];
             groups.map_init(memory, |places, group| run.eliminate(group, places)).collect::<Result<()>>()?;
             for s in &unit.rest {
-                go_on()?;
+                interrupt()?;
                 run.eliminate(std::slice::from_ref(s), &mut places)?;
             }
         }
@@ -163,17 +163,17 @@ impl Schedule {
 }
 
 /// What a factorisation works on.
-struct Run<'a, Kept> {
+struct Run<'a, PreviousRanks> {
     schedule: &'a Schedule,
     structure: &'a SymbolicSupernodalCholesky<usize>,
     columns: &'a dyn Columns,
     buffers: Buffers,
     updates: Vec<Mutex<Option<Update>>>,
-    kept: Vec<Mutex<Option<Kept>>>,
-    keep: &'a (dyn Fn(&Eliminated) -> Kept + Sync),
+    kept: Vec<Mutex<Option<PreviousRanks>>>,
+    keep: &'a (dyn Fn(&Eliminated) -> PreviousRanks + Sync),
 }
 
-impl<Kept> Run<'_, Kept> {
+impl<PreviousRanks> Run<'_, PreviousRanks> {
     /// Eliminates some supernodes in their order; `places` has room for every position.
     fn eliminate(&self, supernodes: &[u32], places: &mut [u32]) -> Result<()> {
         for s in supernodes.iter().map(|&s| s as usize) {
@@ -198,7 +198,7 @@ impl<Kept> Run<'_, Kept> {
         let addend = |&child: &u32| {
             let pattern = self.structure.supernode(child as usize).pattern();
             let places = pattern.iter().map(|&position| places[position]).collect();
-            take(&self.updates[child as usize]).map(|update| Addend::new(update, places))
+            take(&self.updates[child as usize]).map(|update| UpdateMatrix::new(update, places))
         };
         let children = self.schedule.children[s].iter().filter_map(addend).collect();
         let own = |column: usize, see: &mut dyn FnMut(usize, f64)| {
@@ -223,7 +223,7 @@ fn not_positive() -> Error {
 }
 
 /// Memory as it is taken and given back, bytes.
-struct Account<'a> {
+struct MemoryCount<'a> {
     schedule: &'a Schedule,
     structure: &'a SymbolicSupernodalCholesky<usize>,
     kept: &'a dyn Fn(usize) -> usize,
@@ -231,7 +231,7 @@ struct Account<'a> {
     peak: usize,
 }
 
-impl Account<'_> {
+impl MemoryCount<'_> {
     fn eliminate(&mut self, s: usize) {
         let numbers = |s: usize| {
             let (front, update) = numbers(self.structure, s);

@@ -1,4 +1,4 @@
-//! Displacement gradients at many places, from displacements of nodes.
+//! Displacement gradients at many points, from displacements of nodes.
 
 use rayon::prelude::*;
 

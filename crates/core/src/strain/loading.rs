@@ -1,4 +1,4 @@
-//! Forces that stand for all that a contact, or several, may meet.
+//! Sampled directions of contact forces, which represent all loadings of one contact or several.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! The strain of a pose at all places of a body, and the few of them that matter for a contact.
+//! Strain of a pose at all evaluation points of a body, and the choice of the few that are watched for a contact.
 
 use std::sync::Arc;
 
@@ -6,8 +6,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::loading::{Loadings, loadings};
-use super::places::choose;
 use super::response::{MAX_CONTACTS_WATCHED, Place, StrainResponse};
+use super::watched_points::choose;
 use super::{GradientOperator, StrainKind};
 use crate::element::{Face, Tri3, Tri6};
 use crate::green::{GreensFunction, Interior, TouchNode};

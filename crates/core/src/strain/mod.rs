@@ -1,6 +1,6 @@
 //! Chapter 8 of docs/theory.md: the strain of a pose, and the share of a contact's force that is within a limit.
 //!
-//! Linear elasticity is honest to about 10 % strain. While a contact sticks, the displacements are affine in the forces on
+//! Linear elasticity is accurate up to about 10 % strain. While a contact sticks, the displacements are affine in the forces on
 //! the patches, `u = u_free + sum_c Psi W_c f_c`, and so is the displacement gradient at any place of the body: a place is
 //! [`GradientOperator`] rows applied to `u_free` (its base) and to the columns of `Psi W_c` (its slopes per newton). Two
 //! measures follow from a gradient ([`StrainKind`]): the infinitesimal strain where the elements are known, and the Green
@@ -20,11 +20,11 @@ mod gradient;
 mod loading;
 #[cfg(feature = "offline")]
 mod measure;
-#[cfg(feature = "offline")]
-mod places;
 mod provisional;
 mod response;
 mod tensor;
+#[cfg(feature = "offline")]
+mod watched_points;
 
 #[cfg(feature = "offline")]
 pub use gradient::GradientOperator;

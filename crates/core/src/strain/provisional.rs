@@ -1,4 +1,4 @@
-//! How far a patch may move before anything is known of the strain under it: for the first ticks of a contact.
+//! Provisional bound on the displacement of a patch, used until the strain response of its contact is ready.
 //!
 //! On a half-space a traction `3 F / (pi a^2) (1 - r^2/a^2)^2`, whose weights are those of a patch of radius `a`, moves the
 //! patch, by the mean `d = W^T u` with its own weights, by

@@ -1,4 +1,4 @@
-//! Which share of the forces of the contacts keeps the strain within a limit: the tick's side. Nothing here allocates.
+//! Share of the contact forces that keeps the strain within a limit, evaluated in the tick. Nothing here allocates.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! An allocator that counts what each thread allocates and frees. `crates/servo/tests/no_allocation.rs` uses it too.
+//! An allocator that counts what each thread allocates and frees. `crates/servo/tests/loop/` uses it too.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

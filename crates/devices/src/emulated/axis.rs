@@ -4,13 +4,13 @@
 //! m x'' + b x' + k x = F + k (wanted + drift t) - friction sign(x')
 //! ```
 //!
-//! With `k > 0` the particular solution is `wanted + (F - b drift) / k + drift t`, and what is left of `x` decays as
+//! With `k > 0` the particular solution is `target + (F - b drift) / k + drift t`, and what is left of `x` decays as
 //! `exp(-a t) (y cos wt + (y' + a y) sin(wt) / w)` with `a = b / 2m`, `w^2 = k/m - a^2`; beyond critical damping the functions are
 //! hyperbolic. With `k = 0` it is a mass in a viscous medium.
 
 /// Longest time between two looks at the sign of the velocity, s. Turns are found to the bit between two looks; one that is
 /// begun and undone within is missed, which a mass on muscles, of 40 Hz at most, does not make.
-const LOOK: f64 = 0.25e-3;
+const SIGN_CHECK_INTERVAL: f64 = 0.25e-3;
 
 /// Halvings of a look to where the velocity is zero: below the resolution of a double.
 const HALVINGS: usize = 60;
@@ -36,7 +36,7 @@ pub struct Axis {
     /// Held, N.
     pub force: f64,
     /// Where the muscles pull at the beginning, m, and how fast that moves, m/s.
-    pub wanted: f64,
+    pub target: f64,
     pub drift: f64,
 }
 
@@ -48,7 +48,7 @@ impl Axis {
         }
         let mut time = 0.0;
         while time < seconds {
-            let at = Axis { wanted: self.wanted + self.drift * time, ..*self };
+            let at = Axis { target: self.target + self.drift * time, ..*self };
             let left = seconds - time;
             let rests = state.velocity == 0.0;
             let stuck = if rests { at.time_stuck(state.position) } else { 0.0 };
@@ -60,7 +60,7 @@ impl Axis {
             let pull = at.pull(state.position);
             let sense = if rests { if pull == 0.0 { self.drift } else { pull } } else { state.velocity }.signum();
             let slid;
-            (state, slid) = at.slide(state, sense, left.min(LOOK));
+            (state, slid) = at.slide(state, sense, left.min(SIGN_CHECK_INTERVAL));
             time += slid;
         }
         state
@@ -68,7 +68,7 @@ impl Axis {
 
     /// Force on a tip at rest without its friction, N.
     fn pull(&self, position: f64) -> f64 {
-        self.force + self.stiffness * (self.wanted - position)
+        self.force + self.stiffness * (self.target - position)
     }
 
     /// How long friction holds a tip at rest, s.
@@ -107,7 +107,7 @@ impl Axis {
         if self.stiffness == 0.0 {
             return self.in_viscous_medium(state, t);
         }
-        let centre = self.wanted + (self.force - self.damping * self.drift) / self.stiffness;
+        let centre = self.target + (self.force - self.damping * self.drift) / self.stiffness;
         let (y, rate) = (state.position - centre, state.velocity - self.drift);
         let a = 0.5 * self.damping / self.mass;
         let squared = self.stiffness / self.mass;
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     const AXIS: Axis =
-        Axis { mass: 0.2, damping: 3.0, stiffness: 400.0, friction: 0.0, force: 1.5, wanted: 0.01, drift: 0.05 };
+        Axis { mass: 0.2, damping: 3.0, stiffness: 400.0, friction: 0.0, force: 1.5, target: 0.01, drift: 0.05 };
     const START: State = State { position: -0.004, velocity: 0.3 };
 
     /// By the classical scheme of Runge and Kutta, from the equation of motion as it stands.
@@ -166,7 +166,7 @@ mod tests {
         let rate = |t: f64, s: State| State {
             position: s.velocity,
             velocity: (axis.force - axis.damping * s.velocity
-                + axis.stiffness * (axis.wanted + axis.drift * t - s.position)
+                + axis.stiffness * (axis.target + axis.drift * t - s.position)
                 - axis.friction * if s.velocity == 0.0 { 0.0 } else { s.velocity.signum() })
                 / axis.mass,
         };
@@ -205,7 +205,7 @@ mod tests {
             assert_close(axis.advance(START, 0.02), expected, 1e-13);
             // The half of a motion is a motion.
             let half = axis.advance(START, 0.01);
-            let later = Axis { wanted: axis.wanted + axis.drift * 0.01, ..axis };
+            let later = Axis { target: axis.target + axis.drift * 0.01, ..axis };
             assert_close(later.advance(half, 0.01), expected, 1e-13);
         }
     }
@@ -214,7 +214,7 @@ mod tests {
     fn a_mass_on_a_spring_with_dry_friction_loses_its_amplitude_evenly() {
         // Textbook: each half period takes 2 f/k off, and it stops where the spring is weaker than the friction.
         let axis =
-            Axis { mass: 0.1, damping: 0.0, stiffness: 100.0, friction: 0.1, force: 0.0, wanted: 0.0, drift: 0.0 };
+            Axis { mass: 0.1, damping: 0.0, stiffness: 100.0, friction: 0.1, force: 0.0, target: 0.0, drift: 0.0 };
         let half_period = std::f64::consts::PI * (axis.mass / axis.stiffness).sqrt();
         let mut state = State { position: 0.0105, velocity: 0.0 };
         for turn in 1..=5 {
@@ -230,11 +230,11 @@ mod tests {
     #[test]
     fn a_stuck_tip_starts_when_the_muscles_pull_more_than_the_friction() {
         // 400 N/m at 0.05 m/s reach 0.6 N after 30 ms.
-        let axis = Axis { friction: 0.6, force: 0.0, wanted: 0.0, ..AXIS };
+        let axis = Axis { friction: 0.6, force: 0.0, target: 0.0, ..AXIS };
         let rest = State::default();
         assert_eq!(axis.advance(rest, 0.0299), rest);
         let (later, moved) = (0.05, axis.advance(rest, 0.05));
-        let sliding = Axis { friction: 0.0, force: -0.6, wanted: axis.drift * 0.03, ..axis };
+        let sliding = Axis { friction: 0.0, force: -0.6, target: axis.drift * 0.03, ..axis };
         assert_close(moved, by_runge_kutta(&sliding, rest, later - 0.03, 2000), 1e-12);
         // The other way just so.
         let mirrored = Axis { drift: -axis.drift, ..axis }.advance(rest, later);

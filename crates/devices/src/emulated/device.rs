@@ -1,9 +1,9 @@
-//! An emulated device in the process of its loop.
+//! Emulated device that runs in the process of its loop.
 
 use glam::DVec3;
 use triple_buffer::{Input, Output, triple_buffer};
 
-use super::hand::Wanted;
+use super::hand::HandTarget;
 use super::tip::Tip;
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Twist, Wrench};
 
@@ -11,7 +11,7 @@ use crate::{Buttons, Device, DeviceFault, DeviceLimits, Pose, Reading, Twist, Wr
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// Where the hand wants to be from now on, m; `None` leaves it to what it was made with.
-    pub wanted: Option<DVec3>,
+    pub target: Option<DVec3>,
     /// Which buttons it holds.
     pub buttons: Buttons,
     /// Whether the tool is in the scene.
@@ -20,13 +20,13 @@ pub struct Command {
 
 impl Default for Command {
     fn default() -> Self {
-        Self { wanted: None, buttons: Buttons::default(), active: true }
+        Self { target: None, buttons: Buttons::default(), active: true }
     }
 }
 
-/// What the tip does in truth, beside what its device measures.
+/// True motion of the tip, which the device measures in whole steps of its encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Truth {
+pub struct TrueMotion {
     /// m.
     pub position: DVec3,
     /// m/s.
@@ -38,7 +38,7 @@ pub struct Truth {
 /// The end that steers and looks on, from any thread.
 pub struct Handle {
     commands: Input<Command>,
-    truths: Output<Truth>,
+    true_motions: Output<TrueMotion>,
 }
 
 impl Handle {
@@ -47,9 +47,9 @@ impl Handle {
         self.commands.write(command);
     }
 
-    /// What the tip did at the last reading. Wait-free.
-    pub fn truth(&mut self) -> Truth {
-        *self.truths.read()
+    /// True motion at the last reading. Wait-free.
+    pub fn true_motion(&mut self) -> TrueMotion {
+        *self.true_motions.read()
     }
 }
 
@@ -60,7 +60,7 @@ pub struct EmulatedDevice {
     tip: Tip,
     limits: DeviceLimits,
     commands: Output<Command>,
-    truths: Input<Truth>,
+    true_motions: Input<TrueMotion>,
     read_ns: Option<u64>,
 }
 
@@ -68,10 +68,16 @@ pub struct EmulatedDevice {
 /// may be wrong.
 pub fn emulated(name: &str, tip: Tip, limits: DeviceLimits) -> (Handle, EmulatedDevice) {
     let (commands, received) = triple_buffer(&Command::default());
-    let (published, truths) = triple_buffer(&Truth { position: tip.position(), ..Truth::default() });
-    let device =
-        EmulatedDevice { name: name.to_owned(), tip, limits, commands: received, truths: published, read_ns: None };
-    (Handle { commands, truths }, device)
+    let (published, true_motions) = triple_buffer(&TrueMotion { position: tip.position(), ..TrueMotion::default() });
+    let device = EmulatedDevice {
+        name: name.to_owned(),
+        tip,
+        limits,
+        commands: received,
+        true_motions: published,
+        read_ns: None,
+    };
+    (Handle { commands, true_motions }, device)
 }
 
 impl Device for EmulatedDevice {
@@ -84,18 +90,18 @@ impl Device for EmulatedDevice {
         self.read_ns = Some(now_ns);
         self.tip.advance(1e-9 * elapsed_ns as f64);
         let command = *self.commands.read();
-        if let (Some(position), Some(hand)) = (command.wanted, &mut self.tip.hand) {
-            match &mut hand.wanted {
-                Wanted::At(wanted) => *wanted = position,
+        if let (Some(position), Some(hand)) = (command.target, &mut self.tip.hand) {
+            match &mut hand.target {
+                HandTarget::At(target) => *target = position,
                 // Keeps the memory of the waypoints: a tick neither allocates nor frees.
-                Wanted::Along(waypoints) => {
+                HandTarget::Along(waypoints) => {
                     waypoints.truncate(1);
                     waypoints.iter_mut().for_each(|only| only.position = position);
                 }
             }
         }
         let measured = self.tip.measure();
-        self.truths.write(Truth {
+        self.true_motions.write(TrueMotion {
             position: self.tip.position(),
             velocity: self.tip.velocity(),
             force: self.tip.force(),
@@ -141,22 +147,24 @@ mod tests {
         let push = DVec3::new(30.0, 0.0, -40.0);
         let readings: Vec<Reading> = (0..100).map(|k| tick(&mut device, k, push)).collect();
         assert_eq!(readings[0].pose, Pose::default());
-        let truth = handle.truth();
-        assert!((truth.force - DVec3::new(1.8, 0.0, -2.4)).length() < 1e-15);
+        let true_motion = handle.true_motion();
+        assert!((true_motion.force - DVec3::new(1.8, 0.0, -2.4)).length() < 1e-15);
         // v = F/b (1 - exp(-b t / m)).
         let speed = 3.0 / 0.5 * (1.0 - (-0.5 * 0.099 / 0.1_f64).exp());
-        assert!((truth.velocity - speed * push.normalize()).length() < 1e-12);
-        assert!((readings[99].pose.position - truth.position).length() < 1e-5);
-        assert!((readings[99].pose.position - truth.position).length() > 0.0);
+        assert!((true_motion.velocity - speed * push.normalize()).length() < 1e-12);
+        assert!((readings[99].pose.position - true_motion.position).length() < 1e-5);
+        assert!((readings[99].pose.position - true_motion.position).length() > 0.0);
     }
 
     #[test]
     fn the_hand_goes_where_it_is_sent() {
-        for wanted in [Wanted::At(DVec3::ZERO), Wanted::Along(vec![Waypoint { time: 0.0, position: DVec3::ZERO }; 3])] {
-            let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 200.0, wanted };
+        for target in
+            [HandTarget::At(DVec3::ZERO), HandTarget::Along(vec![Waypoint { time: 0.0, position: DVec3::ZERO }; 3])]
+        {
+            let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 200.0, target };
             let tip = Tip::new(MECHANICS, DVec3::ZERO, Some(hand));
             let (mut handle, mut device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
-            handle.set(Command { wanted: Some(DVec3::Y), buttons: Buttons::GRAB, active: true });
+            handle.set(Command { target: Some(DVec3::Y), buttons: Buttons::GRAB, active: true });
             let last = (0..3000).map(|k| tick(&mut device, k, DVec3::ZERO)).last().expect("a reading");
             assert!((last.pose.position - DVec3::Y).length() < 1e-9);
             assert!(last.buttons.grab() && last.active);

@@ -1,4 +1,4 @@
-//! A person's hand as a load.
+//! Model of a person's hand: mass, damper and spring towards a target.
 //!
 //! The tip is held firmly, so that hand and tip move as one, and muscles with their reflexes act like a spring and a damper
 //! towards where the hand wants to be.
@@ -15,12 +15,12 @@ pub struct Hand {
     /// Of the muscles, N/m.
     pub stiffness: f64,
     /// Where it wants to be.
-    pub wanted: Wanted,
+    pub target: HandTarget,
 }
 
-/// Where a hand wants to be: it is there as far as nothing pushes it away.
+/// Target of a hand: its position if no force acts on it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Wanted {
+pub enum HandTarget {
     /// At one place, m.
     At(DVec3),
     /// Where the waypoints lead, in the order of their times: at the first one before, at the last one afterwards.
@@ -36,14 +36,14 @@ pub struct Waypoint {
     pub position: DVec3,
 }
 
-impl Wanted {
+impl HandTarget {
     /// Place at a time, m. From one waypoint to the next the hand wants to move with the least jerk, from rest to rest, as people
     /// reach (Flash and Hogan, The coordination of arm movements, J. Neuroscience 5, 1985):
     /// `10 s^3 - 15 s^4 + 6 s^5` of the way.
     pub fn at(&self, time: f64) -> DVec3 {
         match self {
-            Wanted::At(position) => *position,
-            Wanted::Along(waypoints) => {
+            HandTarget::At(position) => *position,
+            HandTarget::Along(waypoints) => {
                 let next = waypoints.partition_point(|waypoint| waypoint.time <= time);
                 match (next.checked_sub(1).map(|last| waypoints[last]), waypoints.get(next)) {
                     (Some(last), Some(next)) => {
@@ -61,8 +61,8 @@ impl Wanted {
     /// Whether it may change after a time.
     pub fn moves_after(&self, time: f64) -> bool {
         match self {
-            Wanted::At(_) => false,
-            Wanted::Along(waypoints) => waypoints.last().is_some_and(|last| last.time > time),
+            HandTarget::At(_) => false,
+            HandTarget::Along(waypoints) => waypoints.last().is_some_and(|last| last.time > time),
         }
     }
 }
@@ -74,14 +74,14 @@ mod tests {
     #[test]
     fn a_reach_is_smooth_and_rests_at_its_waypoints() {
         let at = |time: f64, x: f64| Waypoint { time, position: DVec3::new(x, 0.0, -x) };
-        let wanted = Wanted::Along(vec![at(0.5, 1.0), at(1.0, 3.0), at(1.2, 3.0)]);
+        let target = HandTarget::Along(vec![at(0.5, 1.0), at(1.0, 3.0), at(1.2, 3.0)]);
         for (time, x) in [(0.0, 1.0), (0.5, 1.0), (0.75, 2.0), (1.0, 3.0), (1.1, 3.0), (9.0, 3.0)] {
-            assert!((wanted.at(time) - DVec3::new(x, 0.0, -x)).length() < 1e-15, "{time}");
+            assert!((target.at(time) - DVec3::new(x, 0.0, -x)).length() < 1e-15, "{time}");
         }
         // Fastest in the middle, 15/8 of the mean speed.
-        let speed = (wanted.at(0.7501).x - wanted.at(0.7499).x) / 0.0002;
+        let speed = (target.at(0.7501).x - target.at(0.7499).x) / 0.0002;
         assert!((speed - 15.0 / 8.0 * 4.0).abs() < 1e-5);
-        assert!(wanted.at(0.501).x - 1.0 < 1e-6);
-        assert!(wanted.moves_after(1.1) && !wanted.moves_after(1.2));
+        assert!(target.at(0.501).x - 1.0 < 1e-6);
+        assert!(target.moves_after(1.1) && !target.moves_after(1.2));
     }
 }

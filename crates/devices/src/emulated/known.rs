@@ -8,7 +8,7 @@
 //! USB, 1 ms, or a quarter where the vendor's loop runs at 4 kHz, must be made up for by friction and hand, as it is by the real
 //! ones.
 
-use super::hand::{Hand, Wanted};
+use super::hand::{Hand, HandTarget};
 use super::tip::Mechanics;
 
 const fn tip(mass: f64, damping: f64, dry_friction: f64, encoder_step: f64, delay: f64) -> Mechanics {
@@ -39,13 +39,13 @@ impl Hand {
     /// 135 N/m (van Beek et al., Scientific Reports 5:18004, 2015, figure 3; of that mass only a part moves as fast as an
     /// unstable contact); the tip of a finger that pushes with 2 to 20 N, 4 to 7.4 N s/m and 255 to 1255 N/m (Hajian and Howe,
     /// J. Biomechanical Engineering 119, 1997, as it is commonly quoted).
-    pub fn loose(wanted: Wanted) -> Self {
-        Self { mass: 0.1, damping: 2.0, stiffness: 100.0, wanted }
+    pub fn loose(target: HandTarget) -> Self {
+        Self { mass: 0.1, damping: 2.0, stiffness: 100.0, target }
     }
 
     /// A hand that grips: 0.3 kg, 10 N s/m, 800 N/m.
-    pub fn firm(wanted: Wanted) -> Self {
-        Self { mass: 0.3, damping: 10.0, stiffness: 800.0, wanted }
+    pub fn firm(target: HandTarget) -> Self {
+        Self { mass: 0.3, damping: 10.0, stiffness: 800.0, target }
     }
 }
 

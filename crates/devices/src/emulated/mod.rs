@@ -22,6 +22,6 @@ mod hand;
 pub mod known;
 mod tip;
 
-pub use device::{Command, EmulatedDevice, Handle, Truth, emulated};
-pub use hand::{Hand, Wanted, Waypoint};
+pub use device::{Command, EmulatedDevice, Handle, TrueMotion, emulated};
+pub use hand::{Hand, HandTarget, Waypoint};
 pub use tip::{Measurement, Mechanics, Tip, VELOCITY_WINDOW};

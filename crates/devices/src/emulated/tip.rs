@@ -14,7 +14,7 @@ pub const VELOCITY_WINDOW: f64 = 0.02;
 const STRETCH: f64 = 0.25e-3;
 
 /// Most writes that wait for their time, and most measurements within the window: of a loop at 50 kHz over 20 ms.
-const MOST_KEPT: usize = 1024;
+const MAX_STORED: usize = 1024;
 
 /// A device's mechanics at its tip, the same along every axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,8 +72,8 @@ impl Tip {
             time: 0.0,
             axes: position.to_array().map(|position| State { position, velocity: 0.0 }),
             force: DVec3::ZERO,
-            pending: VecDeque::with_capacity(MOST_KEPT),
-            measured: VecDeque::with_capacity(MOST_KEPT),
+            pending: VecDeque::with_capacity(MAX_STORED),
+            measured: VecDeque::with_capacity(MAX_STORED),
         }
     }
 
@@ -110,12 +110,12 @@ impl Tip {
 
     /// Writes a force, N: it acts after the delay, until another one does.
     pub fn write(&mut self, force: DVec3) {
-        if self.pending.len() == MOST_KEPT {
+        if self.pending.len() == MAX_STORED {
             // The oldest one early, rather than memory without bound.
             self.force = self.pending.pop_front().map_or(self.force, |oldest| oldest.force);
         }
         self.pending.push_back(Pending { time: self.time + self.mechanics.delay, force });
-        self.take_due();
+        self.apply_due_force();
     }
 
     /// Lets go at once of the force and of all that wait: motors that are switched off.
@@ -128,14 +128,14 @@ impl Tip {
     pub fn advance(&mut self, seconds: f64) {
         let end = self.time + seconds;
         while self.time < end {
-            self.take_due();
+            self.apply_due_force();
             let mut until = self.pending.front().map_or(end, |next| next.time.min(end));
-            if self.hand.as_ref().is_some_and(|hand| hand.wanted.moves_after(self.time)) {
+            if self.hand.as_ref().is_some_and(|hand| hand.target.moves_after(self.time)) {
                 until = until.min(self.time + STRETCH);
             }
             self.move_until(until);
         }
-        self.take_due();
+        self.apply_due_force();
     }
 
     /// What the device measures now; to be asked once a tick, for its velocity is a difference of what it has measured
@@ -145,7 +145,7 @@ impl Tip {
         let position = self.position();
         let position = if step > 0.0 { (position / step).round() * step } else { position };
         // The last one before the window stays, so that a slow loop has one to differ from.
-        while self.measured.len() == MOST_KEPT
+        while self.measured.len() == MAX_STORED
             || self.measured.get(1).is_some_and(|(time, _)| *time <= self.time - VELOCITY_WINDOW)
         {
             self.measured.pop_front();
@@ -158,7 +158,7 @@ impl Tip {
         Measurement { position, velocity }
     }
 
-    fn take_due(&mut self) {
+    fn apply_due_force(&mut self) {
         while let Some(due) = self.pending.front().filter(|next| next.time <= self.time) {
             self.force = due.force;
             self.pending.pop_front();
@@ -170,8 +170,8 @@ impl Tip {
         let seconds = until - self.time;
         let Mechanics { mass, damping, dry_friction, .. } = self.mechanics;
         let held = self.hand.as_ref().map(|hand| {
-            let wanted = hand.wanted.at(self.time);
-            (hand, wanted, (hand.wanted.at(until) - wanted) / seconds)
+            let target = hand.target.at(self.time);
+            (hand, target, (hand.target.at(until) - target) / seconds)
         });
         for (rank, state) in self.axes.iter_mut().enumerate() {
             let alone = Axis {
@@ -180,14 +180,14 @@ impl Tip {
                 stiffness: 0.0,
                 friction: dry_friction,
                 force: self.force[rank],
-                wanted: 0.0,
+                target: 0.0,
                 drift: 0.0,
             };
-            let axis = held.map_or(alone, |(hand, wanted, drift)| Axis {
+            let axis = held.map_or(alone, |(hand, target, drift)| Axis {
                 mass: mass + hand.mass,
                 damping: damping + hand.damping,
                 stiffness: hand.stiffness,
-                wanted: wanted[rank],
+                target: target[rank],
                 drift: drift[rank],
                 ..alone
             });
@@ -199,7 +199,7 @@ impl Tip {
 
 #[cfg(test)]
 mod tests {
-    use super::super::hand::{Wanted, Waypoint};
+    use super::super::hand::{HandTarget, Waypoint};
     use super::*;
 
     const MECHANICS: Mechanics =
@@ -229,11 +229,11 @@ mod tests {
 
     #[test]
     fn the_path_does_not_depend_on_how_time_is_divided() {
-        let wanted = Wanted::Along(vec![
+        let target = HandTarget::Along(vec![
             Waypoint { time: 0.01, position: DVec3::ZERO },
             Waypoint { time: 0.11, position: DVec3::new(0.02, -0.01, 0.005) },
         ]);
-        let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 300.0, wanted };
+        let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 300.0, target };
         let mechanics = Mechanics { dry_friction: 0.05, delay: 0.4e-3, ..MECHANICS };
         let end = |parts: usize| {
             let mut tip = Tip::new(mechanics, DVec3::ZERO, Some(hand.clone()));
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_hand_at_rest_gives_way_by_the_force_over_its_stiffness() {
-        let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 200.0, wanted: Wanted::At(DVec3::Y) };
+        let hand = Hand { mass: 0.1, damping: 4.0, stiffness: 200.0, target: HandTarget::At(DVec3::Y) };
         let mut tip = Tip::new(MECHANICS, DVec3::Y, Some(hand));
         tip.write(DVec3::Z);
         tip.advance(5.0);

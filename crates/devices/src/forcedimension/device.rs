@@ -1,12 +1,12 @@
-//! What the tick asks of the library.
+//! Reading and writing of a device in the tick.
 
 use std::ffi::c_int;
 
 use glam::{DMat3, DQuat, DVec3};
 
 use super::guard::{Guard, State};
-use super::held::Held;
 use super::library::{Dhd, Freshness, fault};
+use super::open_devices::OpenDevice;
 use super::{Traits, ffi::Id};
 use crate::frame::rotation;
 use crate::{Buttons, Device, DeviceFault, DeviceLimits, Frame, OpenError, Pose, Reading, Twist, Wrench};
@@ -26,24 +26,24 @@ pub struct ForceDimensionDevice {
 }
 
 impl ForceDimensionDevice {
-    pub fn new(dhd: Dhd, place: Held, id: Id, traits: Traits) -> Result<Self, OpenError> {
+    pub fn new(dhd: Dhd, place: OpenDevice, id: Id, traits: Traits) -> Result<Self, OpenError> {
         let guard = Guard::start(dhd, place, id, traits.clone())?;
         Ok(Self { dhd, traits, guard, fresh_ns: None })
     }
 
     /// Notes what an error means for the tick and for the guard.
-    fn failed(&self, code: c_int, id: Id) -> DeviceFault {
+    fn fault_of(&self, code: c_int, id: Id) -> DeviceFault {
         let fault = fault(code);
         if fault == DeviceFault::Disconnected {
             // Nothing is written from now on, and what cannot be read may still hear.
             let _ = self.dhd.release(self.traits.has_active_wrist, id);
             let _ = self.dhd.enable_force(false, id);
-            self.guard.lose();
+            self.guard.mark_lost();
         }
         fault
     }
 
-    fn measured(&mut self, id: Id, now_ns: u64) -> Result<Reading, c_int> {
+    fn measure(&mut self, id: Id, now_ns: u64) -> Result<Reading, c_int> {
         let dhd = self.dhd;
         let (position, freshness) = dhd.position(id)?;
         let linear = dhd.linear_velocity(id)?;
@@ -82,7 +82,7 @@ impl Device for ForceDimensionDevice {
             State::MotorsOff => return Err(DeviceFault::MotorsOff),
             State::Ready(id) => id,
         };
-        let reading = self.measured(id, now_ns).map_err(|code| self.failed(code, id))?;
+        let reading = self.measure(id, now_ns).map_err(|code| self.fault_of(code, id))?;
         let Reading { pose, twist, timestamp_ns, .. } = reading;
         if !pose.is_finite() || !twist.linear.is_finite() || !twist.angular.is_finite() {
             return Err(DeviceFault::NotFinite);
@@ -116,7 +116,7 @@ impl Device for ForceDimensionDevice {
         if let Err(code) = written {
             // A force that cannot be replaced is switched off; the guard switches on again what is well.
             let _ = self.dhd.enable_force(false, id);
-            return Err(self.failed(code, id));
+            return Err(self.fault_of(code, id));
         }
         if finite { Ok(()) } else { Err(DeviceFault::NotFinite) }
     }

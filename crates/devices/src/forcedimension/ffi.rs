@@ -9,7 +9,7 @@ use crate::library::api;
 /// A device's number. `c_char` has a sign on some systems and none on others.
 pub type Id = c_char;
 
-type Doubles = unsafe extern "system" fn(*mut c_double, *mut c_double, *mut c_double, Id) -> c_int;
+type VectorFunction = unsafe extern "system" fn(*mut c_double, *mut c_double, *mut c_double, Id) -> c_int;
 
 /// What `-1` must be as a [`c_char`], signed or not.
 pub fn id(number: i8) -> Id {
@@ -62,8 +62,8 @@ api! {
         open = c"dhdOpenID": unsafe extern "system" fn(Id) -> c_int;
         close = c"dhdClose": unsafe extern "system" fn(Id) -> c_int;
         enable_force = c"dhdEnableForce": unsafe extern "system" fn(c_uchar, Id) -> c_int;
-        position = c"dhdGetPosition": Doubles;
-        linear_velocity = c"dhdGetLinearVelocity": Doubles;
+        position = c"dhdGetPosition": VectorFunction;
+        linear_velocity = c"dhdGetLinearVelocity": VectorFunction;
         /// `double[3][3]`, rows one after the other.
         orientation = c"dhdGetOrientationFrame": unsafe extern "system" fn(*mut [[c_double; 3]; 3], Id) -> c_int;
         set_force = c"dhdSetForce": unsafe extern "system" fn(c_double, c_double, c_double, Id) -> c_int;
@@ -81,7 +81,7 @@ api! {
         sdk_version = c"dhdGetSDKVersion": unsafe extern "system" fn(*mut c_int, *mut c_int, *mut c_int, *mut c_int);
     }
     optional {
-        angular_velocity = c"dhdGetAngularVelocityRad": Doubles;
+        angular_velocity = c"dhdGetAngularVelocityRad": VectorFunction;
         max_force = c"dhdGetMaxForce": unsafe extern "system" fn(Id) -> c_double;
         expert_mode = c"dhdEnableExpertMode": unsafe extern "system" fn() -> c_int;
         serial_number = c"dhdGetSerialNumber": unsafe extern "system" fn(*mut c_ushort, Id) -> c_int;

@@ -1,4 +1,4 @@
-//! What is watched beside the tick, by a thread that may wait.
+//! Guard thread of an open device: status, motors, stale forces, and reopening after it was unplugged.
 
 use std::ffi::c_char;
 use std::sync::Arc;
@@ -7,23 +7,23 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::ffi::{Id, force_off, status};
-use super::held::{Held, held};
 use super::library::Dhd;
-use super::{Traits, opened, readied};
+use super::open_devices::{OpenDevice, open_devices};
+use super::{Traits, open_unclaimed, prepare_for_forces};
 use crate::OpenError;
 
 /// Time between two looks.
-const LOOK: Duration = Duration::from_millis(4);
+const POLL_INTERVAL: Duration = Duration::from_millis(4);
 
 /// Longest time for which the motors keep a force that is not written again, ns: sixteen ticks, half of what the hardware's
 /// own watchdog waits, which is there for a process that does not run at all.
 const HOLD_NS: u64 = 16_000_000;
 
 /// Looks from one question for the device's status to the next.
-const LOOKS_A_STATUS: u32 = 5;
+const POLLS_PER_STATUS: u32 = 5;
 
 /// Looks from one attempt to bring back a device, or motors that are off, to the next: 0.2 s.
-const LOOKS_AN_ATTEMPT: u32 = 50;
+const POLLS_PER_ATTEMPT: u32 = 50;
 
 /// What the tick finds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ const MOTORS_OFF: i32 = -2;
 struct Shared {
     dhd: Dhd,
     /// Where it was when it was opened.
-    place: Held,
+    place: OpenDevice,
     traits: Traits,
     /// The device's number when it is ready; [`LOST`], [`MOTORS_OFF`].
     state: AtomicI32,
@@ -58,7 +58,7 @@ pub struct Guard {
 }
 
 impl Guard {
-    pub fn start(dhd: Dhd, place: Held, id: Id, traits: Traits) -> Result<Self, OpenError> {
+    pub fn start(dhd: Dhd, place: OpenDevice, id: Id, traits: Traits) -> Result<Self, OpenError> {
         let (began, written_ns, closing) = (Instant::now(), AtomicU64::new(0), AtomicBool::new(false));
         let state = AtomicI32::new(id.into());
         let shared = Arc::new(Shared { dhd, place, traits, state, began, written_ns, closing });
@@ -78,7 +78,7 @@ impl Guard {
     }
 
     /// The tick has found it unplugged.
-    pub fn lose(&self) {
+    pub fn mark_lost(&self) {
         self.shared.state.store(LOST, Ordering::Release);
         if let Some(thread) = &self.thread {
             thread.thread().unpark();
@@ -102,11 +102,11 @@ impl Drop for Guard {
             let _ = self.shared.release(id);
             let _ = self.shared.dhd.enable_force(false, id);
         }
-        let mut held = held();
+        let mut open_devices = open_devices();
         if let Some(id) = open {
             self.shared.dhd.close(id);
         }
-        held.retain(|one| one.rank != self.shared.place.rank);
+        open_devices.retain(|one| one.rank != self.shared.place.rank);
     }
 }
 
@@ -129,14 +129,14 @@ impl Shared {
     }
 
     fn close(&self, id: Id) {
-        let mut held = held();
+        let mut open_devices = open_devices();
         self.dhd.close(id);
-        self.note(&mut held, None);
+        self.set_id(&mut open_devices, None);
     }
 
     /// Writes down by which number it is open.
-    fn note(&self, held: &mut [Held], id: Option<Id>) {
-        held.iter_mut().filter(|one| one.rank == self.place.rank).for_each(|one| one.id = id);
+    fn set_id(&self, open_devices: &mut [OpenDevice], id: Option<Id>) {
+        open_devices.iter_mut().filter(|one| one.rank == self.place.rank).for_each(|one| one.id = id);
     }
 
     /// Changes the state, unless the tick has changed it meanwhile.
@@ -150,34 +150,34 @@ impl Shared {
 /// Until the device is closed; the number by which it is open then.
 fn watch(shared: &Shared, id: Id) -> Option<Id> {
     let mut open = Some(id);
-    let mut look = 0_u32;
+    let mut poll = 0_u32;
     while !shared.closing.load(Ordering::Acquire) {
-        look = look.wrapping_add(1);
+        poll = poll.wrapping_add(1);
         match (shared.state(), open) {
             (State::Lost, _) => {
                 if let Some(lost) = open.take() {
                     shared.close(lost);
                 }
-                if look.is_multiple_of(LOOKS_AN_ATTEMPT) {
+                if poll.is_multiple_of(POLLS_PER_ATTEMPT) {
                     open = reopen(shared);
                 }
             }
-            (_, Some(id)) => watch_open(shared, id, look),
+            (_, Some(id)) => watch_open(shared, id, poll),
             (_, None) => shared.state.store(LOST, Ordering::Release),
         }
-        std::thread::park_timeout(LOOK);
+        std::thread::park_timeout(POLL_INTERVAL);
     }
     open
 }
 
-fn watch_open(shared: &Shared, id: Id, look: u32) {
+fn watch_open(shared: &Shared, id: Id, poll: u32) {
     let state = shared.state();
     let age_ns = shared.now_ns().saturating_sub(shared.written_ns.load(Ordering::Relaxed));
     if age_ns > HOLD_NS || state == State::MotorsOff {
         // The tick notices what is wrong, if it still ticks. Motors that are off must not come back with a force of before.
         let _ = shared.release(id);
     }
-    if !look.is_multiple_of(LOOKS_A_STATUS) {
+    if !poll.is_multiple_of(POLLS_PER_STATUS) {
         return;
     }
     match shared.dhd.status(id) {
@@ -187,7 +187,7 @@ fn watch_open(shared: &Shared, id: Id, look: u32) {
             let cause = status[status::FORCE_OFF_CAUSE];
             // Those that a person holds down end by themselves.
             let by_hand = matches!(cause, force_off::BUTTON | force_off::DEAD_MAN);
-            if !by_hand && look.is_multiple_of(LOOKS_AN_ATTEMPT) && shared.dhd.enable_force(true, id).is_ok() {
+            if !by_hand && poll.is_multiple_of(POLLS_PER_ATTEMPT) && shared.dhd.enable_force(true, id).is_ok() {
                 let _ = shared.release(id);
             }
         }
@@ -199,28 +199,28 @@ fn watch_open(shared: &Shared, id: Id, look: u32) {
 
 /// The same device, if it is back: at any rank if its serial number is known, else where it was among as many.
 fn reopen(shared: &Shared) -> Option<Id> {
-    let mut held = held();
+    let mut open_devices = open_devices();
     let (own, count) = (shared.place.rank, shared.dhd.count() as i8);
     let as_many = count == shared.place.count;
     let may_be = |rank: &i8| match shared.traits.serial {
-        Some(_) => *rank == own || !as_many || held.iter().all(|one| one.rank != *rank),
+        Some(_) => *rank == own || !as_many || open_devices.iter().all(|one| one.rank != *rank),
         None => *rank == own && as_many,
     };
     let own_first = std::iter::once(own).filter(|own| *own < count).chain((0..count).filter(|rank| *rank != own));
-    let id = own_first.filter(may_be).find_map(|rank| back_at(shared, rank, &held))?;
-    shared.note(&mut held, Some(id));
+    let id = own_first.filter(may_be).find_map(|rank| reopen_at(shared, rank, &open_devices))?;
+    shared.set_id(&mut open_devices, Some(id));
     shared.written_ns.store(shared.now_ns(), Ordering::Relaxed);
     shared.state.store(id.into(), Ordering::Release);
     Some(id)
 }
 
 /// The same device, if it is of this rank now.
-fn back_at(shared: &Shared, rank: i8, held: &[Held]) -> Option<Id> {
-    let (id, traits) = opened(shared.dhd, rank, held).ok()?;
+fn reopen_at(shared: &Shared, rank: i8, open_devices: &[OpenDevice]) -> Option<Id> {
+    let (id, traits) = open_unclaimed(shared.dhd, rank, open_devices).ok()?;
     let is_same = (traits.serial, traits.system_type) == (shared.traits.serial, shared.traits.system_type);
     if !is_same {
         shared.dhd.close(id);
         return None;
     }
-    readied(shared.dhd, rank, id, &traits).is_ok().then_some(id)
+    prepare_for_forces(shared.dhd, rank, id, &traits).is_ok().then_some(id)
 }

@@ -6,10 +6,10 @@ use std::ffi::c_int;
 use glam::DVec3;
 
 use super::ffi::{self, Api, Id, error, result, status};
-use crate::library::{Libraries, Loaded, Search, text};
+use crate::library::{Libraries, LibrarySearch, LoadedLibrary, text};
 use crate::{Connection, DeviceFault, OpenError};
 
-const SEARCH: Search = Search {
+const SEARCH: LibrarySearch = LibrarySearch {
     product: "Force Dimension's SDK",
     variable: "PALPATE_FORCEDIMENSION_LIBRARY",
     names: &["libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"],
@@ -42,7 +42,7 @@ pub enum Freshness {
 impl Dhd {
     /// Finds and loads it, and looks whether it is of a version that works.
     pub fn load(connection: &Connection) -> Result<(Self, Facts), OpenError> {
-        let Loaded { path, api } = LIBRARIES.get(&SEARCH, connection, Api::bind)?;
+        let LoadedLibrary { path, api } = LIBRARIES.get(&SEARCH, connection, Api::bind)?;
         let mut version = [0; 4];
         let [major, minor, release, revision] = &mut version;
         // SAFETY: four pointers to integers of the caller.

@@ -11,16 +11,16 @@
 mod device;
 mod ffi;
 mod guard;
-mod held;
 mod library;
 mod models;
+mod open_devices;
 
 use self::device::ForceDimensionDevice;
 use self::ffi::{Id, error, status};
-use self::held::{Held, held, ranks_have_moved};
 use self::library::Dhd;
 use self::models::{Model, model};
-use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Opened};
+use self::open_devices::{OpenDevice, open_devices, ranks_have_moved};
+use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, ReadyDevice};
 
 /// The devices that there are, by rank.
 pub fn list(connection: &Connection) -> Listing {
@@ -28,9 +28,9 @@ pub fn list(connection: &Connection) -> Listing {
         Ok(loaded) => loaded,
         Err(error) => return Listing { found: Vec::new(), missing: Some(error), facts: Vec::new() },
     };
-    let held = held();
+    let open_devices = open_devices();
     let count = dhd.count() as i8;
-    let found: Vec<FoundDevice> = (0..count).map(|rank| describe(dhd, rank, &held, count)).collect();
+    let found: Vec<FoundDevice> = (0..count).map(|rank| describe(dhd, rank, &open_devices, count)).collect();
     let missing = found.is_empty().then(nothing_found);
     Listing { found, missing, facts }
 }
@@ -39,9 +39,9 @@ pub fn list(connection: &Connection) -> Listing {
 ///
 /// # Errors
 /// A library that is not there or too old; no such device, or one that is in use or not initialised.
-pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
+pub fn open(connection: &Connection) -> Result<ReadyDevice, OpenError> {
     let (dhd, _) = Dhd::load(connection)?;
-    let mut held = held();
+    let mut open_devices = open_devices();
     let count = dhd.count() as i8;
     if count == 0 {
         return Err(nothing_found());
@@ -51,17 +51,17 @@ pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
             let what = format!("there is no Force Dimension device {asked:?}");
             OpenError::new(what, format!("choose one from 0 to {}", count - 1))
         })?,
-        None => (0..count).find(|rank| held.iter().all(|one| one.rank != *rank)).unwrap_or(0),
+        None => (0..count).find(|rank| open_devices.iter().all(|one| one.rank != *rank)).unwrap_or(0),
     };
-    if held.iter().any(|one| one.rank == rank) {
-        return Err(in_use(rank));
+    if open_devices.iter().any(|one| one.rank == rank) {
+        return Err(in_use_error(rank));
     }
-    let (id, traits) = opened(dhd, rank, &held)?;
-    readied(dhd, rank, id, &traits)?;
-    let place = Held { rank, id: Some(id), count };
+    let (id, traits) = open_unclaimed(dhd, rank, &open_devices)?;
+    prepare_for_forces(dhd, rank, id, &traits)?;
+    let place = OpenDevice { rank, id: Some(id), count };
     let device = ForceDimensionDevice::new(dhd, place, id, traits)?;
-    held.push(place);
-    Ok(Opened { device: Box::new(device), scheduler: None })
+    open_devices.push(place);
+    Ok(ReadyDevice { device: Box::new(device), scheduler: None })
 }
 
 /// What does not change of an open device.
@@ -93,20 +93,20 @@ fn traits(dhd: Dhd, id: Id) -> Traits {
 const WATCHDOG: u8 = 255;
 
 /// Opens a device that nobody in this process holds, whatever its rank has been.
-fn opened(dhd: Dhd, rank: i8, held: &[Held]) -> Result<(Id, Traits), OpenError> {
-    let id = dhd.open(rank).map_err(|code| does_not_open(dhd, rank, code))?;
-    if held.iter().any(|one| one.id == Some(id)) {
+fn open_unclaimed(dhd: Dhd, rank: i8, open_devices: &[OpenDevice]) -> Result<(Id, Traits), OpenError> {
+    let id = dhd.open(rank).map_err(|code| open_error(dhd, rank, code))?;
+    if open_devices.iter().any(|one| one.id == Some(id)) {
         // Not opened anew, and not to be closed.
-        return Err(in_use(rank));
+        return Err(in_use_error(rank));
     }
     Ok((id, traits(dhd, id)))
 }
 
 /// Readies an open device for forces, which are zero until one is written, or closes it.
-fn readied(dhd: Dhd, rank: i8, id: Id, traits: &Traits) -> Result<(), OpenError> {
+fn prepare_for_forces(dhd: Dhd, rank: i8, id: Id, traits: &Traits) -> Result<(), OpenError> {
     let ready = || {
         obstacle(dhd, id, &traits.name)?;
-        let failed = |code| does_not_open(dhd, rank, code);
+        let failed = |code| open_error(dhd, rank, code);
         dhd.compensate_gravity(id).map_err(failed)?;
         // A force of before must not come back with the motors; a library may refuse one while they are off.
         let _ = dhd.release(traits.has_active_wrist, id);
@@ -135,15 +135,15 @@ fn obstacle(dhd: Dhd, id: Id, name: &str) -> Result<(), OpenError> {
 }
 
 /// Why a device may not be opened to be described.
-fn hindrance(rank: i8, held: &[Held], count: i8) -> Option<OpenError> {
-    if ranks_have_moved(held, count) {
+fn hindrance(rank: i8, open_devices: &[OpenDevice], count: i8) -> Option<OpenError> {
+    if ranks_have_moved(open_devices, count) {
         let what = format!("Force Dimension device {rank} cannot be told from those in use: some have come or gone");
         return Some(OpenError::new(what, "close those of this program, then look again"));
     }
-    held.iter().any(|one| one.rank == rank).then(|| in_use(rank))
+    open_devices.iter().any(|one| one.rank == rank).then(|| in_use_error(rank))
 }
 
-fn describe(dhd: Dhd, rank: i8, held: &[Held], count: i8) -> FoundDevice {
+fn describe(dhd: Dhd, rank: i8, open_devices: &[OpenDevice], count: i8) -> FoundDevice {
     let unknown = |error| FoundDevice {
         id: rank.to_string(),
         name: "Force Dimension device".to_owned(),
@@ -151,10 +151,10 @@ fn describe(dhd: Dhd, rank: i8, held: &[Held], count: i8) -> FoundDevice {
         obstacle: Some(error),
         facts: Vec::new(),
     };
-    if let Some(hindrance) = hindrance(rank, held, count) {
+    if let Some(hindrance) = hindrance(rank, open_devices, count) {
         return unknown(hindrance);
     }
-    let (id, traits) = match opened(dhd, rank, held) {
+    let (id, traits) = match open_unclaimed(dhd, rank, open_devices) {
         Ok(opened) => opened,
         Err(error) => return unknown(error),
     };
@@ -175,14 +175,14 @@ fn nothing_found() -> OpenError {
     OpenError::new("no Force Dimension device is found", advice)
 }
 
-fn in_use(rank: i8) -> OpenError {
+fn in_use_error(rank: i8) -> OpenError {
     OpenError::new(
         format!("Force Dimension device {rank} is in use by this program"),
         "use another one, or close it first",
     )
 }
 
-fn does_not_open(dhd: Dhd, rank: i8, code: i32) -> OpenError {
+fn open_error(dhd: Dhd, rank: i8, code: i32) -> OpenError {
     let what = format!("Force Dimension device {rank} does not open ({})", dhd.error_text(code));
     match code {
         error::DEVICE_IN_USE => OpenError::new(what, "close the program that uses it"),

@@ -1,4 +1,4 @@
-//! Where the service listens, and how fast it is asked.
+//! Address of the service, with rate, hold time and port of events.
 
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::time::Duration;

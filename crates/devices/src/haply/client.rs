@@ -1,7 +1,7 @@
-//! The driver's thread: sends the latest force, takes one state, publishes it, and so on.
+//! The driver's thread: sends the latest force, receives one state and publishes it, at a fixed rate.
 //!
-//! What stands on the motors is the latest force of a loop that goes on, or zero: zero when the loop or the measurements stop
-//! for a few milliseconds, when anything is wrong with a reply, and last of all when the device is dropped.
+//! The motors exert the latest force of a running loop, or zero: if the loop or the measurements stop for a few milliseconds, if a
+//! reply is faulty, and finally when the device is dropped.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,42 +14,42 @@ use tungstenite::Utf8Bytes;
 
 use super::commands::{self, ForceMessage, KEEPALIVE};
 use super::fault::ReplyFault;
-use super::grips::Turning;
-use super::handoff::{Asked, Clock, Published};
+use super::grips::GripMotion;
+use super::handoff::{Clock, ForceRequest, PublishedReading};
 use super::output::Output;
 use super::priority;
-use super::reading::understand;
+use super::reading::parse_reading;
 use super::safety_events::SafetyEvents;
 use super::service::Service;
 use super::snapshot::{Arm, Snapshot};
 use super::socket::{Socket, SocketError};
 use crate::{DeviceFault, Reading};
 
-/// After this time without a measurement the reading is a fault, ns: as long as the safety stage waits for one.
+/// Time without a measurement after which the reading is a fault, ns; the same as in the safety stage.
 pub const STALE_NS: u64 = 50_000_000;
-/// After this time without a reply the connection is given up.
-const DEAD: Duration = Duration::from_millis(500);
-/// Messages without force to an arm that a reply does not have: it may still have one.
+/// Time without a reply after which the connection is closed and opened again.
+const RECONNECT_AFTER: Duration = Duration::from_millis(500);
+/// Messages with zero force to an arm that is missing in replies: its motors may still exert the last one.
 const ABSENT_FORCES: u32 = 16;
-/// Time between two questions for an arm that is not there.
+/// Time between two messages while the arm is absent.
 const ABSENT_PERIOD: Duration = Duration::from_millis(20);
 /// First and longest time between two attempts to connect.
 const RETRY: [Duration; 2] = [Duration::from_millis(50), Duration::from_millis(1000)];
-/// Longest time for the last message, which takes the force off, and again for the end of the connection.
-const FAREWELL: Duration = Duration::from_millis(20);
-/// Time between two looks at the channel of events, ns.
+/// Longest time for the last message, which sets the force to zero, and again for closing the connection.
+const CLOSE_TIMEOUT: Duration = Duration::from_millis(20);
+/// Interval at which the channel of events is polled, ns.
 const EVENTS_NS: u64 = 5_000_000;
-/// Most messages beyond the replies that are thrown away at once.
-const MOST_UNASKED: usize = 64;
+/// Most unsolicited messages that are discarded at once.
+const MAX_UNSOLICITED: usize = 64;
 
-/// What to say next.
+/// Kind of the next message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// The arm was there all along: forces.
+    /// Forces, for an arm that is set up.
     Forces,
-    /// It has just come: how it is to be set.
+    /// Configuration of an arm that has just appeared.
     Hello,
-    /// It is not there, for so many messages.
+    /// The arm has been absent for so many messages.
     Absent(u32),
 }
 
@@ -61,43 +61,43 @@ pub struct Client {
     hello: String,
     phase: Phase,
     message: ForceMessage,
-    turning: Turning,
+    grip_motion: GripMotion,
     output: Output,
     events: SafetyEvents,
     events_ns: u64,
     /// Latest state of the channel of events.
     motors_off: bool,
     clock: Clock,
-    /// What is published.
-    pub published: Published,
-    to_loop: Input<Published>,
-    from_loop: Latest<Asked>,
+    /// The published reading.
+    pub published: PublishedReading,
+    to_loop: Input<PublishedReading>,
+    from_loop: Latest<ForceRequest>,
     stop: Arc<AtomicBool>,
     /// When the next message is due.
     due: Instant,
     period: Duration,
-    /// From the latest message to its reply.
+    /// Time from the latest message to its reply.
     pub round_trip: Duration,
 }
 
 impl Client {
-    /// For an arm of a service that has been connected to.
+    /// Client of an arm of a connected service.
     pub fn new(
         service: Service,
         socket: Socket,
         (arm, snapshot): (Arm, &Snapshot),
         clock: Clock,
-        (to_loop, from_loop): (Input<Published>, Latest<Asked>),
+        (to_loop, from_loop): (Input<PublishedReading>, Latest<ForceRequest>),
     ) -> Self {
         let period = Duration::from_secs_f64(1.0 / service.address.rate);
         Self {
             hello: commands::hello(&arm, snapshot),
             message: ForceMessage::new(&arm.id),
             events: service.safety_events(&arm.id),
-            published: Published::new(Reading::default()),
+            published: PublishedReading::new(Reading::default()),
             socket: Some(socket),
             phase: Phase::Hello,
-            turning: Turning::default(),
+            grip_motion: GripMotion::default(),
             output: Output::default(),
             events_ns: 0,
             motors_off: false,
@@ -113,39 +113,39 @@ impl Client {
         }
     }
 
-    /// The flag that ends it.
+    /// The flag that stops it.
     pub fn stop_flag(&self) -> Arc<AtomicBool> {
         self.stop.clone()
     }
 
-    /// Until it is stopped.
+    /// Runs until it is stopped.
     pub fn run(mut self) {
         priority::raise();
         while !self.is_stopped() {
             match self.exchange() {
-                Ok(()) => self.pace(),
+                Ok(()) => self.wait_until_due(),
                 Err(_) => {
                     self.fail(DeviceFault::Disconnected);
                     self.connect_again();
                 }
             }
         }
-        self.say_goodbye();
+        self.close_connection();
     }
 
-    /// One message and its reply.
+    /// Sends one message and receives its reply.
     ///
     /// # Errors
-    /// A connection of no more use.
+    /// A broken connection.
     pub fn exchange(&mut self) -> Result<(), SocketError> {
-        self.look_at_events();
+        self.poll_events();
         let force = self.next_force();
         let socket = self.socket.as_mut().ok_or(SocketError::Closed)?;
-        // A reply that nobody waits for would make every later one an old one.
-        let mut unasked = 0;
+        // An unsolicited message left in the queue would be taken for the next reply, and delay every later one.
+        let mut unsolicited = 0;
         while socket.poll()?.is_some() {
-            unasked += 1;
-            if unasked > MOST_UNASKED {
+            unsolicited += 1;
+            if unsolicited > MAX_UNSOLICITED {
                 return Err(SocketError::Protocol("messages that nobody asked for".into()));
             }
         }
@@ -157,12 +157,12 @@ impl Client {
         })?;
         let reply = self.reply(sent, force)?;
         self.round_trip = sent.elapsed();
-        self.take(&reply);
+        self.publish(&reply);
         Ok(())
     }
 
     /// Waits until the next message is due.
-    pub fn pace(&mut self) {
+    pub fn wait_until_due(&mut self) {
         let now = Instant::now();
         let period = if matches!(self.phase, Phase::Absent(ABSENT_FORCES..)) { ABSENT_PERIOD } else { self.period };
         self.due = (self.due + period).max(now);
@@ -178,8 +178,7 @@ impl Client {
         self.output.choose(self.from_loop.read(), self.published.faults, measured, now_ns)
     }
 
-    /// Waits for the reply. Where it is late, the force is taken off by a message of its own, and the reply to that is the
-    /// one that counts.
+    /// Waits for the reply. If it is late, an extra message sets the force to zero, and its reply is used.
     fn reply(&mut self, sent: Instant, force: DVec3) -> Result<Utf8Bytes, SocketError> {
         let socket = self.socket.as_mut().ok_or(SocketError::Closed)?;
         match socket.receive(sent + self.service.address.hold) {
@@ -190,12 +189,12 @@ impl Client {
             self.output.withhold();
         }
         socket.send(self.message.of(DVec3::ZERO))?;
-        let mut owed = 2;
-        while sent.elapsed() < DEAD && !self.stop.load(Ordering::Relaxed) {
+        let mut outstanding = 2;
+        while sent.elapsed() < RECONNECT_AFTER && !self.stop.load(Ordering::Relaxed) {
             let socket = self.socket.as_mut().ok_or(SocketError::Closed)?;
             match socket.receive(Instant::now() + Duration::from_nanos(STALE_NS)) {
-                Ok(reply) if owed == 1 => return Ok(reply),
-                Ok(_) => owed -= 1,
+                Ok(reply) if outstanding == 1 => return Ok(reply),
+                Ok(_) => outstanding -= 1,
                 Err(SocketError::TimedOut) => self.fail(DeviceFault::Stale),
                 Err(error) => return Err(error),
             }
@@ -203,21 +202,21 @@ impl Client {
         Err(SocketError::Closed)
     }
 
-    /// Publishes what a reply says.
-    fn take(&mut self, reply: &str) {
+    /// Publishes the reading of a reply.
+    fn publish(&mut self, reply: &str) {
         let now_ns = self.clock.now_ns();
-        let understood = understand(reply, (&self.arm.id, self.arm.rank), &mut self.turning, now_ns);
-        match (self.phase, &understood) {
+        let parsed = parse_reading(reply, (&self.arm.id, self.arm.rank), &mut self.grip_motion, now_ns);
+        match (self.phase, &parsed) {
             (Phase::Absent(messages), Err(ReplyFault::Absent)) => {
                 self.phase = Phase::Absent(messages.saturating_add(1))
             }
             (_, Err(ReplyFault::Absent)) => self.phase = Phase::Absent(0),
-            // Its state is that of before it was set up.
+            // The state is from before the arm was set up.
             (Phase::Absent(_), Ok(_)) => return self.phase = Phase::Hello,
             (Phase::Hello, Ok(_)) => self.phase = Phase::Forces,
             _ => {}
         }
-        match understood {
+        match parsed {
             Ok(_) if self.motors_off => self.fail(DeviceFault::MotorsOff),
             Ok(reading) => {
                 self.published.succeed(reading);
@@ -227,7 +226,7 @@ impl Client {
         }
     }
 
-    fn look_at_events(&mut self) {
+    fn poll_events(&mut self) {
         let now_ns = self.clock.now_ns();
         if now_ns.saturating_sub(self.events_ns) >= EVENTS_NS {
             self.events_ns = now_ns;
@@ -244,7 +243,7 @@ impl Client {
     }
 
     fn connect_again(&mut self) {
-        self.say_goodbye();
+        self.close_connection();
         let [mut wait, longest] = RETRY;
         while !self.is_stopped() {
             if let Ok((socket, snapshot)) = self.service.connect() {
@@ -268,7 +267,7 @@ impl Client {
         self.due = Instant::now();
     }
 
-    /// Sleeps unless it is stopped.
+    /// Sleeps, and returns early when stopped.
     fn sleep(&self, time: Duration) {
         let until = Instant::now() + time;
         while !self.is_stopped() && Instant::now() < until {
@@ -280,12 +279,12 @@ impl Client {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Takes the force off, if the other end still takes messages, and closes the connection.
-    fn say_goodbye(&mut self) {
+    /// Sets the force to zero, if the service still accepts messages, and closes the connection.
+    fn close_connection(&mut self) {
         let Some(mut socket) = self.socket.take() else { return };
         if socket.send(self.message.of(DVec3::ZERO)).is_ok() {
-            let _ = socket.receive(Instant::now() + FAREWELL);
+            let _ = socket.receive(Instant::now() + CLOSE_TIMEOUT);
         }
-        socket.close(Instant::now() + FAREWELL);
+        socket.close(Instant::now() + CLOSE_TIMEOUT);
     }
 }

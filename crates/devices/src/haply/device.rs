@@ -1,4 +1,4 @@
-//! The loop's side: never waits, never allocates.
+//! The `Device` that the loop reads and writes. It never waits and never allocates.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,22 +8,22 @@ use std::time::{Duration, Instant};
 use triple_buffer::{Input, Output as Latest};
 
 use super::client::STALE_NS;
-use super::handoff::{Asked, Clock, Published};
+use super::handoff::{Clock, ForceRequest, PublishedReading};
 use super::output::hold_ns;
 use crate::{Device, DeviceFault, DeviceLimits, Reading, Wrench};
 
 /// Longest time to wait for the thread's last message. A thread that is about to connect has no force to take off.
-const LEAVE: Duration = Duration::from_millis(200);
+const JOIN_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// An arm of the service.
 pub struct Haply {
     name: String,
     limits: DeviceLimits,
     clock: Clock,
-    from_thread: Latest<Published>,
-    to_thread: Input<Asked>,
+    from_thread: Latest<PublishedReading>,
+    to_thread: Input<ForceRequest>,
     /// Number of the latest fault that the loop knows of.
-    knew: Option<u64>,
+    known_fault: Option<u64>,
     fault: Option<DeviceFault>,
     /// Shortest time for which a force stays on the motors, ns.
     least_hold_ns: u64,
@@ -37,18 +37,18 @@ impl Haply {
     pub fn new(
         (name, limits): (String, DeviceLimits),
         (clock, hold): (Clock, Duration),
-        (from_thread, to_thread): (Latest<Published>, Input<Asked>),
+        (from_thread, to_thread): (Latest<PublishedReading>, Input<ForceRequest>),
         (stop, thread): (Arc<AtomicBool>, JoinHandle<()>),
     ) -> Self {
         let hold_ns = hold.as_nanos() as u64;
-        let (knew, fault, least_hold_ns) = (None, None, hold_ns);
-        Self { name, limits, clock, from_thread, to_thread, knew, fault, least_hold_ns, hold_ns, stop, thread }
+        let (known_fault, fault, least_hold_ns) = (None, None, hold_ns);
+        Self { name, limits, clock, from_thread, to_thread, known_fault, fault, least_hold_ns, hold_ns, stop, thread }
     }
 
     fn latest(&mut self) -> Result<Reading, DeviceFault> {
         let published = *self.from_thread.read();
-        let knew = self.knew.replace(published.faults);
-        if knew.is_some_and(|knew| knew != published.faults) {
+        let known_fault = self.known_fault.replace(published.faults);
+        if known_fault.is_some_and(|known_fault| known_fault != published.faults) {
             // Also one that was over before this tick.
             return Err(published.latest);
         }
@@ -76,8 +76,8 @@ impl Device for Haply {
     /// The arm has no motors for torques.
     fn write(&mut self, wrench: Wrench) -> Result<(), DeviceFault> {
         let written_ns = self.clock.now_ns();
-        let knew = self.knew.filter(|_| self.fault.is_none());
-        self.to_thread.write(Asked { force: wrench.force, knew, written_ns, hold_ns: self.hold_ns });
+        let known_fault = self.known_fault.filter(|_| self.fault.is_none());
+        self.to_thread.write(ForceRequest { force: wrench.force, known_fault, written_ns, hold_ns: self.hold_ns });
         self.fault.map_or(Ok(()), Err)
     }
 
@@ -90,7 +90,7 @@ impl Device for Haply {
 impl Drop for Haply {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        let until = Instant::now() + LEAVE;
+        let until = Instant::now() + JOIN_TIMEOUT;
         while !self.thread.is_finished() && Instant::now() < until {
             thread::sleep(Duration::from_millis(1));
         }

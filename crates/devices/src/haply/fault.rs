@@ -1,4 +1,4 @@
-//! What can be wrong with a reply.
+//! Faults of a reply.
 
 use crate::DeviceFault;
 

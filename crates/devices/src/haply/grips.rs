@@ -84,7 +84,7 @@ fn buttons(state: &Value) -> Buttons {
 
 /// How the grip turns: the service does not say. Of an arm without grip, nothing turns.
 #[derive(Clone, Copy, Debug)]
-pub struct Turning {
+pub struct GripMotion {
     orientation: DQuat,
     velocity: DVec3,
     /// Latest orientation from which a velocity was taken, and when it came, ns.
@@ -93,13 +93,13 @@ pub struct Turning {
     changed_ns: u64,
 }
 
-impl Default for Turning {
+impl Default for GripMotion {
     fn default() -> Self {
         Self { orientation: DQuat::IDENTITY, velocity: DVec3::ZERO, before: (DQuat::IDENTITY, 0), changed_ns: 0 }
     }
 }
 
-impl Turning {
+impl GripMotion {
     /// Takes up an orientation that came at `now_ns`; gives the latest one and the angular velocity, rad/s. A grip that falls
     /// asleep stays as it is.
     pub fn follow(&mut self, orientation: Option<DQuat>, now_ns: u64) -> (DQuat, DVec3) {
@@ -175,17 +175,17 @@ mod tests {
     /// A steady turn seen 50 times a second by exchanges of 2 kHz, then a stop.
     #[test]
     fn angular_velocity_of_a_slow_grip() {
-        let mut turning = Turning::default();
+        let mut grip_motion = GripMotion::default();
         let (rate, mut seen) = (3.0, DVec3::ZERO);
         for step in 0..1000_u64 {
             let now = step * 500_000 + 200_000_000;
             let angle = rate * 0.02 * (step / 40) as f64;
-            (_, seen) = turning.follow(Some(DQuat::from_rotation_y(angle)), now);
+            (_, seen) = grip_motion.follow(Some(DQuat::from_rotation_y(angle)), now);
             if step > 100 {
                 assert!((seen - DVec3::Y * rate).length() < 1e-9, "{step} {seen}");
             }
         }
-        let rest = turning.follow(None, 1_000_000_000);
+        let rest = grip_motion.follow(None, 1_000_000_000);
         assert_eq!(rest.1, DVec3::ZERO);
         assert_ne!(seen, DVec3::ZERO);
     }

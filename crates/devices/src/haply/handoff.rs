@@ -1,4 +1,4 @@
-//! What the loop and the driver's thread hand each other, wait-free: the latest one counts on both ways.
+//! Wait-free hand-off between the loop and the driver's thread: the latest force one way, the latest reading the other.
 //!
 //! Every fault has a number. A force carries the number up to which its reading knew of faults: the thread puts out none that
 //! was computed before the latest fault, and the loop is told of every fault even if it was over between two ticks.
@@ -11,11 +11,11 @@ use crate::{DeviceFault, Reading};
 
 /// From the loop: a force.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Asked {
+pub struct ForceRequest {
     /// On the hand, N.
     pub force: DVec3,
     /// Number of the latest fault that its reading knew of; `None` before the first reading.
-    pub knew: Option<u64>,
+    pub known_fault: Option<u64>,
     /// When it was written, ns.
     pub written_ns: u64,
     /// How long it may stay on the motors, ns.
@@ -24,7 +24,7 @@ pub struct Asked {
 
 /// From the thread: the latest measurement.
 #[derive(Clone, Copy, Debug)]
-pub struct Published {
+pub struct PublishedReading {
     /// What was measured last.
     pub reading: Reading,
     /// Why there is nothing newer.
@@ -35,7 +35,7 @@ pub struct Published {
     pub latest: DeviceFault,
 }
 
-impl Published {
+impl PublishedReading {
     /// Without a fault so far.
     pub fn new(reading: Reading) -> Self {
         Self { reading, fault: None, faults: 0, latest: DeviceFault::Stale }

@@ -7,12 +7,12 @@ use triple_buffer::triple_buffer;
 
 use super::client::Client;
 use super::device::Haply;
-use super::handoff::{Asked, Clock, Published};
+use super::handoff::{Clock, ForceRequest, PublishedReading};
 use super::output::MAX_FORCE;
 use super::service::Service;
 use super::snapshot::{Arm, Snapshot};
 use super::socket::Socket;
-use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Opened, Reading, known};
+use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Reading, ReadyDevice, known};
 
 /// Exchanges by which the delay is measured before the first tick.
 const TRIALS: usize = 64;
@@ -50,22 +50,22 @@ fn found(arm: Arm, limits: DeviceLimits) -> FoundDevice {
 ///
 /// # Errors
 /// No service, no such arm, or one that cannot be used now.
-pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
+pub fn open(connection: &Connection) -> Result<ReadyDevice, OpenError> {
     let service = Service::of(connection)?;
     let (socket, snapshot, arm) = find(&service, connection.id.as_deref())?;
     let hold = service.address.hold;
     let (name, rate) = (format!("{} {}", arm.model, arm.id), service.address.rate);
     let clock = Clock::start();
-    let (to_loop, from_thread) = triple_buffer(&Published::new(Reading::default()));
-    let (to_thread, from_loop) = triple_buffer(&Asked::default());
+    let (to_loop, from_thread) = triple_buffer(&PublishedReading::new(Reading::default()));
+    let (to_thread, from_loop) = triple_buffer(&ForceRequest::default());
     let mut client = Client::new(service, socket, (arm, &snapshot), clock, (to_loop, from_loop));
-    let delay = try_out(&mut client, &name)? + 1.0 / rate;
+    let delay = measure_delay(&mut client, &name)? + 1.0 / rate;
     let stop = client.stop_flag();
     let thread = thread::Builder::new().name("haply".into()).spawn(move || client.run()).map_err(|error| {
         OpenError::new(format!("the system gives no thread for the {name} ({error})"), "close other programs")
     })?;
     let device = Haply::new((name, limits(rate, delay)), (clock, hold), (from_thread, to_thread), (stop, thread));
-    Ok(Opened { device: Box::new(device), scheduler: None })
+    Ok(ReadyDevice { device: Box::new(device), scheduler: None })
 }
 
 /// What an arm at the end of a service can render. A measurement waits for half a period of the exchanges on average until the
@@ -114,7 +114,7 @@ fn choose(service: &Service, snapshot: &Snapshot, id: Option<&str>) -> Result<Ar
 }
 
 /// Exchanges without force: the median time from a message to its reply, s.
-fn try_out(client: &mut Client, name: &str) -> Result<f64, OpenError> {
+fn measure_delay(client: &mut Client, name: &str) -> Result<f64, OpenError> {
     let began = Instant::now();
     let mut times = Vec::with_capacity(TRIALS);
     while times.len() < TRIALS && began.elapsed() < LONGEST_TRIAL {
@@ -128,7 +128,7 @@ fn try_out(client: &mut Client, name: &str) -> Result<f64, OpenError> {
             return Err(OpenError::new(format!("the {name} gives no measurements ({why})"), advice));
         }
         times.push(client.round_trip);
-        client.pace();
+        client.wait_until_due();
     }
     times.sort_unstable();
     Ok(times[times.len() / 2].as_secs_f64())

@@ -1,7 +1,7 @@
 //! The reading in a reply.
 
 use super::fault::ReplyFault;
-use super::grips::Turning;
+use super::grips::GripMotion;
 use super::{entries, grips};
 use crate::{Pose, Reading, Twist};
 
@@ -10,10 +10,10 @@ use crate::{Pose, Reading, Twist};
 ///
 /// # Errors
 /// Why there is none.
-pub fn understand(
+pub fn parse_reading(
     reply: &str,
     (id, rank): (&str, usize),
-    turning: &mut Turning,
+    grip_motion: &mut GripMotion,
     now_ns: u64,
 ) -> Result<Reading, ReplyFault> {
     let message = entries::parse(reply)?;
@@ -21,7 +21,7 @@ pub fn understand(
     entries::check_motors(entry)?;
     let (position, linear) = entries::tip(entry)?;
     let grip = grips::of_arm(&message, rank)?;
-    let (orientation, angular) = turning.follow(grip.map(|grip| grip.orientation), now_ns);
+    let (orientation, angular) = grip_motion.follow(grip.map(|grip| grip.orientation), now_ns);
     Ok(Reading {
         pose: Pose { position, orientation },
         twist: Twist { linear, angular },
@@ -67,7 +67,7 @@ mod tests {
     }
 
     fn read(text: &str) -> Result<Reading, ReplyFault> {
-        understand(text, ("0A01", 1), &mut Turning::default(), 5)
+        parse_reading(text, ("0A01", 1), &mut GripMotion::default(), 5)
     }
 
     #[test]

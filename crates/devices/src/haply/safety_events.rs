@@ -9,7 +9,7 @@ use super::entries;
 use super::socket::Socket;
 
 /// Most events taken at once: the thread has a device to serve.
-const MOST_AT_ONCE: usize = 16;
+const MAX_EVENTS: usize = 16;
 
 /// What the arm's safety has done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ impl SafetyEvents {
     /// Takes up what has come; whether the arm has taken forces off since the last call, or holds its brake.
     pub fn motors_off(&mut self) -> bool {
         let mut triggered = false;
-        for _ in 0..MOST_AT_ONCE {
+        for _ in 0..MAX_EVENTS {
             let Some(socket) = &mut self.socket else { break };
             match socket.poll() {
                 Ok(Some(text)) => match parse(&text, &self.id) {

@@ -1,4 +1,4 @@
-//! A service that can be connected to again and again.
+//! Connection to the service, and reconnection.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use super::socket::{Socket, SocketError};
 use crate::{Connection, OpenError};
 
 /// Longest time until the service greets.
-const GREETING: Duration = Duration::from_millis(1000);
+const GREETING_TIMEOUT: Duration = Duration::from_millis(1000);
 
 /// Where it is, looked up once.
 pub struct Service {
@@ -38,9 +38,10 @@ impl Service {
     /// # Errors
     /// Nobody there, or nobody who speaks as a service of 3.1 to 3.5 does.
     pub fn connect(&self) -> Result<(Socket, Snapshot), OpenError> {
-        let mut socket = Socket::connect(&self.addresses, &self.address.uri).map_err(|error| self.refused(&error))?;
-        let greeting = socket.receive(Instant::now() + GREETING).map_err(|error| self.refused(&error))?;
-        let snapshot = Snapshot::parse(&greeting).map_err(|fault| self.misunderstood(fault))?;
+        let mut socket =
+            Socket::connect(&self.addresses, &self.address.uri).map_err(|error| self.connect_error(&error))?;
+        let greeting = socket.receive(Instant::now() + GREETING_TIMEOUT).map_err(|error| self.connect_error(&error))?;
+        let snapshot = Snapshot::parse(&greeting).map_err(|fault| self.protocol_error(fault))?;
         Ok((socket, snapshot))
     }
 
@@ -51,7 +52,7 @@ impl Service {
     }
 
     /// Why there is nobody.
-    pub fn refused(&self, error: &SocketError) -> OpenError {
+    pub fn connect_error(&self, error: &SocketError) -> OpenError {
         let (address, who) = (&self.address, "Haply Inverse Service");
         match error {
             SocketError::Refused(why) => OpenError::new(
@@ -69,7 +70,7 @@ impl Service {
         }
     }
 
-    fn misunderstood(&self, fault: ReplyFault) -> OpenError {
+    fn protocol_error(&self, fault: ReplyFault) -> OpenError {
         let address = &self.address;
         match fault {
             ReplyFault::Dialect => OpenError::new(

@@ -1,4 +1,4 @@
-//! The full state with which the service greets, and again when asked for it: what there is, and why it cannot be used.
+//! Full state that the service sends on connection and on request: arms, grips, and why an arm cannot be used.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! A websocket whose every call ends in time.
+//! Websocket with a timeout on every call.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
@@ -56,13 +56,13 @@ impl From<tungstenite::Error> for SocketError {
 
 /// A stream that reads until a moment, however the bytes drip in.
 #[derive(Debug)]
-struct Timed {
+struct TimeoutStream {
     stream: TcpStream,
     /// `None` reads what is there and never waits.
     until: Option<Instant>,
 }
 
-impl Read for Timed {
+impl Read for TimeoutStream {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let Some(until) = self.until else { return self.stream.read(buffer) };
         let left = until.saturating_duration_since(Instant::now());
@@ -74,7 +74,7 @@ impl Read for Timed {
     }
 }
 
-impl Write for Timed {
+impl Write for TimeoutStream {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         self.stream.write(buffer)
     }
@@ -86,7 +86,7 @@ impl Write for Timed {
 
 /// A client's end.
 pub struct Socket {
-    socket: WebSocket<Timed>,
+    socket: WebSocket<TimeoutStream>,
 }
 
 impl Socket {
@@ -108,7 +108,7 @@ impl Socket {
     fn shake_hands(stream: TcpStream, uri: &Uri) -> Result<Self, SocketError> {
         let prepared = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SEND)));
         prepared.map_err(|error| SocketError::Protocol(error.to_string()))?;
-        let timed = Timed { stream, until: Some(Instant::now() + CONNECT) };
+        let timed = TimeoutStream { stream, until: Some(Instant::now() + CONNECT) };
         let config = WebSocketConfig::default()
             .read_buffer_size(BUFFER)
             .max_message_size(Some(LARGEST_MESSAGE))

@@ -1,4 +1,4 @@
-//! What the tick asks of the library: `read` begins the device's frame, `write` ends it.
+//! Reading and writing of a device in the tick: `read` begins the device's frame, `write` ends it.
 
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ impl TouchDevice {
 
     /// The device's number, where it may be used.
     fn handle(&self) -> Result<Handle, DeviceFault> {
-        if self.scheduler.is_dormant() {
+        if self.scheduler.is_suspended() {
             return Err(DeviceFault::Disconnected);
         }
         if !self.scheduler.is_ticking() {
@@ -77,12 +77,12 @@ impl TouchDevice {
         let Some(code) = self.slot.take_foreign_error().or(own) else { return Ok(()) };
         let fault = fault(code);
         if fault == DeviceFault::Disconnected && code != error::SUCCESS {
-            self.slot.lose();
+            self.slot.mark_lost();
         }
         Err(fault)
     }
 
-    fn measured(&self, now_ns: u64) -> Reading {
+    fn measure(&self, now_ns: u64) -> Reading {
         let hd = self.hd;
         let transform: [f64; 16] = hd.doubles(parameter::CURRENT_TRANSFORM);
         let position = DVec3::new(transform[12], transform[13], transform[14]);
@@ -123,7 +123,7 @@ impl Device for TouchDevice {
         let late = self.read_ns.is_some_and(|last_ns| now_ns.saturating_sub(last_ns) > STALE_AFTER_NS);
         self.read_ns = Some(now_ns);
         self.begin(handle);
-        let reading = self.measured(now_ns);
+        let reading = self.measure(now_ns);
         self.check(handle)?;
         let Reading { pose, twist, .. } = reading;
         if !pose.is_finite() || !twist.linear.is_finite() || !twist.angular.is_finite() {
@@ -147,7 +147,7 @@ impl Device for TouchDevice {
         // Other devices have begun their frames since.
         self.hd.make_current(handle);
         // The library has set the force to zero when the frame began.
-        if finite && !self.scheduler.is_quiet() {
+        if finite && !self.scheduler.is_force_off() {
             let limits = &self.slot.traits.limits;
             let force = FRAME.to_vendor(force.clamp_length_max(limits.max_force));
             self.hd.set_doubles(parameter::CURRENT_FORCE, force.to_array());

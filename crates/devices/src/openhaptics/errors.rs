@@ -1,4 +1,4 @@
-//! What the errors of the stack mean for a loop.
+//! Device faults by the library's error codes.
 
 use super::ffi::{Enum, error};
 use crate::DeviceFault;

@@ -4,10 +4,10 @@
 use std::ffi::{CString, c_void};
 
 use super::ffi::{self, Api, Callback, Enum, Handle, INVALID_HANDLE, SchedulerHandle, error, parameter};
-use crate::library::{Libraries, Loaded, Search, text};
+use crate::library::{Libraries, LibrarySearch, LoadedLibrary, text};
 use crate::{Connection, OpenError};
 
-const SEARCH: Search = Search {
+const SEARCH: LibrarySearch = LibrarySearch {
     product: "OpenHaptics (HD)",
     variable: "PALPATE_OPENHAPTICS_LIBRARY",
     names: &["libHD.so", "libHD.so.3.5", "libHD.so.3.4", "libHD.so.3.0", "libHD.so.3"],
@@ -27,7 +27,7 @@ pub struct Hd(&'static Api);
 impl Hd {
     /// Finds and loads it; and the name of its file.
     pub fn load(connection: &Connection) -> Result<(Self, String), OpenError> {
-        let Loaded { path, api } = LIBRARIES.get(&SEARCH, connection, Api::bind)?;
+        let LoadedLibrary { path, api } = LIBRARIES.get(&SEARCH, connection, Api::bind)?;
         Ok((Self(api), path.display().to_string()))
     }
 

@@ -20,7 +20,7 @@ use self::device::TouchDevice;
 use self::ffi::{Enum, Handle, calibration, capability, error, parameter};
 use self::library::Hd;
 use self::scheduler::HdScheduler;
-use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, Opened};
+use crate::{Connection, DeviceLimits, FoundDevice, Listing, OpenError, ReadyDevice};
 
 /// Earliest version of OpenHaptics whose functions are the ones declared here.
 const FIRST_VERSION: u32 = 3;
@@ -66,7 +66,7 @@ pub fn list(connection: &Connection) -> Listing {
 ///
 /// # Errors
 /// A library that is not there or too old; no such device, or one that is in use or not calibrated.
-pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
+pub fn open(connection: &Connection) -> Result<ReadyDevice, OpenError> {
     let (hd, _) = Hd::load(connection)?;
     let name = match connection.id.as_deref().filter(|name| *name != DEFAULT) {
         Some(name) => Some(CString::new(name).map_err(|_| {
@@ -77,7 +77,7 @@ pub fn open(connection: &Connection) -> Result<Opened, OpenError> {
     let scheduler = HdScheduler::of(hd);
     let slot = scheduler.add(name)?;
     let device = TouchDevice::new(scheduler, slot);
-    Ok(Opened { device: Box::new(device), scheduler: Some(scheduler.handout()) })
+    Ok(ReadyDevice { device: Box::new(device), scheduler: Some(scheduler.handout()) })
 }
 
 /// What does not change of an open device.
@@ -105,19 +105,19 @@ fn traits(hd: Hd) -> Traits {
 
 /// Initialises a device and readies it for forces: these are off until a frame has one. The scheduler is stopped.
 fn prepared(hd: Hd, name: Option<&CString>) -> Result<(Handle, Traits), OpenError> {
-    let handle = hd.init(name).map_err(|code| does_not_open(hd, name, code))?;
+    let handle = hd.init(name).map_err(|code| open_error(hd, name, code))?;
     hd.make_current(handle);
-    let readied = || {
+    let prepare_for_forces = || {
         let traits = traits(hd);
         check_version(&hd.string(parameter::VERSION))?;
         check_calibration(hd, &traits.name)?;
         hd.enable(capability::FORCE_OUTPUT);
         match hd.first_error() {
             None => Ok((handle, traits)),
-            Some(code) => Err(does_not_open(hd, name, code)),
+            Some(code) => Err(open_error(hd, name, code)),
         }
     };
-    readied().inspect_err(|_: &OpenError| hd.disable_device(handle))
+    prepare_for_forces().inspect_err(|_: &OpenError| hd.disable_device(handle))
 }
 
 /// A version whose number cannot be read is not refused: how the vendor writes it is not documented.
@@ -149,7 +149,7 @@ fn check_calibration(hd: Hd, name: &str) -> Result<(), OpenError> {
     Err(OpenError::new(what, advice))
 }
 
-fn does_not_open(hd: Hd, name: Option<&CString>, code: Enum) -> OpenError {
+fn open_error(hd: Hd, name: Option<&CString>, code: Enum) -> OpenError {
     let device = name.map_or(DEFAULT.into(), |name| name.to_string_lossy());
     let what = format!("the Touch device {device:?} does not open ({})", hd.error_text(code));
     match code {
@@ -161,7 +161,7 @@ fn does_not_open(hd: Hd, name: Option<&CString>, code: Enum) -> OpenError {
 
 /// The default device and the library's version.
 fn describe_default(hd: Hd) -> Result<(FoundDevice, String), OpenError> {
-    let handle = hd.init(None).map_err(|code| does_not_open(hd, None, code))?;
+    let handle = hd.init(None).map_err(|code| open_error(hd, None, code))?;
     hd.make_current(handle);
     let Traits { name, limits } = traits(hd);
     let version = hd.string(parameter::VERSION);

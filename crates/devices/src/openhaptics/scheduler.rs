@@ -1,9 +1,9 @@
-//! The scheduler of the library: one thread for all its devices, which calls the tick.
+//! Scheduler of the OpenHaptics library: one thread for all its devices, which calls the tick.
 //!
-//! The vendor's rules: one frame a device and tick; no calls from elsewhere while the scheduler runs; a device that comes, goes
-//! or comes back is a matter of a stopped scheduler. A thread beside it, the keeper, does that. While the scheduler is stopped for
-//! a device that is unplugged, the keeper calls the tick, so that the loop says what is wrong and goes on with devices of other
-//! drivers; those of this one say that they are disconnected.
+//! Rules of the vendor: one frame for each device and tick; no calls from other threads while the scheduler runs; devices are
+//! added, removed and reconnected only while it is stopped. The watchdog thread does that. While the scheduler is stopped for an
+//! unplugged device, the watchdog calls the tick: the loop then reports the fault and continues with devices of other drivers,
+//! while all devices of this driver are disconnected.
 #![allow(unsafe_code)] // The callback gets its scheduler as an untyped pointer.
 
 use std::cell::Cell;
@@ -19,57 +19,57 @@ use super::library::Hd;
 use super::{Traits, prepared};
 use crate::{OpenError, Scheduler};
 
-/// Ticks a second: the library's default, and what every device of the vendor has.
+/// Ticks per second: the library's default, and the rate of every device of the vendor.
 const RATE: f64 = 1000.0;
 
-/// Time between two looks of the keeper.
-const LOOK: Duration = Duration::from_millis(20);
+/// Interval at which the watchdog thread polls.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Time for which the loop may tick on with a device that is unplugged before the scheduler is stopped: it publishes its fault.
-const FAREWELL: Duration = Duration::from_millis(60);
+/// Time for which the loop continues with an unplugged device before the scheduler is stopped, so that it publishes the fault.
+const UNPLUG_GRACE: Duration = Duration::from_millis(60);
 
 /// Time between two attempts to find an unplugged device.
 const ATTEMPT: Duration = Duration::from_millis(500);
 
-/// Longest time for which the ticks without force are waited for before the scheduler is stopped.
-const HUSH: Duration = Duration::from_millis(50);
+/// Longest wait for the ticks with zero force before the scheduler is stopped.
+const ZERO_FORCE_TIMEOUT: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// The scheduler whose tick this thread is in.
+    /// The scheduler whose tick runs on this thread.
     static TICKING: Cell<*const HdScheduler> = const { Cell::new(std::ptr::null()) };
 }
 
 type Tick = Box<dyn FnMut() + Send>;
 
-/// A device of the scheduler, as it and the tick share it.
+/// A device of the scheduler, shared with the tick.
 pub struct Slot {
     /// Its name in the vendor's setup; the default device has none.
     pub name: Option<CString>,
     pub traits: Traits,
     handle: AtomicU32,
     lost: AtomicBool,
-    /// Nobody has it any more.
+    /// Its driver object has been dropped.
     closing: AtomicBool,
-    /// Has had its frame in this tick.
+    /// Whether it has had its frame in this tick.
     framed: AtomicBool,
-    /// An error that was found in the frame of another device.
+    /// Its error that the frame of another device has read.
     foreign_error: AtomicU32,
 }
 
 impl Slot {
-    /// Its number, while it is plugged in.
+    /// Its handle, while it is plugged in.
     pub fn handle(&self) -> Option<Handle> {
         let handle = self.handle.load(Ordering::Acquire);
         (handle != INVALID_HANDLE && !self.lost.load(Ordering::Acquire)).then_some(handle)
     }
 
-    /// Its number, while the library has it: one that is taken for lost may still hear.
+    /// Its handle, while the library has one: a device marked as lost may still receive forces.
     pub fn last_handle(&self) -> Option<Handle> {
         let handle = self.handle.load(Ordering::Acquire);
         (handle != INVALID_HANDLE).then_some(handle)
     }
 
-    pub fn lose(&self) {
+    pub fn mark_lost(&self) {
         self.lost.store(true, Ordering::Release);
     }
 
@@ -83,36 +83,36 @@ impl Slot {
     }
 }
 
-/// What is changed only by who has stopped the scheduler, or is about to start it.
+/// State that changes only while the scheduler is stopped.
 #[derive(Default)]
 struct Control {
     running: Option<SchedulerHandle>,
-    keeper: Option<JoinHandle<()>>,
+    watchdog: Option<JoinHandle<()>>,
 }
 
-/// The scheduler of one library, for as long as the process lives: the library may call it.
+/// The scheduler of one library. It is never freed, for the library may call it at any time.
 pub struct HdScheduler {
     pub hd: Hd,
     control: Mutex<Control>,
-    /// Changed only while the library's scheduler is stopped: in a tick they can always be read.
+    /// Changed only while the library's scheduler is stopped, so that a tick can always read them.
     slots: RwLock<Vec<Arc<Slot>>>,
     tick: Mutex<Option<Tick>>,
-    /// Ticks that are over.
+    /// Number of completed ticks.
     ticks: AtomicU64,
-    /// Set before the library's scheduler is stopped: frames have no force.
+    /// Set before the library's scheduler is stopped: frames have zero force.
     quiet: AtomicBool,
-    /// Set while the library's scheduler is stopped for a device that is unplugged.
-    dormant: AtomicBool,
+    /// Set while the library's scheduler is stopped for an unplugged device.
+    suspended: AtomicBool,
     stopping: AtomicBool,
-    /// The tick has panicked.
+    /// Whether the tick has panicked.
     panicked: AtomicBool,
-    /// The same for all devices, so that a loop sees that they share it.
+    /// The same object for all devices: a loop recognises by it that they share a scheduler.
     handout: OnceLock<Arc<dyn Scheduler>>,
 }
 
 /// Called by the library at each of its ticks.
 unsafe extern "system" fn callback(scheduler: *mut c_void) -> CallbackCode {
-    // SAFETY: it was scheduled with a scheduler that is never freed.
+    // SAFETY: the pointer is that of a scheduler, which is never freed.
     let scheduler = unsafe { &*scheduler.cast::<HdScheduler>().cast_const() };
     scheduler.tick();
     CALLBACK_CONTINUE
@@ -123,7 +123,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl HdScheduler {
-    /// Of a library, from the second call on the same.
+    /// The scheduler of a library; later calls return the same.
     pub fn of(hd: Hd) -> &'static HdScheduler {
         static ALL: Mutex<Vec<&'static HdScheduler>> = Mutex::new(Vec::new());
         let mut all = locked(&ALL);
@@ -137,7 +137,7 @@ impl HdScheduler {
             tick: Mutex::default(),
             ticks: AtomicU64::new(0),
             quiet: AtomicBool::new(false),
-            dormant: AtomicBool::new(false),
+            suspended: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
             handout: OnceLock::new(),
@@ -146,9 +146,9 @@ impl HdScheduler {
         scheduler
     }
 
-    /// What a loop has of it.
+    /// The scheduler for a loop.
     pub fn handout(&'static self) -> Arc<dyn Scheduler> {
-        self.handout.get_or_init(|| Arc::new(Handout(self))).clone()
+        self.handout.get_or_init(|| Arc::new(LoopScheduler(self))).clone()
     }
 
     fn slots(&self) -> RwLockReadGuard<'_, Vec<Arc<Slot>>> {
@@ -157,28 +157,28 @@ impl HdScheduler {
 
     /// Whether this thread may read and write devices now: in a tick of the library.
     pub fn is_ticking(&self) -> bool {
-        std::ptr::eq(TICKING.get(), self) && !self.is_dormant()
+        std::ptr::eq(TICKING.get(), self) && !self.is_suspended()
     }
 
-    /// Whether frames are to have no force.
-    pub fn is_quiet(&self) -> bool {
+    /// Whether frames must have zero force.
+    pub fn is_force_off(&self) -> bool {
         self.quiet.load(Ordering::Acquire)
     }
 
-    /// Whether the library's scheduler is stopped for a device that is unplugged.
-    pub fn is_dormant(&self) -> bool {
-        self.dormant.load(Ordering::Acquire)
+    /// Whether the library's scheduler is stopped for an unplugged device.
+    pub fn is_suspended(&self) -> bool {
+        self.suspended.load(Ordering::Acquire)
     }
 
-    /// One tick. The locks are free: whoever else takes them has stopped the library's scheduler.
+    /// One tick. The locks are free, for other threads take them only while the library's scheduler is stopped.
     fn tick(&self) {
         let (Ok(slots), Ok(mut tick)) = (self.slots.try_read(), self.tick.try_lock()) else { return };
         slots.iter().for_each(|slot| slot.framed.store(false, Ordering::Relaxed));
         TICKING.set(self);
         let callable = tick.as_mut().filter(|_| !self.panicked.load(Ordering::Acquire));
-        // A panic must not reach the library. A loop catches its own; a tick that panics all the same is not called again.
+        // A panic must not reach the library. A loop catches its own; a tick that panics nevertheless is not called again.
         let panicked = callable.is_some_and(|tick| catch_unwind(AssertUnwindSafe(tick)).is_err());
-        if !self.is_dormant() {
+        if !self.is_suspended() {
             slots.iter().for_each(|slot| self.release(slot));
         }
         TICKING.set(std::ptr::null());
@@ -186,30 +186,29 @@ impl HdScheduler {
         self.panicked.fetch_or(panicked, Ordering::AcqRel);
     }
 
-    /// A frame without a force for a device that has had none in this tick: it would keep its last one, even one that is
-    /// taken for lost.
+    /// A frame with zero force for a device without one in this tick: it would keep its last force, even if it is marked as lost.
     fn release(&self, slot: &Slot) {
         let Some(handle) = slot.last_handle().filter(|_| !slot.framed.load(Ordering::Relaxed)) else { return };
         self.hd.begin_frame(handle);
         self.hd.end_frame(handle);
         if self.errors(handle) == Some(error::COMMUNICATION) {
-            slot.lose();
+            slot.mark_lost();
         }
     }
 
-    /// Takes the errors off the library's stack, which is the same for all devices: the first one of this device, or of none.
+    /// Clears the library's error stack, which all devices share. Returns an error of this device, or of none.
     pub fn errors(&self, handle: Handle) -> Option<Enum> {
         let mut own = None;
         self.hd.drain_errors(|code, device| {
-            if device == handle || !self.leave_error(code, device) {
+            if device == handle || !self.deliver_error(code, device) {
                 own = Some(code);
             }
         });
         own
     }
 
-    /// Leaves an error to the device that it is about, which finds it in its next frame.
-    fn leave_error(&self, code: Enum, device: Handle) -> bool {
+    /// Stores an error for its device, which reads it in its next frame.
+    fn deliver_error(&self, code: Enum, device: Handle) -> bool {
         match self.slots.try_read() {
             Ok(slots) => slots
                 .iter()
@@ -220,7 +219,7 @@ impl HdScheduler {
         }
     }
 
-    /// Adds a device while no loop runs: its own would have neither measurements nor forces meanwhile.
+    /// Adds a device while no loop runs: the devices of a running loop would have neither measurements nor forces meanwhile.
     pub fn add(&self, name: Option<CString>) -> Result<Arc<Slot>, OpenError> {
         let control = self.control_in_time()?;
         if self.open().iter().any(|slot| slot.name == name) {
@@ -246,22 +245,21 @@ impl HdScheduler {
         Ok(slot)
     }
 
-    /// The lock of who stops the scheduler. The keeper has it for long only while it waits for a device.
+    /// The lock that is held while the scheduler is stopped. The watchdog holds it for long only while it waits for a device.
     fn control_in_time(&self) -> Result<MutexGuard<'_, Control>, OpenError> {
         let began = Instant::now();
         while began.elapsed() < ATTEMPT {
             match self.control.try_lock() {
                 Ok(control) => return Ok(control),
                 Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
-                Err(TryLockError::WouldBlock) => std::thread::sleep(LOOK),
+                Err(TryLockError::WouldBlock) => std::thread::sleep(POLL_INTERVAL),
             }
         }
         let what = "another device of OpenHaptics is unplugged and waited for";
         Err(OpenError::new(what, "plug it in or close it, then try again"))
     }
 
-    /// Does something with the scheduler stopped, and starts it again. For as long as it does not start, the devices say that
-    /// they are disconnected.
+    /// Calls `act` with the scheduler stopped, and starts it again. Devices are disconnected until it starts.
     fn paused(&self, act: impl FnOnce()) {
         self.stop_quietly();
         act();
@@ -272,19 +270,19 @@ impl HdScheduler {
         }
     }
 
-    /// Stops the library's scheduler, behind two ticks without force: devices would keep their last one.
+    /// Stops the library's scheduler after two ticks with zero force: devices would keep their last force.
     fn stop_quietly(&self) {
         self.quiet.store(true, Ordering::Release);
-        // The first may have begun before.
+        // The first of three ticks may have begun before.
         let (enough, began) = (self.ticks.load(Ordering::Acquire) + 3, Instant::now());
-        while self.ticks.load(Ordering::Acquire) < enough && began.elapsed() < HUSH {
+        while self.ticks.load(Ordering::Acquire) < enough && began.elapsed() < ZERO_FORCE_TIMEOUT {
             std::thread::sleep(Duration::from_micros(500));
         }
         self.hd.stop_scheduler();
         self.quiet.store(false, Ordering::Release);
     }
 
-    /// Starts the library's scheduler; whether it ticks then, or is to stop anyway. Its stack of errors is read by its ticks.
+    /// Starts the library's scheduler. Returns whether it ticks, or is to stop anyway. Its ticks read its error stack.
     fn starts(&self) -> bool {
         let (before, began) = (self.ticks.load(Ordering::Acquire), Instant::now());
         self.hd.start_scheduler();
@@ -297,7 +295,7 @@ impl HdScheduler {
         true
     }
 
-    /// A device that nobody has any more: closed at once, or by the keeper.
+    /// Removes a device whose driver object is dropped: at once, or later by the watchdog.
     pub fn remove(&self, slot: &Slot) {
         slot.closing.store(true, Ordering::Release);
         if let Ok(control) = self.control.try_lock()
@@ -307,12 +305,12 @@ impl HdScheduler {
         }
     }
 
-    /// Names of the open devices.
+    /// The open devices.
     pub fn open(&self) -> Vec<Arc<Slot>> {
         self.slots().iter().filter(|slot| !slot.closing.load(Ordering::Acquire)).cloned().collect()
     }
 
-    /// Does something that no tick may interrupt, unless a loop runs.
+    /// Calls `act`, which no tick may interrupt, unless a loop runs.
     pub fn while_idle<R>(&self, act: impl FnOnce() -> R) -> Option<R> {
         let control = self.control.try_lock().ok()?;
         if control.running.is_some() {
@@ -322,7 +320,7 @@ impl HdScheduler {
         Some(act())
     }
 
-    /// Closes the devices that nobody has. The scheduler is stopped.
+    /// Closes the removed devices. The scheduler must be stopped.
     fn sweep(&self) {
         self.slots.write().unwrap_or_else(PoisonError::into_inner).retain(|slot| {
             let closing = slot.closing.load(Ordering::Acquire);
@@ -338,10 +336,10 @@ impl HdScheduler {
         self.slots().iter().any(|slot| is(slot))
     }
 
-    /// Until the scheduler is to stop.
-    fn keep(&self) {
+    /// The watchdog: runs until the scheduler is to stop.
+    fn watch(&self) {
         while !self.stopping.load(Ordering::Acquire) {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
             let lost = self.any(|slot| slot.lost.load(Ordering::Acquire));
             let closing = self.any(|slot| slot.closing.load(Ordering::Acquire));
             if !lost && !closing {
@@ -349,13 +347,13 @@ impl HdScheduler {
             }
             let Ok(_control) = self.control.try_lock() else { continue };
             if lost {
-                std::thread::sleep(FAREWELL);
+                std::thread::sleep(UNPLUG_GRACE);
             }
             self.paused(|| self.wait_for_lost());
         }
     }
 
-    /// Closes what nobody has, and waits until every lost device is back. The scheduler is stopped.
+    /// Closes the removed devices, and waits until every lost device is back. The scheduler must be stopped.
     fn wait_for_lost(&self) {
         let is_lost = |slot: &Slot| slot.lost.load(Ordering::Acquire);
         loop {
@@ -369,21 +367,21 @@ impl HdScheduler {
         }
     }
 
-    /// Ticks without the library until the next attempt. The scheduler is stopped.
+    /// Ticks without the library until the next attempt. The scheduler must be stopped.
     fn tick_dormant(&self) {
-        self.dormant.store(true, Ordering::Release);
+        self.suspended.store(true, Ordering::Release);
         let began = Instant::now();
         while began.elapsed() < ATTEMPT && !self.stopping.load(Ordering::Acquire) {
             self.tick();
             std::thread::sleep(Duration::from_secs_f64(1.0 / RATE));
         }
-        self.dormant.store(false, Ordering::Release);
+        self.suspended.store(false, Ordering::Release);
     }
 
     fn bring_back(&self, slot: &Slot) {
-        let gone = slot.handle.swap(INVALID_HANDLE, Ordering::AcqRel);
-        if gone != INVALID_HANDLE {
-            self.hd.disable_device(gone);
+        let old_handle = slot.handle.swap(INVALID_HANDLE, Ordering::AcqRel);
+        if old_handle != INVALID_HANDLE {
+            self.hd.disable_device(old_handle);
             self.hd.first_error();
         }
         if let Ok((handle, _)) = prepared(self.hd, slot.name.as_ref()) {
@@ -394,10 +392,10 @@ impl HdScheduler {
     }
 }
 
-/// What a loop has of the scheduler.
-struct Handout(&'static HdScheduler);
+/// Handle of a loop to the scheduler.
+struct LoopScheduler(&'static HdScheduler);
 
-impl Scheduler for Handout {
+impl Scheduler for LoopScheduler {
     fn rate(&self) -> f64 {
         RATE
     }
@@ -417,16 +415,16 @@ impl Scheduler for Handout {
         // SAFETY: the callback reads a scheduler, and this one is never freed.
         let scheduled = unsafe { hd.schedule(callback, data) };
         hd.start_scheduler();
-        let keeper = match hd.first_error() {
+        let watchdog = match hd.first_error() {
             None => std::thread::Builder::new()
                 .name("palpate-openhaptics".to_owned())
-                .spawn(|| scheduler.keep())
+                .spawn(|| scheduler.watch())
                 .map_err(|error| format!("the system gives no thread ({error})")),
             Some(code) => Err(format!("the scheduler of OpenHaptics does not start ({})", hd.error_text(code))),
         };
-        match keeper {
-            Ok(keeper) => {
-                *control = Control { running: Some(scheduled), keeper: Some(keeper) };
+        match watchdog {
+            Ok(watchdog) => {
+                *control = Control { running: Some(scheduled), watchdog: Some(watchdog) };
                 Ok(())
             }
             Err(what) => {
@@ -443,17 +441,17 @@ impl Scheduler for Handout {
     fn stop(&self) {
         let scheduler = self.0;
         scheduler.stopping.store(true, Ordering::Release);
-        // The keeper may wait for a device with the lock; told to stop, it lets go of it.
-        let keeper = locked(&scheduler.control).keeper.take();
-        if let Some(keeper) = keeper {
-            let _ = keeper.join();
+        // The watchdog may hold the lock while it waits for a device; it releases it when `stopping` is set.
+        let watchdog = locked(&scheduler.control).watchdog.take();
+        if let Some(watchdog) = watchdog {
+            let _ = watchdog.join();
         }
         let mut control = locked(&scheduler.control);
         let Some(scheduled) = control.running.take() else { return };
         scheduler.stop_quietly();
         scheduler.hd.unschedule(scheduled);
         scheduler.hd.first_error();
-        // What it owns closes its devices, with the scheduler stopped.
+        // Dropping the tick removes the devices that it owns; the scheduler is stopped.
         let tick = locked(&scheduler.tick).take();
         drop(control);
         drop(tick);

@@ -4,48 +4,52 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::{Asked, Gone, Input, LONGEST_HOLD, Output, Pose, Reading, Said, Twist, Wrench};
+use super::{Disconnected, Input, LONGEST_HOLD, LatestReading, LatestWrench, Output, Pose, Reading, Twist, Wrench};
 use crate::{Buttons, DeviceFault};
 
 /// To be used by one thread of the program, which may take its time; every call is wait-free.
 pub struct ProgramEnd {
-    said: Input<Said>,
-    asked: Output<Asked>,
-    gone: Arc<Gone>,
+    reading: Input<LatestReading>,
+    wrench: Output<LatestWrench>,
+    disconnected: Arc<Disconnected>,
     begun: Instant,
 }
 
 impl ProgramEnd {
-    pub(super) fn new(said: Input<Said>, asked: Output<Asked>, gone: Arc<Gone>) -> Self {
-        Self { said, asked, gone, begun: Instant::now() }
+    pub(super) fn new(
+        reading: Input<LatestReading>,
+        wrench: Output<LatestWrench>,
+        disconnected: Arc<Disconnected>,
+    ) -> Self {
+        Self { reading, wrench, disconnected, begun: Instant::now() }
     }
 
     /// Says where the tool is, as measured now. Numbers that are not finite are the servo's to refuse.
     pub fn publish(&mut self, pose: Pose, twist: Twist, buttons: Buttons) {
-        self.say(Reading { pose, twist, buttons, active: true, timestamp_ns: 0 });
+        self.send(Reading { pose, twist, buttons, active: true, timestamp_ns: 0 });
     }
 
     /// Says that the tool is out of the scene.
     pub fn publish_absent(&mut self) {
-        self.say(Reading::default());
+        self.send(Reading::default());
     }
 
-    fn say(&mut self, reading: Reading) {
+    fn send(&mut self, reading: Reading) {
         // From one on: a loop's clock may stand at zero, and time is to go forward from reading to reading.
         let timestamp_ns = 1 + self.begun.elapsed().as_nanos() as u64;
-        self.said.write(Some(Ok(Reading { timestamp_ns, ..reading })));
+        self.reading.write(Some(Ok(Reading { timestamp_ns, ..reading })));
     }
 
     /// Says that there is no reading, and why; it stands until the next one.
     pub fn fail(&mut self, fault: DeviceFault) {
-        self.said.write(Some(Err(fault)));
+        self.reading.write(Some(Err(fault)));
     }
 
     /// The wrench to put out, and its age if a loop has asked for one. It is zero before the first tick, when no tick has renewed
     /// it for [`LONGEST_HOLD`], and when the loop has ended.
     pub fn wrench(&mut self) -> (Wrench, Option<Duration>) {
-        self.asked.update();
-        let Some((wrench, when)) = *self.asked.output_buffer_mut() else { return (Wrench::default(), None) };
+        self.wrench.update();
+        let Some((wrench, when)) = *self.wrench.output_buffer_mut() else { return (Wrench::default(), None) };
         let age = when.elapsed();
         let holds = !self.loop_has_ended() && age.as_secs_f64() <= LONGEST_HOLD;
         (if holds { wrench } else { Wrench::default() }, Some(age))
@@ -53,13 +57,13 @@ impl ProgramEnd {
 
     /// Whether the servo has let go of the device.
     pub fn loop_has_ended(&self) -> bool {
-        self.gone.servo.load(Ordering::Acquire)
+        self.disconnected.servo.load(Ordering::Acquire)
     }
 }
 
 /// The servo learns that nobody publishes any more.
 impl Drop for ProgramEnd {
     fn drop(&mut self) {
-        self.gone.program.store(true, Ordering::Release);
+        self.disconnected.program.store(true, Ordering::Release);
     }
 }

@@ -29,26 +29,26 @@ pub const LONGEST_SILENCE: f64 = 0.05;
 /// 100 Hz.
 pub const LONGEST_HOLD: f64 = 0.025;
 
-/// Which of both sides have gone.
+/// Which of both sides has ended.
 #[derive(Default)]
-struct Gone {
+struct Disconnected {
     program: AtomicBool,
     servo: AtomicBool,
 }
 
-/// What the program says: a reading, or why there is none; nothing at first.
-type Said = Option<Result<Reading, DeviceFault>>;
+/// Latest reading of the program, or its fault; none at first.
+type LatestReading = Option<Result<Reading, DeviceFault>>;
 
-/// A wrench, and when the servo put it out.
-type Asked = Option<(Wrench, Instant)>;
+/// Latest wrench of the servo, and its time.
+type LatestWrench = Option<(Wrench, Instant)>;
 
 /// The device's end, owned by the servo.
 pub struct ProgrammedDevice {
     name: String,
     limits: DeviceLimits,
-    said: Output<Said>,
-    asked: Input<Asked>,
-    gone: Arc<Gone>,
+    reading: Output<LatestReading>,
+    wrench: Input<LatestWrench>,
+    disconnected: Arc<Disconnected>,
     /// Ticks since the latest reading.
     silent: u32,
 }
@@ -57,11 +57,17 @@ pub struct ProgrammedDevice {
 pub fn programmed(name: impl Into<String>, limits: DeviceLimits, rate: f64) -> (ProgramEnd, ProgrammedDevice) {
     let (said_in, said_out) = triple_buffer(&None);
     let (asked_in, asked_out) = triple_buffer(&None);
-    let gone = Arc::new(Gone::default());
+    let disconnected = Arc::new(Disconnected::default());
     let limits = DeviceLimits { delay: limits.delay + 1.5 / rate, ..limits };
-    let device =
-        ProgrammedDevice { name: name.into(), limits, said: said_out, asked: asked_in, gone: gone.clone(), silent: 0 };
-    (ProgramEnd::new(said_in, asked_out, gone), device)
+    let device = ProgrammedDevice {
+        name: name.into(),
+        limits,
+        reading: said_out,
+        wrench: asked_in,
+        disconnected: disconnected.clone(),
+        silent: 0,
+    };
+    (ProgramEnd::new(said_in, asked_out, disconnected), device)
 }
 
 impl Device for ProgrammedDevice {
@@ -70,12 +76,12 @@ impl Device for ProgrammedDevice {
     }
 
     fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
-        self.silent = if self.said.update() { 0 } else { self.silent.saturating_add(1) };
+        self.silent = if self.reading.update() { 0 } else { self.silent.saturating_add(1) };
         // Asked after the update: what a program said before it went is not missed.
-        let gone = self.gone.program.load(Ordering::Acquire);
-        match *self.said.output_buffer_mut() {
+        let disconnected = self.disconnected.program.load(Ordering::Acquire);
+        match *self.reading.output_buffer_mut() {
             Some(Err(fault)) => Err(fault),
-            _ if gone => Err(DeviceFault::Disconnected),
+            _ if disconnected => Err(DeviceFault::Disconnected),
             None => Ok(Reading { timestamp_ns: now_ns, ..Reading::default() }),
             Some(Ok(_)) if f64::from(self.silent) * period > LONGEST_SILENCE => Err(DeviceFault::Stale),
             Some(Ok(reading)) => Ok(reading),
@@ -83,7 +89,7 @@ impl Device for ProgrammedDevice {
     }
 
     fn write(&mut self, wrench: Wrench) -> Result<(), DeviceFault> {
-        self.asked.write(Some((wrench, Instant::now())));
+        self.wrench.write(Some((wrench, Instant::now())));
         Ok(())
     }
 
@@ -95,7 +101,7 @@ impl Device for ProgrammedDevice {
 /// The program learns that there is no loop any more.
 impl Drop for ProgrammedDevice {
     fn drop(&mut self) {
-        self.gone.servo.store(true, Ordering::Release);
+        self.disconnected.servo.store(true, Ordering::Release);
     }
 }
 

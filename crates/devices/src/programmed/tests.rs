@@ -49,7 +49,7 @@ fn a_program_that_says_nothing_more_is_stale_until_it_does() {
     publish(&mut end, 0.1);
     let silent: Vec<_> = (0..60).map(|_| device.read(0, PERIOD)).collect();
     // The first tick takes the reading, 50 more are within 50 ms of it.
-    assert_eq!(silent.iter().position(|said| *said == Err(DeviceFault::Stale)), Some(51));
+    assert_eq!(silent.iter().position(|reading| *reading == Err(DeviceFault::Stale)), Some(51));
     publish(&mut end, 0.1);
     assert!(device.read(0, PERIOD).is_ok());
 }

@@ -44,7 +44,7 @@ impl Emulated for Device {
     type Library = Library;
 
     const VARIABLE: &str = "PALPATE_EMULATED_FORCEDIMENSION";
-    const USUAL: &str = "omega.6";
+    const DEFAULT_DEVICES: &str = "omega.6";
 
     fn world() -> &'static OnceLock<Mutex<World<Self>>> {
         static WORLD: OnceLock<Mutex<World<Device>>> = OnceLock::new();

@@ -78,7 +78,7 @@ fn fact<R>(id: c_char, of: impl FnOnce(&Device) -> R, random: impl FnOnce(u64) -
 }
 
 /// Random numbers in the place of these, and a random result, if the device talks nonsense.
-fn perhaps_nonsense(id: c_char, code: c_int, values: &mut [f64]) -> c_int {
+fn randomize_if_disturbed(id: c_char, code: c_int, values: &mut [f64]) -> c_int {
     let mut world = world();
     if !find(&mut world, id).is_some_and(|device| device.has(Disturbance::Nonsense)) {
         return code;
@@ -98,7 +98,7 @@ fn measured<const N: usize>(
         (values, code) = of(device)?;
         Ok(code)
     });
-    (perhaps_nonsense(id, code, &mut values), values)
+    (randomize_if_disturbed(id, code, &mut values), values)
 }
 
 /// Writes what was measured, unless the call has failed.
@@ -215,7 +215,7 @@ pub unsafe extern "system" fn dhdGetOrientationFrame(matrix: *mut [c_double; 9],
 fn command(id: c_char, force: DVec3, torque: DVec3) -> c_int {
     let wrench = Wrench { force: from_vendor(force), torque: from_vendor(torque) };
     let code = with(id, |device| device.command(wrench).map(|()| 0));
-    perhaps_nonsense(id, code, &mut [])
+    randomize_if_disturbed(id, code, &mut [])
 }
 
 #[unsafe(no_mangle)]

@@ -57,7 +57,7 @@ impl Emulated for Device {
 
     /// Models by commas, each with its name in the setup (`Left=PHANTOM Omni`); the first without a name is the default device.
     const VARIABLE: &str = "PALPATE_EMULATED_OPENHAPTICS";
-    const USUAL: &str = "Touch";
+    const DEFAULT_DEVICES: &str = "Touch";
 
     fn world() -> &'static OnceLock<Mutex<World<Self>>> {
         static WORLD: OnceLock<Mutex<World<Device>>> = OnceLock::new();
@@ -108,8 +108,8 @@ impl Emulated for Device {
         self.output
     }
 
-    fn hurry(as_fast_as_possible: bool) {
-        world::<Self>().library.hurried = as_fast_as_possible;
+    fn run_fast(as_fast_as_possible: bool) {
+        world::<Self>().library.fast = as_fast_as_possible;
     }
 }
 

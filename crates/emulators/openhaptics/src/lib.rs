@@ -77,7 +77,7 @@ fn with_current<R>(world: &mut World<Device>, act: impl FnOnce(&mut Device) -> R
 }
 
 /// Whether the current device answers with random numbers.
-fn talks_nonsense(world: &World<Device>) -> bool {
+fn answers_randomly(world: &World<Device>) -> bool {
     let current = world.devices.get(world.library.current as usize);
     current.is_some_and(|device| device.has(Disturbance::Nonsense))
 }
@@ -159,7 +159,7 @@ pub extern "system" fn hdEndFrame(handle: u32) {
 unsafe fn get<T>(values: *mut T, of: impl FnOnce(&Device) -> Option<Vec<T>>, random: impl Fn(&mut Random) -> T) {
     let mut world = world();
     let Some(found) = with_current(&mut world, |device| of(device).ok_or(error::INVALID_ENUM)) else { return };
-    let nonsense = talks_nonsense(&world) && world.random.bits().is_multiple_of(2);
+    let nonsense = answers_randomly(&world) && world.random.bits().is_multiple_of(2);
     for (entry, number) in found.into_iter().enumerate() {
         let number = if nonsense { random(&mut world.random) } else { number };
         // SAFETY: by the caller.
@@ -221,7 +221,7 @@ pub unsafe extern "system" fn hdGetBooleanv(asked: u32, values: *mut u8) {
 #[unsafe(no_mangle)]
 pub extern "system" fn hdGetString(asked: u32) -> *const c_char {
     let mut world = world::<Device>();
-    if talks_nonsense(&world) {
+    if answers_randomly(&world) {
         return std::ptr::null();
     }
     let old = world.has(Disturbance::WrongVersion);
@@ -255,7 +255,7 @@ pub unsafe extern "system" fn hdSetDoublev(asked: u32, values: *const [c_double;
 #[unsafe(no_mangle)]
 pub extern "system" fn hdGetError() -> ErrorInfo {
     let mut world = world::<Device>();
-    if talks_nonsense(&world) && world.random.bits().is_multiple_of(8) {
+    if answers_randomly(&world) && world.random.bits().is_multiple_of(8) {
         let (code, device) = (world.random.bits() as u32 % 0x700, world.random.bits() as u32 % 3);
         return ErrorInfo { code, internal: -1, device };
     }

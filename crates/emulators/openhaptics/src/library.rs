@@ -1,4 +1,4 @@
-//! What the library has beside its devices: one stack of errors, the device of the calls that name none.
+//! State of the library beside its devices: one stack of errors, the device of the calls that name none.
 
 use std::ffi::c_int;
 
@@ -21,13 +21,13 @@ pub struct Library {
     /// Device of the calls that name none.
     pub current: u32,
     /// Ticks without pauses.
-    pub hurried: bool,
+    pub fast: bool,
     errors: Vec<ErrorInfo>,
 }
 
 impl Default for Library {
     fn default() -> Self {
-        Self { current: INVALID_HANDLE, hurried: false, errors: Vec::new() }
+        Self { current: INVALID_HANDLE, fast: false, errors: Vec::new() }
     }
 }
 

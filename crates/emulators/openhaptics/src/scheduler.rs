@@ -107,8 +107,8 @@ fn run() {
     let mut last = Instant::now();
     let mut deadline = last;
     while is_running() {
-        let hurried = world::<Device>().library.hurried;
-        if !hurried {
+        let fast = world::<Device>().library.fast;
+        if !fast {
             deadline = (deadline + PERIOD).max(Instant::now());
             std::thread::sleep(deadline - Instant::now().min(deadline));
         }
@@ -116,7 +116,7 @@ fn run() {
             std::thread::sleep(SLOW);
         }
         let now = Instant::now();
-        let elapsed = if hurried { PERIOD } else { now - last };
+        let elapsed = if fast { PERIOD } else { now - last };
         last = now;
         TICKS.fetch_add(1, Ordering::AcqRel);
         world::<Device>().devices.iter_mut().for_each(|device| device.advance(elapsed.as_secs_f64()));

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use palpate_devices::emulated::{Mechanics, known};
 use palpate_emulators::SteeredTip;
-use palpate_emulators::inverse_service::{InverseService, Options, Persona};
+use palpate_emulators::inverse_service::{InverseService, Options, Release};
 
 const HELP: &str = "\
 Emulates Haply's Inverse Service with Inverse3 arms that a simulated hand moves.
@@ -47,7 +47,7 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Option<Arguments
         match name.as_str() {
             "--port" => parsed.options.port = number(0.0, 65535.0)? as u16,
             "--events-port" => parsed.options.events_port = number(0.0, 65535.0)? as u16,
-            "--persona" => parsed.options.persona = value.parse::<Persona>()?,
+            "--persona" => parsed.options.release = value.parse::<Release>()?,
             "--devices" => parsed.devices = number(1.0, 4.0)? as usize,
             "--latency" => parsed.options.latency = Duration::from_secs_f64(1e-3 * number(0.0, 1e4)?),
             _ => return Err(format!("there is no option {name}")),
@@ -71,7 +71,7 @@ fn serve(arguments: &Arguments) -> Result<(), String> {
         service.add_arm(id, "inverse3", tip()?);
         service.add_grip(&format!("{}", 61_570 + rank), id);
     }
-    println!("Inverse Service {} at {}", options.persona.name(), service.address());
+    println!("Inverse Service {} at {}", options.release.name(), service.address());
     let mut before = 0;
     loop {
         thread::sleep(Duration::from_secs(2));

@@ -1,9 +1,9 @@
-//! What an emulated device gives the suite.
+//! The `Bench` trait: steering of an emulated device, and what is known of it.
 
 use std::time::Duration;
 
 use glam::DVec3;
-use palpate_devices::{Buttons, DeviceFault, OpenError, Opened, Wrench};
+use palpate_devices::{Buttons, DeviceFault, OpenError, ReadyDevice, Wrench};
 
 use crate::tip::Tip;
 
@@ -18,7 +18,7 @@ pub trait Bench: Send + 'static {
     ///
     /// # Errors
     /// Those of the driver.
-    fn open(&mut self) -> Result<Opened, OpenError>;
+    fn open(&mut self) -> Result<ReadyDevice, OpenError>;
 
     /// Puts the tip at a place, from which it goes on at its velocity until it is put elsewhere. What holds it there is
     /// stronger than the motors.
@@ -34,7 +34,7 @@ pub trait Bench: Send + 'static {
     fn disturb(&mut self, disturbance: Option<Disturbance>);
 
     /// Lets a device that has its own scheduler tick as fast as it can, or at its rate again. Nothing to do for others.
-    fn hurry(&mut self, _as_fast_as_possible: bool) {}
+    fn run_fast(&mut self, _as_fast_as_possible: bool) {}
 }
 
 /// What goes wrong. The suite uses the first five of them; the rest is for the tests of single drivers.
@@ -117,5 +117,5 @@ pub struct Facts {
     /// What the driver says at [`Disturbance::DriverError`].
     pub driver_error: DeviceFault,
     /// Whether ticks may follow each other faster than at 1 kHz.
-    pub hurries: bool,
+    pub can_run_fast: bool,
 }

@@ -1,4 +1,4 @@
-//! Many ticks: the tip goes around a circle, the spring follows it, and nothing may be missed.
+//! Endurance check over many ticks: the tip goes around a circle, the spring follows it, and nothing may be missed.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -10,7 +10,7 @@ use palpate_devices::{Device, DeviceFault, Reading};
 
 use super::rig::Rig;
 use super::spring::{PUSH, STIFFNESS, Spring};
-use super::{Bench, Check, Facts, Seat, Tip, Verdict};
+use super::{Bench, BenchSlot, Check, CheckResult, Facts, Tip};
 
 /// Ticks for one round of the tip. With a prime number the grid of positions is met everywhere.
 const ROUND: usize = 499;
@@ -24,12 +24,12 @@ pub struct Endurance {
     /// Ticks.
     pub ticks: usize,
     /// As fast as possible, where the device allows it, instead of at 1 kHz.
-    pub hurried: bool,
+    pub fast: bool,
 }
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct Measurements {
     /// Ticks, all with a finite reading of the right place and the right force.
     pub ticks: usize,
     /// Time that they took, s.
@@ -47,35 +47,35 @@ pub fn checks<B: Bench>() -> Vec<Check<B>> {
 }
 
 /// A minute's worth where nothing limits the rate, else a second and a half: the minute is for [`endure`] by hand.
-fn many<B: Bench>(seat: &mut Seat<B>) -> Verdict {
-    let hurried = seat.bench().facts().hurries;
-    let ticks = if hurried { 60_000 } else { 1_500 };
-    seat.with_open(|rig| run(rig, Endurance { ticks, hurried })).map(|_| ())
+fn many<B: Bench>(slot: &mut BenchSlot<B>) -> CheckResult {
+    let fast = slot.bench().facts().can_run_fast;
+    let ticks = if fast { 60_000 } else { 1_500 };
+    slot.with_open(|rig| run(rig, Endurance { ticks, fast })).map(|_| ())
 }
 
 /// Ticks a device for as long as asked.
 ///
 /// # Errors
 /// The first tick that was not right, or a device that does not open.
-pub fn endure<B: Bench>(bench: B, endurance: Endurance) -> Result<Figures, String> {
-    Seat(Some(bench)).with_open(|rig| run(rig, endurance))
+pub fn endure<B: Bench>(bench: B, endurance: Endurance) -> Result<Measurements, String> {
+    BenchSlot(Some(bench)).with_open(|rig| run(rig, endurance))
 }
 
-fn run<B: Bench>(rig: &mut Rig<B>, endurance: Endurance) -> Result<Figures, String> {
-    rig.hurry(endurance.hurried);
-    let mut round = Round::new(rig.facts, endurance.ticks);
+fn run<B: Bench>(rig: &mut Rig<B>, endurance: Endurance) -> Result<Measurements, String> {
+    rig.run_fast(endurance.fast);
+    let mut round = CircularPath::new(rig.facts, endurance.ticks);
     let figures =
         rig.each_tick(endurance.ticks + 1, move |bench, device, now_ns| match round.tick(bench, device, now_ns) {
             Ok(None) => ControlFlow::Continue(()),
             Ok(Some(figures)) => ControlFlow::Break(Ok(figures)),
             Err(seen) => ControlFlow::Break(Err(seen)),
         });
-    rig.hurry(false);
+    rig.run_fast(false);
     figures
 }
 
 /// The tip on its way around.
-struct Round {
+struct CircularPath {
     facts: Facts,
     spring: Spring,
     ticks: usize,
@@ -90,7 +90,7 @@ struct Round {
     longest_gap: f64,
 }
 
-impl Round {
+impl CircularPath {
     fn new(facts: Facts, ticks: usize) -> Self {
         Self {
             facts,
@@ -111,7 +111,7 @@ impl Round {
         bench: &mut B,
         device: &mut dyn Device,
         now_ns: u64,
-    ) -> Result<Option<Figures>, String> {
+    ) -> Result<Option<Measurements>, String> {
         let tick = self.costs.len();
         let now = Instant::now();
         let gap = self.last.map_or(0.0, |last| (now - last).as_secs_f64());
@@ -143,7 +143,7 @@ impl Round {
         Ok((self.costs.len() == self.ticks).then(|| self.figures()))
     }
 
-    fn compare(&mut self, reading: &Reading, motors: DVec3, suspended: bool) -> Verdict {
+    fn compare(&mut self, reading: &Reading, motors: DVec3, suspended: bool) -> CheckResult {
         let (place, tolerance) = (reading.pose.position, self.facts.position_tolerance);
         if !self.places.iter().any(|told| (*told - place).length() <= tolerance) {
             return Err(format!("the position is {place}, none of {:?} within {tolerance}", self.places));
@@ -162,10 +162,10 @@ impl Round {
         Ok(())
     }
 
-    fn figures(&mut self) -> Figures {
+    fn figures(&mut self) -> Measurements {
         self.costs.sort_by(f64::total_cmp);
         let quantile = |share: f64| self.costs[(share * (self.costs.len() - 1) as f64) as usize];
-        Figures {
+        Measurements {
             ticks: self.costs.len(),
             seconds: self.began.elapsed().as_secs_f64(),
             longest_gap: self.longest_gap,

@@ -1,5 +1,5 @@
-//! Bad days: cables, errors, versions, delays, numbers that are none. No force outlives a fault by more than a tick, and a
-//! device that is well again works again in the same program.
+//! Fault checks: cables, errors, versions, delays, numbers that are not finite. No force outlives a fault by more
+//! than a tick, and a device that has recovered works again in the same program.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -10,24 +10,24 @@ use palpate_devices::{DeviceFault, OpenError};
 use super::readings::close_to;
 use super::rig::{PERIOD, Rig};
 use super::spring::{PUSH, STIFFNESS, Spring};
-use super::{Bench, Check, Disturbance, Seat, Tip, Verdict};
+use super::{Bench, BenchSlot, Check, CheckResult, Disturbance, Tip};
 
 pub fn checks<B: Bench>() -> Vec<Check<B>> {
     vec![
-        Check { name: "unplugged: no force, and plugged in it works again", run: |seat| seat.with_open(unplugged) },
-        Check { name: "a driver's error: no force, and then it works again", run: |seat| seat.with_open(driver_error) },
-        Check { name: "slow replies: stale, and then it works again", run: |seat| seat.with_open(slow_replies) },
-        Check { name: "positions that are no numbers: no force", run: |seat| seat.with_open(not_finite) },
-        Check { name: "a wrong version is refused", run: |seat| refused(seat, Disturbance::WrongVersion) },
-        Check { name: "a device that is not there is refused", run: |seat| refused(seat, Disturbance::Unplugged) },
+        Check { name: "unplugged: no force, and plugged in it works again", run: |slot| slot.with_open(unplugged) },
+        Check { name: "a driver's error: no force, and then it works again", run: |slot| slot.with_open(driver_error) },
+        Check { name: "slow replies: stale, and then it works again", run: |slot| slot.with_open(slow_replies) },
+        Check { name: "positions that are no numbers: no force", run: |slot| slot.with_open(not_finite) },
+        Check { name: "a wrong version is refused", run: |slot| refused(slot, Disturbance::WrongVersion) },
+        Check { name: "a device that is not there is refused", run: |slot| refused(slot, Disturbance::Unplugged) },
     ]
 }
 
 /// How long a fault is watched, where its ticks are slow.
-const WATCHED: Duration = Duration::from_millis(300);
+const FAULT_WATCH: Duration = Duration::from_millis(300);
 
 /// Time after which a fault must have been said.
-fn until_said<B: Bench>(rig: &Rig<B>) -> f64 {
+fn fault_deadline<B: Bench>(rig: &Rig<B>) -> f64 {
     (rig.facts.stale_after + PERIOD * (2 + rig.facts.late_ticks as u32)).as_secs_f64()
 }
 
@@ -42,7 +42,7 @@ fn without_force<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance) -> Result
         -STIFFNESS * PUSH * DVec3::X,
         STIFFNESS * facts.position_tolerance + facts.force_tolerance,
     )?;
-    let (most, mut spring, mut began) = (until_said(rig), Spring::to(facts.middle), None);
+    let (most, mut spring, mut began) = (fault_deadline(rig), Spring::to(facts.middle), None);
     let (mut after_fault, mut said_at) = (0, None);
     rig.each_tick(60_000, move |bench, device, now_ns| {
         let began = *began.get_or_insert_with(|| {
@@ -66,14 +66,14 @@ fn without_force<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance) -> Result
         }
         after_fault += 1;
         // Slow replies may make slow ticks.
-        let long = said_at.get_or_insert_with(Instant::now).elapsed() > WATCHED;
+        let long = said_at.get_or_insert_with(Instant::now).elapsed() > FAULT_WATCH;
         let enough = if long { 2 } else { 50 } + facts.late_ticks;
         if after_fault > enough { ControlFlow::Break(Ok(fault)) } else { ControlFlow::Continue(()) }
     })
 }
 
 /// Whether the device, well again, gives readings in time, and after a reset forces.
-fn works_again<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn recovers<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let (facts, mut spring, mut began) = (rig.facts, Spring::to(rig.facts.middle), None);
     let mut good = 0;
     spring.fault = Some(DeviceFault::Stale);
@@ -103,52 +103,52 @@ fn works_again<B: Bench>(rig: &mut Rig<B>) -> Verdict {
 }
 
 /// A fault without force that is one of those expected, and afterwards works again.
-fn faults_as<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance, expected: &[DeviceFault]) -> Verdict {
+fn faults_with<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance, expected: &[DeviceFault]) -> CheckResult {
     let fault = without_force(rig, disturbance)?;
     if !expected.contains(&fault) {
         return Err(format!("{disturbance:?} gives {fault:?}, none of {expected:?}"));
     }
-    works_again(rig)
+    recovers(rig)
 }
 
-fn unplugged<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn unplugged<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let expected = [DeviceFault::Disconnected, DeviceFault::Stale];
-    (0..2).try_for_each(|_| faults_as(rig, Disturbance::Unplugged, &expected))
+    (0..2).try_for_each(|_| faults_with(rig, Disturbance::Unplugged, &expected))
 }
 
-fn driver_error<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn driver_error<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let expected = [rig.facts.driver_error];
-    faults_as(rig, Disturbance::DriverError, &expected)
+    faults_with(rig, Disturbance::DriverError, &expected)
 }
 
-fn slow_replies<B: Bench>(rig: &mut Rig<B>) -> Verdict {
-    faults_as(rig, Disturbance::SlowReplies, &[DeviceFault::Stale])
+fn slow_replies<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
+    faults_with(rig, Disturbance::SlowReplies, &[DeviceFault::Stale])
 }
 
-fn not_finite<B: Bench>(rig: &mut Rig<B>) -> Verdict {
-    faults_as(rig, Disturbance::NotFinite, &[DeviceFault::NotFinite])
+fn not_finite<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
+    faults_with(rig, Disturbance::NotFinite, &[DeviceFault::NotFinite])
 }
 
 /// Does not open, with one line that says what is wrong and what to do; and opens when all is well.
-fn refused<B: Bench>(seat: &mut Seat<B>, disturbance: Disturbance) -> Verdict {
-    seat.bench().disturb(Some(disturbance));
-    let error = match seat.bench().open() {
+fn refused<B: Bench>(slot: &mut BenchSlot<B>, disturbance: Disturbance) -> CheckResult {
+    slot.bench().disturb(Some(disturbance));
+    let error = match slot.bench().open() {
         Err(error) => error,
         Ok(_) => return Err(format!("opens at {disturbance:?}")),
     };
     useful(&error)?;
-    seat.bench().disturb(None);
+    slot.bench().disturb(None);
     let waited = Instant::now();
     loop {
-        match seat.with_open(|_| Ok(())) {
+        match slot.with_open(|_| Ok(())) {
             Ok(()) => return Ok(()),
-            Err(still) if waited.elapsed() > seat.bench().facts().recovers_within => return Err(still),
+            Err(still) if waited.elapsed() > slot.bench().facts().recovers_within => return Err(still),
             Err(_) => std::thread::sleep(10 * PERIOD),
         }
     }
 }
 
-fn useful(error: &OpenError) -> Verdict {
+fn useful(error: &OpenError) -> CheckResult {
     let line = error.to_string();
     if error.what.trim().is_empty() || error.advice.trim().is_empty() || line.contains('\n') || line.len() > 1000 {
         return Err(format!("the error does not say what to do in one line: {line:?}"));

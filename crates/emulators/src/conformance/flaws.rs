@@ -1,10 +1,10 @@
-//! The suite finds what it is there to find: a device without a flaw passes, one with a flaw fails the check that is about it.
+//! Tests of the suite itself: a device without a flaw passes, one with a flaw fails the check that is about it.
 
 use glam::DVec3;
 use palpate_devices::{Buttons, DeviceFault, OpenError};
 
 use super::ideal::{ERROR, Flaw, Ideal, MIDDLE};
-use super::{Seat, assert_conforms, checks};
+use super::{BenchSlot, assert_conforms, checks};
 
 #[test]
 fn an_exact_device_passes() {
@@ -12,9 +12,9 @@ fn an_exact_device_passes() {
 }
 
 fn is_found(flaw: Flaw, found_by: &str) {
-    let mut seat = Seat(Some(Ideal::new(Some(flaw))));
+    let mut slot = BenchSlot(Some(Ideal::new(Some(flaw))));
     let check = checks().into_iter().find(|check| check.name == found_by).expect("a check of this name");
-    assert!((check.run)(&mut seat).is_err(), "{found_by:?} does not find {flaw:?}");
+    assert!((check.run)(&mut slot).is_err(), "{found_by:?} does not find {flaw:?}");
 }
 
 #[test]

@@ -1,11 +1,11 @@
-//! A device in this process, as exact as numbers are; and the same with one flaw, which the suite must find.
+//! Ideal device in this process, exact up to rounding; and the same with one flaw, which the suite must find.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use palpate_devices::{
-    Buttons, Device, DeviceFault, DeviceLimits, OpenError, Opened, Pose, Reading, Twist, Wrench, known,
+    Buttons, Device, DeviceFault, DeviceLimits, OpenError, Pose, Reading, ReadyDevice, Twist, Wrench, known,
 };
 
 use super::{Bench, Disturbance, Facts};
@@ -92,11 +92,11 @@ impl Bench for Ideal {
             force_holds: FORCE_HOLDS,
             recovers_within: Duration::from_millis(100),
             driver_error: ERROR,
-            hurries: true,
+            can_run_fast: true,
         }
     }
 
-    fn open(&mut self) -> Result<Opened, OpenError> {
+    fn open(&mut self) -> Result<ReadyDevice, OpenError> {
         let hardware = locked(&self.0);
         let refusal = match hardware.disturbance {
             Some(Disturbance::WrongVersion) => {
@@ -113,7 +113,7 @@ impl Bench for Ideal {
             Some(error) => Err(error),
             None => {
                 let driver = Driver { hardware: Arc::clone(&self.0), last: None, held: Wrench::default() };
-                Ok(Opened { device: Box::new(driver), scheduler: None })
+                Ok(ReadyDevice { device: Box::new(driver), scheduler: None })
             }
         }
     }

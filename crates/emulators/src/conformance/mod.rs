@@ -20,7 +20,7 @@ mod stalls;
 mod wrenches;
 
 pub use bench::{Bench, Disturbance, Facts};
-pub use endurance::{Endurance, Figures, endure};
+pub use endurance::{Endurance, Measurements, endure};
 
 use crate::tip::Tip;
 use rig::Rig;
@@ -30,16 +30,16 @@ use stalls::StallWatch;
 pub struct Check<B: Bench> {
     /// What it checks.
     pub name: &'static str,
-    run: fn(&mut Seat<B>) -> Verdict,
+    run: fn(&mut BenchSlot<B>) -> CheckResult,
 }
 
 /// Passed, or what was seen instead.
-type Verdict = Result<(), String>;
+type CheckResult = Result<(), String>;
 
 /// The bench between checks, when no driver has it.
-struct Seat<B: Bench>(Option<B>);
+struct BenchSlot<B: Bench>(Option<B>);
 
-impl<B: Bench> Seat<B> {
+impl<B: Bench> BenchSlot<B> {
     fn bench(&mut self) -> &mut B {
         self.0.as_mut().expect("the bench is here between checks")
     }
@@ -75,15 +75,15 @@ const MOST_RUNS: usize = 5;
 /// Runs every check; the names of those that fail, with what was seen. One that fails while the machine stalls is run again: of
 /// a driver's thread that got no time it tells nothing.
 pub fn failures<B: Bench>(bench: B) -> Vec<(&'static str, String)> {
-    let mut seat = Seat(Some(bench));
+    let mut slot = BenchSlot(Some(bench));
     let mut failures = Vec::new();
     for check in checks::<B>() {
         for run in 1..=MOST_RUNS {
             let watch = StallWatch::begin();
-            let verdict = (check.run)(&mut seat);
+            let verdict = (check.run)(&mut slot);
             let stalled = watch.end();
-            seat.bench().disturb(None);
-            seat.bench().set_tip(Tip::default());
+            slot.bench().disturb(None);
+            slot.bench().set_tip(Tip::default());
             match verdict {
                 Ok(()) => break,
                 Err(_) if stalled && run < MOST_RUNS => (),

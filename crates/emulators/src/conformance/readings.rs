@@ -1,23 +1,23 @@
-//! What the device says: places, motion, orientation, buttons.
+//! Checks of readings: position, velocity, orientation, buttons.
 
 use glam::{DQuat, DVec3};
 use palpate_devices::{Buttons, Reading};
 
 use super::rig::{PERIOD, Rig};
 use super::spring::{PUSH, Spring};
-use super::{Bench, Check, Tip, Verdict};
+use super::{Bench, Check, CheckResult, Tip};
 
 pub fn checks<B: Bench>() -> Vec<Check<B>> {
     vec![
-        Check { name: "tells its name and its limits", run: |seat| seat.with_open(names_itself) },
-        Check { name: "positions are metres, right, away and up", run: |seat| seat.with_open(places) },
-        Check { name: "velocities are m/s, right, away and up", run: |seat| seat.with_open(motion) },
-        Check { name: "orientations turn about right, away and up", run: |seat| seat.with_open(turns) },
-        Check { name: "buttons are bits, and button 0 grabs", run: |seat| seat.with_open(buttons) },
+        Check { name: "tells its name and its limits", run: |slot| slot.with_open(names_itself) },
+        Check { name: "positions are metres, right, away and up", run: |slot| slot.with_open(places) },
+        Check { name: "velocities are m/s, right, away and up", run: |slot| slot.with_open(motion) },
+        Check { name: "orientations turn about right, away and up", run: |slot| slot.with_open(turns) },
+        Check { name: "buttons are bits, and button 0 grabs", run: |slot| slot.with_open(buttons) },
     ]
 }
 
-pub fn close_to(what: &str, seen: DVec3, expected: DVec3, tolerance: f64) -> Verdict {
+pub fn close_to(what: &str, seen: DVec3, expected: DVec3, tolerance: f64) -> CheckResult {
     let distance = (seen - expected).length();
     if distance.is_nan() || distance > tolerance {
         return Err(format!("{what} is {seen}, not {expected} within {tolerance}"));
@@ -25,7 +25,7 @@ pub fn close_to(what: &str, seen: DVec3, expected: DVec3, tolerance: f64) -> Ver
     Ok(())
 }
 
-fn names_itself<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn names_itself<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let (name, limits) = (rig.name(), rig.limits);
     if name.trim().is_empty() || name.contains('\n') {
         return Err(format!("its name is {name:?}"));
@@ -38,7 +38,7 @@ fn names_itself<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     Ok(())
 }
 
-fn places<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn places<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let (middle, tolerance) = (rig.facts.middle, rig.facts.position_tolerance);
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         for offset in [PUSH * axis, -PUSH * axis] {
@@ -64,7 +64,7 @@ fn moved<B: Bench>(rig: &mut Rig<B>, tip: Tip) -> Result<Reading, String> {
     })
 }
 
-fn motion<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn motion<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let tolerance = rig.facts.velocity_tolerance;
     for velocity in [0.1 * DVec3::X, 0.1 * DVec3::Y, 0.1 * DVec3::Z, DVec3::new(-0.05, 0.03, -0.08)] {
         let tip = Tip { velocity, ..Tip::at(DVec3::ZERO) };
@@ -74,7 +74,7 @@ fn motion<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     Ok(())
 }
 
-fn turns<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn turns<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     if !rig.facts.turns {
         return Ok(());
     }
@@ -91,7 +91,7 @@ fn turns<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     Ok(())
 }
 
-fn buttons<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn buttons<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     for button in 0..rig.facts.buttons {
         for pressed in [Buttons(1 << button), Buttons(0)] {
             let seen = rig.settle(Spring::to(rig.facts.middle), move |bench| bench.press(pressed))?;

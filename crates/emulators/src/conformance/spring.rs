@@ -1,4 +1,4 @@
-//! The force loop that the suite plays: a spring that holds the tip where it is held, and what a loop does about a fault.
+//! Controller of the test rig: a spring to a fixed point, and the reaction to a fault.
 
 use glam::DVec3;
 use palpate_devices::{Device, DeviceFault, Reading, Wrench};

@@ -1,4 +1,4 @@
-//! Whether the machine has had time for a thread that sleeps.
+//! Detection of stalls of the machine, which excuse missed ticks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! What the motors get: signs, units, limits, and nothing when nobody writes.
+//! Checks of the forces on the motors: signs, units, limits, and nothing when nobody writes.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -9,21 +9,21 @@ use palpate_devices::Wrench;
 use super::readings::close_to;
 use super::rig::{PERIOD, Rig};
 use super::spring::{PUSH, STIFFNESS, Spring};
-use super::{Bench, Check, Seat, Tip, Verdict};
+use super::{Bench, BenchSlot, Check, CheckResult, Tip};
 
 pub fn checks<B: Bench>() -> Vec<Check<B>> {
     vec![
-        Check { name: "a spring pushes back", run: |seat| seat.with_open(pushes_back) },
-        Check { name: "torques are N m about right, away and up", run: |seat| seat.with_open(torques) },
-        Check { name: "forces beyond its largest are clamped", run: |seat| seat.with_open(clamps) },
-        Check { name: "a force that is not a number is none", run: |seat| seat.with_open(refuses_nan) },
-        Check { name: "motors are off when the loop stops writing", run: |seat| seat.with_open(stops) },
+        Check { name: "a spring pushes back", run: |slot| slot.with_open(pushes_back) },
+        Check { name: "torques are N m about right, away and up", run: |slot| slot.with_open(torques) },
+        Check { name: "forces beyond its largest are clamped", run: |slot| slot.with_open(clamps) },
+        Check { name: "a force that is not a number is none", run: |slot| slot.with_open(refuses_nan) },
+        Check { name: "motors are off when the loop stops writing", run: |slot| slot.with_open(stops) },
         Check { name: "motors are off when it is closed, and it opens again", run: closes },
     ]
 }
 
 /// Pushing right gives a force to the left, of the size that was written.
-fn pushes_back<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn pushes_back<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let facts = rig.facts;
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         for offset in [PUSH * axis, -PUSH * axis] {
@@ -48,7 +48,7 @@ pub fn write_and_settle<B: Bench>(rig: &mut Rig<B>, wrench: Wrench) -> Result<Wr
     })
 }
 
-fn torques<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn torques<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let largest = rig.limits.max_torque;
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         // Motors of rotation that there are not get nothing, and forces are as they were.
@@ -61,7 +61,7 @@ fn torques<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     Ok(())
 }
 
-fn clamps<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn clamps<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let (largest, largest_torque, tolerance) = (rig.limits.max_force, rig.limits.max_torque, rig.facts.force_tolerance);
     if largest.is_infinite() {
         return Ok(());
@@ -87,7 +87,7 @@ fn clamps<B: Bench>(rig: &mut Rig<B>) -> Verdict {
 }
 
 /// The driver may call it a fault, but the motors must not keep what they had.
-fn refuses_nan<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn refuses_nan<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     for broken in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         write_and_settle(rig, Wrench { force: DVec3::X, torque: DVec3::ZERO })?;
         let motors = rig.after(rig.facts.late_ticks, move |bench, device, now_ns| {
@@ -103,7 +103,7 @@ fn refuses_nan<B: Bench>(rig: &mut Rig<B>) -> Verdict {
 }
 
 /// Ticks that leave the device alone, as a loop does that hangs.
-fn stops<B: Bench>(rig: &mut Rig<B>) -> Verdict {
+fn stops<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let held = write_and_settle(rig, Wrench { force: DVec3::X, torque: DVec3::ZERO })?;
     close_to("the force", held.force, DVec3::X, rig.facts.force_tolerance)?;
     let (began, holds) = (Instant::now(), rig.facts.force_holds);
@@ -117,15 +117,15 @@ fn stops<B: Bench>(rig: &mut Rig<B>) -> Verdict {
     close_to("the force after the loop has stopped", force, DVec3::ZERO, rig.facts.force_tolerance)
 }
 
-fn closes<B: Bench>(seat: &mut Seat<B>) -> Verdict {
+fn closes<B: Bench>(slot: &mut BenchSlot<B>) -> CheckResult {
     for _ in 0..2 {
-        let (tolerance, holds) = seat.with_open(|rig| {
+        let (tolerance, holds) = slot.with_open(|rig| {
             let held = write_and_settle(rig, Wrench { force: DVec3::Z, torque: DVec3::ZERO })?;
             close_to("the force", held.force, DVec3::Z, rig.facts.force_tolerance)?;
             Ok((rig.facts.force_tolerance, rig.facts.force_holds))
         })?;
         std::thread::sleep(holds);
-        let left = seat.bench().motors().force;
+        let left = slot.bench().motors().force;
         close_to("the force after closing", left, DVec3::ZERO, tolerance)?;
     }
     Ok(())

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use glam::{DQuat, DVec3};
 use palpate_devices::Buttons;
 
-use super::steering::{ArmEnd, Commanded, MotorForce};
+use super::steering::{ActiveCommand, ArmEnd, MotorForce};
 use crate::tip::{SteeredTip, Tip};
 
 /// Most changes of the motors' force that are remembered.
@@ -64,7 +64,7 @@ impl Arm {
 
     /// Moves on to a time, s; a command that has not been repeated ends on the way.
     pub fn advance(&mut self, to: f64) {
-        if let Some((tip, since)) = self.end.newly_put() {
+        if let Some((tip, since)) = self.end.take_new_tip() {
             self.tip.put(tip, since);
         }
         if let Some((_, until)) = self.command.filter(|(_, until)| *until <= to) {
@@ -105,7 +105,7 @@ impl Arm {
         let moment = |time: f64| self.began + Duration::from_secs_f64(time);
         let at = moment(self.tip.time());
         let until = self.command.map(|(_, until)| moment(until));
-        self.end.publish(Commanded { motors: MotorForce { force, at }, until });
+        self.end.publish(ActiveCommand { motors: MotorForce { force, at }, until });
         if force != self.motors.force {
             self.tip.write(force);
             if self.changes.len() < MOST_CHANGES {

@@ -9,18 +9,18 @@
 //! second session's forces are ignored while another one's hold, how messages of 3.0 look, where the middle of the workspace is.
 
 mod arm;
-mod persona;
+mod release;
+mod reply_flaw;
 mod requests;
 mod server;
 mod session;
 mod shared;
 mod state;
 mod steering;
-mod trouble;
 mod world;
 
 pub use arm::MIDDLE;
-pub use persona::Persona;
+pub use release::Release;
+pub use reply_flaw::ReplyFlaw;
 pub use server::{InverseService, Options};
 pub use steering::MotorForce;
-pub use trouble::Trouble;

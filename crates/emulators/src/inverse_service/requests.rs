@@ -1,9 +1,9 @@
-//! What a client may ask for in a message, and what the service makes of the rest.
+//! Parsing of clients' messages; keys that the service does not accept become complaints.
 
 use glam::DVec3;
 use serde_json::{Map, Value};
 
-use super::persona::Persona;
+use super::release::Release;
 
 /// What a message asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,14 +49,14 @@ const CONFIGURES: [&str; 6] = ["preset", "basis", "mount", "damping", "force_gat
 const MOST_DEVICES: usize = 64;
 
 struct Reader {
-    persona: Persona,
+    release: Release,
     request: Request,
 }
 
 impl Request {
     /// Of a message. Nothing in it can make this fail: what cannot be understood is complained about.
-    pub fn parse(text: &str, persona: Persona) -> Self {
-        let mut reader = Reader { persona, request: Request::default() };
+    pub fn parse(text: &str, release: Release) -> Self {
+        let mut reader = Reader { release, request: Request::default() };
         match serde_json::from_str(text) {
             Ok(Value::Object(message)) => reader.message(&message),
             Ok(_) => reader.complain("message", "is no object"),
@@ -138,11 +138,11 @@ impl Reader {
 
     fn force(&mut self, rank: usize, command: &Value) {
         for key in command.as_object().into_iter().flatten().map(|(key, _)| key.as_str()) {
-            if key != "execute" && !self.persona.force_keys().contains(&key) {
+            if key != "execute" && !self.release.force_keys().contains(&key) {
                 self.complain(key, "is unknown of set_cursor_force");
             }
         }
-        let Some(vector) = self.persona.force_keys().iter().find_map(|key| command.get(key)) else {
+        let Some(vector) = self.release.force_keys().iter().find_map(|key| command.get(key)) else {
             return self.complain("set_cursor_force", "has no vector");
         };
         let [x, y, z] = ["x", "y", "z"].map(|axis| vector.get(axis).and_then(Value::as_f64));
@@ -159,7 +159,7 @@ impl Reader {
             return self.complain("configure", "has a preset and a mount: ambiguous");
         }
         for (key, value) in configure {
-            let is_known = self.persona.has_presets() && CONFIGURES.contains(&key.as_str());
+            let is_known = self.release.has_presets() && CONFIGURES.contains(&key.as_str());
             match (is_known, key.as_str(), value.get("preset").and_then(Value::as_str)) {
                 (true, "preset", Some(name)) => self.request.devices[rank].preset = Some(name.into()),
                 (true, "preset", None) => self.complain("preset", "has no name"),
@@ -174,8 +174,8 @@ impl Reader {
 mod tests {
     use super::*;
 
-    fn force(text: &str, persona: Persona) -> (Option<DVec3>, usize) {
-        let request = Request::parse(text, persona);
+    fn force(text: &str, release: Release) -> (Option<DVec3>, usize) {
+        let request = Request::parse(text, release);
         (request.devices.first().and_then(|device| device.force), request.complaints.len())
     }
 
@@ -185,20 +185,20 @@ mod tests {
             r#"{"inverse3":[{"device_id":"0A01","commands":{"set_cursor_force":{"values":{"x":1,"y":0,"z":-2.5}}}}]}"#;
         let vector = values.replace("values", "vector");
         let expected = Some(DVec3::new(1.0, 0.0, -2.5));
-        assert_eq!(force(values, Persona::V31), (expected, 0));
-        assert_eq!(force(values, Persona::V35), (expected, 0));
-        assert_eq!(force(&vector, Persona::V35), (expected, 0));
+        assert_eq!(force(values, Release::V31), (expected, 0));
+        assert_eq!(force(values, Release::V35), (expected, 0));
+        assert_eq!(force(&vector, Release::V35), (expected, 0));
         // An unknown key is ignored, and its force with it.
-        assert_eq!(force(&vector, Persona::V34), (None, 2));
+        assert_eq!(force(&vector, Release::V34), (None, 2));
         let dry_run = values.replace(r#"{"values""#, r#"{"execute":false,"values""#);
-        assert_eq!(force(&dry_run, Persona::V35), (None, 0));
+        assert_eq!(force(&dry_run, Release::V35), (None, 0));
     }
 
     #[test]
     fn two_entries_of_a_device_are_one() {
         let text = r#"{"inverse3":[{"device_id":"0A01","commands":{"probe_position":{}}},
             {"device_id":"0A01","commands":{"set_cursor_force":{"values":{"x":0,"y":1,"z":0}}}}]}"#;
-        let request = Request::parse(text, Persona::V35);
+        let request = Request::parse(text, Release::V35);
         assert_eq!(request.devices.len(), 1);
         assert_eq!((request.devices[0].probe, request.devices[0].force), (true, Some(DVec3::Y)));
         assert_eq!(request.complaints, Vec::<String>::new());
@@ -217,12 +217,12 @@ mod tests {
             r#"{"inverse3":[{"device_id":"0A01","commands":{"set_cursor_force":{"values":{"x":1}}}}]}"#,
             r#"{"inverse3":[{"device_id":"0A01","commands":{"set_cursor_force":{},"set_cursor_position":{}}}]}"#,
         ] {
-            assert!(!Request::parse(text, Persona::V35).complaints.is_empty(), "{text}");
+            assert!(!Request::parse(text, Release::V35).complaints.is_empty(), "{text}");
         }
-        assert_eq!(Request::parse("{}", Persona::V35), Request::default());
+        assert_eq!(Request::parse("{}", Release::V35), Request::default());
         let presets = r#"{"inverse3":[{"device_id":"0A01","configure":{"preset":{"preset":"arm_front_centered"}}}]}"#;
-        assert_eq!(Request::parse(presets, Persona::V34).complaints.len(), 1);
-        let request = Request::parse(presets, Persona::V35);
+        assert_eq!(Request::parse(presets, Release::V34).complaints.len(), 1);
+        let request = Request::parse(presets, Release::V35);
         assert_eq!(request.devices[0].preset.as_deref(), Some("arm_front_centered"));
     }
 }

@@ -1,4 +1,4 @@
-//! The service as a whole: its sockets, and what a test does to it.
+//! The service: its sockets, and the functions by which a test steers it.
 
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};
@@ -12,18 +12,18 @@ use palpate_devices::Buttons;
 use serde_json::json;
 
 use super::arm::{Arm, Grip};
-use super::persona::Persona;
+use super::release::Release;
+use super::reply_flaw::ReplyFlaw;
 use super::session;
 use super::shared::{Shared, locked};
 use super::steering::{MotorForce, TestEnd, ends};
-use super::trouble::Trouble;
 use super::world::World;
 use crate::tip::{SteeredTip, Tip};
 
 /// Time between two looks for clients.
-const LOOK: Duration = Duration::from_millis(2);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 /// Longest time to wait for what a client wants.
-const PATIENCE: Duration = Duration::from_millis(500);
+const TIMEOUT: Duration = Duration::from_millis(500);
 
 /// What to emulate.
 #[derive(Default)]
@@ -33,7 +33,7 @@ pub struct Options {
     /// Port of the channel of events; 0 for a free one.
     pub events_port: u16,
     /// The release.
-    pub persona: Persona,
+    pub release: Release,
     /// Time from a message to its reply.
     pub latency: Duration,
 }
@@ -60,7 +60,7 @@ impl InverseService {
         let events_listener = TcpListener::bind(("127.0.0.1", options.events_port))?;
         let (address, events) = (listener.local_addr()?, events_listener.local_addr()?);
         let began = Instant::now();
-        let shared = Arc::new(Shared::new(World::new(options.persona, began), options.latency));
+        let shared = Arc::new(Shared::new(World::new(options.release, began), options.latency));
         let stop = Arc::new(AtomicBool::new(false));
         let mut service = Self { shared, stop, threads: Vec::new(), address, events, began, ends: Mutex::default() };
         service.listen(listener, |stream, shared| {
@@ -68,7 +68,7 @@ impl InverseService {
         })?;
         service.listen(events_listener, |stream, shared| {
             let timeouts =
-                stream.set_read_timeout(Some(PATIENCE)).and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+                stream.set_read_timeout(Some(TIMEOUT)).and_then(|()| stream.set_write_timeout(Some(TIMEOUT)));
             if let (Ok(()), Ok(socket)) = (timeouts, tungstenite::accept(stream)) {
                 locked(&shared.listeners).push(socket);
             }
@@ -84,7 +84,7 @@ impl InverseService {
                 match listener.accept() {
                     Ok((stream, _)) if stream.set_nonblocking(false).is_ok() => serve(stream, shared.clone()),
                     Err(error) if error.kind() != ErrorKind::WouldBlock => return,
-                    _ => thread::sleep(LOOK),
+                    _ => thread::sleep(POLL_INTERVAL),
                 }
             }
         }));
@@ -149,13 +149,13 @@ impl InverseService {
     }
 
     /// From now on replies are wrong, or right again.
-    pub fn set_trouble(&self, trouble: Option<Trouble>) {
-        locked(&self.shared.world).trouble = trouble;
+    pub fn set_reply_flaw(&self, reply_flaw: Option<ReplyFlaw>) {
+        locked(&self.shared.world).reply_flaw = reply_flaw;
     }
 
     /// From now on it is another release.
-    pub fn set_persona(&self, persona: Persona) {
-        locked(&self.shared.world).persona = persona;
+    pub fn set_release(&self, release: Release) {
+        locked(&self.shared.world).release = release;
     }
 
     /// Ends all connections, as a service that starts anew.

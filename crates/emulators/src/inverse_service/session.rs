@@ -9,15 +9,15 @@ use std::time::{Duration, Instant};
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Error, Message, WebSocket};
 
+use super::reply_flaw::ReplyFlaw;
 use super::shared::{Shared, locked};
 use super::state::render;
-use super::trouble::Trouble;
-use crate::priority::be_on_time;
+use crate::priority::request_realtime;
 
 /// Longest time until a client has shaken hands, and for which one may take nothing.
-const PATIENCE: Duration = Duration::from_secs(2);
+const TIMEOUT: Duration = Duration::from_secs(2);
 /// Time between two looks at whether the service ends.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Waits shorter than this are slept, for timeouts of sockets are coarse.
 const SHORT: Duration = Duration::from_millis(3);
 /// Largest message that is taken, bytes.
@@ -28,8 +28,8 @@ pub fn serve(stream: TcpStream, shared: &Shared) {
     let generation = shared.generation();
     let prepared = stream
         .set_nodelay(true)
-        .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
-        .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+        .and_then(|()| stream.set_read_timeout(Some(TIMEOUT)))
+        .and_then(|()| stream.set_write_timeout(Some(TIMEOUT)));
     let config = WebSocketConfig::default()
         .read_buffer_size(16 << 10)
         .max_message_size(Some(LARGEST_MESSAGE))
@@ -38,7 +38,7 @@ pub fn serve(stream: TcpStream, shared: &Shared) {
         return;
     }
     let Ok(socket) = tungstenite::accept_with_config(stream, Some(config)) else { return };
-    be_on_time();
+    request_realtime();
     let number = locked(&shared.world).begin_session();
     Client { socket, number, due: VecDeque::new() }.converse(shared, generation);
     locked(&shared.world).end_session(number);
@@ -60,12 +60,17 @@ impl Client {
             if !self.send_due() {
                 return;
             }
-            let wait = self.due.front().map_or(LOOK, |(due, _)| due.saturating_duration_since(Instant::now()));
+            let wait = self.due.front().map_or(POLL_INTERVAL, |(due, _)| due.saturating_duration_since(Instant::now()));
             if !self.due.is_empty() && wait < SHORT {
                 thread::sleep(wait);
                 continue;
             }
-            if self.socket.get_ref().set_read_timeout(Some(wait.clamp(Duration::from_micros(1), LOOK))).is_err() {
+            if self
+                .socket
+                .get_ref()
+                .set_read_timeout(Some(wait.clamp(Duration::from_micros(1), POLL_INTERVAL)))
+                .is_err()
+            {
                 return;
             }
             match self.socket.read() {
@@ -89,16 +94,16 @@ impl Client {
             None => true,
         };
         world.advance();
-        let (state, trouble) = (render(&world, self.number, full), world.trouble.clone());
+        let (state, reply_flaw) = (render(&world, self.number, full), world.reply_flaw.clone());
         drop(world);
         shared.send_events();
-        if trouble == Some(Trouble::Cut) {
+        if reply_flaw == Some(ReplyFlaw::Cut) {
             return false;
         }
-        let later = trouble.as_ref().map_or(Duration::ZERO, Trouble::delay);
+        let later = reply_flaw.as_ref().map_or(Duration::ZERO, ReplyFlaw::delay);
         let due = Instant::now() + shared.latency + later;
-        let messages = match &trouble {
-            Some(trouble) => trouble.spoil(state),
+        let messages = match &reply_flaw {
+            Some(reply_flaw) => reply_flaw.apply(state),
             None => vec![Message::text(state.to_string())],
         };
         self.due.extend(messages.into_iter().map(|message| (due, message)));

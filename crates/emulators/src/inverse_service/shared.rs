@@ -1,4 +1,4 @@
-//! What the threads of the service share.
+//! State shared by the threads of the service.
 
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -19,7 +19,7 @@ pub struct MotorForce {
 
 /// A force on the motors and when it ends by itself.
 #[derive(Clone, Copy, Debug)]
-pub struct Commanded {
+pub struct ActiveCommand {
     /// What is on the motors.
     pub motors: MotorForce,
     /// `None` for no force.
@@ -29,18 +29,18 @@ pub struct Commanded {
 /// The arm's end.
 pub struct ArmEnd {
     put: Output<Option<(Tip, f64)>>,
-    commanded: Input<Commanded>,
+    commanded: Input<ActiveCommand>,
 }
 
 /// The test's end.
 pub struct TestEnd {
     put: Input<Option<(Tip, f64)>>,
-    commanded: Output<Commanded>,
+    commanded: Output<ActiveCommand>,
 }
 
 /// Both ends, of an arm without force.
 pub fn ends(began: Instant) -> (TestEnd, ArmEnd) {
-    let none = Commanded { motors: MotorForce { force: DVec3::ZERO, at: began }, until: None };
+    let none = ActiveCommand { motors: MotorForce { force: DVec3::ZERO, at: began }, until: None };
     let ((put, is_put), (commands, commanded)) = (triple_buffer(&None), triple_buffer(&none));
     (TestEnd { put, commanded }, ArmEnd { put: is_put, commanded: commands })
 }
@@ -53,7 +53,7 @@ impl TestEnd {
 
     /// What is on the motors now.
     pub fn motors(&mut self) -> MotorForce {
-        let Commanded { motors, until } = *self.commanded.read();
+        let ActiveCommand { motors, until } = *self.commanded.read();
         match until.filter(|until| *until <= Instant::now()) {
             Some(at) => MotorForce { force: DVec3::ZERO, at },
             None => motors,
@@ -63,12 +63,12 @@ impl TestEnd {
 
 impl ArmEnd {
     /// Where a test has put the tip since the last call, and when, s.
-    pub fn newly_put(&mut self) -> Option<(Tip, f64)> {
+    pub fn take_new_tip(&mut self) -> Option<(Tip, f64)> {
         if self.put.update() { *self.put.output_buffer_mut() } else { None }
     }
 
     /// Publishes what is on the motors.
-    pub fn publish(&mut self, commanded: Commanded) {
+    pub fn publish(&mut self, commanded: ActiveCommand) {
         self.commanded.write(commanded);
     }
 }

@@ -1,4 +1,4 @@
-//! All that is behind the sockets: arms, grips, sessions, time.
+//! State of the service: arms, grips, sessions, time.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -7,12 +7,12 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::arm::{Arm, Grip};
-use super::persona::Persona;
+use super::release::Release;
+use super::reply_flaw::ReplyFlaw;
 use super::requests::Request;
-use super::trouble::Trouble;
 
 /// Most complaints and events that are kept.
-const MOST_KEPT: usize = 1000;
+const MAX_STORED: usize = 1000;
 
 /// A client's session.
 #[derive(Clone, Debug, Default)]
@@ -35,7 +35,7 @@ impl Session {
 /// The state of the service.
 pub struct World {
     /// What it speaks.
-    pub persona: Persona,
+    pub release: Release,
     /// Its arms, unplugged ones too.
     pub arms: Vec<Arm>,
     /// Its grips.
@@ -43,7 +43,7 @@ pub struct World {
     /// Open sessions by their number.
     pub sessions: BTreeMap<u64, Session>,
     /// What is wrong with its replies.
-    pub trouble: Option<Trouble>,
+    pub reply_flaw: Option<ReplyFlaw>,
     /// What clients sent that the service would not take.
     pub complaints: Vec<String>,
     /// Events that have not been sent yet.
@@ -56,13 +56,13 @@ pub struct World {
 
 impl World {
     /// Without devices.
-    pub fn new(persona: Persona, began: Instant) -> Self {
+    pub fn new(release: Release, began: Instant) -> Self {
         Self {
-            persona,
+            release,
             arms: Vec::new(),
             grips: Vec::new(),
             sessions: BTreeMap::new(),
-            trouble: None,
+            reply_flaw: None,
             complaints: Vec::new(),
             events: Vec::new(),
             messages: 0,
@@ -119,7 +119,7 @@ impl World {
 
     /// Puts an event on its way.
     pub fn announce(&mut self, name: &str, level: &str, data: Value) {
-        if self.events.len() < MOST_KEPT {
+        if self.events.len() < MAX_STORED {
             let category = name.split('-').next().unwrap_or("system");
             self.events
                 .push(json!({"name": name, "category": category, "level": level, "data": data, "message": name}));
@@ -130,12 +130,12 @@ impl World {
     pub fn take(&mut self, number: u64, text: &str) -> bool {
         self.advance();
         self.messages += 1;
-        let request = Request::parse(text, self.persona);
+        let request = Request::parse(text, self.release);
         for complaint in &request.complaints {
             let data = json!({"field": complaint, "reason": "not taken", "context": "simulation"});
             self.announce("invalid-value", "warning", data);
         }
-        let room = MOST_KEPT.saturating_sub(self.complaints.len());
+        let room = MAX_STORED.saturating_sub(self.complaints.len());
         self.complaints.extend(request.complaints.iter().take(room).cloned());
         for device in &request.devices {
             self.take_device(number, device.id.as_str(), device.force, device.probe);
@@ -178,9 +178,9 @@ mod tests {
     use crate::tip::SteeredTip;
 
     /// Takes messages whatever is in them: motors stay within their force, and states are JSON.
-    fn takes(messages: &[String], persona: Persona) {
+    fn takes(messages: &[String], release: Release) {
         let began = Instant::now();
-        let mut world = World::new(persona, began);
+        let mut world = World::new(release, began);
         world.arms.push(Arm::new(("0A01", "inverse3"), SteeredTip::held(), (began, ends(began).1)));
         let session = world.begin_session();
         for message in messages {
@@ -193,8 +193,8 @@ mod tests {
         assert_eq!(world.arms[0].motors.force, DVec3::ZERO);
     }
 
-    fn any_persona() -> impl Strategy<Value = Persona> {
-        prop::sample::select(Persona::ALL.to_vec())
+    fn any_release() -> impl Strategy<Value = Release> {
+        prop::sample::select(Release::ALL.to_vec())
     }
 
     /// What a client could have meant.
@@ -219,18 +219,18 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn any_text(texts in prop::collection::vec(".{0,200}", 1..5), persona in any_persona()) {
-            takes(&texts, persona);
+        fn any_text(texts in prop::collection::vec(".{0,200}", 1..5), release in any_release()) {
+            takes(&texts, release);
         }
 
         #[test]
-        fn any_command(messages in prop::collection::vec(message(), 1..8), persona in any_persona()) {
-            takes(&messages, persona);
+        fn any_command(messages in prop::collection::vec(message(), 1..8), release in any_release()) {
+            takes(&messages, release);
         }
 
         #[test]
-        fn commands_cut_short(message in message(), end in any::<prop::sample::Index>(), persona in any_persona()) {
-            takes(&[message[..end.index(message.len())].to_string()], persona);
+        fn commands_cut_short(message in message(), end in any::<prop::sample::Index>(), release in any_release()) {
+            takes(&[message[..end.index(message.len())].to_string()], release);
         }
     }
 }

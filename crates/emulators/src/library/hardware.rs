@@ -1,4 +1,4 @@
-//! What devices of all libraries have: a tip, buttons, a cable, and a program that may have opened them.
+//! State common to the devices of all libraries: a tip, buttons, a cable, and a program that may have opened them.
 
 use glam::{DMat3, DQuat, DVec3};
 use palpate_devices::emulated::Mechanics;

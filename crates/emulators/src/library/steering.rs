@@ -1,4 +1,4 @@
-//! The test's side: an emulated library that is loaded, and what is done to its devices.
+//! Steering of an emulated library by a test: its loaded functions, and changes to its devices.
 #![allow(unsafe_code)] // The functions of a loaded library are called.
 
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ pub struct Steering {
     pub(super) press: extern "C" fn(u32, u32),
     pub(super) motors: extern "C" fn(u32) -> Motors,
     pub(super) disturb: extern "C" fn(u32, u32),
-    pub(super) hurry: extern "C" fn(bool),
+    pub(super) run_fast: extern "C" fn(bool),
 }
 
 /// What the motors put out, N and N m.
@@ -64,8 +64,8 @@ impl Steering {
     }
 
     /// Lets a scheduler tick without pauses.
-    pub fn hurry(&self, as_fast_as_possible: bool) {
-        (self.hurry)(as_fast_as_possible);
+    pub fn run_fast(&self, as_fast_as_possible: bool) {
+        (self.run_fast)(as_fast_as_possible);
     }
 }
 

@@ -1,4 +1,4 @@
-//! The library's side: its devices, and what its steering does to them.
+//! State of an emulated library: its devices, and the functions that steering calls.
 #![allow(unsafe_code)] // The names of devices come as a string of C.
 
 use std::env;
@@ -21,7 +21,7 @@ pub trait Emulated: Sized + Send + 'static {
     const VARIABLE: &str;
 
     /// Devices that are plugged in when it is not set.
-    const USUAL: &str;
+    const DEFAULT_DEVICES: &str;
 
     /// Where the library keeps its world.
     fn world() -> &'static OnceLock<Mutex<World<Self>>>;
@@ -39,7 +39,7 @@ pub trait Emulated: Sized + Send + 'static {
     fn motors(&mut self) -> Wrench;
 
     /// Lets the library's scheduler tick without pauses, if it has one.
-    fn hurry(_as_fast_as_possible: bool) {}
+    fn run_fast(_as_fast_as_possible: bool) {}
 }
 
 /// The state of a library.
@@ -95,7 +95,7 @@ impl Random {
 
 /// The world of a library. Its first devices are those that the environment names.
 pub fn world<D: Emulated>() -> MutexGuard<'static, World<D>> {
-    let plugged_in = || env::var(D::VARIABLE).unwrap_or_else(|_| D::USUAL.to_owned());
+    let plugged_in = || env::var(D::VARIABLE).unwrap_or_else(|_| D::DEFAULT_DEVICES.to_owned());
     D::world().get_or_init(|| Mutex::new(World::new(&plugged_in()))).lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -107,7 +107,7 @@ pub const fn steering<D: Emulated>() -> Steering {
         press: press::<D>,
         motors: motors::<D>,
         disturb: disturb::<D>,
-        hurry: hurry::<D>,
+        run_fast: run_fast::<D>,
     }
 }
 
@@ -141,6 +141,6 @@ extern "C" fn disturb<D: Emulated>(rank: u32, number: u32) {
     with_device(rank, |device: &mut D| device.disturb(Disturbance::numbered(number)));
 }
 
-extern "C" fn hurry<D: Emulated>(as_fast_as_possible: bool) {
-    D::hurry(as_fast_as_possible);
+extern "C" fn run_fast<D: Emulated>(as_fast_as_possible: bool) {
+    D::run_fast(as_fast_as_possible);
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use palpate_devices::haply::open;
 use palpate_devices::{Connection, Device, Wrench};
-use palpate_emulators::inverse_service::{MotorForce, Persona, Trouble};
+use palpate_emulators::inverse_service::{MotorForce, Release, ReplyFlaw};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::{ARM, alone, service};
 
 /// Troubles one after another.
-const TROUBLES: usize = 40;
+const REPLY_FLAWS: usize = 40;
 /// Ticks of each, and twice as many without.
 const TICKS: usize = 20;
 /// Every so many troubles the loop hangs, for so long.
@@ -98,7 +98,7 @@ fn any_json() -> impl Strategy<Value = Value> {
     ]
 }
 
-fn any_trouble() -> impl Strategy<Value = Trouble> {
+fn any_reply_flaw() -> impl Strategy<Value = ReplyFlaw> {
     let paths = [
         "/inverse3",
         "/inverse3/0",
@@ -113,31 +113,31 @@ fn any_trouble() -> impl Strategy<Value = Trouble> {
     ];
     let path = prop::sample::select(paths.to_vec());
     prop_oneof![
-        Just(Trouble::Silence),
-        (0..80_u64).prop_map(|ms| Trouble::Late(Duration::from_millis(ms))),
-        Just(Trouble::Twice),
-        Just(Trouble::Cut),
-        Just(Trouble::Truncated),
-        ".{0,40}".prop_map(Trouble::Text),
-        Just(Trouble::Binary),
-        (0..2_000_000_usize).prop_map(Trouble::Huge),
-        (path.clone(), any_json()).prop_map(|(path, value)| Trouble::Replaced(path, value)),
-        path.prop_map(Trouble::Missing),
+        Just(ReplyFlaw::Silence),
+        (0..80_u64).prop_map(|ms| ReplyFlaw::Late(Duration::from_millis(ms))),
+        Just(ReplyFlaw::Twice),
+        Just(ReplyFlaw::Cut),
+        Just(ReplyFlaw::Truncated),
+        ".{0,40}".prop_map(ReplyFlaw::Text),
+        Just(ReplyFlaw::Binary),
+        (0..2_000_000_usize).prop_map(ReplyFlaw::Huge),
+        (path.clone(), any_json()).prop_map(|(path, value)| ReplyFlaw::Replaced(path, value)),
+        path.prop_map(ReplyFlaw::Missing),
     ]
 }
 
 #[test]
 fn whatever_the_service_replies_no_force_is_stale() {
     let _alone = alone();
-    let service = service(Persona::V35);
+    let service = service(Release::V35);
     let connection = Connection { address: Some(service.address()), ..Connection::default() };
     let mut device = open(&connection).expect("the emulated arm opens").device;
     let (mut ticks, mut runner) = (Loop::default(), TestRunner::deterministic());
-    for rank in 0..TROUBLES {
-        let trouble = any_trouble().new_tree(&mut runner).expect("a trouble").current();
-        service.set_trouble(Some(trouble));
+    for rank in 0..REPLY_FLAWS {
+        let reply_flaw = any_reply_flaw().new_tree(&mut runner).expect("a trouble").current();
+        service.set_reply_flaw(Some(reply_flaw));
         (0..TICKS).for_each(|_| ticks.tick(&mut *device));
-        service.set_trouble(None);
+        service.set_reply_flaw(None);
         (0..TICKS).for_each(|_| ticks.tick(&mut *device));
         if rank % HANGS == 0 {
             std::thread::sleep(HANG);
@@ -146,6 +146,6 @@ fn whatever_the_service_replies_no_force_is_stale() {
     }
     drop(device);
     let forces = ticks.check(&service.take_changes(ARM));
-    assert!(forces > TROUBLES && ticks.faults.len() > TROUBLES, "{forces} forces, {} faults", ticks.faults.len());
+    assert!(forces > REPLY_FLAWS && ticks.faults.len() > REPLY_FLAWS, "{forces} forces, {} faults", ticks.faults.len());
     assert_eq!(service.motors(ARM).force, DVec3::ZERO);
 }

@@ -1,4 +1,4 @@
-//! The last word to a service that can no longer be understood: it may still obey.
+//! The last message to a service whose replies cannot be parsed takes the force off: it may still act on it.
 
 use std::io::Write;
 use std::net::TcpListener;

@@ -7,7 +7,7 @@ use glam::DVec3;
 use palpate_devices::haply::open;
 use palpate_devices::{Connection, Wrench};
 use palpate_emulators::Tip;
-use palpate_emulators::inverse_service::Persona;
+use palpate_emulators::inverse_service::Release;
 
 use super::{ARM, alone, service};
 
@@ -23,7 +23,7 @@ const ANGLE: f64 = 5e-4;
 fn delay_and_cost_by_rate() {
     let _alone = alone();
     for rate in [500, 1000, 2000, 3000, 4000, 8000] {
-        let service = service(Persona::V35);
+        let service = service(Release::V35);
         let address = format!("{}&rate={rate}", service.address());
         let mut device = open(&Connection { address: Some(address), ..Connection::default() }).expect("opens").device;
         let began = Instant::now();

@@ -1,4 +1,4 @@
-//! What stands in `scene.json`. Numbers are SI; vectors x y z, quaternions w x y z.
+//! Contents of `scene.json`. Numbers are SI; vectors x y z, quaternions w x y z.
 
 use std::collections::BTreeMap;
 

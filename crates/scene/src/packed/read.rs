@@ -1,4 +1,4 @@
-//! A packed scene from its folder.
+//! Reader of packed scenes.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Why there is no force.
+//! Latched faults: the reasons for which forces are zero.
 
 use std::fmt;
 

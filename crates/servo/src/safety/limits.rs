@@ -1,4 +1,4 @@
-//! What is allowed out to a device and in from one.
+//! Safety limits on wrenches, readings and ticks.
 
 use palpate_core::Result;
 use palpate_core::simulation::Model;

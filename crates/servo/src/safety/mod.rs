@@ -20,4 +20,4 @@ mod vector;
 pub use fault::{Fault, FaultReason};
 pub use limits::{SafetyLimits, check_stiffness};
 pub use passivity::PortEnergy;
-pub use stage::{Computed, SafetyStage};
+pub use stage::{ComputedWrench, SafetyStage};

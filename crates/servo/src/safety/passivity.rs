@@ -120,12 +120,12 @@ struct Measurement {
 
 /// What a model has received at a port, or at several, and what of it hands have not put in, J.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Account {
+pub struct PortBalance {
     received: f64,
     owed: f64,
 }
 
-impl Account {
+impl PortBalance {
     /// Part of what the model has received that hands have put in.
     pub fn share(&self) -> f64 {
         let owes = self.owed > TOLERANCE && self.received > 0.0;
@@ -143,10 +143,10 @@ impl Account {
     }
 }
 
-impl Sum for Account {
-    fn sum<I: Iterator<Item = Self>>(accounts: I) -> Self {
-        accounts.fold(Self::default(), |mut sum, account| {
-            sum.add(account.received, account.owed);
+impl Sum for PortBalance {
+    fn sum<I: Iterator<Item = Self>>(balances: I) -> Self {
+        balances.fold(Self::default(), |mut sum, balance| {
+            sum.add(balance.received, balance.owed);
             sum
         })
     }
@@ -166,9 +166,9 @@ pub struct Port {
     computed: Wrench,
     withheld: Wrench,
     /// Of the contact.
-    account: Account,
+    balance: PortBalance,
     /// Of all contacts since the ports of the scene were last without any.
-    contribution: Account,
+    contribution: PortBalance,
     /// What has been given, and what never paid, J.
     given: f64,
     unpaid: f64,
@@ -177,11 +177,11 @@ pub struct Port {
 impl Port {
     /// Energies so far.
     pub fn energy(&self) -> PortEnergy {
-        PortEnergy { given: self.given, owed: self.account.owed, unpaid: self.unpaid }
+        PortEnergy { given: self.given, owed: self.balance.owed, unpaid: self.unpaid }
     }
 
     /// Part in the balance of all ports of the scene; zero once there is no port in contact.
-    pub fn contribution(&mut self) -> &mut Account {
+    pub fn contribution(&mut self) -> &mut PortBalance {
         &mut self.contribution
     }
 
@@ -207,7 +207,7 @@ impl Port {
                 self.moved = Motion::between(&before.pose, &now.pose);
                 // By ticks, not by the device's clock: live and offline runs give the same bits.
                 self.velocity = self.moved.over(self.elapsed);
-                self.book_half(self.computed, self.withheld);
+                self.record_half(self.computed, self.withheld);
             }
         }
         (self.latest, self.elapsed) = (Some(now), 0.0);
@@ -215,7 +215,7 @@ impl Port {
 
     /// Ends the balance: no wrench goes out, or nobody knows where the tip is. What is owed then stays unpaid.
     pub fn close(&mut self) {
-        let unpaid = self.unpaid + self.account.overdraft();
+        let unpaid = self.unpaid + self.balance.overdraft();
         *self = Self { given: self.given, unpaid, ..Self::default() };
     }
 
@@ -229,42 +229,42 @@ impl Port {
         scene_share: f64,
         period: f64,
     ) -> Wrench {
-        if self.account.owed <= TOLERANCE && scene_share >= 1.0 {
+        if self.balance.owed <= TOLERANCE && scene_share >= 1.0 {
             return Wrench::default();
         }
         let Motion { linear, angular } = self.velocity;
         let bounds = [limits.max_damping * linear.length(), limits.max_angular_damping * angular.length()];
         // Power that the bounds allow, and the part of it that pays the overdraft in time.
         let most = bounds[0] * linear.length() + bounds[1] * angular.length();
-        let wanted = self.account.overdraft() / (PAYMENT_TICKS * period);
+        let wanted = self.balance.overdraft() / (PAYMENT_TICKS * period);
         let part = if wanted < most { wanted / most } else { 1.0 };
         let part = if wanted > 0.0 { part } else { 0.0 };
-        let share = self.account.share().min(scene_share);
+        let share = self.balance.share().min(scene_share);
         Wrench {
-            force: against(linear, computed.force, asked.force, share, part, bounds[0]),
-            torque: against(angular, computed.torque, asked.torque, share, part, bounds[1]),
+            force: damping_against(linear, computed.force, asked.force, share, part, bounds[0]),
+            torque: damping_against(angular, computed.torque, asked.torque, share, part, bounds[1]),
         }
     }
 
     /// Books the tick: `computed` by the model, `out` to the device. A scene whose bodies move `keeps_energy` when it is let
     /// go.
-    pub fn book(&mut self, computed: Wrench, out: Wrench, keeps_energy: bool) {
+    pub fn record(&mut self, computed: Wrench, out: Wrench, keeps_energy: bool) {
         let withheld = Wrench { force: computed.force - out.force, torque: computed.torque - out.torque };
-        self.book_half(computed, withheld);
+        self.record_half(computed, withheld);
         (self.computed, self.withheld) = (computed, withheld);
         if computed == Wrench::default() {
-            let left = if keeps_energy { self.account.owed.max(0.0) } else { self.account.overdraft() };
-            self.account = Account { received: 0.0, owed: if left > TOLERANCE { left } else { 0.0 } };
+            let left = if keeps_energy { self.balance.owed.max(0.0) } else { self.balance.overdraft() };
+            self.balance = PortBalance { received: 0.0, owed: if left > TOLERANCE { left } else { 0.0 } };
         }
         self.moved = Motion::default();
     }
 
     /// Books half of the motion under a wrench at one end of it: that of the tick before as soon as the motion is known, so
     /// that the share is exact, see the module's header; that of this tick when it has gone out.
-    fn book_half(&mut self, computed: Wrench, withheld: Wrench) {
+    fn record_half(&mut self, computed: Wrench, withheld: Wrench) {
         let received = -0.5 * work(&computed, &self.moved);
         let owed = -0.5 * work(&withheld, &self.moved);
-        self.account.add(received, owed);
+        self.balance.add(received, owed);
         self.contribution.add(received, owed);
         self.given += owed - received;
     }
@@ -276,7 +276,7 @@ fn work(wrench: &Wrench, moved: &Motion) -> f64 {
 }
 
 /// Damping against a velocity, at most `bound`: what is asked beyond the share of what is computed, and a `part` of the bound.
-fn against(velocity: DVec3, computed: DVec3, asked: DVec3, share: f64, part: f64, bound: f64) -> DVec3 {
+fn damping_against(velocity: DVec3, computed: DVec3, asked: DVec3, share: f64, part: f64, bound: f64) -> DVec3 {
     let Some(direction) = velocity.try_normalize() else { return DVec3::ZERO };
     let due = share * computed.dot(direction).max(0.0);
     let beyond = (asked.dot(direction) - due).max(0.0);

@@ -1,4 +1,4 @@
-//! What a device says, before anything is computed from it.
+//! Checks of a device's reading before anything is computed from it.
 
 use glam::DVec3;
 use palpate_devices::Reading;

@@ -1,23 +1,23 @@
-//! The stage of one tool.
+//! Safety stage of one tool.
 
 use glam::DVec3;
 use palpate_devices::{DeviceFault, Reading, Wrench};
 
-use super::passivity::{Account, Port, PortEnergy};
+use super::passivity::{Port, PortBalance, PortEnergy};
 use super::reading::ReadingCheck;
 use super::vector::{LimitedVector, clamped};
 use super::{FaultReason, SafetyLimits};
 
 /// What a tick computed for one device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Computed {
+pub struct ComputedWrench {
     /// By the contact laws, before the limit of strain: the reference of the energy balance.
     pub law: Wrench,
     /// What that limit leaves of it.
     pub limited: Wrench,
 }
 
-impl From<Wrench> for Computed {
+impl From<Wrench> for ComputedWrench {
     /// Where strain is not limited.
     fn from(wrench: Wrench) -> Self {
         Self { law: wrench, limited: wrench }
@@ -68,9 +68,9 @@ impl SafetyStage {
     /// their devices said, and before any is applied.
     pub fn scene_share(stages: &mut [Self]) -> f64 {
         if !stages.iter().any(|stage| stage.port.is_in_contact()) {
-            stages.iter_mut().for_each(|stage| *stage.port.contribution() = Account::default());
+            stages.iter_mut().for_each(|stage| *stage.port.contribution() = PortBalance::default());
         }
-        stages.iter_mut().map(|stage| *stage.port.contribution()).sum::<Account>().share()
+        stages.iter_mut().map(|stage| *stage.port.contribution()).sum::<PortBalance>().share()
     }
 
     /// The latched fault, if any.
@@ -90,21 +90,26 @@ impl SafetyStage {
     }
 
     /// Takes up what a device said at `now_ns`; latches where it cannot be believed. `None` where it said nothing.
-    pub fn admit(&mut self, said: Result<Reading, DeviceFault>, now_ns: u64, period: f64) -> Option<Reading> {
-        let checked = said.map_err(FaultReason::Device);
+    pub fn accept_reading(
+        &mut self,
+        reading: Result<Reading, DeviceFault>,
+        now_ns: u64,
+        period: f64,
+    ) -> Option<Reading> {
+        let checked = reading.map_err(FaultReason::Device);
         let checked = checked.and_then(|reading| {
             self.readings.check(&reading, now_ns, period, &self.limits)?;
             self.port.follow(&reading, period);
             Ok(())
         });
         checked.unwrap_or_else(|fault| self.latch(fault));
-        said.ok()
+        reading.ok()
     }
 
     /// The wrench to put out for `computed`, `period` seconds after the last call; the share is that of
     /// [`SafetyStage::scene_share`], one for a stage by itself.
-    pub fn apply(&mut self, computed: impl Into<Computed>, scene_share: f64, period: f64) -> Wrench {
-        let Computed { law, limited } = computed.into();
+    pub fn apply(&mut self, computed: impl Into<ComputedWrench>, scene_share: f64, period: f64) -> Wrench {
+        let ComputedWrench { law, limited } = computed.into();
         self.age += period;
         // The magnitude of a finite vector may overflow.
         if ![law, limited].iter().all(|wrench| wrench.force.length().is_finite() && wrench.torque.length().is_finite())
@@ -135,7 +140,7 @@ impl SafetyStage {
                 .torque
                 .pass(damped(asked.torque, damping.torque, limits.max_torque), limits.max_torque_slew * period),
         };
-        self.port.book(law, out, self.keeps_energy);
+        self.port.record(law, out, self.keeps_energy);
         out
     }
 }
@@ -209,10 +214,10 @@ mod tests {
     }
 
     /// Ticks through what a device says, by its tick; the fault and the tick at which it latched.
-    fn admitted(said: impl Fn(u64) -> Result<Reading, DeviceFault>, ticks: u64) -> Option<(u64, FaultReason)> {
+    fn admitted(reading: impl Fn(u64) -> Result<Reading, DeviceFault>, ticks: u64) -> Option<(u64, FaultReason)> {
         let mut stage = settled(SafetyLimits::default());
         (0..ticks).find_map(|tick| {
-            stage.admit(said(tick), tick * PERIOD_NS, PERIOD);
+            stage.accept_reading(reading(tick), tick * PERIOD_NS, PERIOD);
             stage.fault().map(|fault| (tick, fault))
         })
     }

@@ -1,4 +1,4 @@
-//! The change of a force or torque vector from tick to tick.
+//! Slew limit of a force or torque vector.
 //!
 //! Let `p` be the last output, `c` the vector asked for, already ramped, damped and clamped, and `s` the largest change. Letting go
 //! is safe and passes at once; pushing harder, or elsewhere, does not. So the output is

@@ -69,9 +69,9 @@ impl Device for Held {
 }
 
 /// A ticker past the start ramp, and the ends of its hand-offs.
-fn settled(device: Held) -> (Ticker, Input<(u64, Task)>, Output<Seen>) {
+fn settled(device: Held) -> (Ticker, Input<(u64, Task)>, Output<Observation>) {
     let (tasks, asked) = triple_buffer(&(0, Task::default()));
-    let (published, seen) = triple_buffer(&Seen::default());
+    let (published, seen) = triple_buffer(&Observation::default());
     let mut ticker = Ticker::new(Box::new(device), asked, published);
     (0..300).for_each(|tick| ticker.tick(1_000_000 * tick, PERIOD));
     (ticker, tasks, seen)
@@ -130,7 +130,7 @@ fn a_tip_that_nobody_holds_runs_away_and_is_let_go() {
     run(&mut ticker, 0..9000);
     assert!(seen.read().ran_away && seen.read().done);
     // b x' = F t/T: after sqrt(2 b x T / F) it has gone that far.
-    let expected = (2.0 * DAMPING * LONGEST_WAY * 10.0 / 0.4_f64).sqrt() * 0.4 / 10.0;
+    let expected = (2.0 * DAMPING * MAX_TRAVEL * 10.0 / 0.4_f64).sqrt() * 0.4 / 10.0;
     assert!((seen.read().largest_force / expected - 1.0).abs() < 0.02, "{expected}");
     assert_eq!(written.lock().expect("no panic").last(), Some(&DVec3::ZERO));
 }
@@ -165,7 +165,7 @@ fn what_is_seen_of_a_path_is_its_statistics() {
 #[test]
 fn a_check_that_asks_for_more_is_refused() {
     let (device, written) = Held::new();
-    let mut check = SelfCheck::start(Opened { device: Box::new(device), scheduler: None }).expect("a thread");
+    let mut check = SelfCheck::start(ReadyDevice { device: Box::new(device), scheduler: None }).expect("a thread");
     let push = |direction, force, seconds| Task { direction, force, seconds };
     for task in
         [push(DVec3::X, 0.6, 1.0), push(DVec3::ONE, 0.1, 1.0), push(DVec3::X, f64::NAN, 1.0), push(DVec3::X, 0.1, 0.0)]
@@ -173,7 +173,7 @@ fn a_check_that_asks_for_more_is_refused() {
         assert!(check.begin(task).is_err());
     }
     check.begin(Task::default()).expect("watching is always possible");
-    while check.seen().is_none_or(|seen| seen.readings < 5) {
+    while check.observation().is_none_or(|seen| seen.readings < 5) {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     check.stop();

@@ -25,7 +25,7 @@ pub const PERIOD_NS: u64 = 1_000_000;
 pub const TOOL: ToolModel = ToolModel {
     shape: ToolShape::Sphere { radius: 0.005 },
     radius: 0.005,
-    law: LawKind::Patch,
+    law: LawKind::PATCH,
     pad_youngs_modulus: None,
     max_stiffness: 5000.0,
 };
@@ -64,7 +64,7 @@ pub fn sliding(moving: bool, shapes: [ToolShape; 2]) -> Arc<Model> {
     let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes], homogeneous: true };
     let body = body.with_moduli(moduli).expect("constants that match");
     let body = if moving { set_in_motion(body) } else { body };
-    let tools = shapes.map(|shape| ToolModel { shape, radius: 0.01, law: LawKind::Local, ..TOOL });
+    let tools = shapes.map(|shape| ToolModel { shape, radius: 0.01, law: LawKind::LOCAL, ..TOOL });
     Arc::new(Model::new(vec![body], tools.into()).expect("a valid scene"))
 }
 

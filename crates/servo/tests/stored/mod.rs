@@ -20,10 +20,10 @@ pub struct Scene {
 }
 
 pub const SCENES: [Scene; 4] = [
-    Scene { name: "rest", moving: false, tools: 1, law: LawKind::Local },
-    Scene { name: "rest-two", moving: false, tools: 2, law: LawKind::Local },
-    Scene { name: "motion", moving: true, tools: 1, law: LawKind::Local },
-    Scene { name: "motion-two", moving: true, tools: 2, law: LawKind::Patch },
+    Scene { name: "rest", moving: false, tools: 1, law: LawKind::LOCAL },
+    Scene { name: "rest-two", moving: false, tools: 2, law: LawKind::LOCAL },
+    Scene { name: "motion", moving: true, tools: 1, law: LawKind::LOCAL },
+    Scene { name: "motion-two", moving: true, tools: 2, law: LawKind::PATCH },
 ];
 
 pub fn folder() -> PathBuf {
@@ -60,7 +60,7 @@ pub fn model(scene: &Scene) -> Arc<Model> {
     let capsule = || ToolShape::capsule(0.005, 0.005).expect("a capsule");
     let sphere = || ToolShape::sphere(0.01).expect("a sphere");
     let tool = |rank: usize| ToolModel {
-        shape: if rank == 0 || scene.law == LawKind::Patch { sphere() } else { capsule() },
+        shape: if rank == 0 || scene.law == LawKind::PATCH { sphere() } else { capsule() },
         radius: 0.01,
         law: scene.law,
         pad_youngs_modulus: None,

@@ -1,4 +1,4 @@
-"""What a machine tells of itself that matters to a loop at 1 kHz, read from the files of the Linux kernel.
+"""Properties of a machine that matter to a loop at 1 kHz, read from the files of the Linux kernel.
 
 Sources: proc(5), cgroups(7), capabilities(7), Documentation/ABI/testing/sysfs-devices-system-cpu of the kernel. What a
 system does not tell is None: on others than Linux that is most of it.

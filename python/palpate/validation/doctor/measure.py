@@ -1,4 +1,4 @@
-"""What doctor measures: wake-ups of the loop at its real scheduling, the cost of ticks, and the rate of the page."""
+"""Measurements of doctor: wake-ups of the loop at its real scheduling, the cost of ticks, and the rate of the page."""
 
 from __future__ import annotations
 

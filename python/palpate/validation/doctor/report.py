@@ -1,4 +1,4 @@
-"""What doctor reports: the machine, what was measured, the verdict, and what to change."""
+"""Report of doctor: the machine, the measurements, the verdict and the advice."""
 
 from __future__ import annotations
 

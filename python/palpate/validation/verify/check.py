@@ -1,4 +1,4 @@
-"""What a benchmark reports: figures beside their targets, and plots."""
+"""Results of a benchmark: figures with their targets, and plots."""
 
 from __future__ import annotations
 

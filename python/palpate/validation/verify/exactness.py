@@ -1,4 +1,4 @@
-"""What must come out exactly, and how fast the rest is approached."""
+"""Patch tests, which must be exact, and convergence rates."""
 
 from __future__ import annotations
 

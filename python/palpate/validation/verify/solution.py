@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.body import Body, Fixed, Loads, Material
+from palpate.dynamics import ModalBasis, modes
 from palpate.errors import LockingWarning
 from palpate.fields import Interior
 from palpate.green import GreensFunction, precompute
@@ -29,6 +30,12 @@ def green_of(body: Body, touch: Sequence[int] | np.ndarray | None = None, precis
     """Green's function, always computed anew; its file is gone with its last user."""
     with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
         return precompute(body, precision=precision, touch=touch, path=Path(folder) / "green.palpate", progress=False)
+
+
+def modes_of(body: Body, count: int) -> ModalBasis:
+    """Lowest modes, always computed anew."""
+    with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
+        return modes(body, count, path=Path(folder) / "modes.palpate", progress=False)
 
 
 def surface_response(body: Body) -> np.ndarray:

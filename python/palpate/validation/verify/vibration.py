@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import scipy.linalg
 import scipy.optimize
 
 from palpate.body import Body, Material
-from palpate.dynamics import ModalBasis, modes
+from palpate.dynamics import ModalBasis
 from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.grids import box
+from palpate.validation.verify.solution import modes_of
 
 # Beam of square section, ten times longer than deep.
 LENGTH, DEPTH = 0.1, 0.01
@@ -32,7 +31,7 @@ def clamped_beam() -> Outcome:
     mesh = box(BEAM_CELLS, (LENGTH, DEPTH, DEPTH), quadratic=True)
     end, middle = mesh.nodes[:, 0] < 1e-9, np.abs(mesh.nodes - DEPTH / 2) < 1e-9
     body = Body(mesh, material=RUBBER, fixed=np.column_stack([end, end & middle[:, 1], end & middle[:, 2]]))
-    basis = _modes(body, 24)
+    basis = modes_of(body, 24)
     across, along = _along_the_axis(body, basis)
     checks = _beam_checks(basis.frequencies[across], timoshenko_frequencies("clamped", 3))
     speed = np.sqrt(RUBBER.youngs_modulus / RUBBER.density)
@@ -45,7 +44,7 @@ def clamped_beam() -> Outcome:
 def free_beam() -> Outcome:
     """Six rigid motions and the first bending frequencies of a beam without supports."""
     body = Body(box(BEAM_CELLS, (LENGTH, DEPTH, DEPTH), quadratic=True), material=RUBBER, fixed=None)
-    basis = _modes(body, 20)
+    basis = modes_of(body, 20)
     rigid = int(np.count_nonzero(basis.frequencies == 0.0))
     across, _ = _along_the_axis(body, basis)
     bending = basis.frequencies[across & (basis.frequencies > 0)]
@@ -62,7 +61,7 @@ def plate() -> Outcome:
     sides = [(np.abs(x) < 1e-9) | (np.abs(x - 10.0) < 1e-9) for x in mesh.nodes.T[:2]]
     fixed = np.column_stack([sides[1], sides[0], sides[0] | sides[1]])
     body = Body(mesh, material=STEEL, fixed=fixed)
-    basis = _modes(body, 10)
+    basis = modes_of(body, 10)
     squared = np.einsum("nam,nam->am", basis.shapes, basis.shapes)
     bends = squared[2] > squared[:2].sum(axis=0)
     bending, membrane = basis.frequencies[bends], basis.frequencies[~bends]
@@ -158,12 +157,6 @@ def _first_roots(function: Callable[[float], float], count: int) -> np.ndarray:
             roots.append(scipy.optimize.brentq(function, low, low + step, xtol=1e-10))
         low += step
     return np.array(roots)
-
-
-def _modes(body: Body, count: int) -> ModalBasis:
-    """Lowest modes, always computed anew."""
-    with tempfile.TemporaryDirectory(prefix="palpate-verify-") as folder:
-        return modes(body, count, path=Path(folder) / "modes.palpate", progress=False)
 
 
 def _along_the_axis(body: Body, basis: ModalBasis) -> tuple[np.ndarray, np.ndarray]:

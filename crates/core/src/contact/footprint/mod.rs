@@ -1,4 +1,4 @@
-//! Where a tool that is no sphere meets a body: the plane of the contact, as a smooth function of the tool's pose.
+//! Footprint of a tool that is not a sphere: the plane of its contact, as a smooth function of the tool's pose.
 //!
 //! The pieces `i` of the surface near the tool, at distances `s_i` from it, have the weights
 //!
@@ -6,68 +6,68 @@
 //! w_i = A_i (1 - s_i/m)^2 eta(n_i . d_i)      x = sum w_i x_i / sum w_i        n = sum w_i n_i / |sum w_i n_i|
 //! ```
 //!
-//! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes.
-//! The factor `eta` leaves out what faces away from the tool's middle, in the direction `d_i`, as the other side of a plate does.
-//! The plane of the contact is raised over `x` to the highest piece that the tool may touch. All this is a function of the tool's
-//! pose alone with exact derivatives, as long as the tool's middle has not sunk in; from then on the middle is taken as lifted
-//! along the contact's normal of the tick before.
+//! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. The factor
+//! `eta` excludes pieces that face away from the tool's middle, in the direction `d_i`, as the other side of a plate does. The
+//! plane of the contact is raised over `x` to the highest piece that the tool may touch. All this is a function of the tool's pose
+//! alone with exact derivatives, as long as the tool's middle has not sunk in; from then on the middle is taken as lifted along the
+//! contact's normal of the tick before.
 //!
-//! Heights over one plane cannot describe a floor and a wall that stands on it. A wall that rises over the plane of the tick before
-//! is therefore taken down to it, wholly where it is steeper than 78 degrees, not at all up to 45, and pressed as a further place of
-//! the same tool, on a plane of its own.
+//! Heights over one plane cannot describe a floor and a wall that stands on it. A wall that rises over the plane of the previous
+//! tick is therefore flattened to that plane, completely if it is steeper than 78 degrees and not at all up to 45. It is pressed by
+//! an additional contact of the same tool, on a plane of its own.
 
 mod near;
 
 use glam::{DMat3, DVec3};
 
-pub use self::near::{NearPiece, NearPieces, PosedShape};
+pub use self::near::{NearPiece, NearPieces, PlacedShape};
 use super::local::ContactPlane;
-use super::local::cells::{End, GridFrame, Heights, LEAST_COSINE, Relief};
+use super::local::cells::{GridFrame, Heights, LEAST_COSINE, Relief, SurfaceEnd, Wedge};
 use super::smooth::{FanWeights, FootPoint, SmoothSurface};
 use super::{SurfaceQuery, Tessellation};
 use crate::tensor::{across, outer};
 
-/// Distance from which a piece counts, over the tool's thickness, and over the edge of a piece at the least: more than any point
-/// of a piece is from its middle.
+/// Distance within which a piece counts, over the tool's thickness, and its least value over the edge of a piece: larger than the
+/// distance of any point of a piece from its middle.
 const MARGIN: [f64; 2] = [0.3, 0.75];
-/// Edge of a piece at most, over the tool's thickness.
+/// Longest edge of a piece, over the tool's thickness.
 const PIECE: f64 = 0.4;
 /// Cosines between a piece's normal and the direction to the tool's middle from which it counts, and counts fully.
 const FACING: [f64; 2] = [-0.4, 1.0];
-/// Cosines between the normals of a wall that rises over the contact's plane and of that plane from which it belongs to the
-/// contact, and does so fully.
-const ALIKE: [f64; 2] = [0.2, 0.7];
-/// How far the contact's middle lies before a piece, over the margin, for that to be such a wall, and to be one fully.
-const BEFORE: [f64; 2] = [0.0, 0.5];
-/// A piece that is so much of a wall is pressed as a place of its own.
-const WALL: f64 = 0.9;
-/// Normals whose sum is shorter than this part of their weights have no common direction.
-const COMMON: f64 = 0.05;
-/// A piece that does not touch the tool raises the plane by this many times its distance less.
-const LOWERED: f64 = 4.0;
-/// Largest cosine between a piece's normal and the way that the tool has come: it does not come through the body.
-const AWAY: f64 = 0.5;
-/// Least cosine between a piece's normal and the direction to the tool for it to be where a contact begins.
-const MET: f64 = 0.2;
+/// Cosines between the normals of a rising wall and of the contact's plane from which the wall belongs to the contact, and belongs
+/// fully.
+const SAME_CONTACT: [f64; 2] = [0.2, 0.7];
+/// Distances of the contact's middle in front of a piece, over the margin, from which the piece is such a wall, and fully one.
+const IN_FRONT: [f64; 2] = [0.0, 0.5];
+/// Share of a wall from which a piece is pressed by an additional contact.
+const WALL_SHARE: f64 = 0.9;
+/// Length of the sum of normals, over the sum of their weights, below which they have no common direction.
+const LEAST_COMMON_NORMAL: f64 = 0.05;
+/// Distance of a piece from the tool lowers its height for the plane by this factor.
+const DISTANCE_SLOPE: f64 = 4.0;
+/// Largest cosine between a piece's normal and the motion of the tool, which does not come through the body.
+const MOTION_COSINE: f64 = 0.5;
+/// Least cosine between a piece's normal and the direction to the tool for a contact to begin there.
+const LEAST_FACING: f64 = 0.2;
 
-/// A surface that a tool which is no sphere is pressed on.
+/// A surface for tools that are not spheres.
 pub struct PressedSurface {
-    /// In pieces as fine as the tool needs.
+    /// Its pieces, as fine as the tool needs.
     pub fine: Tessellation,
     /// Distance from the tool within which pieces count, m.
     pub margin: f64,
-    /// What the tool meets at the fans, each evened with those around it.
+    /// Fields at the fans, each smoothed with those around it.
     pub fields: Vec<super::FanFields>,
 }
 
-/// The plane of a contact, and how it follows the tool's place and its rotation about its origin.
+/// The plane of a contact, and its derivatives by the tool's position and its rotation about its origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Footprint {
     /// The drawn triangle next to the middle.
     pub triangle: u32,
-    /// Mean place of the contact on the body, m.
+    /// Mean position of the contact on the body, m.
     pub middle: DVec3,
-    /// Its derivatives by the tool's place and by its rotation.
+    /// Its derivatives by the tool's position and by its rotation.
     pub middle_by: [DMat3; 2],
     /// Unit outward normal.
     pub normal: DVec3,
@@ -79,7 +79,7 @@ pub struct Footprint {
     pub origin_by: [DMat3; 2],
 }
 
-/// A contact's plane as it is known before.
+/// A contact's plane of the previous tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// A point of it, m.
@@ -95,14 +95,14 @@ pub struct FootprintScratch {
     pub near: NearPieces,
 }
 
-/// A direction that pieces face, and how it follows the tool.
+/// Mean normal of the pieces, and its derivatives by the tool's position and rotation.
 #[derive(Clone, Copy)]
-struct Facing {
+struct MeanNormal {
     normal: DVec3,
     by: [DMat3; 2],
 }
 
-/// Sums over pieces; places are counted from the tool's middle.
+/// Sums over pieces; positions are relative to the tool's middle.
 #[derive(Clone, Copy)]
 struct Sums {
     weight: f64,
@@ -125,33 +125,33 @@ impl PressedSurface {
     ) -> Self {
         let fine = Tessellation::new(surface, query, smooth, PIECE * thickness);
         let margin = (MARGIN[0] * thickness).max(MARGIN[1] * fine.edge);
-        Self { fine, margin, fields: smooth.evened(fields) }
+        Self { fine, margin, fields: smooth.smoothed(fields) }
     }
 }
 
 impl FootprintScratch {
-    /// Plane of the piece that the tool is deepest in, or next to, among those that face it and the way `gone` that it has
-    /// come.
-    pub fn first_met(&self, gone: DVec3) -> Option<Plane> {
-        let away = AWAY * gone.length();
-        let meets = |near: &&NearPiece| near.normal.dot(near.by_pose[0]) > MET && near.normal.dot(gone) <= away;
+    /// Plane of the piece that the tool is deepest in, or next to, among those that face it and its `displacement`.
+    pub fn first_touched(&self, displacement: DVec3) -> Option<Plane> {
+        let away = MOTION_COSINE * displacement.length();
+        let meets = |near: &&NearPiece| {
+            near.normal.dot(near.by_pose[0]) > LEAST_FACING && near.normal.dot(displacement) <= away
+        };
         let first = self.near.pieces.iter().filter(meets).min_by(|a, b| a.distance.total_cmp(&b.distance));
         first.map(|near| Plane { point: near.middle, normal: near.normal })
     }
 
-    /// Plane of a wall that stands on all planes that a tool is known to press on, or faces them across the tool, where the tool is
-    /// nearest to it, and how far it is from it, m.
-    pub fn wall_beside(&self, known: &[Plane]) -> Option<(Plane, f64)> {
+    /// Plane of the nearest piece of a wall that stands on all planes that a tool presses on, or faces them across the tool.
+    pub fn wall_beside(&self, known: &[Plane]) -> Option<Plane> {
         let is_wall = |near: &&NearPiece| {
-            near.facing > MET && known.iter().all(|plane| near.share_of_wall(plane, self.near.margin) > WALL)
+            near.facing_cosine > LEAST_FACING
+                && known.iter().all(|plane| near.share_of_wall(plane, self.near.margin) > WALL_SHARE)
         };
         let pieces = self.near.pieces.iter().chain(&self.near.opposite);
         let nearest = pieces.filter(is_wall).min_by(|a, b| a.distance.total_cmp(&b.distance))?;
-        Some((Plane { point: nearest.middle, normal: nearest.normal }, nearest.distance))
+        Some(Plane { point: nearest.middle, normal: nearest.normal })
     }
 
-    /// The footprint of a tool whose pieces have been gathered, and the weights of the fans below it. `None` where it is near no
-    /// piece.
+    /// The footprint of a tool whose near pieces are known, and the weights of the fans below it. `None` if no piece is near.
     pub fn find(
         &mut self,
         fine: &Tessellation,
@@ -159,15 +159,15 @@ impl FootprintScratch {
         known: Plane,
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
-        self.take_down(fine, known);
+        self.flatten_walls(fine, known);
         let sums = self.sum()?;
-        let Facing { normal, by: normal_by } = sums.facing(known.normal);
+        let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
         let middle = sums.place * inverse;
         let middle_by = [0, 1].map(|k| (sums.place_by[k] - outer(middle, sums.weight_by[k])) * inverse);
         let middle = middle + self.near.centre;
-        let own = Facing { normal, by: normal_by };
-        let (level, level_by) = self.level(middle, middle_by, own);
+        let mean_normal = MeanNormal { normal, by: normal_by };
+        let (level, level_by) = self.level(fine, (middle, middle_by), mean_normal);
         let raised = |k: usize| middle_by[k] + outer(normal, level_by[k]) + normal_by[k] * level;
         let triangle = self.weigh(fine, smooth, middle, weights);
         Some(Footprint {
@@ -181,9 +181,9 @@ impl FootprintScratch {
         })
     }
 
-    /// Takes walls down to a plane.
-    fn take_down(&mut self, fine: &Tessellation, plane: Plane) {
-        let before = self.near.taken_down.replace(plane);
+    /// Flattens walls to a plane.
+    fn flatten_walls(&mut self, fine: &Tessellation, plane: Plane) {
+        let before = self.near.flattened_to.replace(plane);
         if before == Some(plane) {
             return;
         }
@@ -191,7 +191,7 @@ impl FootprintScratch {
             if before.is_some() {
                 near.corners = fine.corners(near.piece);
             }
-            near.take_down(&plane, self.near.margin);
+            near.flatten_walls(&plane, self.near.margin);
         }
     }
 
@@ -219,20 +219,30 @@ impl FootprintScratch {
         (sums.weight > 0.0).then_some(sums)
     }
 
-    /// Height of the plane over the middle, m, and its derivatives: no lower than any piece that the tool may touch.
-    fn level(&self, middle: DVec3, middle_by: [DMat3; 2], facing: Facing) -> (f64, [DVec3; 2]) {
+    /// Height of the plane over the middle, m, and its derivatives: no lower than any point of a piece that the tool may touch.
+    /// Were one higher, a flat tool would have a force before it reaches the plane.
+    fn level(
+        &self,
+        fine: &Tessellation,
+        (middle, middle_by): (DVec3, [DMat3; 2]),
+        mean: MeanNormal,
+    ) -> (f64, [DVec3; 2]) {
         let (mut level, mut by) = (f64::NEG_INFINITY, [DVec3::ZERO; 2]);
-        for near in self.near.pieces.iter().filter(|near| near.normal.dot(facing.normal) > 0.0) {
+        for near in self.near.pieces.iter().filter(|near| near.normal.dot(mean.normal) > 0.0) {
             let apart = near.distance - self.near.margin;
-            for corner in near.corners {
-                let height = (corner - middle).dot(facing.normal) - LOWERED * apart.max(0.0);
+            let lower = DISTANCE_SLOPE * apart.max(0.0);
+            let highest =
+                near.corners.map(|corner| (corner - middle).dot(mean.normal)).into_iter().fold(f64::MIN, f64::max);
+            if highest + fine.most_over_corners() - lower <= level {
+                continue;
+            }
+            for (top, over) in fine.highest_points(near.piece, near.corners, mean.normal) {
+                let height = (top - middle).dot(mean.normal) + over - lower;
                 if height > level {
                     level = height;
                     by = [0, 1].map(|k| {
-                        let lowered = if apart > 0.0 { near.by_pose[k] * LOWERED } else { DVec3::ZERO };
-                        facing.by[k].transpose() * (corner - middle)
-                            - middle_by[k].transpose() * facing.normal
-                            - lowered
+                        let lowered = if apart > 0.0 { near.by_pose[k] * DISTANCE_SLOPE } else { DVec3::ZERO };
+                        mean.by[k].transpose() * (top - middle) - middle_by[k].transpose() * mean.normal - lowered
                     });
                 }
             }
@@ -240,7 +250,7 @@ impl FootprintScratch {
         if level.is_finite() { (level, by) } else { (0.0, [DVec3::ZERO; 2]) }
     }
 
-    /// Gives the fans the weights of the pieces of their triangles; the triangle next to the middle.
+    /// Sets the weights of the fans from those of the pieces of their triangles; returns the triangle next to the middle.
     fn weigh(&self, fine: &Tessellation, smooth: &SmoothSurface, middle: DVec3, weights: &mut FanWeights) -> u32 {
         weights.begin();
         let count = fine.pieces_of_triangle() as u32;
@@ -266,31 +276,31 @@ impl FootprintScratch {
 }
 
 impl NearPiece {
-    /// Weight of a piece, and its derivatives by the tool's place and rotation; `None` for one that does not count.
+    /// Weight of a piece, and its derivatives by the tool's position and rotation; `None` for zero.
     fn weigh(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
-        let close = 1.0 - self.distance / margin;
-        let (eta, rise) = rising(self.facing, FACING);
-        if close <= 0.0 || eta <= 0.0 {
+        let nearness = 1.0 - self.distance / margin;
+        let (eta, rise) = smooth_step(self.facing_cosine, FACING);
+        if nearness <= 0.0 || eta <= 0.0 {
             return None;
         }
-        let (by_distance, by_facing) = (-2.0 * close * eta / margin, close * close * rise);
-        let area = self.area * self.joined;
-        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_by[k] * by_facing) * area);
-        Some((area * close * close * eta, by))
+        let (by_distance, by_facing) = (-2.0 * nearness * eta / margin, nearness * nearness * rise);
+        let area = self.area * self.contact_share;
+        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * area);
+        Some((area * nearness * nearness * eta, by))
     }
 
-    /// How much it is a wall that rises before a plane: one for one that is steep, and stands in front of the plane's point.
+    /// Share to which the piece is a wall rising over a plane: one if it is steep and the plane's point lies in front of it.
     fn share_of_wall(&self, plane: &Plane, margin: f64) -> f64 {
-        let (alike, _) = rising(self.normal.dot(plane.normal), ALIKE);
-        let (before, _) = rising((plane.point - self.middle).dot(self.normal) / margin, BEFORE);
-        (1.0 - alike) * before
+        let (belonging, _) = smooth_step(self.normal.dot(plane.normal), SAME_CONTACT);
+        let (before, _) = smooth_step((plane.point - self.middle).dot(self.normal) / margin, IN_FRONT);
+        (1.0 - belonging) * before
     }
 
-    /// Takes a wall that rises over the contact down to its plane, the more the steeper it is. Over an edge nothing is taken down:
-    /// the middle lies behind both sides.
-    fn take_down(&mut self, plane: &Plane, margin: f64) {
+    /// Flattens a wall that rises over the contact to its plane, the more the steeper it is. Over a convex edge nothing is
+    /// flattened: the middle lies behind both sides.
+    fn flatten_walls(&mut self, plane: &Plane, margin: f64) {
         let share = self.share_of_wall(plane, margin);
-        self.joined = 1.0 - share;
+        self.contact_share = 1.0 - share;
         if share > 0.0 {
             for corner in &mut self.corners {
                 let height = (*corner - plane.point).dot(plane.normal);
@@ -300,21 +310,21 @@ impl NearPiece {
     }
 }
 
-/// Rises from zero to one between two bounds, and its slope.
-fn rising(at: f64, [from, to]: [f64; 2]) -> (f64, f64) {
+/// Smooth step from zero to one between two bounds, and its slope.
+fn smooth_step(at: f64, [from, to]: [f64; 2]) -> (f64, f64) {
     let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
     (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / (to - from))
 }
 
 impl Sums {
     /// The mean normal; `known` where there is none.
-    fn facing(&self, known: DVec3) -> Facing {
+    fn mean_normal(&self, known: DVec3) -> MeanNormal {
         let length = self.normal.length();
-        if length <= COMMON * self.weight {
-            return Facing { normal: known, by: [DMat3::ZERO; 2] };
+        if length <= LEAST_COMMON_NORMAL * self.weight {
+            return MeanNormal { normal: known, by: [DMat3::ZERO; 2] };
         }
         let normal = self.normal / length;
-        Facing { normal, by: self.normal_by.map(|by| across(normal) * by * (1.0 / length)) }
+        MeanNormal { normal, by: self.normal_by.map(|by| across(normal) * by * (1.0 / length)) }
     }
 }
 
@@ -327,7 +337,7 @@ impl PressedSurface {
 }
 
 impl Footprint {
-    /// The middle as a foot of the tool's place.
+    /// The middle as a foot of the tool's position.
     pub fn foot(&self, place: DVec3) -> FootPoint {
         FootPoint {
             triangle: self.triangle,
@@ -345,32 +355,48 @@ impl Footprint {
 pub struct NearRelief<'a> {
     /// The pieces.
     pub near: &'a NearPieces,
-    /// The surface that they are of.
+    /// Their surface.
     pub fine: &'a Tessellation,
 }
 
 impl Relief for NearRelief<'_> {
-    fn end(&self, plane: &ContactPlane, direction: DVec3, lowest: f64) -> Option<End> {
+    fn end(&self, plane: &ContactPlane, direction: DVec3, lowest: f64) -> Option<SurfaceEnd> {
         let facing = |near: &&NearPiece| near.normal.dot(plane.axes.z_axis) > 0.0;
-        End::of(self.near.pieces.iter().filter(facing).map(|near| near.corners), plane, direction, lowest)
+        SurfaceEnd::of(self.near.pieces.iter().filter(facing).map(|near| near.corners), plane, direction, lowest)
     }
 
     fn fill(&self, frame: &GridFrame, heights: &mut Heights) {
         let normal = frame.axes.z_axis;
         let faces = |of: DVec3| of.dot(normal) >= LEAST_COSINE;
         for near in self.near.pieces.iter().filter(|near| faces(near.normal)) {
-            heights.add_facet(frame, near.corners, self.fine.bends(near.piece));
+            heights.add_facet(frame, near.corners, self.fine.bulges(near.piece));
         }
-        for near in self.near.pieces.iter().filter(|near| faces(near.normal)) {
+        for near in &self.near.pieces {
             for k in 0..3 {
                 let edge = [near.corners[k], near.corners[(k + 1) % 3]];
-                match self.fine.across(near.piece, k).map(|beyond| (beyond, self.fine.normal(beyond))) {
-                    Some((beyond, turned)) if faces(turned) => {
-                        if near.piece < beyond && self.fine.is_crease(near.piece, k) {
-                            heights.even_edge(frame, edge, [near.normal, turned]);
-                        }
+                let across = self.fine.across(near.piece, k).map(|neighbour| (neighbour, self.fine.normal(neighbour)));
+                let is_crease = self.fine.is_crease(near.piece, k);
+                if let Some((neighbour, other_normal)) = across
+                    && faces(near.normal)
+                    && faces(other_normal)
+                {
+                    if near.piece < neighbour && is_crease {
+                        heights.smooth_edge(frame, edge, [near.normal, other_normal]);
                     }
-                    _ => heights.add_edge(frame, edge, near.normal),
+                } else if faces(near.normal) {
+                    heights.add_edge(frame, edge, Some(near.normal));
+                } else if let Some((_, other_normal)) = across
+                    && is_crease
+                    && !faces(other_normal)
+                    && (near.normal + other_normal).dot(normal) > 0.0
+                {
+                    // A blade with both sides steeper than heights may be.
+                    heights.add_edge(frame, edge, None);
+                }
+                if let Some((_, other_normal)) = across.filter(|_| is_crease)
+                    && let Some(wedge) = Wedge::new(near.normal, other_normal, edge[1] - edge[0])
+                {
+                    heights.soften(frame, edge, &wedge, self.near.margin);
                 }
             }
         }

@@ -140,7 +140,7 @@ fn closed_form(depth: f64) -> (f64, f64, f64) {
     let x = t.tanh();
     let y = x * x;
     let force = (1.0 + y) * t - x;
-    // int_0^x (s artanh s)^2 ds, by parts; what is left is int_0^t s tanh s ds.
+    // int_0^x (s artanh s)^2 ds, by parts; the remaining integral is int_0^t s tanh s ds.
     let rest = y * x * t * t / 3.0 + (y * t - (t - x)) / 3.0 - 2.0 / 3.0 * integral_of_t_tanh_t(t);
     (x, force, force * depth - x * depth * depth + rest)
 }
@@ -256,8 +256,8 @@ mod tests {
             let at = |radius| indent_sphere(d, radius, MODULUS);
             let h = 1e-4 * RADIUS;
             let difference = (at(RADIUS + h).energy - at(RADIUS - h).energy) / (2.0 * h);
-            let told = at(RADIUS).energy_by_radius;
-            assert!((difference / told - 1.0).abs() < 1e-7, "{d}: {difference} {told}");
+            let computed = at(RADIUS).energy_by_radius;
+            assert!((difference / computed - 1.0).abs() < 1e-7, "{d}: {difference} {computed}");
         }
     }
 

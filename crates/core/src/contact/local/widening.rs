@@ -1,4 +1,4 @@
-//! A sphere on a half-space in which something is hidden not much deeper than the contact is wide.
+//! A sphere on a body with an inclusion not much deeper than the contact is wide.
 //!
 //! The regular part of the compliance is the mean of a smooth field over the pressure, so that it goes with the pressure's
 //! second moment: `C(a) = C(a_0) + kappa (A - a_0^2)` with the square `A` of the contact radius. `C(a_0)` is the body's; the
@@ -15,7 +15,7 @@ use super::sphere::{SphereContact, indent_sphere};
 
 /// Newton's steps for the approach of the sphere alone. Three are usual.
 const MOST_STEPS: usize = 12;
-/// An approach that is right to this part stays.
+/// Relative error of a converged approach.
 const SETTLED: f64 = 1e-13;
 
 /// How the regular compliance changes with the contact.
@@ -30,7 +30,7 @@ pub struct Widening {
 /// State of the sphere, and derivatives of its energy at constant approach.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WidenedContact {
-    /// Its energy and derivative by the radius are those of the whole.
+    /// The sphere; its stiffness, energy and derivative by the radius are those of the whole.
     pub sphere: SphereContact,
     /// By `E*`, J/Pa.
     pub energy_by_modulus: f64,
@@ -45,7 +45,7 @@ impl Widening {
         let mut own = whole;
         let mut sphere = indent_sphere(own, radius, effective_modulus);
         if self.rate == 0.0 {
-            // A body of one material: nothing hidden, here or beside.
+            // A body of one material.
             let energy_by_modulus = sphere.energy / effective_modulus;
             return WidenedContact { sphere, energy_by_modulus, energy_by_rate: 0.0 };
         }
@@ -63,7 +63,7 @@ impl Widening {
         self.whole(sphere, growth, radius, effective_modulus)
     }
 
-    /// What the sphere's state means for the whole; `growth` is the derivative of the approach by the sphere's own.
+    /// State of the whole from that of the sphere; `growth` is the derivative of the approach by the sphere's own.
     fn whole(self, sphere: SphereContact, growth: f64, radius: f64, effective_modulus: f64) -> WidenedContact {
         let (force, area) = (sphere.force, hertz_area(sphere.force, radius, effective_modulus));
         let wide = 0.5 * force * force * (area - self.reference);
@@ -111,9 +111,9 @@ mod tests {
         for widening in widenings() {
             for depth in [0.02, 0.1, 0.3, 0.8].map(|d| d * RADIUS) {
                 let at = |d: f64| widening.indent(d, RADIUS, MODULUS).sphere;
-                let found = at(depth);
-                assert!((slope(|d| at(d).energy, depth) / found.force - 1.0).abs() < 1e-6, "{widening:?} {depth}");
-                assert!((slope(|d| at(d).force, depth) / found.stiffness - 1.0).abs() < 1e-6, "{widening:?} {depth}");
+                let contact = at(depth);
+                assert!((slope(|d| at(d).energy, depth) / contact.force - 1.0).abs() < 1e-6, "{widening:?} {depth}");
+                assert!((slope(|d| at(d).force, depth) / contact.stiffness - 1.0).abs() < 1e-6, "{widening:?} {depth}");
             }
         }
     }
@@ -124,12 +124,12 @@ mod tests {
             let depth = 0.3 * RADIUS;
             let energy =
                 |rate, radius, modulus| Widening { rate, ..widening }.indent(depth, radius, modulus).sphere.energy;
-            let found = widening.indent(depth, RADIUS, MODULUS);
-            let close = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs().max(1e-3 * found.sphere.energy);
-            assert!(close(slope(|r| energy(widening.rate, r, MODULUS), RADIUS), found.sphere.energy_by_radius));
-            assert!(close(slope(|e| energy(widening.rate, RADIUS, e), MODULUS), found.energy_by_modulus));
+            let contact = widening.indent(depth, RADIUS, MODULUS);
+            let close = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs().max(1e-3 * contact.sphere.energy);
+            assert!(close(slope(|r| energy(widening.rate, r, MODULUS), RADIUS), contact.sphere.energy_by_radius));
+            assert!(close(slope(|e| energy(widening.rate, RADIUS, e), MODULUS), contact.energy_by_modulus));
             if widening.rate != 0.0 {
-                assert!(close(slope(|k| energy(k, RADIUS, MODULUS), widening.rate), found.energy_by_rate));
+                assert!(close(slope(|k| energy(k, RADIUS, MODULUS), widening.rate), contact.energy_by_rate));
             }
         }
     }

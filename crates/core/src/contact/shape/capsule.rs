@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, Vec3Swizzles};
 
 use super::{LineEntry, ellipsoid};
 
-/// Square of the part of a direction across the axis below which it runs along it.
+/// Square of the part of a direction across the axis below which the direction counts as axial.
 const LEAST_ACROSS: f64 = 1e-30;
 
 /// Farthest point in a direction; for one perpendicular to the axis, that in the middle of the line of all farthest ones.

@@ -1,6 +1,6 @@
 //! Shapes of rigid tools, in the tool's own frame; m.
 //!
-//! The origin is the point that a device moves: the centre of a sphere, of an ellipsoid and of the hemisphere in front of
+//! The origin is the point at the device's position: the centre of a sphere, of an ellipsoid and of the hemisphere in front of
 //! a capsule, the middle of a punch's face. Capsule and punch lie along +z, their front towards -z.
 
 mod capsule;
@@ -14,7 +14,7 @@ pub use surface::SurfaceShape;
 
 use crate::{Error, Result};
 
-/// What tools look like.
+/// Shape of a tool.
 #[derive(Clone, Debug)]
 pub enum ToolShape {
     /// A sphere around the origin.
@@ -45,7 +45,7 @@ pub enum ToolShape {
     Surface(Box<SurfaceShape>),
 }
 
-/// Where a straight line enters a shape.
+/// Point where a straight line enters a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineEntry {
     /// Distance along the line, in units of its direction.
@@ -174,6 +174,11 @@ impl ToolShape {
         }
     }
 
+    /// Whether its contact has no closed form: its pressure is computed on cells.
+    pub fn needs_cells(&self) -> bool {
+        !matches!(self, ToolShape::Sphere { .. })
+    }
+
     /// Radius of the ball around [`ToolShape::centre`], m.
     pub fn bounding_radius(&self) -> f64 {
         match *self {
@@ -209,7 +214,7 @@ impl ToolShape {
     }
 }
 
-/// Refuses numbers that no length can be.
+/// Rejects numbers that are not positive lengths.
 fn positive(what: &str, value: f64) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Any closed surface, as its signed distance on a grid.
+//! A closed surface by its signed distance on a grid.
 //!
 //! Distances are exact at the grid's nodes (parry's closest point and pseudo-normals) and interpolated by quadratic
 //! B-splines: the gradient is continuous, so that forces are, and edges are rounded by about a grid cell. Linear interpolation
@@ -19,7 +19,7 @@ const CELLS_ALONG_LONGEST: f64 = 48.0;
 const MARGIN: f64 = 2.0;
 /// Sweeps that make the spline pass through the distances at the nodes; each leaves a quarter of the error at worst.
 const PREFILTER_SWEEPS: usize = 12;
-/// Directions in which the farthest vertices are kept.
+/// Directions whose farthest vertices are stored.
 const SUPPORT_DIRECTIONS: usize = 256;
 /// How far the splines may bulge out of a surface, in grid cells.
 const OVERSHOOT: f64 = 0.05;
@@ -133,8 +133,8 @@ impl SurfaceShape {
         (value, gradient / self.spacing)
     }
 
-    /// Farthest of the vertices that are kept, moved on by what the others may lie beyond them: a plane that this point does
-    /// not reach, nothing reaches.
+    /// Farthest of the stored vertices, moved outwards by the largest distance of the others from their hull: no point of the
+    /// surface reaches a plane that this point does not reach.
     pub(super) fn support(&self, direction: DVec3) -> DVec3 {
         let mut farthest = (f64::NEG_INFINITY, DVec3::ZERO);
         for &point in &self.extreme_points {
@@ -187,7 +187,7 @@ impl SurfaceShape {
     }
 }
 
-/// Refuses what is no closed surface; turns it outwards.
+/// Rejects surfaces that are not closed; orients triangles outwards.
 fn checked(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>> {
     let invalid = |message: String| Err(Error::Invalid(message));
     if triangles.len() < LEAST_TRIANGLES {
@@ -293,12 +293,12 @@ fn extreme_points<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DV
     points
 }
 
-/// How much farther than the kept vertices others reach, in directions between those asked for.
-fn hull_margin<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I, kept: &[DVec3]) -> f64 {
+/// Largest distance by which other vertices reach beyond the stored ones, in directions between those stored.
+fn hull_margin<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I, stored: &[DVec3]) -> f64 {
     let reach = |points: &mut dyn Iterator<Item = DVec3>, direction: DVec3| {
         points.map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max)
     };
-    let beyond = |d| reach(&mut vertices(), d) - reach(&mut kept.iter().copied(), d);
+    let beyond = |d| reach(&mut vertices(), d) - reach(&mut stored.iter().copied(), d);
     spiral(4 * SUPPORT_DIRECTIONS + 1).map(beyond).fold(0.0, f64::max)
 }
 

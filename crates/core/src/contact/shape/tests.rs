@@ -94,8 +94,8 @@ fn an_ellipsoid_in_its_planes_of_symmetry() {
         (DVec3::new(0.0, 0.0, 0.0), -1.0),
         (DVec3::new(2.9, 0.0, 0.0), -0.1),
     ] {
-        let (told, gradient) = shape.signed_distance(point);
-        assert!((told - distance).abs() < 1e-11, "{point}: {told}");
+        let (computed, gradient) = shape.signed_distance(point);
+        assert!((computed - distance).abs() < 1e-11, "{point}: {computed}");
         assert!(gradient.is_finite());
     }
 }

@@ -1,4 +1,4 @@
-//! Fans: what belongs to a surface node on one smooth side of it, with the quadric that fits the surface there.
+//! Fans: the faces around a surface node on one smooth side of it, with the quadric fitted to them.
 //!
 //! Edges that turn by more than [`CREASE`] are creases. The triangles around a node fall into fans between its creases; a
 //! node of a smooth surface has one, the corner of a cube three. A fan has a normal and a curvature of its own, from the
@@ -14,11 +14,11 @@ use crate::tensor::outer;
 const CREASE: f64 = 0.642_787_609_686_539_4;
 /// Reach of a fan's blending weight over its longest edge.
 const REACH: f64 = 1.8;
-/// Neighbours as far as this, over the longest edge, take part in the fit.
+/// Largest distance of neighbours in the fit, over the longest edge.
 const FIT: f64 = 2.2;
-/// Curvature is at most this over the longest edge: a mesh cannot show more.
+/// Largest curvature times the longest edge: a mesh cannot resolve more.
 const SHARPEST: f64 = 1.0;
-/// Fits in turn, each in the frame of the one before.
+/// Number of fits, each in the frame of the previous one.
 const FITS: usize = 2;
 
 /// One smooth side of a surface node.
@@ -28,7 +28,7 @@ pub struct Fan {
     pub node: u32,
     /// A triangle of it.
     pub triangle: u32,
-    /// Where it is, m.
+    /// Position of the node, m.
     pub position: DVec3,
     /// Unit outward normal.
     pub normal: DVec3,
@@ -38,7 +38,7 @@ pub struct Fan {
     pub mean: f64,
     /// Gaussian curvature, 1/m^2.
     pub gauss: f64,
-    /// Where its blending weight ends, m.
+    /// Distance at which its blending weight ends, m.
     pub reach: f64,
     /// Mean length of its edges, m.
     pub spacing: f64,
@@ -198,7 +198,7 @@ fn fit(rank: u32, fan: &mut Fan, before: &[Fan], neighbours: &[Vec<u32>]) {
     }
     let Some([a, b, c, d, e]) = solved(matrix, right) else { return };
     let slope = DVec2::new(a, b);
-    // Beyond this the neighbours are no graph over the plane.
+    // Steeper neighbours are no graph over the plane.
     if slope.length() > 1.0 {
         return;
     }

@@ -1,4 +1,4 @@
-//! The closest point of the smooth surface, followed from where it was.
+//! The closest point of the smooth surface (foot), followed from its previous position.
 //!
 //! `p = x + s n(x)` with `f(x) = 0` is solved by Newton's method: along the normal by `f`, along the surface by its
 //! curvature `S`, for a step `dx` turns the normal by `S dx`. The distance `s` has the gradient `n` and the Hessian
@@ -15,11 +15,11 @@ use crate::tensor::across;
 
 /// Newton steps at most; three or four are usual.
 const STEPS: usize = 12;
-/// Beyond a step this small, over the spacing of the nodes, the surface is its own quadric to round-off.
+/// Length of the last step, over the spacing of the nodes: within it the surface is its own quadric up to rounding.
 const SETTLED: f64 = 1e-5;
 /// Triangles crossed within a step at most.
 const CROSSINGS: usize = 16;
-/// The surface is not followed where it would turn back: least `1 + s kappa`.
+/// Least `1 + s kappa`: near the centre of curvature the closest point is not unique.
 const LEAST_STRETCH: f64 = 0.1;
 
 /// The drawn surface below a smooth one.
@@ -27,7 +27,7 @@ const LEAST_STRETCH: f64 = 0.1;
 pub struct DrawnSurface<'a> {
     /// Its triangles.
     pub surface: &'a Surface,
-    /// Where they are.
+    /// Closest-point search on them.
     pub query: &'a SurfaceQuery,
 }
 
@@ -36,11 +36,11 @@ pub struct DrawnSurface<'a> {
 pub struct FootPoint {
     /// The drawn triangle below or above it.
     pub triangle: u32,
-    /// Where it is, m.
+    /// Its position, m.
     pub position: DVec3,
     /// Unit outward normal, towards `p` from outside.
     pub normal: DVec3,
-    /// Of `p`, m; negative inside.
+    /// Distance of `p`, m; negative inside.
     pub distance: f64,
     /// `dn/dp`, symmetric, 1/m.
     pub turning: DMat3,
@@ -51,19 +51,19 @@ pub struct FootPoint {
 }
 
 impl FootPoint {
-    /// A point of the surface that does not move with the point it is the foot of.
+    /// A foot that does not move with `p`.
     pub fn at(position: DVec3, normal: DVec3) -> Self {
         Self { position, normal, turning: DMat3::ZERO, shift: DMat3::ZERO, ..Self::default() }
     }
 
-    /// The same point for a place elsewhere, the surface being taken for its plane and the point for fixed in it.
-    pub fn held(&self, p: DVec3) -> Self {
+    /// The same foot for another point `p`: the surface is replaced by its plane, and the foot is fixed in it.
+    pub fn frozen(&self, p: DVec3) -> Self {
         let distance = (p - self.position).dot(self.normal);
         Self { distance, turning: DMat3::ZERO, shift: DMat3::ZERO, ..*self }
     }
 
-    /// The point that it is the foot of.
-    fn of(&self) -> DVec3 {
+    /// The point `p`.
+    fn query_point(&self) -> DVec3 {
         self.position + self.normal * self.distance
     }
 }
@@ -77,7 +77,7 @@ impl SmoothSurface {
         from: &FootPoint,
         near: &mut Neighbourhood,
     ) -> Option<FootPoint> {
-        let start = from.position + from.shift * (p - from.of());
+        let start = from.position + from.shift * (p - from.query_point());
         let triangle = self.triangle_below(drawn.surface, from.triangle, start);
         let followed = triangle.and_then(|triangle| self.follow(drawn.surface, p, (triangle, start), near));
         followed.or_else(|| self.foot_anywhere(drawn, p, near))
@@ -98,25 +98,25 @@ impl SmoothSurface {
         near: &mut Neighbourhood,
     ) -> FootPoint {
         let start = (closest.triangle, closest.position);
-        let smooth = if self.is_within(closest) { self.follow(drawn.surface, p, start, near) } else { None };
+        let smooth = if self.is_off_creases(closest) { self.follow(drawn.surface, p, start, near) } else { None };
         smooth.unwrap_or_else(|| on_crease(closest))
     }
 
-    /// Height over the drawn surface beyond which the smooth one is farther than `distance` too, m: no quadric departs from the
-    /// drawn triangles by as much as its fan reaches.
-    pub fn surely_beyond(&self, distance: f64, closest: &SurfacePoint) -> bool {
-        let first = self.met[self.ranges[closest.triangle as usize][0] as usize];
+    /// Whether the smooth surface is surely farther than `distance`, m: no quadric deviates from the drawn triangles by as much as
+    /// the reach of its fan.
+    pub fn is_beyond(&self, distance: f64, closest: &SurfacePoint) -> bool {
+        let first = self.reaching[self.ranges[closest.triangle as usize][0] as usize];
         closest.signed_distance > distance + self.fans[first as usize].reach
     }
 
     /// Whether the closest point of the drawn surface is on no crease.
-    fn is_within(&self, closest: &SurfacePoint) -> bool {
+    fn is_off_creases(&self, closest: &SurfacePoint) -> bool {
         let creases = &self.creases[closest.triangle as usize];
         // The edge (k, k + 1) lies opposite to the corner k + 2.
         !(0..3).any(|k| creases[k] && closest.barycentric[(k + 2) % 3] < 1e-9)
     }
 
-    /// On the smooth side of a triangle; `None` where it ends.
+    /// The foot on the smooth side of a triangle; `None` where that side ends.
     fn follow(
         &self,
         surface: &Surface,
@@ -125,8 +125,8 @@ impl SmoothSurface {
         near: &mut Neighbourhood,
     ) -> Option<FootPoint> {
         for step in 0..STEPS {
-            near.take_up(self, triangle);
-            let at = self.arch.dispatch(Blending { fans: near.own(), point: x })?;
+            near.load(self, triangle);
+            let at = self.arch.dispatch(Blending { fans: near.same_side(), point: x })?;
             let size = at.gradient.length();
             let normal = at.gradient / size;
             let across = across(normal);
@@ -166,7 +166,7 @@ impl SmoothSurface {
             let [a, b, c] = surface.corners(triangle);
             let normal = (b - a).cross(c - a);
             let opposite = [(b - a).cross(x - a), (c - b).cross(x - b), (a - c).cross(x - c)].map(|n| n.dot(normal));
-            // The edge (k, k + 1) that x lies farthest beyond, with a margin so that no two triangles hand it to and fro.
+            // The edge (k, k + 1) that x lies farthest beyond, with a margin against going back and forth between two triangles.
             let beyond = -1e-9 * normal.length_squared();
             let k = (0..3).min_by(|&i, &j| opposite[i].total_cmp(&opposite[j])).unwrap_or(0);
             if opposite[k] >= beyond {

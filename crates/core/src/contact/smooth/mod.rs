@@ -2,8 +2,8 @@
 //!
 //! Drawn triangles are off a curved surface by an eighth of their edge's square over its radius: a sphere of 5 mm that
 //! slides over facets of 5 mm on a body of radius 40 mm would feel 0.08 mm of that, 4 % of a press of 2 mm. Contact
-//! meets the zero of a smooth function instead (`blend`), made of quadrics at the nodes (`fans`). Where it ends, at a
-//! crease of the surface, the closest point is that of the drawn triangles.
+//! uses the zero of a smooth function instead (`blend`), made of quadrics at the nodes (`fans`). At a crease of the surface, where
+//! this function ends, the closest point is that of the drawn triangles.
 
 mod blend;
 mod fans;
@@ -26,21 +26,21 @@ use crate::mesh::Surface;
 
 /// Fans of nodes whose normals are turned farther than this from a triangle's do not belong to it (cosine).
 const SAME_SIDE: f64 = 0.0;
-/// Part of a triangle's size by which a point may lie beside it and still be met by its fans.
+/// Distance over a triangle's size up to which a point beside it is evaluated with its fans.
 const MARGIN: f64 = 1.2;
 
-/// Fans of a surface, and which of them each triangle meets.
+/// Fans of a surface, and the fans that reach each triangle.
 pub struct SmoothSurface {
     pub(super) fans: Vec<Fan>,
-    /// Whether each fan may be touched.
+    /// Whether each fan is touchable.
     pub(super) touchable: Vec<bool>,
     /// For each triangle the fans of its corners, and for each fan those that share a triangle with it.
     pub(super) of_corners: Vec<[u32; 3]>,
     pub(super) neighbours: Vec<Vec<u32>>,
     creases: Vec<[bool; 3]>,
-    /// For each triangle where its fans begin in `met`, where those begin that lie beyond creases, and the end.
+    /// For each triangle the start of its fans in `reaching`, the start of those beyond creases, and the end.
     ranges: Vec<[u32; 3]>,
-    met: Vec<u32>,
+    reaching: Vec<u32>,
     arch: Arch,
 }
 
@@ -54,30 +54,30 @@ impl SmoothSurface {
         self.neighbours.iter().for_each(|of_fan| ranges.add(of_fan));
         ranges.add(&self.creases);
         ranges.add(&self.ranges);
-        ranges.add(&self.met);
+        ranges.add(&self.reaching);
     }
 
-    /// Fits the surface, all of which may be touched.
+    /// Fits the surface; all of it is touchable.
     pub fn new(surface: &Surface) -> Self {
         let Fans { fans, of_corners, neighbours, creases } = Fans::new(surface);
         let touchable = vec![true; fans.len()];
         let walked = of_corners.clone();
-        let (ranges, met, arch) = (Vec::new(), Vec::new(), Arch::new());
-        let mut smooth = Self { fans, touchable, of_corners, neighbours, creases, ranges, met, arch };
+        let (ranges, reaching, arch) = (Vec::new(), Vec::new(), Arch::new());
+        let mut smooth = Self { fans, touchable, of_corners, neighbours, creases, ranges, reaching, arch };
         let mut walk = Walk {
             surface,
             of_corners: &walked,
             visited: vec![u32::MAX; surface.triangles.len()],
-            kept: vec![u32::MAX; smooth.fans.len()],
+            listed: vec![u32::MAX; smooth.fans.len()],
             queue: Vec::new(),
         };
         for t in 0..surface.triangles.len() as u32 {
-            smooth.meet(&mut walk, t);
+            smooth.list_fans(&mut walk, t);
         }
         smooth
     }
 
-    /// The same surface of which only some fans may be touched.
+    /// The same surface with only some fans touchable.
     pub fn touchable_at(self, touchable: Vec<bool>) -> Self {
         Self { touchable, ..self }
     }
@@ -92,12 +92,12 @@ impl SmoothSurface {
         self.of_corners[triangle as usize]
     }
 
-    /// Whether a fan may be touched.
+    /// Whether a fan is touchable.
     pub fn is_touchable(&self, fan: u32) -> bool {
         self.touchable[fan as usize]
     }
 
-    /// Which edges of a triangle are creases.
+    /// Whether each edge of a triangle is a crease.
     pub fn creases_of(&self, triangle: u32) -> [bool; 3] {
         self.creases[triangle as usize]
     }
@@ -114,9 +114,9 @@ impl SmoothSurface {
         nodes
     }
 
-    /// Fields known at the fans, each blended with those around it as at the fan's own place: interpolated linearly between
-    /// the corners of a triangle they are as even as blended ones.
-    pub fn evened<const N: usize>(&self, fields: &[[f64; N]]) -> Vec<[f64; N]> {
+    /// Fields at the fans, each blended with those around it: interpolated linearly between the corners of a triangle they are as
+    /// smooth as blended ones.
+    pub fn smoothed<const N: usize>(&self, fields: &[[f64; N]]) -> Vec<[f64; N]> {
         let mut weights = FanWeights::new(Neighbourhood::new(std::iter::once(self)));
         let even = |(rank, fan): (usize, &Fan)| {
             let foot = FootPoint { triangle: fan.triangle, ..FootPoint::at(fan.position, fan.normal) };
@@ -129,33 +129,33 @@ impl SmoothSurface {
     /// Mean spacing of the nodes around a fan, m.
     pub(super) fn spacing_around(&self, fan: &Fan) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
-        for near in self.own(fan.triangle) {
+        for near in self.same_side(fan.triangle) {
             sum += near.spacing;
             count += 1.0;
         }
         if count > 0.0 { sum / count } else { fan.spacing }
     }
 
-    /// Fans that a triangle meets without crossing a crease.
-    fn own(&self, triangle: u32) -> impl Iterator<Item = &Fan> {
+    /// Fans that reach a triangle without crossing a crease.
+    fn same_side(&self, triangle: u32) -> impl Iterator<Item = &Fan> {
         let [from, to, _] = self.ranges[triangle as usize];
-        self.met[from as usize..to as usize].iter().map(|&fan| &self.fans[fan as usize])
+        self.reaching[from as usize..to as usize].iter().map(|&fan| &self.fans[fan as usize])
     }
 
-    /// Groups of lanes that the fans of any triangle fill at most.
+    /// Most groups of lanes that the fans of a triangle fill.
     fn most_groups(&self) -> usize {
         let groups = |fans: u32| (fans as usize).div_ceil(LANES);
         self.ranges.iter().map(|[from, between, to]| groups(between - from) + groups(to - between)).max().unwrap_or(0)
     }
 
-    /// Lists the fans that reach a triangle, first those on its side of all creases. These are in order of their direction, so that
-    /// fans side by side reach the same places.
-    fn meet(&mut self, walk: &mut Walk<'_>, triangle: u32) {
+    /// Lists the fans that reach a triangle, first those on its side of all creases. These are ordered by direction, so that
+    /// neighbouring fans reach the same points.
+    fn list_fans(&mut self, walk: &mut Walk<'_>, triangle: u32) {
         let corners = walk.surface.corners(triangle);
         let centre: DVec3 = corners.into_iter().sum::<DVec3>() / 3.0;
         let size = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
         let normal = walk.surface.normals[triangle as usize];
-        let from = self.met.len() as u32;
+        let from = self.reaching.len() as u32;
         walk.queue.clear();
         walk.queue.push(triangle);
         walk.visited[triangle as usize] = triangle;
@@ -165,21 +165,21 @@ impl SmoothSurface {
             while next < walk.queue.len() {
                 let t = walk.queue[next] as usize;
                 next += 1;
-                let mut reached = false;
+                let mut reaches_triangle = false;
                 for &rank in &walk.of_corners[t] {
                     let fan = &self.fans[rank as usize];
                     let near = fan.position.distance(centre) < fan.reach + MARGIN * size;
                     if near && fan.normal.dot(normal) > SAME_SIDE - f64::from(u8::from(crossing)) * 0.7 {
-                        reached = true;
-                        if walk.kept[rank as usize] != triangle {
-                            walk.kept[rank as usize] = triangle;
-                            self.met.push(rank);
+                        reaches_triangle = true;
+                        if walk.listed[rank as usize] != triangle {
+                            walk.listed[rank as usize] = triangle;
+                            self.reaching.push(rank);
                         }
                     }
                 }
                 for (k, &other) in walk.surface.neighbours[t].iter().enumerate() {
                     let open = other != u32::MAX && (crossing || !self.creases[t][k]);
-                    if reached && open && walk.visited[other as usize] != triangle {
+                    if reaches_triangle && open && walk.visited[other as usize] != triangle {
                         walk.visited[other as usize] = triangle;
                         walk.queue.push(other);
                     }
@@ -194,11 +194,11 @@ impl SmoothSurface {
                     let anywhere = offset.length() + size < fan.reach;
                     if anywhere { f64::NEG_INFINITY } else { turn(along.dot(offset), normal.cross(along).dot(offset)) }
                 };
-                self.met[from as usize..].sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-                between = self.met.len() as u32;
+                self.reaching[from as usize..].sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+                between = self.reaching.len() as u32;
             }
         }
-        self.ranges.push([from, between, self.met.len() as u32]);
+        self.ranges.push([from, between, self.reaching.len() as u32]);
     }
 }
 
@@ -213,7 +213,7 @@ struct Walk<'a> {
     surface: &'a Surface,
     of_corners: &'a [[u32; 3]],
     visited: Vec<u32>,
-    kept: Vec<u32>,
+    listed: Vec<u32>,
     queue: Vec<u32>,
 }
 

@@ -1,6 +1,6 @@
-//! The fans that a triangle meets, laid out for vectors of the processor: a copy, taken where a tool crosses a triangle.
+//! The fans that reach a triangle, copied into lanes for the processor's vectors when a tool crosses into the triangle.
 //!
-//! A tick evaluates the surface some times at about one place. Sums over the fans go through fixed lanes that are added up
+//! A tick evaluates the surface several times at about one point. Sums over the fans go through fixed lanes that are added up
 //! in a fixed order, so that processors with short and with long vectors find the same bits.
 
 use super::SmoothSurface;
@@ -19,13 +19,13 @@ pub struct FanLanes {
     /// Curvature by `xx, xy, xz, yy, yz, zz`.
     pub curvature: [Lane; 6],
     pub inverse_squared_reach: Lane,
-    /// One where the node may be touched, else zero.
+    /// One where the node is touchable, else zero.
     pub touchable: Lane,
     pub ranks: [u32; LANES],
 }
 
 impl FanLanes {
-    /// Fans that are nowhere.
+    /// Fans without reach, to fill a group.
     const NONE: Self = Self {
         position: [[1e9; LANES]; 3],
         normal: [[0.0; LANES]; 3],
@@ -81,7 +81,7 @@ pub fn total([a, b, c, d]: Lane) -> f64 {
 pub struct Neighbourhood {
     triangle: Option<u32>,
     groups: Vec<FanLanes>,
-    own: usize,
+    same_side_count: usize,
     count: usize,
     /// Spacing of the first fan, m.
     pub(super) spacing: f64,
@@ -91,27 +91,27 @@ impl Neighbourhood {
     /// Memory for any triangle of some surfaces.
     pub fn new<'a>(surfaces: impl Iterator<Item = &'a SmoothSurface>) -> Self {
         let most = surfaces.map(SmoothSurface::most_groups).max().unwrap_or(0);
-        Self { triangle: None, groups: vec![FanLanes::NONE; most], own: 0, count: 0, spacing: 0.0 }
+        Self { triangle: None, groups: vec![FanLanes::NONE; most], same_side_count: 0, count: 0, spacing: 0.0 }
     }
 
-    /// Forgets the triangle: the next is of another surface.
-    pub fn forget(&mut self) {
+    /// Invalidates the triangle: the next may be of another surface.
+    pub fn invalidate(&mut self) {
         self.triangle = None;
     }
 
-    /// Takes up the fans of a triangle.
-    pub(super) fn take_up(&mut self, surface: &SmoothSurface, triangle: u32) {
+    /// Loads the fans of a triangle.
+    pub(super) fn load(&mut self, surface: &SmoothSurface, triangle: u32) {
         if self.triangle == Some(triangle) {
             return;
         }
         self.triangle = Some(triangle);
         let [from, between, to] = surface.ranges[triangle as usize].map(|place| place as usize);
-        self.spacing = surface.fans[surface.met[from] as usize].spacing;
-        self.own = self.fill(surface, &surface.met[from..between], 0);
-        self.count = self.fill(surface, &surface.met[between..to], self.own);
+        self.spacing = surface.fans[surface.reaching[from] as usize].spacing;
+        self.same_side_count = self.fill(surface, &surface.reaching[from..between], 0);
+        self.count = self.fill(surface, &surface.reaching[between..to], self.same_side_count);
     }
 
-    /// Fills groups from `first` on; where the next begins.
+    /// Fills groups from `first` on; returns the start of the next.
     fn fill(&mut self, surface: &SmoothSurface, ranks: &[u32], first: usize) -> usize {
         for (group, chunk) in self.groups[first..].iter_mut().zip(ranks.chunks(LANES)) {
             *group = FanLanes::NONE;
@@ -122,12 +122,12 @@ impl Neighbourhood {
         first + ranks.len().div_ceil(LANES)
     }
 
-    /// Those on the triangle's side of all creases.
-    pub(super) fn own(&self) -> &[FanLanes] {
-        &self.groups[..self.own]
+    /// Fans on the triangle's side of all creases.
+    pub(super) fn same_side(&self) -> &[FanLanes] {
+        &self.groups[..self.same_side_count]
     }
 
-    /// All of them.
+    /// All fans.
     pub(super) fn all(&self) -> &[FanLanes] {
         &self.groups[..self.count]
     }

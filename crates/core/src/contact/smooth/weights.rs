@@ -1,4 +1,4 @@
-//! Blending weights of the fans around a foot: what is known at the nodes becomes a smooth field of the tool's place.
+//! Blending weights of the fans around a foot: values at the nodes become smooth fields of the tool's position.
 //!
 //! `nu_i = w_i eta_i / sum w_j eta_j`, with `w = (1 - r^2)^3` of the distance from the fan over its reach, and `eta` rising
 //! smoothly from zero, where the fan's normal is at a right angle to that of the contact, to one at 60 degrees.
@@ -15,7 +15,7 @@ pub const MAX_FANS: usize = 160;
 /// Cosine of the angle between normals from which a fan counts fully.
 const FULLY: f64 = 0.5;
 
-/// Fans around a foot, with weights that sum to one and their gradients by the tool's place.
+/// Fans around a foot, with weights that sum to one and their gradients by the tool's position.
 #[derive(Clone, Debug)]
 pub struct FanWeights {
     /// The fans of the triangle at the foot.
@@ -25,7 +25,7 @@ pub struct FanWeights {
     weights: [f64; MAX_FANS],
     gradients: [DVec3; MAX_FANS],
     turns: [DVec3; MAX_FANS],
-    /// Part of all weight that lies on nodes which may be touched.
+    /// Part of the weight on touchable nodes.
     pub touchable: f64,
     arch: Arch,
 }
@@ -47,7 +47,7 @@ impl<const N: usize> Blended<N> {
 }
 
 impl FanWeights {
-    /// Whether most of what was weighed may not be touched.
+    /// Whether most of the weight lies on nodes that are not touchable.
     pub fn is_outside(&self) -> bool {
         self.touchable < 0.5
     }
@@ -66,7 +66,7 @@ impl FanWeights {
         }
     }
 
-    /// Begins a set of weights that is summed up by [`FanWeights::add`].
+    /// Starts a set of weights; [`FanWeights::add`] adds to it.
     pub fn begin(&mut self) {
         (self.count, self.touchable) = (0, 0.0);
     }
@@ -151,14 +151,14 @@ impl<const N: usize> NullaryFnOnce for Blending<'_, N> {
 }
 
 impl SmoothSurface {
-    /// Weighs the fans around a foot that may be touched.
+    /// Computes the weights of the touchable fans around a foot.
     pub fn weigh(&self, foot: &FootPoint, weights: &mut FanWeights) {
-        weights.near.take_up(self, foot.triangle);
+        weights.near.load(self, foot.triangle);
         self.arch.dispatch(Weighing { foot, weights });
     }
 }
 
-/// Weighs the fans that are near.
+/// Weights of the near fans, as a struct: a closure might be compiled for the narrowest vectors.
 struct Weighing<'a> {
     foot: &'a FootPoint,
     weights: &'a mut FanWeights,

@@ -29,7 +29,7 @@ pub struct EnergyAccount {
 }
 
 /// What a step did to one mode.
-struct Moved {
+struct ModeChange {
     q: [f64; 2],
     v: [f64; 2],
     p: [f64; 2],
@@ -54,7 +54,7 @@ impl EnergyAccount {
             for l in 0..LANES {
                 let ends = |x: &[Lanes], y: &[Lanes]| [x[g].0[l], y[g].0[l]];
                 let (q, v) = (ends(&before.q, &state.q), ends(&before.v, &state.v));
-                let moved = Moved { q, v, p: ends(&before.load, &state.load) };
+                let moved = ModeChange { q, v, p: ends(&before.load, &state.load) };
                 let done = self.work_on(model, &moved, LANES * g + l);
                 work.0[l] += done;
                 dissipated.0[l] += match model.integration {
@@ -71,8 +71,8 @@ impl EnergyAccount {
         self.before.load.copy_from_slice(&state.load);
     }
 
-    fn work_on(&self, model: &ModalModel, moved: &Moved, mode: usize) -> f64 {
-        let Moved { q: [q0, q1], v: [v0, _], p: [p0, p1] } = *moved;
+    fn work_on(&self, model: &ModalModel, moved: &ModeChange, mode: usize) -> f64 {
+        let ModeChange { q: [q0, q1], v: [v0, _], p: [p0, p1] } = *moved;
         match self.means.get(mode) {
             Some(mean) => p0 * (q1 - q0) + (p1 - p0) * (q1 - (mean.q * q0 + mean.v * v0 + mean.p0 * p0 + mean.p1 * p1)),
             None => (p0 + model.integration.weight() * (p1 - p0)) * (q1 - q0),
@@ -92,7 +92,7 @@ impl EnergyAccount {
     }
 }
 
-impl Moved {
+impl ModeChange {
     /// Kinetic and strain energy gained, J.
     fn gained(&self, stiffness: f64) -> f64 {
         let Self { q: [q0, q1], v: [v0, v1], .. } = self;

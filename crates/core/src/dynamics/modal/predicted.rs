@@ -1,4 +1,4 @@
-//! Motion kept one step ahead, so that a tick passes over the modes once.
+//! Modal motion predicted one step ahead, so that a tick reads and writes every mode once.
 //!
 //! A step is a free motion and what new forces add to it. The free motion of the next step follows from the end of this
 //! one, so a single pass adds the forces, predicts, and reads what the prediction makes of the loaded patches. At

@@ -1,4 +1,4 @@
-//! A contact patch seen by the modes: `G = W^T Phi`, three rows, and the compliance it feels within one step.
+//! Projection of a contact patch on the modes: `G = W^T Phi`, three rows, and the compliance it feels within one step.
 //!
 //! With `W` the patch's weights on three components, its mean displacement is `G q`, its force `f` enters as the modal
 //! force `G^T f`, and one step gives it the compliance `G diag(q_load) G^T`. A truncated basis leaves out the residual

@@ -1,6 +1,6 @@
 //! A block of columns that are solved together.
 
-/// Which columns a block has.
+/// Columns of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
     /// First column, in the order of elimination.

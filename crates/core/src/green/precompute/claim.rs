@@ -1,4 +1,4 @@
-//! One writer of a store at a time.
+//! Lock on a store: one process at a time writes it.
 //!
 //! The panels lie in `<store>.partial`. The process that computes the store holds an exclusive lock on that file; the
 //! system releases it when the process ends, however that ends. Two writers with different first regions would put
@@ -22,7 +22,7 @@ pub struct Claim {
 impl Claim {
     /// Claims the store at `target`; `None` while another process, or another thread of this one, has it.
     ///
-    /// Where the file system has no locks the store is taken without one: two writers are then found by their sums
+    /// If the file system has no locks, the store is claimed without one: two writers are then detected by their checksums
     /// ([`super::partial::Partial::verify`]).
     ///
     /// # Errors
@@ -39,7 +39,7 @@ impl Claim {
                 Ok(()) | Err(TryLockError::Error(_)) => {}
             }
             let claim = Self { target: target.to_owned(), path: path.clone(), file, released: AtomicBool::new(false) };
-            // The writer before removes its file at its end: a lock on a file without a name keeps nobody out.
+            // The previous writer removes its file at its end: a lock on a removed file excludes no other process.
             if claim.has_its_name() {
                 return Ok(Some(claim));
             }
@@ -56,7 +56,7 @@ impl Claim {
         &self.path
     }
 
-    /// It, open.
+    /// The open file.
     pub fn file(&self) -> &File {
         &self.file
     }
@@ -68,7 +68,7 @@ impl Claim {
         }
     }
 
-    /// Lets others write the store. A computation that has not begun leaves nothing.
+    /// Releases the store for other writers. A computation that has not begun leaves no file.
     pub fn release(&self) {
         if self.released.swap(true, Ordering::Relaxed) {
             return;
@@ -92,7 +92,7 @@ impl Drop for Claim {
     }
 }
 
-/// Where unfinished work on a store is kept.
+/// Path of the unfinished work on a store.
 pub fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".partial");

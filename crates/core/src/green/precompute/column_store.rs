@@ -1,7 +1,7 @@
-//! A store that gathers blocks of columns, in any order and from anybody, and is written once all are there.
+//! Store under construction: accepts blocks of columns in any order and from any process, and is written when all are present.
 //!
-//! The panels lie in `<path>.partial` beside the store to be, each written to its own place. A block is told from a damaged
-//! one by its checksum, so a computation goes on at whatever blocks are missing.
+//! The panels lie in `<path>.partial` beside the store to be, each written to its own place. A checksum
+//! shows whether a block is damaged, so that a computation resumes with the missing blocks.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -10,15 +10,15 @@ use std::sync::Arc;
 use super::arrangement::Arrangement;
 use super::block::Block;
 use super::claim::Claim;
-use super::columns::{Measurement, Parts};
-use super::finish::Finished;
+use super::columns::{AssembledProblem, Measurement};
+use super::factorization::RequestedPrecision;
+use super::finish::FinishedPanels;
 use super::layout::{Layout, Stage};
-use super::made::Wanted;
 use super::number::Number;
 use super::panels::Panels;
 use super::partial::Partial;
-use super::phase::Listener;
-use super::problem::{KeyOfTouch, Problem};
+use super::phase::PhaseCallback;
+use super::problem::{Problem, TouchKey};
 use super::tasks::{Progress, task_failed};
 use crate::green::entries::Entries;
 use crate::green::function::GreensFunction;
@@ -29,86 +29,86 @@ use crate::green::store::touch_of_store;
 use crate::green::store_writer::StoreWriter;
 use crate::{Error, Result};
 
-/// How the operator is to be written, and what of.
+/// Settings of the store to be written.
 pub struct Target<'a> {
     /// Number format asked for.
-    pub precision: Wanted,
-    /// Bytes that may be taken; `None`: any.
+    pub precision: RequestedPrecision,
+    /// Bound of memory, bytes; `None` for none.
     pub memory: Option<usize>,
-    /// What the file was made from, in JSON, for people.
+    /// Description of the inputs, in JSON, for people.
     pub description: &'a str,
-    /// Told of each phase as it begins.
-    pub phase: Listener<'a>,
+    /// Called as each phase begins.
+    pub phase: PhaseCallback<'a>,
 }
 
-/// What was found where a store was to be written.
+/// Unfinished work of an earlier computation, beside the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Found {
+pub struct PreviousWork {
     /// Columns that an interrupted computation had finished.
     pub resumed: usize,
-    /// It had left something that does not belong to this computation, which was thrown away.
+    /// Whether work of another computation was found and discarded.
     pub discarded: bool,
 }
 
-/// Blocks of columns on their way into a store.
+/// A store under construction.
 pub struct ColumnStore {
     path: PathBuf,
-    parts: Arc<Parts>,
+    parts: Arc<AssembledProblem>,
     blocks: Vec<Block>,
     /// Columns of a block.
     width: usize,
     partial: Arc<Partial>,
-    /// Everything but the numbers and what may be touched.
+    /// The Green's function without its numbers and touch region.
     green: GreensFunction,
-    key: KeyOfTouch,
-    /// What was there.
-    pub found: Found,
+    key: TouchKey,
+    /// Work found at the start.
+    pub previous: PreviousWork,
 }
 
-/// A stage with blocks that are not there.
-pub struct Unfinished {
-    /// Its first column, and the one behind its last.
+/// A stage with missing blocks.
+pub struct UnfinishedStage {
+    /// Its range of columns.
     pub first: usize,
     pub end: usize,
-    /// The blocks that are not there, ascending.
+    /// The missing blocks, ascending.
     pub blocks: Vec<usize>,
 }
 
 impl ColumnStore {
-    /// Begins a store, or goes on where a computation of the same thing stopped. Blocks that it finished of columns in
-    /// another order are not used.
+    /// Begins a store, or resumes an interrupted computation of the same one. Blocks finished in another order of columns are not
+    /// used.
     ///
     /// # Errors
     /// The operating system's.
     pub fn open(
         claim: Arc<Claim>,
         problem: &Problem,
-        parts: Arc<Parts>,
+        parts: Arc<AssembledProblem>,
         measurement: &Measurement,
         target: &Target<'_>,
     ) -> Result<Self> {
         let mut store = Self::begin(claim, problem, parts, measurement, target)?;
         let parts = Arc::clone(&store.parts);
         store.arrange(parts)?;
-        store.found.resumed = store.done();
+        store.previous.resumed = store.done();
         Ok(store)
     }
 
-    /// Begins a store whose columns are in stages of nodes, or goes on in the order in which a computation of the same
-    /// thing has begun, and then with what is left of the stages. [`Self::parts`] has the order.
+    /// Begins a store whose columns are in stages of nodes, or resumes an interrupted computation of the same one: first in its
+    /// order, then by the remaining stages. [`Self::parts`] has the order.
     ///
     /// # Errors
     /// The operating system's.
     pub fn open_in_stages(
         claim: Arc<Claim>,
         problem: &Problem,
-        parts: &Parts,
+        parts: &AssembledProblem,
         stages: &[Vec<u32>],
         measurement: &Measurement,
         target: &Target<'_>,
     ) -> Result<Self> {
-        let arranged = Arc::new(parts.arranged(0, stages));
-        let mut store = Self::begin(claim, problem, arranged, measurement, target)?;
+        let with_stages = Arc::new(parts.with_stages(0, stages));
+        let mut store = Self::begin(claim, problem, with_stages, measurement, target)?;
         let begun = store.partial.begun();
         let layout = &store.parts.layout;
         let row = |place: usize| layout.row(place) as u32;
@@ -120,10 +120,10 @@ impl ColumnStore {
             Arc::clone(&store.parts)
         } else {
             let kept = begun.iter().map(Vec::len).sum();
-            Arc::new(store.parts.adopting(&begun).arranged(kept, stages))
+            Arc::new(store.parts.with_blocks_first(&begun).with_stages(kept, stages))
         };
         store.arrange(parts)?;
-        store.found.resumed = store.done();
+        store.previous.resumed = store.done();
         Ok(store)
     }
 
@@ -131,7 +131,7 @@ impl ColumnStore {
     fn begin(
         claim: Arc<Claim>,
         problem: &Problem,
-        parts: Arc<Parts>,
+        parts: Arc<AssembledProblem>,
         measurement: &Measurement,
         target: &Target<'_>,
     ) -> Result<Self> {
@@ -145,15 +145,15 @@ impl ColumnStore {
         let path = claim.target().to_owned();
         let (partial, discarded) = Partial::open(claim, &header, &parts.layout, kind)?;
         let key = problem.key_of_touch(target.precision.named());
-        let found = Found { resumed: 0, discarded };
-        Ok(Self { path, parts, blocks: Vec::new(), width, partial: Arc::new(partial), green, key, found })
+        let previous = PreviousWork { resumed: 0, discarded };
+        Ok(Self { path, parts, blocks: Vec::new(), width, partial: Arc::new(partial), green, key, previous })
     }
 
-    /// Goes on with the columns in the order of other parts of the same problem; blocks that are the same stay.
+    /// Continues with the columns in the order of other parts of the same problem; equal blocks stay finished.
     ///
     /// # Errors
     /// The operating system's.
-    pub fn arrange(&mut self, parts: Arc<Parts>) -> Result<()> {
+    pub fn arrange(&mut self, parts: Arc<AssembledProblem>) -> Result<()> {
         self.blocks = parts.layout.blocks(self.width);
         self.parts = parts;
         let partial = Arc::get_mut(&mut self.partial).ok_or_else(task_failed)?;
@@ -161,7 +161,7 @@ impl ColumnStore {
     }
 
     /// Rows and columns in their order.
-    pub fn parts(&self) -> &Arc<Parts> {
+    pub fn parts(&self) -> &Arc<AssembledProblem> {
         &self.parts
     }
 
@@ -170,28 +170,28 @@ impl ColumnStore {
         &self.blocks
     }
 
-    /// Numbers of the blocks that are not there.
+    /// Numbers of the missing blocks.
     pub fn missing(&self) -> Vec<usize> {
         (0..self.blocks.len()).filter(|&k| !self.partial.has(k)).collect()
     }
 
-    /// The first stage with a block that is not there.
-    pub fn first_unfinished(&self) -> Option<Unfinished> {
+    /// The first stage with a missing block.
+    pub fn first_unfinished(&self) -> Option<UnfinishedStage> {
         let missing = self.missing();
         let stage = self.parts.layout.stage_of(self.blocks[*missing.first()?].first);
         let Stage { supports, forces } = self.parts.layout.stages()[stage].clone();
         let blocks = missing.into_iter().take_while(|&block| self.blocks[block].first < forces.end).collect();
-        Some(Unfinished { first: supports.start, end: forces.end, blocks })
+        Some(UnfinishedStage { first: supports.start, end: forces.end, blocks })
     }
 
-    /// How many blocks there are up to the last one that is there.
-    pub fn begun_blocks(&self) -> usize {
+    /// Number of blocks up to the last finished one.
+    pub fn leading_blocks(&self) -> usize {
         (0..self.blocks.len()).rev().find(|&block| self.partial.has(block)).map_or(0, |last| last + 1)
     }
 
     /// Columns of these blocks.
     pub fn begun(&self) -> usize {
-        self.blocks[..self.begun_blocks()].iter().map(|block| block.width).sum()
+        self.blocks[..self.leading_blocks()].iter().map(|block| block.width).sum()
     }
 
     /// Columns in all.
@@ -199,12 +199,12 @@ impl ColumnStore {
         self.parts.layout.columns
     }
 
-    /// Columns that are there.
+    /// Number of finished columns.
     pub fn done(&self) -> usize {
         self.blocks.iter().enumerate().filter(|(k, _)| self.partial.has(*k)).map(|(_, block)| block.width).sum()
     }
 
-    /// Keeps the panel of a block; from any thread.
+    /// Stores the panel of a block; from any thread.
     ///
     /// # Errors
     /// A panel of another size, or the operating system's.
@@ -216,8 +216,7 @@ impl ColumnStore {
         self.partial.put(block, panel)
     }
 
-    /// Keeps the panel of a block that has come from elsewhere, with the checksum it was sent with; `false`: it is not the
-    /// panel that was summed.
+    /// Stores the panel of a block from another process, given its checksum; `false` if the checksum does not match.
     ///
     /// # Errors
     /// A panel of another size, or the operating system's.
@@ -239,7 +238,7 @@ impl ColumnStore {
     }
 
     /// Writes a store of the first `columns` alone, which are all the columns of some nodes: it is complete, and has the key
-    /// of the problem in which only these may be touched. Where there is one of as many nodes of the same body it stays.
+    /// of the problem in which only these may be touched. If there is a store of as many nodes of the same body, it stays.
     ///
     /// # Errors
     /// A block that is missing or was changed, the operating system's, or an interruption.
@@ -275,7 +274,7 @@ impl ColumnStore {
         let (precision, done, all) = (self.green.precision(), self.done(), self.columns());
         let panels = Panels::<T>::File(Arc::clone(&self.partial));
         let finished =
-            Finished { parts: &self.parts, arrangement, blocks: &self.blocks[..count], panels: &panels, tasks };
+            FinishedPanels { parts: &self.parts, arrangement, blocks: &self.blocks[..count], panels: &panels, tasks };
         let magnitude = finished.magnitudes()?;
         self.green.touch.clone_from(&arrangement.touch);
         self.green.key = self.key.of(&arrangement.touch);
@@ -297,12 +296,12 @@ pub fn checksum(panel: &[u8]) -> [u8; 32] {
     *blake3::hash(panel).as_bytes()
 }
 
-/// Everything but the numbers.
+/// The Green's function without its numbers.
 pub fn geometry(
     problem: &Problem,
     layout: &Layout,
     measurement: &Measurement,
-    wanted: Wanted,
+    requested: RequestedPrecision,
 ) -> Result<GreensFunction> {
     let supports = &problem.supports;
     let row_of_dof: HashMap<u32, u32> =
@@ -326,7 +325,7 @@ pub fn geometry(
         loads: problem.loads.clone(),
         free_response: measurement.response.clone(),
         accuracy: measurement.accuracy,
-        key: problem.key(wanted.named()),
+        key: problem.key(requested.named()),
         youngs_modulus: problem.common_youngs_modulus(),
         description: String::new(),
         path: None,
@@ -340,5 +339,5 @@ fn without_numbers(
     magnitude: Vec<f64>,
     precision: Precision,
 ) -> Entries {
-    Entries::new(arrangement.places.clone(), row_is_fixed, magnitude, Numbers::zeros(precision, 0), None)
+    Entries::new(arrangement.node_order.clone(), row_is_fixed, magnitude, Numbers::zeros(precision, 0), None)
 }

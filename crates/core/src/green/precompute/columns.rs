@@ -1,15 +1,15 @@
 //! A factored body: any block of its columns, by number.
 //!
-//! What a block's numbers depend on is the problem, the number format and the width of the blocks; not who solves it, when,
-//! or on how many threads. So the blocks of one operator may be solved by several processes, each with a factor of its own.
+//! The numbers of a block depend on the problem, the number format and the width of the blocks, not on the process, the time or the
+//! number of threads. So several processes may solve the blocks of one operator, each with a factor of its own.
 
 use std::sync::Arc;
 
 use super::block::Block;
+use super::factorization::{Factorization, RequestedPrecision, Sweeps, factorize};
 use super::layout::Layout;
-use super::made::{Made, Sweeps, Wanted, made};
-use super::phase::Listener;
-use super::plan::Prepared;
+use super::phase::PhaseCallback;
+use super::plan::SymbolicAnalysis;
 use super::problem::Problem;
 use super::sweep::Scratch;
 use super::system::System;
@@ -20,8 +20,8 @@ use crate::fem::{Supports, SymmetricCsc};
 use crate::green::accuracy::Accuracy;
 use crate::green::precision::Precision;
 
-/// Matrix, rows and columns of a problem: what a block is solved with, and a store put together.
-pub struct Parts {
+/// Matrix, rows and columns of a problem, for solving blocks and assembling a store.
+pub struct AssembledProblem {
     /// Stiffness of all dofs.
     pub stiffness: Arc<SymmetricCsc>,
     /// The supports.
@@ -30,13 +30,13 @@ pub struct Parts {
     pub layout: Layout,
 }
 
-impl Parts {
+impl AssembledProblem {
     /// Assembles and orders, without a factor.
     ///
     /// # Errors
     /// Not enough memory.
     pub fn new(problem: &Problem) -> Result<Self> {
-        let Prepared { stiffness, layout, .. } = Prepared::new(problem, &|_| {})?;
+        let SymbolicAnalysis { stiffness, layout, .. } = SymbolicAnalysis::new(problem, &|_| {})?;
         Ok(Self::of(problem, stiffness, layout))
     }
 
@@ -45,13 +45,13 @@ impl Parts {
     }
 
     /// The same with the columns behind the first `kept` in other stages of nodes ([`Layout::arrange`]).
-    pub fn arranged(&self, kept: usize, stages: &[Vec<u32>]) -> Self {
+    pub fn with_stages(&self, kept: usize, stages: &[Vec<u32>]) -> Self {
         self.changed(|layout| layout.arrange(kept, stages, &self.stiffness, &self.supports))
     }
 
-    /// The same with blocks of these rows first ([`Layout::adopt`]).
-    pub fn adopting(&self, blocks: &[Vec<u32>]) -> Self {
-        self.changed(|layout| layout.adopt(blocks, &self.stiffness, &self.supports))
+    /// The same with blocks of these rows first ([`Layout::put_blocks_first`]).
+    pub fn with_blocks_first(&self, blocks: &[Vec<u32>]) -> Self {
+        self.changed(|layout| layout.put_blocks_first(blocks, &self.stiffness, &self.supports))
     }
 
     fn changed(&self, change: impl FnOnce(&mut Layout)) -> Self {
@@ -72,7 +72,7 @@ impl Parts {
     }
 }
 
-/// What a store needs to know of the factor, beside the columns.
+/// Properties of the factor that are stored with the columns.
 #[derive(Clone, Debug)]
 pub struct Measurement {
     /// Number format.
@@ -87,17 +87,17 @@ pub struct Measurement {
 
 /// A factored problem.
 pub struct Columns {
-    /// What the blocks are of.
-    pub parts: Arc<Parts>,
-    /// What was found on the way.
+    /// Matrix, rows and columns.
+    pub parts: Arc<AssembledProblem>,
+    /// Precision, accuracy and free response.
     pub measurement: Measurement,
     /// Blocks that the memory allows to be solved at a time.
     pub tasks: usize,
     sweeps: Sweeps,
 }
 
-/// Memory of one task that solves blocks: what it computes with, and the panel.
-pub enum Working {
+/// Memory of one task that solves blocks: for the sweeps and for the panel.
+pub enum TaskMemory {
     /// Of a store of halves.
     Single(Scratch<f32>, Vec<f32>),
     /// Computed in double, stored in single precision.
@@ -107,63 +107,63 @@ pub enum Working {
 }
 
 impl Columns {
-    /// Factorises, measures, and chooses the number format and the width of the blocks; `go_on` is asked between the steps.
+    /// Factorises, measures, and chooses the number format and the width of the blocks; `interrupt` is called between the steps.
     ///
     /// # Errors
     /// A singular stiffness, a bound of memory (bytes) that cannot be kept, or an interruption.
     pub fn new(
         problem: &Problem,
-        wanted: Wanted,
+        requested: RequestedPrecision,
         memory: Option<usize>,
         in_memory: bool,
-        phase: Listener<'_>,
-        go_on: &(dyn Fn() -> Result<()> + Sync),
+        phase: PhaseCallback<'_>,
+        interrupt: &(dyn Fn() -> Result<()> + Sync),
     ) -> Result<Self> {
-        let Made { stiffness, layout, route, sweeps, response, precision, accuracy } =
-            made(problem, wanted, memory, in_memory, phase, go_on)?;
+        let Factorization { stiffness, layout, route, sweeps, response, precision, accuracy } =
+            factorize(problem, requested, memory, in_memory, phase, interrupt)?;
         let measurement = Measurement { precision, accuracy, response: response.values, width: route.width };
-        let parts = Arc::new(Parts::of(problem, stiffness, layout));
+        let parts = Arc::new(AssembledProblem::of(problem, stiffness, layout));
         Ok(Self { parts, measurement, tasks: route.tasks, sweeps })
     }
 
-    /// Goes on with the columns in the order of other parts of the same problem.
-    pub fn arrange(&mut self, parts: Arc<Parts>) {
-        let wanted = &parts.layout.wanted;
+    /// Continues with the columns in the order of other parts of the same problem.
+    pub fn arrange(&mut self, parts: Arc<AssembledProblem>) {
+        let requested = &parts.layout.requests;
         match &mut self.sweeps {
-            Sweeps::Single(sweep) => sweep.tree.reading = Reading::new(&sweep.tree, wanted),
-            Sweeps::Double(sweep) => sweep.tree.reading = Reading::new(&sweep.tree, wanted),
+            Sweeps::Single(sweep) => sweep.tree.reading = Reading::new(&sweep.tree, requested),
+            Sweeps::Double(sweep) => sweep.tree.reading = Reading::new(&sweep.tree, requested),
         }
         self.parts = parts;
     }
 
     /// Memory for a task that solves blocks of up to `width` columns.
-    pub fn working(&self, width: usize) -> Working {
+    pub fn task_memory(&self, width: usize) -> TaskMemory {
         match &self.sweeps {
-            Sweeps::Single(sweep) => Working::Single(Scratch::new(&sweep.tree, width), Vec::new()),
+            Sweeps::Single(sweep) => TaskMemory::Single(Scratch::new(&sweep.tree, width), Vec::new()),
             Sweeps::Double(sweep) if self.measurement.precision == Precision::F64 => {
-                Working::Double(Scratch::new(&sweep.tree, width), Vec::new())
+                TaskMemory::Double(Scratch::new(&sweep.tree, width), Vec::new())
             }
-            Sweeps::Double(sweep) => Working::Mixed(Scratch::new(&sweep.tree, width), Vec::new()),
+            Sweeps::Double(sweep) => TaskMemory::Mixed(Scratch::new(&sweep.tree, width), Vec::new()),
         }
     }
 
     /// Solves a block; its panel's numbers, as bytes that are aligned for them.
     ///
     /// # Errors
-    /// Memory that was made for other columns.
-    pub fn solve<'w>(&self, block: &Block, working: &'w mut Working) -> Result<&'w [u8]> {
-        let Parts { stiffness, supports, layout } = self.parts.as_ref();
+    /// Memory allocated for other columns.
+    pub fn solve<'w>(&self, block: &Block, working: &'w mut TaskMemory) -> Result<&'w [u8]> {
+        let AssembledProblem { stiffness, supports, layout } = self.parts.as_ref();
         let system = System { stiffness, supports, layout };
         match (&self.sweeps, working) {
-            (Sweeps::Single(sweep), Working::Single(scratch, panel)) => {
+            (Sweeps::Single(sweep), TaskMemory::Single(scratch, panel)) => {
                 system.solve(sweep, block, scratch, panel);
                 Ok(bytemuck::cast_slice(panel))
             }
-            (Sweeps::Double(sweep), Working::Mixed(scratch, panel)) => {
+            (Sweeps::Double(sweep), TaskMemory::Mixed(scratch, panel)) => {
                 system.solve(sweep, block, scratch, panel);
                 Ok(bytemuck::cast_slice(panel))
             }
-            (Sweeps::Double(sweep), Working::Double(scratch, panel)) => {
+            (Sweeps::Double(sweep), TaskMemory::Double(scratch, panel)) => {
                 system.solve(sweep, block, scratch, panel);
                 Ok(bytemuck::cast_slice(panel))
             }

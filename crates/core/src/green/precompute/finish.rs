@@ -1,8 +1,8 @@
-//! Finished panels put together: the bounds of the rows, and the stored numbers of every column.
+//! Assembly of finished panels: the bounds of the rows, and the stored numbers of every column.
 
 use super::arrangement::Arrangement;
 use super::block::Block;
-use super::columns::Parts;
+use super::columns::AssembledProblem;
 use super::mirror::Mirror;
 use super::number::Number;
 use super::panels::Panels;
@@ -11,21 +11,21 @@ use crate::Result;
 use crate::green::entries::scales;
 use crate::green::precision::Precision;
 
-/// All panels, finished.
-pub struct Finished<'a, T> {
-    /// What they are of.
-    pub parts: &'a Parts,
-    /// How the store keeps them.
+/// The finished panels of a store.
+pub struct FinishedPanels<'a, T> {
+    /// Matrix, rows and columns.
+    pub parts: &'a AssembledProblem,
+    /// Their order in the store.
     pub arrangement: &'a Arrangement,
     /// Their columns.
     pub blocks: &'a [Block],
-    /// Them.
+    /// The panels.
     pub panels: &'a Panels<T>,
     /// Blocks put together at a time.
     pub tasks: usize,
 }
 
-impl<T: Number> Finished<'_, T> {
+impl<T: Number> FinishedPanels<'_, T> {
     fn mirror(&self) -> Mirror<'_, T> {
         Mirror { layout: &self.parts.layout, arrangement: self.arrangement, blocks: self.blocks, panels: self.panels }
     }
@@ -38,7 +38,7 @@ impl<T: Number> Finished<'_, T> {
         magnitudes(&self.mirror(), &self.parts.stiffness)
     }
 
-    /// Hands the bytes of every column to `put`, as column of the store and bytes, from several tasks at a time.
+    /// Calls `put(column of the store, bytes)` for every column, from several tasks at a time.
     ///
     /// # Errors
     /// That of reading a panel, or of `put`.

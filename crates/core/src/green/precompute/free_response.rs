@@ -1,4 +1,4 @@
-//! The free response: what the reference loads (weight, pressure, nodal forces) do to the body before anyone touches it.
+//! Free response: displacements and reactions under the reference loads alone (weight, pressure, nodal forces).
 //!
 //! With the loads `F` on all dofs as knowns of the reference problem, `v = Psi F_N` without forming the columns inside:
 //!
@@ -6,10 +6,9 @@
 //! u_N = K_NN^-1 F_N,      f_D = K_DN u_N
 //! ```
 //!
-//! `f_D` is `K u` on the supports: the support reaction is `f_D - F_D`, for what is loaded onto a support goes straight
-//! into it.
+//! `f_D` is `K u` on the supports: the support reaction is `f_D - F_D`, for a load on a support acts on it directly.
 //!
-//! It is corrected by its residual, which tells the error that it had: `K_NN e = F_N - K_NN u`, in the energy norm
+//! It is corrected by its residual, which gives the error before the correction: `K_NN e = F_N - K_NN u`, in the energy norm
 //! `sqrt(e^T K e)`.
 
 use super::inverse::Inverse;
@@ -22,7 +21,7 @@ use crate::{Error, Result};
 pub struct FreeResponse {
     /// Displacements, m, and forces, N; empty without loads.
     pub values: Vec<f64>,
-    /// The last correction, which bounds what is left.
+    /// The last correction, which bounds the remaining error.
     pub error: f64,
     /// Its energy norm, sqrt(J).
     pub size: f64,

@@ -1,8 +1,8 @@
-//! A store that grows: some nodes are computed first, and can be touched while the others follow.
+//! Precomputation in stages: a region is computed first and can be touched while the rest is computed.
 //!
-//! At the end of each stage the nodes that are ready are written as a store of their own and renamed over the one before:
-//! whatever reads that path finds a complete store. What people ask for meanwhile becomes the next stage, and the others
-//! are put into stages around it anew; finished blocks stay.
+//! At the end of each stage the nodes that are ready are written as a store of their own and renamed over the one before: a reader
+//! of that path always finds a complete store. Nodes requested meanwhile become the next stage, and the others are put into new
+//! stages around them; finished blocks stay.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,19 +12,19 @@ use super::column_store::ColumnStore;
 use super::columns::Columns;
 use super::problem::Problem;
 use super::solving::{Work, solve};
-use super::stages::{by_distance, growing, stages};
+use super::stages::{by_distance, split_growing, stages};
 use super::tasks::Progress;
 use crate::Error;
 use crate::Result;
 use std::sync::Arc;
 
-/// In which order a store grows, and who is told.
+/// Order in which a store grows, and callbacks.
 pub struct Growth<'a> {
     /// Nodes that are computed first, ranks among the surface nodes; empty for all at once.
     pub first: &'a [u32],
-    /// Asked between blocks, from any task, for nodes that are to be ready next.
+    /// Called between blocks, from any task; returns nodes that are to be ready next.
     pub next: &'a (dyn Fn() -> Option<Vec<u32>> + Sync),
-    /// Told how many nodes may be touched by the store that has been written.
+    /// Called with the number of touchable nodes of each written store.
     pub ready: &'a (dyn Fn(usize) + Sync),
 }
 
@@ -37,7 +37,7 @@ impl Growth<'_> {
         stages(&positions(problem), &problem.touch, self.first)
     }
 
-    /// Solves what is missing, and writes the store of every stage but the last.
+    /// Solves the missing blocks, and writes the store of every stage but the last.
     ///
     /// # Errors
     /// An interruption, or the operating system's.
@@ -50,7 +50,7 @@ impl Growth<'_> {
     ) -> Result<()> {
         let mut written = 0;
         while let Some(stage) = store.first_unfinished() {
-            // What an interrupted computation has finished before.
+            // Columns that an interrupted computation has finished.
             written = self.write(written, stage.first, columns, store, progress)?;
             let painted = self.solve(&stage.blocks, columns, store, progress)?;
             if painted.is_empty() {
@@ -61,14 +61,14 @@ impl Growth<'_> {
             let kept = store.begun();
             let waiting = parts.layout.waiting_nodes(kept);
             let stages = around(&positions(problem), &waiting, &painted, problem.touch.len() - waiting.len());
-            store.arrange(Arc::new(parts.arranged(kept, &stages)))?;
+            store.arrange(Arc::new(parts.with_stages(kept, &stages)))?;
             columns.arrange(Arc::clone(store.parts()));
         }
         Ok(())
     }
 
-    /// Writes the store of the first `end` columns if they are more than those written, not all, and whole nodes; how many
-    /// are written then.
+    /// Writes the store of the first `end` columns if they are more than those written, not all, and whole nodes. Returns the
+    /// number of written columns.
     fn write(
         &self,
         written: usize,
@@ -78,7 +78,7 @@ impl Growth<'_> {
         progress: Progress<'_>,
     ) -> Result<usize> {
         let layout = &columns.parts.layout;
-        if end <= written || end == layout.columns || !layout.is_whole(end) {
+        if end <= written || end == layout.columns || !layout.covers_whole_nodes(end) {
             return Ok(written);
         }
         store.write(end, columns.tasks, progress)?;
@@ -86,7 +86,7 @@ impl Growth<'_> {
         Ok(end)
     }
 
-    /// Solves blocks of a stage, until nodes are asked for that wait in another: these.
+    /// Solves blocks of a stage. Stops when nodes of another stage are requested, and returns them.
     fn solve(
         &self,
         blocks: &[usize],
@@ -94,7 +94,7 @@ impl Growth<'_> {
         store: &ColumnStore,
         progress: Progress<'_>,
     ) -> Result<Vec<u32>> {
-        let (layout, begun) = (&columns.parts.layout, store.begun_blocks());
+        let (layout, begun) = (&columns.parts.layout, store.leading_blocks());
         let painted = Mutex::new(Vec::new());
         let lock = || painted.lock().unwrap_or_else(PoisonError::into_inner);
         let begin = |block: usize| {
@@ -122,10 +122,10 @@ fn positions(problem: &Problem) -> Vec<DVec3> {
     problem.surface_nodes.iter().map(|&n| problem.mesh.nodes[n as usize]).collect()
 }
 
-/// Stages of the nodes that wait: the painted ones, then the others by their distance from them; `ready` are done.
+/// Stages of the remaining nodes: the painted ones, then the others by their distance from them; `ready` are done.
 fn around(positions: &[DVec3], waiting: &[u32], painted: &[u32], ready: usize) -> Vec<Vec<u32>> {
     let (painted, mut others): (Vec<u32>, Vec<u32>) = waiting.iter().partition(|node| painted.contains(node));
     by_distance(positions, &mut others, &painted);
     let before = ready + painted.len();
-    std::iter::once(painted).chain(growing(others, before)).collect()
+    std::iter::once(painted).chain(split_growing(others, before)).collect()
 }

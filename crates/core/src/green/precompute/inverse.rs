@@ -1,14 +1,14 @@
 //! `K_NN^-1` for loads on any free dof: sweeps through the whole tree, corrected by their residuals.
 //!
 //! The sweeps may be in single precision: each correction `x += S (f - K x)`, the residual in double, reduces the error by
-//! what the sweeps themselves are wrong by. Where that is not enough the operators are of no use for columns either.
+//! the relative error of the sweeps. If the corrections do not converge, the operators are of no use for columns either.
 
 use rayon::prelude::*;
 
 use super::number::Number;
 use super::operators::Operator;
 use super::sweep::{Scratch, Source, Sweep, loaded};
-use super::tree::{Tree, Wanted};
+use super::tree::{PositionRequest, Tree};
 use crate::fem::{Supports, SymmetricCsc};
 use crate::solver::Symbolic;
 use crate::solver::front::Eliminated;
@@ -16,10 +16,10 @@ use crate::solver::multifrontal::{Columns, Schedule};
 use crate::{Error, Result};
 
 /// Corrections stop when one is smaller than this part of the answer in the energy norm, or after so many.
-const ENOUGH: f64 = 1e-11;
-const MOST: usize = 6;
-/// An answer whose last correction was larger is not believed.
-const BELIEVED: f64 = 1e-5;
+const CORRECTION_TOLERANCE: f64 = 1e-11;
+const MAX_CORRECTIONS: usize = 6;
+/// Solutions whose last correction is larger are rejected.
+const MAX_LAST_CORRECTION: f64 = 1e-5;
 
 /// The factor of a body as sweeps through its whole tree.
 pub struct Inverse<'a, C> {
@@ -30,12 +30,12 @@ pub struct Inverse<'a, C> {
 }
 
 /// Refined columns and their errors in the energy norm, over the norm of the column.
-pub struct Refined {
+pub struct RefinedColumns {
     /// One column after the other, by rank of the free dofs.
     pub columns: Vec<f64>,
     /// Of each column: the first correction, the error of the sweeps alone.
     pub first: Vec<f64>,
-    /// Of each column: the last correction, which bounds what is left.
+    /// Of each column: the last correction, which bounds the remaining error.
     pub last: Vec<f64>,
     /// Of each column: its energy norm, sqrt(J).
     pub size: Vec<f64>,
@@ -45,20 +45,20 @@ impl<'a, C: Number> Inverse<'a, C> {
     /// Factorises in double precision.
     ///
     /// # Errors
-    /// A pivot that is not positive, or that of `go_on`.
+    /// A pivot that is not positive, or that of `interrupt`.
     pub fn new(
         symbolic: &Symbolic,
         schedule: &Schedule,
         positions: &'a [u32],
         stiffness: &'a SymmetricCsc,
         supports: &'a Supports,
-        go_on: &(dyn Fn() -> Result<()> + Sync),
+        interrupt: &(dyn Fn() -> Result<()> + Sync),
     ) -> Result<Self> {
         let supernodes = symbolic.supernodes()?;
         let columns = Permuted::new(positions, stiffness, supports);
         let keep = |factor: &Eliminated| Operator::<C>::all(factor);
-        let operators = schedule.run(supernodes, &columns, &keep, go_on)?.into_iter().flatten().collect();
-        let everything = Wanted { supports: true, ..Wanted::NOTHING };
+        let operators = schedule.run(supernodes, &columns, &keep, interrupt)?.into_iter().flatten().collect();
+        let everything = PositionRequest { supports: true, ..PositionRequest::NOTHING };
         let tree = Tree::new(supernodes, &vec![everything; positions.len()]);
         Ok(Self { sweep: Sweep { tree, operators }, stiffness, supports, positions })
     }
@@ -85,14 +85,14 @@ impl<'a, C: Number> Inverse<'a, C> {
     }
 
     /// Solves and corrects; `None` if the corrections do not become small.
-    pub fn refined(&self, loads: &[f64]) -> Option<Refined> {
+    pub fn refined(&self, loads: &[f64]) -> Option<RefinedColumns> {
         let rows = self.positions.len();
         let width = loads.len() / rows;
         let mut scratch = Scratch::new(&self.sweep.tree, width);
         let mut columns = loads.to_vec();
         self.solve(&mut scratch, &mut columns);
-        let mut found = Refined { columns, first: Vec::new(), last: Vec::new(), size: Vec::new() };
-        for _ in 0..MOST {
+        let mut found = RefinedColumns { columns, first: Vec::new(), last: Vec::new(), size: Vec::new() };
+        for _ in 0..MAX_CORRECTIONS {
             let mut residual = loads.to_vec();
             let columns = found.columns.par_chunks_exact(rows).zip(residual.par_chunks_exact_mut(rows));
             columns.for_each(|(x, r)| subtract_product(self.stiffness, self.supports, x, r));
@@ -101,17 +101,17 @@ impl<'a, C: Number> Inverse<'a, C> {
             found.columns.iter_mut().zip(&correction).for_each(|(x, e)| *x += e);
             found.size = energies(loads, &found.columns, rows);
             let energies = energies(&residual, &correction, rows);
-            // What is no number stays none, and is not believed.
+            // NaN stays NaN, and is rejected.
             found.last =
                 energies.iter().zip(&found.size).map(|(e, size)| if *size == 0.0 { 0.0 } else { e / size }).collect();
             if found.first.is_empty() {
                 found.first.clone_from(&found.last);
             }
-            if found.last.iter().all(|&last| last <= ENOUGH) {
+            if found.last.iter().all(|&last| last <= CORRECTION_TOLERANCE) {
                 break;
             }
         }
-        found.last.iter().all(|&last| last <= BELIEVED).then_some(found)
+        found.last.iter().all(|&last| last <= MAX_LAST_CORRECTION).then_some(found)
     }
 
     /// Memory for one column.
@@ -119,7 +119,7 @@ impl<'a, C: Number> Inverse<'a, C> {
         Scratch::new(&self.sweep.tree, 1)
     }
 
-    /// What the columns of `Psi` need of it.
+    /// Its part for the columns of `Psi`.
     ///
     /// # Errors
     /// Never: every node has an operator.
@@ -138,7 +138,7 @@ impl<'a, C: Number> Inverse<'a, C> {
         Ok(Sweep { tree, operators })
     }
 
-    /// Whether all of it are numbers.
+    /// Whether all entries are finite.
     pub fn is_finite(&self) -> bool {
         self.sweep.operators.par_iter().all(Operator::is_finite)
     }

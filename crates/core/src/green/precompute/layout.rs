@@ -1,4 +1,4 @@
-//! The rows and columns of `Psi`: which there are, and in which order they are solved.
+//! Rows and columns of `Psi`, and the order in which they are solved.
 //!
 //! A row has a rank: those with columns come first, moved supports before the others, which are by elimination; then
 //! those without. The columns are solved stage by stage, in a stage by rank: what is solved `k`-th has the place `k`. A
@@ -11,7 +11,7 @@ use super::block::Block;
 use super::problem::Problem;
 use super::runs::runs;
 use super::sweep::Source;
-use super::tree::{NONE, Tree, Wanted};
+use super::tree::{NONE, PositionRequest, Tree};
 use crate::fem::{Supports, SymmetricCsc};
 use crate::solver::Symbolic;
 
@@ -36,8 +36,8 @@ pub struct Layout {
     rank_of_dof: Vec<u32>,
     /// Permuted position of each free dof.
     positions: Vec<u32>,
-    /// What is wanted of each position.
-    pub wanted: Vec<Wanted>,
+    /// Request of each position.
+    pub requests: Vec<PositionRequest>,
 }
 
 /// Columns that are solved before all later ones, by their places.
@@ -45,7 +45,7 @@ pub struct Layout {
 pub struct Stage {
     /// Moved supports.
     pub supports: Range<usize>,
-    /// The others, right behind them.
+    /// The others, directly after them.
     pub forces: Range<usize>,
 }
 
@@ -78,10 +78,10 @@ impl Layout {
         }
         let (ranks, places) = ((0..columns as u32).collect(), (0..columns as u32).collect());
         let stages = vec![Stage { supports: 0..supported, forces: supported..columns }];
-        let wanted = Vec::new();
+        let requests = Vec::new();
         let mut layout =
-            Self { row_dofs, row_of_rank, columns, supported, ranks, places, stages, rank_of_dof, positions, wanted };
-        layout.want(stiffness, supports);
+            Self { row_dofs, row_of_rank, columns, supported, ranks, places, stages, rank_of_dof, positions, requests };
+        layout.find_requests(stiffness, supports);
         layout
     }
 
@@ -93,7 +93,7 @@ impl Layout {
             *stage = Stage { supports: until(&stage.supports), forces: until(&stage.forces) };
         }
         let mut stage_of_row = vec![NONE; self.row_dofs.len()];
-        // What is left of nodes that are solved in part comes first.
+        // The remaining columns of partly solved nodes come first.
         let cut: Vec<u32> = (0..kept).map(|place| self.row(place) as u32 / 3).collect();
         let first = std::iter::once((0, &cut));
         for (stage, nodes) in nodes.iter().enumerate().chain(first) {
@@ -117,7 +117,7 @@ impl Layout {
     }
 
     /// Takes over the beginning of another order: the rows of blocks, each of which is a stage of its own.
-    pub fn adopt(&mut self, blocks: &[Vec<u32>], stiffness: &SymmetricCsc, supports: &Supports) {
+    pub fn put_blocks_first(&mut self, blocks: &[Vec<u32>], stiffness: &SymmetricCsc, supports: &Supports) {
         let mut ranks = Vec::with_capacity(self.columns);
         self.stages.clear();
         for rows in blocks {
@@ -134,7 +134,7 @@ impl Layout {
     }
 
     /// Whether the columns of the first places are all the columns of some nodes.
-    pub fn is_whole(&self, columns: usize) -> bool {
+    pub fn covers_whole_nodes(&self, columns: usize) -> bool {
         let mut count = vec![0u8; self.row_dofs.len() / 3 + 1];
         (0..columns).for_each(|place| count[self.row(place) / 3] += 1);
         count.iter().all(|&count| count % 3 == 0)
@@ -152,12 +152,12 @@ impl Layout {
         for (place, &rank) in self.ranks.iter().enumerate() {
             self.places[rank as usize] = place as u32;
         }
-        self.want(stiffness, supports);
+        self.find_requests(stiffness, supports);
     }
 
-    /// Finds what is read at which position: a row with a column by its own stage and those before it.
-    fn want(&mut self, stiffness: &SymmetricCsc, supports: &Supports) {
-        let mut wanted = vec![Wanted::NOTHING; self.positions.len()];
+    /// Sets the readers of each position: a row with a column is read by its own stage and those before it.
+    fn find_requests(&mut self, stiffness: &SymmetricCsc, supports: &Supports) {
+        let mut requests = vec![PositionRequest::NOTHING; self.positions.len()];
         let at = |dof: u32| match supports.free_rank[dof as usize] {
             NONE => None,
             rank => Some(self.positions[rank as usize] as usize),
@@ -166,20 +166,20 @@ impl Layout {
         for (rank, &row) in self.row_of_rank.iter().enumerate() {
             let (dof, stage) = (self.row_dofs[row as usize], stage_of(rank));
             if let Some(position) = at(dof) {
-                wanted[position].stage = stage;
-                wanted[position].before = wanted[position].before.max(stage);
+                requests[position].stage = stage;
+                requests[position].before = requests[position].before.max(stage);
                 continue;
             }
-            // What reactions are made of: they are asked of every column before their own.
+            // Positions that enter reactions: every column before their own reads them.
             for position in stiffness.column(dof as usize).filter_map(|(other, _)| at(other)) {
-                wanted[position].supports = true;
-                wanted[position].before = wanted[position].before.max(stage);
+                requests[position].supports = true;
+                requests[position].before = requests[position].before.max(stage);
             }
         }
-        self.wanted = wanted;
+        self.requests = requests;
     }
 
-    /// What the order in which rows and columns are solved is made of.
+    /// Data that determine the order in which rows and columns are solved.
     pub fn order(&self) -> [&[u32]; 3] {
         [&self.row_dofs, &self.row_of_rank, &self.ranks]
     }
@@ -258,7 +258,7 @@ impl Layout {
     }
 
     /// Kept row of a dof, if it is free.
-    pub fn kept(&self, tree: &Tree, supports: &Supports, dof: u32) -> Option<u32> {
+    pub fn tree_row(&self, tree: &Tree, supports: &Supports, dof: u32) -> Option<u32> {
         match supports.free_rank[dof as usize] {
             NONE => None,
             rank => Some(tree.row_of_position[self.positions[rank as usize] as usize]),
@@ -270,12 +270,12 @@ impl Layout {
         let mut sources = Vec::new();
         for k in 0..block.width {
             let (dof, column) = (self.dof(block.first + k), k as u32);
-            if let Some(row) = self.kept(tree, supports, dof) {
+            if let Some(row) = self.tree_row(tree, supports, dof) {
                 sources.push(Source { row, column, value: 1.0 });
                 continue;
             }
             for (other, value) in stiffness.column(dof as usize) {
-                if let Some(row) = self.kept(tree, supports, other) {
+                if let Some(row) = self.tree_row(tree, supports, other) {
                     sources.push(Source { row, column, value: -value });
                 }
             }
@@ -301,7 +301,7 @@ impl Layout {
             stages: vec![Stage { supports: 0..0, forces: 0..rows.len() }],
             rank_of_dof: (0..count).collect(),
             positions: Vec::new(),
-            wanted: Vec::new(),
+            requests: Vec::new(),
         }
     }
 }

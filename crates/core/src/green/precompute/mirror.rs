@@ -12,11 +12,11 @@ use super::runs::runs;
 use super::tasks::in_tasks;
 use crate::Result;
 
-/// The panels with what is known of their places.
+/// The panels and their order.
 pub struct Mirror<'a, T> {
     /// Rows and columns.
     pub layout: &'a Layout,
-    /// How they are kept.
+    /// Their blocks.
     pub arrangement: &'a Arrangement,
     /// Blocks of columns that are ready: the first ones.
     pub blocks: &'a [Block],
@@ -33,8 +33,7 @@ pub fn numbers(layout: &Layout, width: usize) -> usize {
 const ROWS_AT_ONCE: usize = 256;
 
 impl<T: Number> Mirror<'_, T> {
-    /// Hands every column to `take`, as its place in the order and its rows in the order of the store, from up
-    /// to `tasks` tasks at a time.
+    /// Calls `take(place in the order, rows in the order of the store)` for every column, from up to `tasks` tasks at a time.
     ///
     /// # Errors
     /// That of reading a panel, or of `take`.
@@ -101,8 +100,8 @@ impl<T: Number> Mirror<'_, T> {
         Ok(())
     }
 
-    /// Rows `ranks` of an earlier panel, which are columns of a later block: contiguous pieces of lines. `solved` says how
-    /// many of the ranks below each are columns up to and with those of that panel.
+    /// Rows `ranks` of an earlier panel, which are columns of a later block: contiguous pieces of lines. `solved` has for
+    /// each rank the number of lower ranks that are columns up to and including those of that panel.
     fn rows(&self, earlier: usize, solved: &[usize], ranks: &[u32], panel: &mut Vec<T>) -> Result<()> {
         let width = self.blocks[earlier].width;
         panel.resize(ranks.len() * width, T::default());

@@ -2,19 +2,19 @@
 //!
 //! A [`Problem`] is ordered and counted ([`plan`]), factorised ([`crate::solver`]), cut down to a tree of small operators,
 //! and swept block of columns by block ([`Columns`]); the finished panels are then mirrored into the store
-//! ([`ColumnStore`]). Both may be in one process, or the columns in several. The columns are solved in stages ([`Growth`]).
+//! ([`ColumnStore`]). Both may run in one process, or the columns in several. The columns are solved in stages ([`Growth`]).
 
 mod arrangement;
 mod block;
 mod claim;
 mod column_store;
 mod columns;
+mod factorization;
 mod finish;
 mod free_response;
 mod growth;
 mod inverse;
 mod layout;
-mod made;
 mod mirror;
 mod number;
 mod operators;
@@ -37,11 +37,11 @@ mod tasks;
 mod tree;
 
 pub use claim::Claim;
-pub use column_store::{ColumnStore, Found, Target, checksum};
-pub use columns::{Columns, Measurement, Parts, Working};
+pub use column_store::{ColumnStore, PreviousWork, Target, checksum};
+pub use columns::{AssembledProblem, Columns, Measurement, TaskMemory};
+pub use factorization::RequestedPrecision;
 pub use growth::Growth;
-pub use made::Wanted;
-pub use phase::{Listener, Phase};
+pub use phase::{Phase, PhaseCallback};
 pub use plan::Plan;
 pub use problem::Problem;
 pub use rate::products;

@@ -1,4 +1,4 @@
-//! Numbers that are computed with and stored.
+//! Number types for computing and storing.
 
 use std::iter::Sum;
 use std::ops::{AddAssign, Neg, SubAssign};

@@ -84,7 +84,7 @@ impl<C: Number> Operator<C> {
         Self { size: rows.len(), g: columns, m: square }
     }
 
-    /// Whether all are numbers.
+    /// Whether all are finite.
     pub fn is_finite(&self) -> bool {
         self.g.iter().chain(&self.m).all(|value| value.to_f64().is_finite())
     }

@@ -1,4 +1,4 @@
-//! Finished blocks of columns, until the operator is put together from them.
+//! Finished blocks of columns, until the operator is assembled from them.
 //!
 //! A block's panel holds, for each of its columns, the rows from the block's first column on in solving order, those
 //! without a column last; the numbers of a row are contiguous. Everything earlier is the mirror
@@ -10,7 +10,7 @@ use super::number::Number;
 use super::partial::Partial;
 use crate::{Error, Result};
 
-/// Where the panels are kept.
+/// Storage of the panels.
 pub enum Panels<T> {
     /// In memory.
     Memory(Vec<OnceLock<Vec<T>>>),
@@ -19,12 +19,12 @@ pub enum Panels<T> {
 }
 
 impl<T: Number> Panels<T> {
-    /// Room for some blocks in memory.
+    /// Memory for some blocks.
     pub fn in_memory(blocks: usize) -> Self {
         Panels::Memory((0..blocks).map(|_| OnceLock::new()).collect())
     }
 
-    /// Keeps the panel of a block.
+    /// Stores the panel of a block.
     ///
     /// # Errors
     /// The operating system's.
@@ -41,7 +41,7 @@ impl<T: Number> Panels<T> {
     /// Copies numbers of a panel, from its number `at` on.
     ///
     /// # Errors
-    /// The operating system's, or a block that is not there.
+    /// The operating system's, or a missing block.
     pub fn get(&self, block: usize, at: usize, out: &mut [T]) -> Result<()> {
         match self {
             Panels::Memory(panels) => {

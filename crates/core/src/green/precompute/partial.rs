@@ -1,10 +1,10 @@
-//! What an interrupted computation leaves: the finished panels, in a file beside the store.
+//! Partial file: the finished panels of an unfinished computation, beside the store.
 //!
-//! Layout: a line of JSON that says what is being computed, padded to [`HEADER`] bytes; the row of each column in solving
+//! Layout: a line of JSON that describes the computation, padded to [`HEADER`] bytes; the row of each column in solving
 //! order, four bytes each, marked where a block begins; a BLAKE3 sum for each column, used by the first of a block; the
 //! panels. A panel is written before its sum. The sum also covers the rows of its columns and of all columns before them,
-//! for these decide which rows a panel has: a block that is torn, missing or of another order has a sum that does not fit
-//! and is computed again. The order of columns behind the last finished block may change while the file is in use. One
+//! for these determine the rows of a panel: a block that is torn, missing or of another order has a wrong sum and is computed
+//! again. The order of columns behind the last finished block may change while the file is in use. One
 //! process writes it at a time ([`Claim`]); before a store made of its panels gets its name, they are compared with their
 //! sums once more ([`Partial::verify`]).
 
@@ -25,7 +25,7 @@ const HEADER: usize = 512;
 /// Bytes of a checksum.
 const SUM: usize = 32;
 /// Added to the row of a column with which a block begins.
-const BEGINS: u32 = 1 << 31;
+const BLOCK_START: u32 = 1 << 31;
 
 /// Panels in a file.
 pub struct Partial {
@@ -34,11 +34,11 @@ pub struct Partial {
     columns: usize,
     rows: usize,
     number: usize,
-    blocks: Vec<Held>,
+    blocks: Vec<FileBlock>,
 }
 
 /// A block and its place in the file.
-struct Held {
+struct FileBlock {
     /// First column, in solving order, and the rows of all.
     first: usize,
     rows: Vec<u32>,
@@ -47,11 +47,11 @@ struct Held {
     /// First byte of its panel, and how many there are.
     start: u64,
     length: usize,
-    /// Sum of the panel that is there.
+    /// Sum of the finished panel.
     sum: Mutex<Option<blake3::Hash>>,
 }
 
-impl Held {
+impl FileBlock {
     fn sum_of(&self, panel: &[u8]) -> blake3::Hash {
         let mut hash = blake3::Hasher::new();
         hash.update(self.order.as_bytes());
@@ -68,11 +68,11 @@ impl Held {
 }
 
 impl Partial {
-    /// Goes on with what an interrupted computation of the same thing left, or begins anew; [`Self::arrange`] then says
-    /// which blocks there are to be.
+    /// Resumes the file of an interrupted computation of the same problem, or begins a new one; [`Self::arrange`] then sets the
+    /// blocks.
     ///
     /// `description` names everything that determines the numbers but for the order of the columns. Returns whether
-    /// something with another description had to be thrown away.
+    /// a file with another description was discarded.
     ///
     /// # Errors
     /// The operating system's.
@@ -106,7 +106,7 @@ impl Partial {
         self.claim.file()
     }
 
-    /// The user knows the store asked for, not the file beside it.
+    /// Errors name the store, for the user has not named the file beside it.
     fn io(&self, source: io::Error) -> Error {
         Error::Io { path: self.claim.target().to_owned(), source }
     }
@@ -116,7 +116,7 @@ impl Partial {
         (HEADER + (size_of::<u32>() + SUM) * self.columns) as u64
     }
 
-    /// Finds the blocks that the file speaks of, and those of them whose sums fit.
+    /// Finds the blocks listed in the file, and those of them with correct sums.
     fn find_blocks(&mut self) -> io::Result<()> {
         let (mut table, mut sums) = (vec![0u32; self.columns], vec![0; SUM * self.columns]);
         if self.file().read_exact_at(bytemuck::cast_slice_mut(&mut table), HEADER as u64).is_err()
@@ -125,26 +125,27 @@ impl Partial {
             return Ok(());
         }
         let mut seen = vec![false; self.rows];
-        let is_new =
-            |entry: &u32| seen.get_mut((entry & !BEGINS) as usize).is_some_and(|seen| !std::mem::replace(seen, true));
-        if table.first().is_none_or(|entry| entry & BEGINS == 0) || !table.iter().all(is_new) {
+        let is_new = |entry: &u32| {
+            seen.get_mut((entry & !BLOCK_START) as usize).is_some_and(|seen| !std::mem::replace(seen, true))
+        };
+        if table.first().is_none_or(|entry| entry & BLOCK_START == 0) || !table.iter().all(is_new) {
             return Ok(());
         }
         let mut panel = Vec::new();
-        for rows in table.chunk_by(|_, next| next & BEGINS == 0) {
-            let held = self.next(rows.iter().map(|entry| entry & !BEGINS).collect());
-            let sum = &sums[SUM * held.first..][..SUM];
-            panel.resize(held.length, 0);
-            if sum.iter().any(|&byte| byte != 0) && self.file().read_exact_at(&mut panel, held.start).is_ok() {
-                *held.sum() = Some(held.sum_of(&panel)).filter(|found| found.as_bytes() == sum);
+        for rows in table.chunk_by(|_, next| next & BLOCK_START == 0) {
+            let block = self.next(rows.iter().map(|entry| entry & !BLOCK_START).collect());
+            let sum = &sums[SUM * block.first..][..SUM];
+            panel.resize(block.length, 0);
+            if sum.iter().any(|&byte| byte != 0) && self.file().read_exact_at(&mut panel, block.start).is_ok() {
+                *block.sum() = Some(block.sum_of(&panel)).filter(|found| found.as_bytes() == sum);
             }
-            self.blocks.push(held);
+            self.blocks.push(block);
         }
         Ok(())
     }
 
-    /// The block of these rows behind the last one.
-    fn next(&self, rows: Vec<u32>) -> Held {
+    /// The block of these rows after the last one.
+    fn next(&self, rows: Vec<u32>) -> FileBlock {
         let mut order = blake3::Hasher::new();
         let (mut first, mut start) = (0, self.panels());
         if let Some(last) = self.blocks.last() {
@@ -153,16 +154,16 @@ impl Partial {
         }
         let order = order.update(bytemuck::cast_slice(&rows)).finalize();
         let length = rows.len() * (self.rows - first) * self.number;
-        Held { first, rows, order, start, length, sum: Mutex::new(None) }
+        FileBlock { first, rows, order, start, length, sum: Mutex::new(None) }
     }
 
     /// Rows of the blocks up to the last one that is finished.
     pub fn begun(&self) -> Vec<Vec<u32>> {
-        let count = self.blocks.iter().rposition(Held::is_finished).map_or(0, |last| last + 1);
-        self.blocks[..count].iter().map(|held| held.rows.clone()).collect()
+        let count = self.blocks.iter().rposition(FileBlock::is_finished).map_or(0, |last| last + 1);
+        self.blocks[..count].iter().map(|block| block.rows.clone()).collect()
     }
 
-    /// Takes other blocks. Those that are as they were stay finished.
+    /// Sets other blocks. Unchanged ones stay finished.
     ///
     /// # Errors
     /// The operating system's.
@@ -172,24 +173,24 @@ impl Partial {
         for block in blocks {
             let rows: Vec<u32> =
                 (block.first..block.first + block.width).map(|place| layout.row(place) as u32).collect();
-            table.extend(rows.iter().enumerate().map(|(k, &row)| if k == 0 { row | BEGINS } else { row }));
-            let mut held = self.next(rows);
+            table.extend(rows.iter().enumerate().map(|(k, &row)| if k == 0 { row | BLOCK_START } else { row }));
+            let mut block = self.next(rows);
             if same && let Some(old) = before.next() {
-                same = old.order == held.order && old.rows.len() == held.rows.len();
-                held = if same { old } else { held };
+                same = old.order == block.order && old.rows.len() == block.rows.len();
+                block = if same { old } else { block };
             }
-            self.blocks.push(held);
+            self.blocks.push(block);
         }
         let table = bytemuck::cast_slice(&table);
         self.file().write_all_at(table, HEADER as u64).map_err(|error| self.io(error))
     }
 
-    /// Where the checksum of the block stands that begins with a column.
+    /// Offset of the checksum of the block that begins with a column.
     fn sum_at(&self, first: usize) -> u64 {
         (HEADER + size_of::<u32>() * self.columns + SUM * first) as u64
     }
 
-    /// Whether a block is there.
+    /// Whether a block is finished.
     pub fn has(&self, block: usize) -> bool {
         self.blocks[block].is_finished()
     }
@@ -199,13 +200,13 @@ impl Partial {
     /// # Errors
     /// The operating system's.
     pub fn put(&self, block: usize, panel: &[u8]) -> Result<()> {
-        let held = &self.blocks[block];
-        let sum = held.sum_of(panel);
+        let block = &self.blocks[block];
+        let sum = block.sum_of(panel);
         self.file()
-            .write_all_at(panel, held.start)
-            .and_then(|()| self.file().write_all_at(sum.as_bytes(), self.sum_at(held.first)))
+            .write_all_at(panel, block.start)
+            .and_then(|()| self.file().write_all_at(sum.as_bytes(), self.sum_at(block.first)))
             .map_err(|error| self.io(error))?;
-        *held.sum() = Some(sum);
+        *block.sum() = Some(sum);
         Ok(())
     }
 
@@ -218,17 +219,17 @@ impl Partial {
         self.file().read_exact_at(out, at).map_err(|error| self.io(error))
     }
 
-    /// Compares the first blocks with the sums that they had when they were finished. Called after they were read: what
-    /// was read is then what was computed. A block that has changed is no longer there.
+    /// Compares the first blocks with the sums that they had when they were finished. Called after they were read,
+    /// so that the read numbers are the computed ones. A changed block counts as missing.
     ///
     /// # Errors
     /// A block that another program has changed, or the operating system's.
     pub fn verify(&self, blocks: usize) -> Result<()> {
-        self.blocks[..blocks].par_iter().try_for_each_init(Vec::new, |panel, held| {
-            panel.resize(held.length, 0);
-            self.file().read_exact_at(panel, held.start).map_err(|error| self.io(error))?;
-            let mut sum = held.sum();
-            if *sum == Some(held.sum_of(panel)) {
+        self.blocks[..blocks].par_iter().try_for_each_init(Vec::new, |panel, block| {
+            panel.resize(block.length, 0);
+            self.file().read_exact_at(panel, block.start).map_err(|error| self.io(error))?;
+            let mut sum = block.sum();
+            if *sum == Some(block.sum_of(panel)) {
                 return Ok(());
             }
             *sum = None;
@@ -254,7 +255,7 @@ mod tests {
 
     const BLOCKS: [Block; 2] = [Block { first: 0, width: 2, rows: 3 }, Block { first: 2, width: 1, rows: 1 }];
 
-    /// The blocks of three rows, all with columns, in an order: in a file, those begun there, and whether it was another's.
+    /// The file for three rows in an order, all with columns; whether another file was discarded; and the blocks found.
     fn open(path: &Path, what: &str, rows: &[u32]) -> (Partial, bool, Vec<Vec<u32>>) {
         let layout = Layout::of_rows(rows);
         let claim = Claim::take(path).expect("a writable folder").expect("nobody else's store");
@@ -275,7 +276,7 @@ mod tests {
         assert!(!discarded && !partial.has(0) && !partial.has(1) && begun.is_empty());
         partial.put(0, &[7; 24]).expect("a writable file");
         partial.put(1, &[8; 4]).expect("a writable file");
-        // The sum of the second block is there, its numbers are not.
+        // The file has the sum of the second block, but not its numbers.
         partial.file().write_all_at(&[9; 4], partial.blocks[1].start).expect("a writable file");
         drop(partial);
         let (resumed, discarded, begun) = open(&path, "one", &[2, 0, 1]);
@@ -330,7 +331,7 @@ mod tests {
         let claim = Claim::take(&path).expect("a writable folder").expect("nobody else's store");
         claim.file().set_len(1).expect("a writable file");
         claim.discard();
-        // The file without a name keeps nobody out, and its end removes nothing of theirs.
+        // A removed file excludes no other process, and dropping it removes no other file.
         let next = Claim::take(&path).expect("a writable folder").expect("nobody else's store");
         drop(claim);
         assert!(Claim::take(&path).expect("a writable folder").is_none());

@@ -1,15 +1,15 @@
-//! The phases of a precomputation, told to whoever waits for it. What each takes is for the listener's clock.
+//! Phases of a precomputation, reported to a callback, which measures the time of each.
 
-/// What a precomputation is doing.
+/// Phase of a precomputation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Stiffness from the elements.
     Assembly,
-    /// Fill-reducing order, structure of the factor, and what of it is needed.
+    /// Fill-reducing order, structure of the factor, and its needed part.
     Ordering,
     /// The factor, and the operators of the sweeps from it.
     Factor,
-    /// How accurate answers will be.
+    /// Accuracy of the answers.
     Accuracy,
     /// Columns, block by block.
     Columns,
@@ -18,7 +18,7 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// As a user reads it.
+    /// Name for users.
     pub fn name(self) -> &'static str {
         match self {
             Phase::Assembly => "assembling",
@@ -32,4 +32,4 @@ impl Phase {
 }
 
 /// Called as each phase begins.
-pub type Listener<'a> = &'a (dyn Fn(Phase) + Sync);
+pub type PhaseCallback<'a> = &'a (dyn Fn(Phase) + Sync);

@@ -1,4 +1,4 @@
-//! What a precomputation will do and need, counted before any number is computed.
+//! Symbolic analysis of a precomputation: columns, operations, memory and blocks, before any number is computed.
 
 use rayon::current_num_threads;
 
@@ -6,7 +6,7 @@ use super::block::Block;
 use super::layout::Layout;
 use super::mirror;
 use super::operators::operator_numbers;
-use super::phase::{Listener, Phase};
+use super::phase::{Phase, PhaseCallback};
 use super::probe;
 use super::problem::Problem;
 use super::sweep::{loaded, scratch_numbers};
@@ -21,15 +21,15 @@ use crate::{Error, Result};
 /// Columns of a block, best first: enough for the matrix products, few enough for the cache and to share among tasks.
 /// Multiples of 48, the width of the product's innermost kernel.
 const WIDTHS: [usize; 4] = [192, 96, 48, 24];
-/// Fewer blocks than this are shared badly among tasks: a smaller body takes narrower ones. It does not depend on the
+/// Least number of blocks, for balance among tasks: a smaller body has narrower ones. It does not depend on the
 /// number of threads, so that the bits do not either.
 const FEWEST_BLOCKS: usize = 24;
-/// Bytes that the allocator, METIS and the tasks' stacks take beside what is counted, measured.
+/// Bytes of the allocator, METIS and the tasks' stacks beyond the counted ones, measured.
 const OVERHEAD_BYTES: usize = 24 << 20;
 /// The counts of a precomputation.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Number format it was counted for.
+    /// Number format of the counts.
     pub precision: Precision,
     /// Order of the factorised matrix.
     pub free_dofs: usize,
@@ -50,14 +50,14 @@ pub struct Plan {
     pub width: usize,
     /// Blocks solved at a time.
     pub tasks: usize,
-    /// Peak of the memory taken, beside what the process holds already, bytes.
+    /// Peak of the memory beyond that in use at the start, bytes.
     pub memory: usize,
     /// Size of the operator in its store, bytes.
     pub store: usize,
 }
 
-/// Everything that precedes the first number.
-pub struct Prepared {
+/// Symbolic analysis: stiffness, order, structure of the factor, rows and columns.
+pub struct SymbolicAnalysis {
     /// Stiffness of all dofs.
     pub stiffness: SymmetricCsc,
     /// Order and structure of the factor.
@@ -70,39 +70,39 @@ pub struct Prepared {
     pub schedule: Schedule,
 }
 
-/// Blocks of columns, and how they are solved.
-pub struct Route {
-    /// Them.
+/// Blocks of columns and number of tasks.
+pub struct BlockPlan {
+    /// The blocks.
     pub blocks: Vec<Block>,
     /// Columns of a block.
     pub width: usize,
     /// Blocks solved at a time.
     pub tasks: usize,
-    /// Peak of the memory taken, bytes.
+    /// Peak of the memory, bytes.
     pub peak: usize,
 }
 
-/// What a route has to fit.
+/// Bounds of a plan of blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// Bytes that may be taken; `None`: any.
+    /// Bound of memory, bytes; `None` for none.
     pub memory: Option<usize>,
-    /// The operator itself is to be held, too.
+    /// Whether the operator itself is held in memory too.
     pub in_memory: bool,
 }
 
-impl Prepared {
+impl SymbolicAnalysis {
     /// Assembles and orders.
     ///
     /// # Errors
     /// Not enough memory.
-    pub fn new(problem: &Problem, phase: Listener<'_>) -> Result<Self> {
+    pub fn new(problem: &Problem, phase: PhaseCallback<'_>) -> Result<Self> {
         phase(Phase::Assembly);
         let stiffness = crate::fem::stiffness(&problem.mesh, &problem.materials);
         phase(Phase::Ordering);
         let symbolic = Symbolic::new(&stiffness, &problem.supports)?;
         let layout = Layout::new(problem, &stiffness, &symbolic);
-        let tree = Tree::new(symbolic.supernodes()?, &layout.wanted);
+        let tree = Tree::new(symbolic.supernodes()?, &layout.requests);
         let schedule = Schedule::new(symbolic.supernodes()?);
         Ok(Self { stiffness, symbolic, layout, tree, schedule })
     }
@@ -111,17 +111,17 @@ impl Prepared {
     ///
     /// # Errors
     /// A bound that cannot be kept, with what would fit.
-    pub fn route(&self, precision: Precision, bounds: Bounds) -> Result<Route> {
+    pub fn plan_blocks(&self, precision: Precision, bounds: Bounds) -> Result<BlockPlan> {
         let sizes = Sizes::new(self, precision, bounds)?;
         let (width, tasks, peak) = sizes.choose(&self.layout, &self.tree, bounds.memory)?;
-        Ok(Route { blocks: self.layout.blocks(width), width, tasks, peak })
+        Ok(BlockPlan { blocks: self.layout.blocks(width), width, tasks, peak })
     }
 
-    /// The counts of a route.
+    /// The counts of a plan of blocks.
     ///
     /// # Errors
     /// Never: the structure is made supernodal.
-    pub fn plan(&self, problem: &Problem, precision: Precision, route: &Route) -> Result<Plan> {
+    pub fn plan(&self, problem: &Problem, precision: Precision, route: &BlockPlan) -> Result<Plan> {
         let Self { stiffness, symbolic, layout, tree, .. } = self;
         let system = System { stiffness, supports: &problem.supports, layout };
         Ok(Plan {
@@ -164,14 +164,14 @@ struct Sizes {
     operators: usize,
     /// The operator and its panels, if they are held.
     result: usize,
-    /// Of a number in a panel, and of one that is computed with.
+    /// Bytes of a number in a panel, and of one in the sweeps.
     stored: usize,
     computed: usize,
 }
 
 impl Sizes {
-    fn new(prepared: &Prepared, precision: Precision, bounds: Bounds) -> Result<Self> {
-        let Prepared { stiffness, symbolic, layout, tree, schedule } = prepared;
+    fn new(prepared: &SymbolicAnalysis, precision: Precision, bounds: Bounds) -> Result<Self> {
+        let SymbolicAnalysis { stiffness, symbolic, layout, tree, schedule } = prepared;
         let supernodes = symbolic.supernodes()?;
         let (stored, computed) = (precision.panel_bytes(), precision.computed_bytes());
         let (dofs, threads) = (stiffness.dimension, current_num_threads());

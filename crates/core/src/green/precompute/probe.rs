@@ -1,9 +1,9 @@
-//! The error of the columns of a body, measured on a few of them before the others are computed.
+//! Accuracy probe: the error of the columns, measured on a few of them before the others are computed.
 //!
-//! The three columns of some nodes are solved and corrected by their residuals until these are small, which leaves what
-//! rounding the entries of `K` itself does. Beside them stand the columns that the sweeps give, and with the
-//! patches around those nodes typical contacts are solved: their errors by the same estimate as an answer's
-//! ([`crate::green::accuracy`]). Columns of supports are measured all at once, by random motions of theirs.
+//! The three columns of some nodes are solved and corrected by their residuals until these are small; only the rounding of the
+//! entries of `K` itself remains. The columns of the sweeps are compared with them. Typical contacts are solved with the patches
+//! around those nodes, and their errors estimated as those of an answer ([`crate::green::accuracy`]). Columns of supports are
+//! measured all at once, by random motions of theirs.
 
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
@@ -19,7 +19,7 @@ use crate::green::accuracy::{Accuracy, Pressed, ROUNDING_MARGIN, largest, roundi
 use crate::green::precision::Precision;
 use crate::solver::Condition;
 
-/// Patches that are probed, and nodes of each: some per cent of the columns of a body of 600 touchable nodes.
+/// Probed patches, and nodes of each: some per cent of the columns of a body of 600 touchable nodes.
 const PATCHES: usize = 3;
 const NODES: usize = 8;
 /// Columns of a patch.
@@ -40,11 +40,11 @@ pub struct Patch {
     exact: Vec<[f64; 3]>,
 }
 
-/// What is compared with.
+/// References of the comparison.
 pub struct Probe {
     patches: Vec<Patch>,
-    /// Error of the factor's own columns in the energy norm, `|w_j| / s_j`: of sweeps in double precision before they were
-    /// corrected, of others what corrections left, for theirs is told by the entries.
+    /// Error of the factor's own columns in the energy norm, `|w_j| / s_j`: for sweeps in double precision before the
+    /// corrections, for others after them, since the entries show the error of those sweeps.
     pub factor_error: f64,
     /// Error of the supports' columns ([`Accuracy::supports`]).
     pub supports_error: f64,
@@ -68,7 +68,7 @@ impl Probe {
             |nodes: Vec<u32>| nodes.into_iter().flat_map(|node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
         let patches: Vec<Vec<u32>> = chosen_patches(problem, condition).into_iter().map(dofs_of).collect();
         let Some(first) = patches.first() else {
-            // Nothing but supports may be touched: what the condition number allows.
+            // Only supports are touchable: the error by the condition number.
             probe.factor_error = condition.number * f64::EPSILON;
             return Some(probe);
         };
@@ -87,7 +87,7 @@ impl Probe {
         Some(probe)
     }
 
-    /// Whether there is no patch: only supports may be touched.
+    /// Whether there is no patch: only supports are touchable.
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
     }
@@ -99,7 +99,7 @@ impl Probe {
         Squares(self.patches.iter().map(of).collect())
     }
 
-    /// Largest error of what the sweeps computed, over `s_i s_j`.
+    /// Largest error of the sweeps' entries, over `s_i s_j`.
     pub fn computed_error(&self, squares: &Squares) -> f64 {
         let mut largest = self.factor_error;
         for (patch, square) in self.patches.iter().zip(&squares.0) {
@@ -110,7 +110,7 @@ impl Probe {
                 }
             }
         }
-        // A column of no number is as wrong as can be.
+        // NaN counts as the largest error.
         if largest.is_finite() { largest } else { 1.0 }
     }
 }
@@ -122,7 +122,7 @@ impl Squares {
     /// Adds to `measured` the errors of typical contacts with these entries: of the force of pressed nodes and patches, and
     /// of nodal forces under stamps.
     pub fn typical(&self, measured: Accuracy, precision: Precision) -> Accuracy {
-        // Contacts are as deep as they please, loads are not: theirs is told by the answers.
+        // Contacts may be of any depth, loads may not: the error of the loads is estimated with the answers.
         let entries = Accuracy { computed: measured.computed, ..Accuracy::default() };
         let mut typical = measured;
         for square in &self.0 {
@@ -197,7 +197,7 @@ fn chosen_patches(problem: &Problem, condition: &Condition) -> Vec<Vec<u32>> {
 /// The patch's rows of its columns, as the sweeps compute them; the mean of both halves.
 fn swept<C: Number>(system: &System<'_>, sweep: &Sweep<C>, scratch: &mut Scratch<C>, dofs: &[u32]) -> Mat<f64> {
     let (tree, width) = (&sweep.tree, dofs.len());
-    let rows: Vec<u32> = dofs.iter().filter_map(|&dof| system.layout.kept(tree, system.supports, dof)).collect();
+    let rows: Vec<u32> = dofs.iter().filter_map(|&dof| system.layout.tree_row(tree, system.supports, dof)).collect();
     let source = |(column, &row): (usize, &u32)| Source { row, column: column as u32, value: 1.0 };
     let sources: Vec<Source> = rows.iter().enumerate().map(source).collect();
     sweep.solve(scratch, &sources, &loaded(tree, width, &sources), &vec![width; tree.nodes.len()]);
@@ -253,7 +253,7 @@ fn stamp_error(square: &Mat<f64>, accuracy: Accuracy, precision: Precision) -> f
     (0..3).map(of_axis).map(finite).fold(0.0, f64::max)
 }
 
-/// An error without a number is one of everything.
+/// NaN as an error of one.
 fn finite(error: f64) -> f64 {
     if error.is_finite() { error } else { 1.0 }
 }

@@ -28,15 +28,15 @@ impl Problem {
     /// Content key of the Green's function with this precision (`None`: chosen by the body): mesh, materials, supports,
     /// loads, touch region.
     ///
-    /// In which order the columns were computed is no part of it, nor is how many were computed together: both follow from
-    /// what was asked for first and from the memory there was, and change the last bits only, below the accuracy that the
-    /// store states. A store of hours would otherwise be refused where another place was to be touched first.
+    /// The order of the columns and the width of the blocks are no part of it. Both depend on the nodes requested first and on the
+    /// available memory, and change the last bits only, below the stated accuracy. Otherwise a store of hours would be rejected for
+    /// another order of touching.
     pub fn key(&self, precision: Option<Precision>) -> String {
         self.key_of_touch(precision).of(&self.touch)
     }
 
     /// The keys of this problem for any touch region.
-    pub fn key_of_touch(&self, precision: Option<Precision>) -> KeyOfTouch {
+    pub fn key_of_touch(&self, precision: Option<Precision>) -> TouchKey {
         let mut key = ContentKey::new(self.mesh.tets.element_name(), precision);
         key.section(bytemuck::cast_slice(&self.mesh.nodes));
         key.section(bytemuck::cast_slice(self.mesh.tets.as_flattened()));
@@ -46,7 +46,7 @@ impl Problem {
         }
         key.section(bytemuck::cast_slice(&self.supports.fixed));
         key.section(bytemuck::cast_slice(&self.surface_nodes));
-        KeyOfTouch { before: key, loads: self.loads.clone() }
+        TouchKey { before: key, loads: self.loads.clone() }
     }
 
     /// The surface in its own numbering.
@@ -77,13 +77,13 @@ impl Problem {
     }
 }
 
-/// What the key of a problem is made of, but for its touch region.
-pub struct KeyOfTouch {
+/// Data of the key of a problem, without its touch region.
+pub struct TouchKey {
     before: ContentKey,
     loads: Vec<f64>,
 }
 
-impl KeyOfTouch {
+impl TouchKey {
     /// The key with these touchable nodes, ascending ranks among the surface nodes.
     pub fn of(&self, touch: &[u32]) -> String {
         let mut key = self.before.clone();

@@ -1,4 +1,4 @@
-//! Products of matrices like those of a precomputation: whoever has a clock learns from them how fast a machine is.
+//! Matrix products like those of a precomputation, to measure the speed of a machine.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
@@ -9,7 +9,7 @@ use super::number::Number;
 const SIZE: usize = 384;
 const WIDTH: usize = 192;
 
-/// Multiplies matrices `count` times on every thread at once, in single precision or in double; the operations that took.
+/// Multiplies matrices `count` times on every thread at once, in single precision or in double; returns the number of operations.
 pub fn products(single: bool, count: usize) -> f64 {
     let threads = rayon::broadcast(|_| if single { multiply::<f32>(count) } else { multiply::<f64>(count) });
     2.0 * (SIZE * SIZE * WIDTH * count * threads.len()) as f64

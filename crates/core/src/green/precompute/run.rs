@@ -4,38 +4,38 @@ use std::sync::{Arc, Mutex};
 
 use super::arrangement::Arrangement;
 use super::claim::Claim;
-use super::column_store::{ColumnStore, Found, Target, geometry};
+use super::column_store::{ColumnStore, PreviousWork, Target, geometry};
 use super::columns::Columns;
-use super::finish::Finished;
+use super::factorization::RequestedPrecision;
+use super::finish::FinishedPanels;
 use super::growth::Growth;
-use super::made::Wanted;
 use super::number::Number;
 use super::panels::Panels;
 use super::phase::Phase;
-use super::plan::{Bounds, Plan, Prepared};
+use super::plan::{Bounds, Plan, SymbolicAnalysis};
 use super::problem::Problem;
 use super::solving::{Work, solve};
-use super::tasks::{Progress, go_on, task_failed};
+use super::tasks::{Progress, report_progress, task_failed};
 use crate::green::entries::Entries;
 use crate::green::function::GreensFunction;
 use crate::green::numbers::Numbers;
 use crate::green::precision::Precision;
 use crate::{Error, Result};
 
-/// Counts what a precomputation would do and need; for a format that is yet to be chosen (`None`) those of the best one that
-/// the memory allows.
+/// Counts operations and memory of a precomputation. Without a format (`None`) they are those of the best one that the memory
+/// allows.
 ///
 /// # Errors
 /// A bound of memory (bytes) that cannot be kept.
 pub fn plan(problem: &Problem, precision: Option<Precision>, memory: Option<usize>) -> Result<Plan> {
-    let prepared = Prepared::new(problem, &|_| {})?;
+    let prepared = SymbolicAnalysis::new(problem, &|_| {})?;
     let bounds = Bounds { memory, in_memory: false };
     let (precision, route) = match precision {
-        Some(precision) => (precision, prepared.route(precision, bounds)?),
+        Some(precision) => (precision, prepared.plan_blocks(precision, bounds)?),
         None => {
-            let mut best = prepared.route(Precision::F16, bounds).map(|route| (Precision::F16, route));
+            let mut best = prepared.plan_blocks(Precision::F16, bounds).map(|route| (Precision::F16, route));
             for precision in [Precision::F32, Precision::F64] {
-                best = prepared.route(precision, bounds).map(|route| (precision, route)).or(best);
+                best = prepared.plan_blocks(precision, bounds).map(|route| (precision, route)).or(best);
             }
             best?
         }
@@ -48,9 +48,9 @@ pub fn plan(problem: &Problem, precision: Option<Precision>, memory: Option<usiz
 /// # Errors
 /// A singular stiffness, or [`Error::Interrupted`].
 pub fn precompute(problem: &Problem, precision: Precision, progress: Progress<'_>) -> Result<GreensFunction> {
-    let (wanted, columns) = (Wanted::Named(precision), 3 * problem.touch.len());
-    let columns = Columns::new(problem, wanted, None, true, &|_| {}, &|| go_on(progress, 0, columns))?;
-    let mut green = geometry(problem, &columns.parts.layout, &columns.measurement, wanted)?;
+    let (requested, columns) = (RequestedPrecision::Named(precision), 3 * problem.touch.len());
+    let columns = Columns::new(problem, requested, None, true, &|_| {}, &|| report_progress(progress, 0, columns))?;
+    let mut green = geometry(problem, &columns.parts.layout, &columns.measurement, requested)?;
     match precision {
         Precision::F64 => collect::<f64>(columns, &mut green, progress)?,
         Precision::F16 | Precision::F32 => collect::<f32>(columns, &mut green, progress)?,
@@ -69,7 +69,7 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
     let arrangement = Arrangement::new(&green.surface.positions, &parts.layout, parts.layout.columns);
     // The factor's memory is free for the operator's.
     drop(columns);
-    let finished = Finished { parts: &parts, arrangement: &arrangement, blocks: &blocks, panels: &panels, tasks };
+    let finished = FinishedPanels { parts: &parts, arrangement: &arrangement, blocks: &blocks, panels: &panels, tasks };
     let magnitude = finished.magnitudes()?;
     let mut numbers = Numbers::try_zeros(precision, parts.layout.columns * green.rows)?;
     let bytes = green.rows * precision.bytes();
@@ -79,15 +79,15 @@ fn collect<T: Number>(columns: Columns, green: &mut GreensFunction, progress: Pr
         Ok(())
     })?;
     drop(places);
-    green.entries = Entries::new(arrangement.places.clone(), &green.row_is_fixed, magnitude, numbers, None);
+    green.entries = Entries::new(arrangement.node_order.clone(), &green.row_is_fixed, magnitude, numbers, None);
     Ok(())
 }
 
 /// Solves the reference problem into a file, without ever holding the operator.
 ///
-/// Finished blocks are kept in the file of the claim; where a computation of the same thing was interrupted, it goes on, with
-/// the same bits as if it had not been where the same is to be touched first. In stages, the file is a complete store of
-/// the nodes that are ready from the end of the first on.
+/// Finished blocks are stored in the file of the claim. An interrupted computation of the same problem is resumed, with the same
+/// bits as without the interruption if the same nodes are to be touched first. In stages, the file is a complete store of the nodes
+/// that are ready from the end of the first on.
 ///
 /// # Errors
 /// A singular stiffness, a bound that cannot be kept (nothing is left behind), the operating system's, finished blocks
@@ -97,23 +97,24 @@ pub fn precompute_to(
     problem: &Problem,
     target: &Target<'_>,
     growth: &Growth<'_>,
-    found: &mut dyn FnMut(Found),
+    found: &mut dyn FnMut(PreviousWork),
     progress: Progress<'_>,
 ) -> Result<()> {
     let all = 3 * problem.touch.len();
-    let mut columns =
-        Columns::new(problem, target.precision, target.memory, false, target.phase, &|| go_on(progress, 0, all))?;
+    let mut columns = Columns::new(problem, target.precision, target.memory, false, target.phase, &|| {
+        report_progress(progress, 0, all)
+    })?;
     let tasks = columns.tasks;
     let stages = growth.stages(problem);
     let mut store = ColumnStore::open_in_stages(claim, problem, &columns.parts, &stages, &columns.measurement, target)?;
     columns.arrange(Arc::clone(store.parts()));
-    found(store.found);
+    found(store.previous);
     (target.phase)(Phase::Columns);
     let solved = growth.grow(problem, &mut columns, &mut store, progress);
     drop(columns);
     (target.phase)(Phase::Store);
     let result = solved.and_then(|()| store.finish(tasks, progress));
-    // What was finished before an interruption, a full disk or a damage is worth keeping; otherwise it is in the way.
+    // Finished blocks stay after an interruption, a full disk or damage; otherwise the file is removed.
     if !matches!(result, Err(Error::Interrupted | Error::Io { .. } | Error::Store { .. })) || store.done() == 0 {
         store.discard();
     }

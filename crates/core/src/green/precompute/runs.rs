@@ -1,4 +1,4 @@
-//! Ascending numbers as ranges.
+//! Ranges of consecutive numbers.
 
 use std::ops::Range;
 

@@ -6,11 +6,11 @@
 //! column have no mirror; theirs follows from their largest entry.
 //!
 //! Sixteen bits an entry: `Psi_ij = s_i s_j q_ij / RANGE`, `q` an integer, with one scale a dof, so that `q` is as symmetric as
-//! `Psi`. A scale a block of nodes gains nothing: neighbours have about the same bound, and what hurts is rounding relative
-//! to it in nearly dependent columns.
+//! `Psi`. A scale for each block of nodes gains nothing: neighbours have about the same bound, and the relevant error is rounding
+//! relative to it in nearly dependent columns.
 //!
-//! Half-precision floats of the same size and scales were measured beside these integers and lose: what a contact solves
-//! with are the entries near their bound, and those have 15 bits here and 11 there (nodal forces under 20 neighbouring
+//! Half-precision floats of the same size and scales were measured too and are less accurate: a contact is solved with entries near
+//! their bound, which have 15 bits here and 11 there (nodal forces under 20 neighbouring
 //! nodes: 1e-2 of the largest with halves).
 
 use super::mirror::Mirror;

@@ -1,22 +1,22 @@
-//! Blocks solved by the threads of this process, whoever takes their panels.
+//! Solution of blocks by the threads of this process.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::block::Block;
 use super::columns::Columns;
-use super::tasks::{Progress, go_on, in_tasks};
+use super::tasks::{Progress, in_tasks, report_progress};
 use crate::Result;
 
-/// What is done with a block, from any task.
+/// Callbacks for a block, from any task.
 #[derive(Clone, Copy)]
 pub struct Work<'a> {
-    /// Asked before it is begun; `false` stops there.
+    /// Called before it begins; `false` stops the computation.
     pub begin: &'a (dyn Fn(usize) -> bool + Sync),
-    /// Given the bytes of its panel.
+    /// Called with the bytes of its panel.
     pub put: &'a (dyn Fn(usize, &[u8]) -> Result<()> + Sync),
 }
 
-/// Solves the blocks numbered in `some`, ascending, from several tasks at a time; `done` columns are there already.
+/// Solves the blocks numbered in `some`, ascending, from several tasks at a time; `done` columns are finished already.
 pub fn solve(
     columns: &Columns,
     blocks: &[Block],
@@ -28,12 +28,12 @@ pub fn solve(
     let done = AtomicUsize::new(done);
     let finished = |more: usize| {
         let before = done.fetch_add(more, Ordering::Relaxed);
-        go_on(progress, before + more, all)
+        report_progress(progress, before + more, all)
     };
     finished(0)?;
     let next = AtomicUsize::new(0);
     in_tasks(columns.tasks, &|| {
-        let mut working = columns.working(columns.measurement.width);
+        let mut working = columns.task_memory(columns.measurement.width);
         while let Some(&block) = some.get(next.fetch_add(1, Ordering::Relaxed)) {
             if !(work.begin)(block) {
                 break;

@@ -1,4 +1,4 @@
-//! In which order the columns of the nodes are computed: a region first, then what lies around it.
+//! Stages of nodes: a region first, then the nodes around it by distance.
 //!
 //! Each stage is about as large as all before it together. The number of stages is then the logarithm of the number of
 //! nodes, and stores written at the end of each stage add up to less than twice the last.
@@ -17,7 +17,7 @@ pub fn stages(positions: &[DVec3], touch: &[u32], first: &[u32]) -> Vec<Vec<u32>
     }
     by_distance(positions, &mut others, &first);
     let mut stages = vec![first];
-    stages.extend(growing(others, stages[0].len()));
+    stages.extend(split_growing(others, stages[0].len()));
     stages
 }
 
@@ -33,11 +33,11 @@ pub fn by_distance(positions: &[DVec3], nodes: &mut [u32], region: &[u32]) {
 }
 
 /// Cuts sorted nodes into stages, each about as large as what is before it.
-pub fn growing(mut nodes: Vec<u32>, mut before: usize) -> Vec<Vec<u32>> {
+pub fn split_growing(mut nodes: Vec<u32>, mut before: usize) -> Vec<Vec<u32>> {
     let mut stages = Vec::new();
     while !nodes.is_empty() {
         let size = before.max(FEWEST_NODES);
-        // What would remain is less than half a stage: it comes along.
+        // A remainder of less than half a stage is added to this one.
         let size = if nodes.len() < size + size / 2 { nodes.len() } else { size };
         let rest = nodes.split_off(size);
         before += size;

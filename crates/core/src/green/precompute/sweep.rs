@@ -14,7 +14,7 @@ use super::number::Number;
 use super::operators::Operator;
 use super::tree::{NONE, Node, Tree};
 
-/// So few columns are solved one block at a time, and read large matrices once: the threads share each.
+/// Most columns that are solved one block at a time, with each large matrix shared among the threads and read once.
 const NARROW: usize = 32;
 /// Numbers of a matrix that is shared.
 const SHARED: usize = 1 << 18;

@@ -1,4 +1,4 @@
-//! A block of columns from its loads to its panel.
+//! Solution of one block of columns, from its loads to its panel.
 
 use super::block::Block;
 use super::layout::Layout;
@@ -7,7 +7,7 @@ use super::sweep::{Scratch, Sweep, loaded};
 use super::tree::Tree;
 use crate::fem::{Supports, SymmetricCsc};
 
-/// What every block reads.
+/// Data that every block reads.
 pub struct System<'a> {
     /// Stiffness of all dofs.
     pub stiffness: &'a SymmetricCsc,
@@ -35,7 +35,7 @@ impl System<'_> {
         let mut sums = vec![0.0; block.width];
         for rank in self.layout.panel_rows(block).into_iter().flatten() {
             let dof = self.layout.row_dofs[self.layout.row_of_rank[rank] as usize];
-            if let Some(kept) = self.layout.kept(tree, self.supports, dof) {
+            if let Some(kept) = self.layout.tree_row(tree, self.supports, dof) {
                 panel.extend(scratch.row(kept, block.width).iter().map(|value| T::from_f64(value.to_f64())));
             } else {
                 self.reactions(tree, dof, block, scratch, &mut sums);
@@ -48,7 +48,7 @@ impl System<'_> {
     fn reactions<C: Number>(&self, tree: &Tree, dof: u32, block: &Block, scratch: &Scratch<C>, sums: &mut [f64]) {
         sums.fill(0.0);
         for (other, stiffness) in self.stiffness.column(dof as usize) {
-            if let Some(kept) = self.layout.kept(tree, self.supports, other) {
+            if let Some(kept) = self.layout.tree_row(tree, self.supports, other) {
                 let values = scratch.row(kept, block.width);
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += stiffness * value.to_f64());
                 continue;
@@ -60,14 +60,14 @@ impl System<'_> {
         }
     }
 
-    /// How many columns of a block read something at each node. A moved support is felt everywhere, and read by the
-    /// reactions of all others; a force is read from its own row on.
+    /// How many columns of a block read something at each node. A moved support acts everywhere, and the
+    /// reactions of all others read it; a force is read from its own row on.
     pub fn readers(&self, tree: &Tree, block: &Block) -> Vec<usize> {
         if self.layout.moves_supports(block) {
             return vec![block.width; tree.nodes.len()];
         }
         let dofs = (block.first..block.first + block.width).map(|place| self.layout.dof(place));
-        let rows: Vec<u32> = dofs.filter_map(|dof| self.layout.kept(tree, self.supports, dof)).collect();
+        let rows: Vec<u32> = dofs.filter_map(|dof| self.layout.tree_row(tree, self.supports, dof)).collect();
         tree.reading.readers(self.layout.stage_of(block.first), &rows)
     }
 }

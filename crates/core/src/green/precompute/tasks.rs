@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use crate::{Error, Result};
 
-/// Told `(columns done, columns in all)` from any thread; `false` stops the computation.
+/// Called with `(columns done, columns in all)` from any thread; `false` stops the computation.
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) -> bool + Sync);
 
 /// Runs `work` in some tasks at once, to the first error.
@@ -29,7 +29,7 @@ pub fn task_failed() -> Error {
     Error::Invalid("a task of the precomputation failed unexpectedly".into())
 }
 
-/// Tells what is done, and stops where that is wanted.
-pub fn go_on(progress: Progress<'_>, done: usize, columns: usize) -> Result<()> {
+/// Reports progress, and stops the computation on request.
+pub fn report_progress(progress: Progress<'_>, done: usize, columns: usize) -> Result<()> {
     if progress(done, columns) { Ok(()) } else { Err(Error::Interrupted) }
 }

@@ -14,9 +14,8 @@
 //! down:  x_k = M_k f_k - G_k^T x_b        from the root to the leaves
 //! ```
 //!
-//! `M_k` is the compliance of the node with its boundary clamped, `-G_k^T` how it follows its boundary. Only rows
-//! are kept that somebody loads or reads, or that a kept row below has in its boundary: for all others `f_k` is zero
-//! and nobody asks for `x_k`.
+//! `M_k` is the compliance of the node with its boundary clamped, and `-G_k^T` its response to its boundary. Only those rows are
+//! kept that are loaded or read, or lie in the boundary of a kept row below: for all others `f_k` is zero and `x_k` is not needed.
 
 use std::ops::Range;
 
@@ -27,9 +26,9 @@ use crate::solver::block_columns::cuts;
 /// No parent, no row, no column.
 pub const NONE: u32 = u32::MAX;
 
-/// What is asked of the solution at one permuted position.
+/// Request for the solution at one permuted position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wanted {
+pub struct PositionRequest {
     /// Stage of its column, or [`NONE`]: it is read by its own column and those of its stage before it.
     pub stage: u32,
     /// It is read by every column of the stages before this one; [`NONE`]: of all.
@@ -38,15 +37,15 @@ pub struct Wanted {
     pub supports: bool,
 }
 
-impl Wanted {
-    /// Nobody asks.
+impl PositionRequest {
+    /// No request.
     pub const NOTHING: Self = Self { stage: NONE, before: 0, supports: false };
 }
 
 /// The kept rows of a block of columns of a supernode.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// Them.
+    /// The rows.
     pub rows: Range<usize>,
     /// Its boundary: part of [`Tree::boundaries`].
     pub boundary: Range<usize>,
@@ -83,7 +82,7 @@ pub struct Tree {
     pub row_of_position: Vec<u32>,
     /// For each kept row its node.
     pub node_of_row: Vec<u32>,
-    /// What is read where, stage by stage.
+    /// Readers of the rows, stage by stage.
     pub reading: Reading,
 }
 
@@ -97,10 +96,10 @@ pub struct Tree {
 pub struct Reading(Vec<Vec<u32>>);
 
 impl Reading {
-    /// Of a tree, and what is wanted of each permuted position.
-    pub fn new(tree: &Tree, wanted: &[Wanted]) -> Self {
-        let stages = wanted.iter().map(|w| w.stage).filter(|&stage| stage != NONE).max().map_or(1, |last| last + 1);
-        Self((0..stages).map(|stage| last_read(tree, wanted, stage)).collect())
+    /// From a tree and the request at each permuted position.
+    pub fn new(tree: &Tree, requests: &[PositionRequest]) -> Self {
+        let stages = requests.iter().map(|w| w.stage).filter(|&stage| stage != NONE).max().map_or(1, |last| last + 1);
+        Self((0..stages).map(|stage| last_read(tree, requests, stage)).collect())
     }
 
     /// For each node how many of a block's columns, the first ones, read something in its subtree; `rows` are the
@@ -111,14 +110,14 @@ impl Reading {
     }
 }
 
-fn last_read(tree: &Tree, wanted: &[Wanted], stage: u32) -> Vec<u32> {
+fn last_read(tree: &Tree, requests: &[PositionRequest], stage: u32) -> Vec<u32> {
     // One higher here, so that 0 means nothing read and NONE stays the highest.
     let mut last = vec![0u32; tree.nodes.len()];
     for (position, &row) in tree.row_of_position.iter().enumerate().filter(|(_, row)| **row != NONE) {
         let of_node = &mut last[tree.node_of_row[row as usize] as usize];
-        if wanted[position].before > stage {
+        if requests[position].before > stage {
             *of_node = NONE;
-        } else if wanted[position].stage == stage {
+        } else if requests[position].stage == stage {
             *of_node = (*of_node).max(row + 1);
         }
     }
@@ -129,13 +128,13 @@ fn last_read(tree: &Tree, wanted: &[Wanted], stage: u32) -> Vec<u32> {
 }
 
 impl Tree {
-    /// Cuts the tree down to the `wanted` positions.
-    pub fn new(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) -> Self {
-        let needed = needed_rows(supernodes, wanted);
+    /// Cuts the tree down to the `requests` positions.
+    pub fn new(supernodes: &SymbolicSupernodalCholesky<usize>, requests: &[PositionRequest]) -> Self {
+        let needed = needed_rows(supernodes, requests);
         let mut tree = Self {
             nodes: Vec::new(),
             boundaries: Vec::new(),
-            row_of_position: vec![NONE; wanted.len()],
+            row_of_position: vec![NONE; requests.len()],
             node_of_row: Vec::new(),
             reading: Reading::default(),
         };
@@ -151,7 +150,7 @@ impl Tree {
             }
         }
         tree.link(supernodes);
-        tree.reading = Reading::new(&tree, wanted);
+        tree.reading = Reading::new(&tree, requests);
         tree
     }
 
@@ -193,7 +192,7 @@ fn blocks(supernodes: &SymbolicSupernodalCholesky<usize>) -> impl Iterator<Item 
     })
 }
 
-/// Positions below a block that ends at `end`: the rest of its supernode, and what that has below.
+/// Positions below a block that ends at `end`: the rest of its supernode, and the rows below that.
 fn boundary_positions(
     supernodes: &SymbolicSupernodalCholesky<usize>,
     supernode: usize,
@@ -202,9 +201,9 @@ fn boundary_positions(
     (end..supernodes.supernode_end()[supernode]).chain(supernodes.supernode(supernode).pattern().iter().copied())
 }
 
-/// Positions that are wanted, or read by a needed block below.
-fn needed_rows(supernodes: &SymbolicSupernodalCholesky<usize>, wanted: &[Wanted]) -> Vec<bool> {
-    let mut needed: Vec<bool> = wanted.iter().map(|w| w.stage != NONE || w.before == NONE || w.supports).collect();
+/// Positions that are requested, or read by a needed block below.
+fn needed_rows(supernodes: &SymbolicSupernodalCholesky<usize>, requests: &[PositionRequest]) -> Vec<bool> {
+    let mut needed: Vec<bool> = requests.iter().map(|w| w.stage != NONE || w.before == NONE || w.supports).collect();
     for (supernode, positions) in blocks(supernodes) {
         if needed[positions.clone()].contains(&true) {
             for row in boundary_positions(supernodes, supernode, positions.end) {

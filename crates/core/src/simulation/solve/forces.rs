@@ -2,21 +2,22 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::contact::smallest_eigenvalue;
 use crate::contact::smooth::FanWeights;
 use crate::simulation::MAX_CONTACTS;
+use crate::simulation::body::BodyDynamics;
 use crate::simulation::contacts::Contact;
-use crate::simulation::law::series_compliance;
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
 use crate::simulation::system::System;
-use crate::simulation::tool::LawKind;
+use crate::simulation::tool::ToolModel;
 
 /// Forces of the contacts of a body, `d` being the displacement of each tool from its anchor, `d_free` its patch's free
-/// motion, `C` the static compliance or that of one step, and `s` what each contact law adds.
+/// motion, `C` the static compliance or that of one step, and `s` what is in series with it.
 pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, body: usize) {
     let moving = state.bodies[body].motion.as_ref();
     let mut slots = [0; MAX_CONTACTS];
-    let count = gather(state, body, &mut slots);
+    let count = linear_slots(state, body, &mut slots);
     solve_with(
         model,
         state,
@@ -27,7 +28,7 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
             None => state.compliance[a][b] * (1.0 / state.bodies[body].stiffness_scale),
         },
         |slot| {
-            let sliding = || dent_of(model, state, slot, |law| law == LawKind::Local);
+            let sliding = || contact_displacement(model, state, slot, |other| other.nonlinear);
             let free = moving.map_or_else(sliding, |motion| motion.free_displacement(slot));
             state.contacts.slots[slot].displacement - free
         },
@@ -37,7 +38,7 @@ pub fn contact_forces(model: &Model, state: &mut State, system: &mut System, bod
     }
 }
 
-/// Compliance of a contact, its law's with it, while the forces of all others stay as they are, m/N.
+/// Compliance of a contact, with what is in series, while the forces of all others stay as they are, m/N.
 pub fn own_compliance(model: &Model, state: &State, slot: usize) -> DMat3 {
     let contact = &state.contacts.slots[slot];
     let body = &state.bodies[contact.body];
@@ -48,24 +49,35 @@ pub fn own_compliance(model: &Model, state: &State, slot: usize) -> DMat3 {
     in_series(model, contact, own)
 }
 
+/// Compliance in series with the body's own at a contact that sticks, the same in all directions, m/N.
+///
+/// A body in motion is coupled by a spring. Near a support, where a body at rest is stiffer than any device can render, its
+/// compliance is raised evenly so that no direction exceeds the tool's maximum stiffness.
+fn series_compliance(tool: &ToolModel, dynamics: Option<&BodyDynamics>, own: &DMat3) -> f64 {
+    match dynamics {
+        Some(dynamics) => 1.0 / dynamics.coupling,
+        None => (1.0 / tool.max_stiffness - smallest_eigenvalue(own)).max(0.0),
+    }
+}
+
 fn in_series(model: &Model, contact: &Contact, own: DMat3) -> DMat3 {
     let (tool, dynamics) = (&model.tools[contact.tool], model.bodies[contact.body].dynamics.as_ref());
     own + DMat3::from_diagonal(DVec3::splat(series_compliance(tool, dynamics, &own)))
 }
 
-/// What the contacts of some laws do, by their forces as far as they are known, at the contact in a slot, m, on a body at rest.
-pub fn dent_of(model: &Model, state: &State, slot: usize, laws: impl Fn(LawKind) -> bool) -> DVec3 {
+/// Displacement of a body at rest at the contact in a slot by the present forces of some contacts, m.
+pub fn contact_displacement(model: &Model, state: &State, slot: usize, which: impl Fn(&Contact) -> bool) -> DVec3 {
     let (contacts, body) = (&state.contacts, state.contacts.slots[slot].body);
     let green = &model.bodies[body].green;
-    let others = contacts.on(body).filter(|&other| laws(contacts.slots[other].law));
+    let others = contacts.on(body).filter(|&other| which(&contacts.slots[other]));
     let dent = |other: usize| {
         contacts.patches[slot].compliance_with(green, &contacts.patches[other]) * contacts.slots[other].force
     };
     others.map(dent).sum::<DVec3>() / state.bodies[body].stiffness_scale
 }
 
-/// Displacement of a body at rest by the contacts that it had a tick ago, at a weighed place of its smooth surface, m.
-pub fn dent_at(model: &Model, state: &State, body: usize, weights: &FanWeights) -> DVec3 {
+/// Displacement of a body at rest by the contacts of the previous tick at a point of its smooth surface with given weights, m.
+pub fn contact_displacement_at(model: &Model, state: &State, body: usize, weights: &FanWeights) -> DVec3 {
     let (fixed, contacts) = (&model.bodies[body], &state.contacts);
     let Some(local) = &fixed.local else { return DVec3::ZERO };
     let mut dent = DVec3::ZERO;
@@ -78,17 +90,17 @@ pub fn dent_at(model: &Model, state: &State, body: usize, weights: &FanWeights) 
     dent / state.bodies[body].stiffness_scale
 }
 
-/// Slots of the contacts of a body that stick, in order; returns how many there are.
-pub fn gather(state: &State, body: usize, slots: &mut [usize; MAX_CONTACTS]) -> usize {
+/// Slots of the linear contacts of a body, in order; returns their number.
+pub fn linear_slots(state: &State, body: usize, slots: &mut [usize; MAX_CONTACTS]) -> usize {
     let mut count = 0;
-    for slot in state.contacts.on(body).filter(|&slot| state.contacts.slots[slot].law != LawKind::Local) {
+    for slot in state.contacts.on(body).filter(|&slot| !state.contacts.slots[slot].nonlinear) {
         slots[count] = slot;
         count += 1;
     }
     count
 }
 
-/// Assembles and solves for some contacts of one body; the forces are left in `system.right`.
+/// Assembles and solves for some contacts of one body; `system.right` has the forces afterwards.
 pub fn solve_with(
     model: &Model,
     state: &State,

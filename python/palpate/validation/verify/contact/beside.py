@@ -1,4 +1,4 @@
-"""Where the half-space of the local law ends: beside an edge of the body, and beside another tool."""
+"""Contact beside an edge of the body and beside another tool, where the half-space of the local law is not valid."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mesh import TetMesh
+from palpate.mesh.triangles import node_area_vectors
 
 # Angle off the normal from which a place is another one, rad.
 ELSEWHERE = 0.6
@@ -59,7 +60,7 @@ def section(mesh: TetMesh, origin: np.ndarray, normal: np.ndarray, step: float) 
     def on_edges(values: np.ndarray) -> np.ndarray:
         return values[edges[:, 0]] * (1 - part) + values[edges[:, 1]] * part
 
-    points, normals = on_edges(mesh.nodes), on_edges(_node_normals(mesh))
+    points, normals = on_edges(mesh.nodes), on_edges(node_area_vectors(mesh.nodes, mesh.surface_triangles))
     loops = [np.append(loop, loop[0]) for loop in _loops(joined.reshape(-1, 2))]
     lengths = [np.cumsum(np.linalg.norm(np.diff(points[loop], axis=0), axis=1)) for loop in loops]
     longest = int(np.argmax([length[-1] for length in lengths]))
@@ -67,16 +68,6 @@ def section(mesh: TetMesh, origin: np.ndarray, normal: np.ndarray, step: float) 
     at = np.arange(0.0, arc[-1], step)
     points, normals = (np.column_stack([np.interp(at, arc, k) for k in rows[loop].T]) for rows in (points, normals))
     return Curve(points, normals / np.linalg.norm(normals, axis=1)[:, None], step)
-
-
-def _node_normals(mesh: TetMesh) -> np.ndarray:
-    """Means of the normals of the triangles around each node, weighted by area, (nodes, 3)."""
-    a, b, c = np.moveaxis(mesh.nodes[mesh.surface_triangles], 1, 0)
-    areas = np.cross(b - a, c - a)
-    normals = np.zeros(mesh.nodes.shape)
-    for corner in mesh.surface_triangles.T:
-        np.add.at(normals, corner, areas)
-    return normals
 
 
 def _loops(pairs: np.ndarray) -> list[np.ndarray]:

@@ -1,4 +1,6 @@
-"""What is judged of a contact's forces. Each takes what was measured, so that a wrong law can be put in its place.
+"""Measures of a contact's forces: work, jumps, friction cone.
+
+Each takes the measured forces, so that tests can replace them by those of a wrong law.
 
 Forces are those on the device, N, as :meth:`palpate.Simulation.play` returns them.
 """

@@ -25,13 +25,11 @@ from scipy.optimize import nnls
 
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
+from palpate.mesh.elements import FACE_TRIANGLES
+from palpate.mesh.shape_functions import TRIANGLE_EDGES, TRIANGLE_NODES, TRIANGLE_POINTS, TRIANGLE_WEIGHTS, values
 
 # Height of the tool's underside over its lowest point (n,), m, at places (n, 2) of the plane, m; may be infinite.
 Gap = Callable[[np.ndarray], np.ndarray]
-
-# Barycentric coordinates of a face's nodes: corners, then middles of 01, 12, 20; and its flat triangles.
-PLACES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
-PARTS = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
 
 
 @dataclass(frozen=True)
@@ -132,39 +130,22 @@ def triangle_areas(corners: np.ndarray) -> np.ndarray:
 def _integrals(places: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """`M` (n, n), and quadrature points (q, 2) with hats times area (q, n), on straight-edged faces of a plane."""
     width = faces.shape[1]
-    at, weight = triangle_rule()
     load = np.zeros((len(places),) * 2)
     points, hats = [], []
     corners = places[faces[:, :3]]
     areas = triangle_areas(corners)
-    for part in PARTS[width]:
-        barycentric = at @ PLACES[part]
-        shapes = face_shapes(barycentric, width)
-        share = areas / len(PARTS[width])
-        for q, hat in enumerate(at):
+    parts = FACE_TRIANGLES[width]
+    for part in parts:
+        barycentric = TRIANGLE_POINTS @ TRIANGLE_NODES[part]
+        shapes = values(barycentric, width, TRIANGLE_EDGES)
+        share = areas / len(parts)
+        for q, hat in enumerate(TRIANGLE_POINTS):
             points.append(np.einsum("k,fkx->fx", barycentric[q], corners))
             row = np.zeros((len(faces), len(places)))
             for local, value in zip(part, hat, strict=True):
-                weighted = share * weight[q] * value
+                weighted = share * TRIANGLE_WEIGHTS[q] * value
                 row[np.arange(len(faces)), faces[:, local]] = weighted
                 for i in range(width):
                     np.add.at(load, (faces[:, i], faces[:, local]), shapes[q, i] * weighted)
             hats.append(row)
     return load, (np.concatenate(points), np.concatenate(hats))
-
-
-def face_shapes(barycentric: np.ndarray, width: int) -> np.ndarray:
-    """Shape functions (q, width) of a 3-node or 6-node face."""
-    if width == 3:
-        return barycentric
-    a, b, c = barycentric.T
-    return np.column_stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a])
-
-
-def triangle_rule() -> tuple[np.ndarray, np.ndarray]:
-    """Six points of degree four (Dunavant 1985): barycentric coordinates (6, 3), and parts of the area (6,)."""
-    points, weights = [], []
-    for a, w in ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)):
-        points += [np.roll([1 - 2 * a, a, a], k) for k in range(3)]
-        weights += 3 * [w]
-    return np.array(points), np.array(weights)

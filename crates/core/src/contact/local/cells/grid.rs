@@ -1,4 +1,4 @@
-//! Where the cells lie: a rectangle on the tangent plane that just holds the part of the tool below that plane.
+//! Rectangle of the cells on the tangent plane: the smallest that contains the part of the tool below that plane.
 //!
 //! The rectangle moves with the tool, turns with its long axis and grows with its depth, so that cells are as fine as the
 //! contact allows, and a tool that slides over a plane meets the same cells everywhere. Its motion is part of the
@@ -13,21 +13,21 @@ use super::super::super::shape::ToolShape;
 
 /// Most steps towards the direction of a side's support.
 const MAX_SUPPORT_STEPS: usize = 50;
-/// How far an arc of the tool may rise over its chord to be straight, over the tool's size: the arc is then 3e-7 long.
+/// Height of a straight arc of the tool over its chord, over the tool's size: such an arc is 3e-7 long.
 const STRAIGHT: f64 = 1e-14;
-/// Tools whose long axis stands more upright than this sine keep the grid along the first tangent.
+/// Least sine of the angle between a tool's long axis and the normal for the grid to follow that axis.
 const LEAST_SINE: f64 = 1e-3;
 
 /// A side of the rectangle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Side {
+pub struct RectangleSide {
     /// Its coordinate along its axis, m.
     pub coordinate: f64,
     /// `e - mu n` or, on the lower side, `e + mu n`: the coordinate's derivative by a motion of the support.
     pub gradient: DVec3,
-    /// The tool's point that gives it, m.
+    /// The tool's point that determines it, m.
     pub support: DVec3,
-    /// The point that has it, m: of the tool, or of the surface where that ends first.
+    /// The point at this coordinate, m: of the tool or, if the surface ends first, of the surface.
     pub point: DVec3,
     /// The coordinate's derivative by a motion of the surface.
     pub by_surface: DVec3,
@@ -39,13 +39,13 @@ pub struct Rectangle {
     /// Its axes.
     pub axes: [DVec3; 2],
     /// Lower and upper side along each axis.
-    pub sides: [[Side; 2]; 2],
+    pub sides: [[RectangleSide; 2]; 2],
     /// Change of its angle about the normal with a rotation of the tool.
     pub angle_by_rotation: DVec3,
 }
 
 /// A tool in the frame of the surface, whose third axis is the normal.
-pub struct PosedTool<'a> {
+pub struct ToolInSurfaceFrame<'a> {
     /// Its shape.
     pub shape: &'a ToolShape,
     /// Axes of the tool as columns.
@@ -54,13 +54,13 @@ pub struct PosedTool<'a> {
     pub tip: DVec3,
 }
 
-impl PosedTool<'_> {
+impl ToolInSurfaceFrame<'_> {
     /// Farthest point in a direction.
     pub fn support(&self, direction: DVec3) -> DVec3 {
         self.tip + self.rotation * self.shape.support(self.rotation.transpose() * direction)
     }
 
-    /// The rectangle around what lies below the plane; there must be something.
+    /// The rectangle around the part of the tool below the plane, which must not be empty.
     pub fn rectangle(&self) -> Rectangle {
         let long = self.rotation * self.shape.long_axis();
         let flat = long.with_z(0.0);
@@ -72,19 +72,19 @@ impl PosedTool<'_> {
         let axes = [first, DVec3::Z.cross(first)];
         let sides = axes.map(|axis| {
             let (lower, upper) = (self.side(-axis), self.side(axis));
-            [lower.turned(), upper]
+            [lower.reversed(), upper]
         });
         Rectangle { axes, sides, angle_by_rotation }
     }
 
     /// The upper side along a direction in the plane.
-    fn side(&self, direction: DVec3) -> Side {
+    fn side(&self, direction: DVec3) -> RectangleSide {
         let mut above = self.support(direction);
         if above.z <= 0.0 {
-            return Side::of_tool(above.dot(direction), direction, above);
+            return RectangleSide::of_tool(above.dot(direction), direction, above);
         }
-        // Supports sink as their direction turns downwards. The next direction is across the chord of the last two, which ends
-        // on a polyhedron, and in between by their heights, which ends elsewhere.
+        // Supports become lower as their direction turns downwards. The next direction is across the chord of the last two, which
+        // ends on a polyhedron, and in between by their heights, which ends elsewhere.
         let (mut level, mut steep) = (direction, DVec3::NEG_Z);
         let mut below = self.support(steep);
         let mut chord = above - below;
@@ -96,7 +96,7 @@ impl PosedTool<'_> {
             let support = self.support(next);
             if support.z.abs() <= straight {
                 let gradient = next / next.dot(direction);
-                return Side::of_tool(direction.dot(support), gradient, support);
+                return RectangleSide::of_tool(direction.dot(support), gradient, support);
             }
             // Nothing lies beyond the chord.
             if step % 2 == 0 && (support - above).dot(next) <= straight {
@@ -112,14 +112,13 @@ impl PosedTool<'_> {
         // The chord's slope is `mu`, and it meets the plane between its ends.
         let support = below - chord * (below.z / chord.z);
         let gradient = direction - DVec3::Z * (chord.dot(direction) / chord.z);
-        Side::of_tool(direction.dot(support), gradient, support)
+        RectangleSide::of_tool(direction.dot(support), gradient, support)
     }
 
-    /// The same rectangle, but no farther than a surface reaches that is higher than the tool's lowest point. `end` has it along a
-    /// direction.
+    /// The same rectangle, cut where the surface above the tool's lowest point ends. `end` returns that end along a direction.
     pub fn within(&self, rectangle: Rectangle, end: impl Fn(DVec3) -> Option<(DVec3, f64)>) -> Rectangle {
         let lowest = self.support(DVec3::NEG_Z);
-        let shorter = |side: Side, direction: DVec3| {
+        let shorter = |side: RectangleSide, direction: DVec3| {
             let Some((point, by_level)) = end(direction) else { return side };
             let coordinate = point.dot(direction);
             if coordinate >= side.coordinate {
@@ -127,23 +126,23 @@ impl PosedTool<'_> {
             }
             // The level is that of the tool's lowest point.
             let gradient = DVec3::Z * by_level;
-            Side { coordinate, gradient, support: lowest, point, by_surface: direction - gradient }
+            RectangleSide { coordinate, gradient, support: lowest, point, by_surface: direction - gradient }
         };
         let sides = [0, 1].map(|k| {
             let ([lower, upper], axis) = (rectangle.sides[k], rectangle.axes[k]);
-            [shorter(lower.turned(), -axis).turned(), shorter(upper, axis)]
+            [shorter(lower.reversed(), -axis).reversed(), shorter(upper, axis)]
         });
         Rectangle { sides, ..rectangle }
     }
 }
 
-impl Side {
+impl RectangleSide {
     fn of_tool(coordinate: f64, gradient: DVec3, support: DVec3) -> Self {
         Self { coordinate, gradient, support, point: support, by_surface: DVec3::ZERO }
     }
 
-    /// Seen along the opposite direction.
-    fn turned(self) -> Self {
+    /// The side as seen along the opposite direction.
+    fn reversed(self) -> Self {
         Self { coordinate: -self.coordinate, gradient: -self.gradient, by_surface: -self.by_surface, ..self }
     }
 }

@@ -152,7 +152,7 @@ struct Product<'a> {
 impl NullaryFnOnce for Product<'_> {
     type Output = ();
 
-    /// Two rows at once hide the latency of additions. Cells that carry nothing are passed over.
+    /// Two rows at once hide the latency of additions. Cells without pressure are skipped.
     #[inline(always)]
     fn call(self) {
         for pair in 0..self.cells.div_ceil(2) {

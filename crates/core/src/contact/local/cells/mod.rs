@@ -1,4 +1,4 @@
-//! Any tool on a body, without friction: pressures on a grid of cells over the plane of the contact.
+//! Frictionless contact of a tool of any shape: pressures on a grid of cells over the plane of the contact.
 //!
 //! The stored energy is `U = max over f >= 0 of - f.gap - f.G f/2`, where `gap` is how far the tool lies above the body at
 //! the middle of each cell (negative where it overlaps) and `G` the influence of the cells' forces on each other, that of a
@@ -18,15 +18,15 @@ mod wrench;
 use glam::{DMat3, DVec3};
 
 use super::super::shape::ToolShape;
-use super::place::{ContactPlane, ToolPose};
-use grid::{PosedTool, Rectangle};
+use super::contact_plane::{ContactPlane, ToolPose};
+use grid::{Rectangle, ToolInSurfaceFrame};
 pub use influence::MAX_CELLS;
 use influence::{Grid, Influence};
 use pressure::PressureScratch;
 pub use pressure::{Convergence, MAX_PRODUCTS, TOLERANCE};
-pub use relief::{End, GridFrame, Heights, LEAST_COSINE, Relief};
+pub use relief::{GridFrame, Heights, LEAST_COSINE, Relief, SurfaceEnd, Wedge};
 
-/// How many cells a side of the grid has.
+/// Number of cells along a side of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resolution {
     /// 16 x 16.
@@ -49,28 +49,30 @@ impl Resolution {
     }
 }
 
-/// A tool at a place.
+/// A tool at a pose over a contact plane.
 #[derive(Clone, Copy, Debug)]
 pub struct CellProblem<'a> {
-    /// What the tool looks like.
+    /// Shape of the tool.
     pub shape: &'a ToolShape,
-    /// Where it is.
+    /// Its pose.
     pub pose: ToolPose,
-    /// The plane of the contact: no lower than what the tool touches.
+    /// The plane of the contact: no lower than any point that the tool touches.
     pub plane: ContactPlane,
     /// `E*`, Pa.
     pub effective_modulus: f64,
-    /// How finely.
+    /// Resolution of the grid.
     pub resolution: Resolution,
+    /// Radius over which the body's own compliance spreads a force, m.
+    pub width: f64,
 }
 
-/// What the next solution starts from.
+/// Pressures that the next solution starts from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureState {
     resolution: Resolution,
     /// Forces over `pi E* sqrt(hx hy)`, m.
     q: Grid,
-    /// Of a punch that covers the same cells, the forces for a unit approach.
+    /// Forces of a punch on the same cells for a unit approach.
     punch: Grid,
 }
 
@@ -88,6 +90,9 @@ pub struct CellScratch {
     solver: PressureScratch,
     heights: Heights,
     gap: Grid,
+    /// Gaps over the roots `s` of the compliance.
+    scaled: Grid,
+    root: Grid,
     /// Slopes of the tool's height along both axes of the grid.
     slopes: [Grid; 2],
     image: Grid,
@@ -101,6 +106,8 @@ impl Default for CellScratch {
             solver: PressureScratch::new(),
             heights: Heights::default(),
             gap: zero,
+            scaled: zero,
+            root: zero,
             slopes: [zero; 2],
             image: zero,
         }
@@ -116,43 +123,63 @@ pub struct CellContact {
     pub torque: DVec3,
     /// Sum of the pressures' normal forces, N.
     pub normal_force: f64,
-    /// Where their resultant acts on the surface, m.
+    /// Point of the surface where their resultant acts, m.
     pub centre_of_pressure: DVec3,
     /// Normal stiffness `dF/dd` of the cells under pressure, N/m; cells at the rim count as whole, so it is up to 5 % too large
     /// (10 % with 8 x 8 cells).
     pub stiffness: f64,
     /// Stored energy, J.
     pub energy: f64,
+    /// Its derivative by the problem's `width`, J/m.
+    pub energy_by_width: f64,
     /// Area of the cells under pressure, m^2.
     pub area: f64,
-    /// How far the tool's support reaches below the plane, m.
-    pub depth: f64,
+    /// Largest overlap of the tool and the surface along the normal, m.
+    pub overlap: f64,
     /// Gradient of the energy by the body's place, N.
     pub body_force: DVec3,
     /// Gradient of the energy by a rotation of the body about the plane's origin, N m.
     pub body_torque: DVec3,
-    /// How the solution ended.
+    /// Convergence of the solution.
     pub convergence: Convergence,
 }
 
 impl CellProblem<'_> {
-    /// Presses the tool into a surface. Nothing touches unless the tool reaches below the plane.
+    /// Presses the tool into a surface. There is no contact unless the tool reaches below the plane.
     ///
-    /// `state` is where the solution starts and what it leaves for the next one; it changes the answer by no more than
-    /// [`TOLERANCE`] lets it.
+    /// `state` is the start of the solution and is updated to its result; it changes the result by no more than [`TOLERANCE`].
     pub fn solve(&self, relief: &impl Relief, state: &mut PressureState, scratch: &mut CellScratch) -> CellContact {
         if state.resolution != self.resolution {
             *state = PressureState { resolution: self.resolution, ..Default::default() };
         }
+        let Some(Overlap { tool, cells, largest }) = self.overlap(relief, scratch) else {
+            return CellContact::default();
+        };
+        scratch.influence.set_aspect(cells.count, cells.sides[1] / cells.sides[0]);
+        let edges = EdgeSoftening::new(&cells, self.width);
+        scratch.soften(&cells, &edges);
+        let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.scaled, largest, &mut state.q);
+        let contact = scratch.integrate(&tool, &cells, &edges, &self.plane, &state.q);
+        let punch = scratch.solver.punch(&scratch.influence, cells.count, &state.q, &mut state.punch);
+        CellContact { stiffness: cells.force_scale * punch, overlap: largest, convergence, ..contact }
+    }
+
+    /// Largest overlap of the tool and the surface along the plane's normal, m.
+    pub fn largest_overlap(&self, relief: &impl Relief, scratch: &mut CellScratch) -> f64 {
+        self.overlap(relief, scratch).map_or(0.0, |overlap| overlap.largest)
+    }
+
+    /// Computes the gaps under the tool; `None` without any overlap.
+    fn overlap(&self, relief: &impl Relief, scratch: &mut CellScratch) -> Option<Overlap<'_>> {
         let to_plane = self.plane.axes.transpose();
-        let tool = PosedTool {
+        let tool = ToolInSurfaceFrame {
             shape: self.shape,
             rotation: to_plane * DMat3::from_quat(self.pose.rotation),
             tip: to_plane * (self.pose.position - self.plane.origin),
         };
         let depth = -tool.support(DVec3::NEG_Z).z;
         if !(depth > 0.0 && depth.is_finite()) {
-            return CellContact::default();
+            return None;
         }
         let rectangle = tool.within(tool.rectangle(), |direction| {
             let end = relief.end(&self.plane, self.plane.axes * direction, -depth)?;
@@ -160,19 +187,46 @@ impl CellProblem<'_> {
         });
         let cells = Cells::new(rectangle, self.resolution.cells(), self.effective_modulus);
         if !(cells.sides[0] > 0.0 && cells.sides[1] > 0.0) {
-            return CellContact::default();
+            return None;
         }
         scratch.heights.clear();
         relief.fill(&cells.frame(&self.plane, depth), &mut scratch.heights);
-        let overlap = scratch.measure_gaps(&tool, &cells, depth);
-        if overlap == 0.0 {
-            return CellContact::default();
+        let largest = scratch.measure_gaps(&tool, &cells, depth);
+        (largest > 0.0).then_some(Overlap { tool, cells, largest })
+    }
+}
+
+/// A tool that overlaps a surface; the gaps are in the scratch memory.
+struct Overlap<'a> {
+    tool: ToolInSurfaceFrame<'a>,
+    cells: Cells,
+    /// Largest overlap with the surface, m.
+    largest: f64,
+}
+
+/// Share of the additional compliance beside edges that the body's own compliance lacks.
+///
+/// Beside an edge a contact of radius `a` has an additional compliance `k/a`. The body's own compliance, spread over the radius
+/// `b`, contains `k/b` of it. The remainder goes to zero as `a` approaches `b`. It is approximated by `(1 - a^2/b^2)^2`, whose slope goes to
+/// zero too, with half the grid's diagonal for `a`.
+#[derive(Default)]
+struct EdgeSoftening {
+    share: f64,
+    /// Its derivatives by the cells' sides, and by `b`, 1/m.
+    by_side: [f64; 2],
+    by_width: f64,
+}
+
+impl EdgeSoftening {
+    fn new(cells: &Cells, width: f64) -> Self {
+        let scale = cells.count as f64 / (2.0 * width);
+        let [x, y] = cells.sides.map(|side| side * scale);
+        let left = 1.0 - x * x - y * y;
+        if left.is_nan() || left <= 0.0 {
+            return Self::default();
         }
-        scratch.influence.set_aspect(cells.count, cells.sides[1] / cells.sides[0]);
-        let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.gap, overlap, &mut state.q);
-        let contact = scratch.integrate(&tool, &cells, &self.plane, &state.q);
-        let punch = scratch.solver.punch(&scratch.influence, cells.count, &state.q, &mut state.punch);
-        CellContact { stiffness: cells.force_scale * punch, depth, convergence, ..contact }
+        let by_side = [x, y].map(|side| -4.0 * left * side * scale);
+        Self { share: left * left, by_side, by_width: 4.0 * left * (1.0 - left) / width }
     }
 }
 

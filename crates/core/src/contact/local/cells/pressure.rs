@@ -23,22 +23,22 @@ pub struct PressureScratch {
     residual: Grid,
     direction: Grid,
     image: Grid,
-    /// Residual under pressure; the solution with negative pressures cut off; what becomes of either.
+    /// Residual under pressure, or the solution with negative pressures set to zero; and its image.
     trial: Grid,
     trial_image: Grid,
 }
 
-/// How a solution ended.
+/// Convergence of a solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Convergence {
     /// Products with the influence taken; at most [`MAX_PRODUCTS`].
     pub products: usize,
     /// Largest overlap or gap left, m.
-    pub miss: f64,
+    pub residual: f64,
 }
 
 /// Residuals of cells with and without pressure.
-struct Miss {
+struct Residuals {
     squared: f64,
     squared_overlap: f64,
     largest: f64,
@@ -51,25 +51,25 @@ impl PressureScratch {
         Self { cells: MAX_CELLS, residual: zero, direction: zero, image: zero, trial: zero, trial_image: zero }
     }
 
-    /// Solves for `q` (m), whose values are where to start. Nothing is carried where `gap` (m) is not negative: the surface
-    /// under pressure is nowhere raised. `depth` is the largest overlap, m.
+    /// Solves for `q` (m), starting from its values. Cells where `gap` (m) is not negative carry no pressure, for pressure raises
+    /// the surface nowhere. `depth` is the largest overlap, m.
     pub fn solve(&mut self, influence: &Influence, cells: usize, gap: &Grid, depth: f64, q: &mut Grid) -> Convergence {
         if cells != self.cells {
             *self = Self { cells, ..Self::new() };
         }
-        let mut told = Convergence { products: 1, miss: 0.0 };
+        let mut convergence = Convergence { products: 1, residual: 0.0 };
         self.start(influence, cells, gap, q);
         let mut scaled_before = f64::INFINITY;
         loop {
-            let miss = self.miss(cells, gap, q);
-            told.miss = miss.largest;
+            let residuals = self.residuals(cells, gap, q);
+            convergence.residual = residuals.largest;
             // A step takes up to two.
-            if miss.largest <= TOLERANCE * depth || told.products + 2 > MAX_PRODUCTS {
-                return told;
+            if residuals.largest <= TOLERANCE * depth || convergence.products + 2 > MAX_PRODUCTS {
+                return convergence;
             }
-            told.products += 1;
-            if miss.squared_overlap > miss.squared {
-                self.join(influence, cells, gap, q);
+            convergence.products += 1;
+            if residuals.squared_overlap > residuals.squared {
+                self.add_cells(influence, cells, gap, q);
                 scaled_before = f64::INFINITY;
                 continue;
             }
@@ -77,19 +77,19 @@ impl PressureScratch {
             if self.advance(cells, q, step) {
                 continue;
             }
-            told.products += 1;
-            self.leave(influence, cells, gap, q, step);
+            convergence.products += 1;
+            self.remove_cells(influence, cells, gap, q, step);
             scaled_before = f64::INFINITY;
         }
     }
 
-    /// Scales the start so that the energy is least, and finds its residual. A start without pressure is replaced by one
-    /// like the root of the overlap, as under a sphere.
+    /// Scales the start to the least energy and computes its residual. A start without pressure is replaced by the root of the
+    /// overlap, as under a sphere.
     fn start(&mut self, influence: &Influence, cells: usize, gap: &Grid, q: &mut Grid) {
-        let carries = (0..cells).any(|j| (0..cells).any(|i| gap[j][i] < 0.0 && q[j][i] > 0.0));
+        let has_pressure = (0..cells).any(|j| (0..cells).any(|i| gap[j][i] < 0.0 && q[j][i] > 0.0));
         for j in 0..cells {
             for i in 0..cells {
-                let start = if carries { q[j][i] } else { (-gap[j][i]).max(0.0).sqrt() };
+                let start = if has_pressure { q[j][i] } else { (-gap[j][i]).max(0.0).sqrt() };
                 q[j][i] = if gap[j][i] < 0.0 { start } else { 0.0 };
             }
         }
@@ -104,25 +104,25 @@ impl PressureScratch {
         }
     }
 
-    fn miss(&self, cells: usize, gap: &Grid, q: &Grid) -> Miss {
-        let mut miss = Miss { squared: 0.0, squared_overlap: 0.0, largest: 0.0 };
+    fn residuals(&self, cells: usize, gap: &Grid, q: &Grid) -> Residuals {
+        let mut residuals = Residuals { squared: 0.0, squared_overlap: 0.0, largest: 0.0 };
         for j in 0..cells {
             for i in 0..cells {
                 let r = self.residual[j][i];
                 if q[j][i] > 0.0 {
-                    miss.squared += r * r;
-                    miss.largest = miss.largest.max(r.abs());
+                    residuals.squared += r * r;
+                    residuals.largest = residuals.largest.max(r.abs());
                 } else if gap[j][i] < 0.0 && r < 0.0 {
-                    miss.squared_overlap += r * r;
-                    miss.largest = miss.largest.max(-r);
+                    residuals.squared_overlap += r * r;
+                    residuals.largest = residuals.largest.max(-r);
                 }
             }
         }
-        miss
+        residuals
     }
 
-    /// Overlapping cells take up pressure in proportion to their overlap.
-    fn join(&mut self, influence: &Influence, cells: usize, gap: &Grid, q: &mut Grid) {
+    /// Adds pressure to overlapping cells in proportion to their overlap.
+    fn add_cells(&mut self, influence: &Influence, cells: usize, gap: &Grid, q: &mut Grid) {
         for j in 0..cells {
             for i in 0..cells {
                 let joins = q[j][i] == 0.0 && gap[j][i] < 0.0;
@@ -130,11 +130,11 @@ impl PressureScratch {
             }
         }
         let step = self.step_along_direction(influence, cells);
-        self.go(cells, q, step);
+        self.take_step(cells, q, step);
     }
 
     /// A step along the direction.
-    fn go(&mut self, cells: usize, q: &mut Grid, step: f64) {
+    fn take_step(&mut self, cells: usize, q: &mut Grid, step: f64) {
         for j in 0..cells {
             for i in 0..cells {
                 q[j][i] -= step * self.direction[j][i];
@@ -143,8 +143,8 @@ impl PressureScratch {
         }
     }
 
-    /// The next conjugate direction and the best step along it. `scaled_before` is what the preconditioned square of the
-    /// residual was a step ago, infinite to begin anew.
+    /// The next conjugate direction and the best step along it. `scaled_before` is the preconditioned square of the residual a step
+    /// ago, infinite for a restart.
     fn search(&mut self, influence: &Influence, cells: usize, q: &Grid, scaled_before: &mut f64) -> f64 {
         for j in 0..cells {
             for i in 0..cells {
@@ -178,13 +178,13 @@ impl PressureScratch {
         if !(0..cells).all(|j| (0..cells).all(|i| stays(j, i))) {
             return false;
         }
-        self.go(cells, q, step);
+        self.take_step(cells, q, step);
         true
     }
 
-    /// Takes a step that would make pressures negative: they are cut off if the energy falls nevertheless, else the step ends
+    /// Takes a step that would make pressures negative. They are set to zero if the energy still falls; otherwise the step ends
     /// where the first of them is zero.
-    fn leave(&mut self, influence: &Influence, cells: usize, gap: &Grid, q: &mut Grid, step: f64) {
+    fn remove_cells(&mut self, influence: &Influence, cells: usize, gap: &Grid, q: &mut Grid, step: f64) {
         let mut feasible = (step, 0, 0);
         for j in 0..cells {
             for i in 0..cells {
@@ -229,12 +229,12 @@ impl PressureScratch {
     /// `1.T^-1 1` over the cells that carry pressure: the stiffness of a flat punch that covers them, which is that of the
     /// contact (its area changes the force only to second order: pressure vanishes at its rim).
     ///
-    /// A few steps from the last answer `p` suffice, for `2 sum(p) - p.T p` has its maximum there. Forgets the residual.
+    /// A few steps from the last result `p` suffice, for `2 sum(p) - p.T p` has its maximum there. Overwrites the residual.
     pub fn punch(&mut self, influence: &Influence, cells: usize, q: &Grid, p: &mut Grid) -> f64 {
-        let carries = (0..cells).any(|j| (0..cells).any(|i| q[j][i] > 0.0 && p[j][i] != 0.0));
+        let has_pressure = (0..cells).any(|j| (0..cells).any(|i| q[j][i] > 0.0 && p[j][i] != 0.0));
         for j in 0..cells {
             for i in 0..cells {
-                p[j][i] = match (q[j][i] > 0.0, carries) {
+                p[j][i] = match (q[j][i] > 0.0, has_pressure) {
                     (true, true) => p[j][i],
                     (true, false) => 1.0,
                     (false, _) => 0.0,
@@ -256,7 +256,7 @@ impl PressureScratch {
         let mut scaled_before = f64::INFINITY;
         for _ in 0..PUNCH_STEPS {
             let step = self.search(influence, cells, q, &mut scaled_before);
-            self.go(cells, p, step);
+            self.take_step(cells, p, step);
         }
         // 2 sum(p) - p.(residual + 1)
         sum(p) - dot(p, &self.residual)

@@ -1,4 +1,4 @@
-//! What cells are compared with in tests: surfaces of second order and Hertz's ellipse.
+//! References for the tests of cells: surfaces of second order and Hertz's ellipse.
 
 use std::f64::consts::PI;
 

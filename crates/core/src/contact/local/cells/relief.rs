@@ -1,16 +1,18 @@
 //! Heights of a body over the contact plane, as means over each cell.
 //!
 //! A body is given by facets that bend with the normals at their corners. Faces steeper than [`STEEPEST`] have no height over the
-//! plane: where such a face begins, at the edge of a block as on the side of a ball, the height falls off by that slope from the
+//! plane: where such a face begins, at the edge of a block or on the side of a ball, the height decreases with that slope from the
 //! edge. So heights are continuous wherever the grid lies. Of several heights the largest counts.
 //!
-//! A height in the middle of a cell would have a slope that jumps when a sharp edge passes by, for a whole row of cells at once. Its
-//! mean over the cell has not: with the distance `x` from an edge where the slope changes by `s`, and half the width `W` of the cell
-//! across it, it is lower than in the middle by `s (W - |x|)^2 / (4 W)` for `|x| < W`.
+//! A height in the middle of a cell would have a slope that jumps when a sharp edge passes by, for a whole row of cells at once.
+//! The slope of its mean over the cell is continuous: with the distance `x` from an edge where the slope changes by `s`, and half
+//! the width `W` of the cell across it, it is lower than in the middle by `s (W - |x|)^2 / (4 W)` for `|x| < W`.
+
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DMat3, DVec3};
 
-use super::super::place::ContactPlane;
+use super::super::contact_plane::ContactPlane;
 use super::influence::{Grid, MAX_CELLS};
 
 /// Largest slope of a height.
@@ -18,7 +20,7 @@ const STEEPEST: f64 = 3.0;
 /// Least cosine of the angle between a facet's normal and that of the plane: that slope.
 pub const LEAST_COSINE: f64 = 0.316_227_766_016_837_94;
 
-/// Where the cells lie: coordinates along both axes of the grid, and height over the plane, m.
+/// Frame of the cells: coordinates along both axes of the grid, and height over the plane, m.
 #[derive(Clone, Copy, Debug)]
 pub struct GridFrame {
     /// A point of the plane.
@@ -31,20 +33,20 @@ pub struct GridFrame {
     pub sides: [f64; 2],
     /// Cells along each side.
     pub count: usize,
-    /// Height of the tool's lowest point, m: what is lower is not touched.
+    /// Height of the tool's lowest point, m: lower parts are not touched.
     pub lowest: f64,
 }
 
-/// Where a surface that is higher than some level ends.
+/// End of the part of a surface above some level.
 #[derive(Clone, Copy, Debug)]
-pub struct End {
+pub struct SurfaceEnd {
     /// The point, m.
     pub point: DVec3,
-    /// How far it goes along the direction as the level rises.
+    /// Change of its coordinate along the direction with the level.
     pub by_level: f64,
 }
 
-impl End {
+impl SurfaceEnd {
     /// The end of triangles along a direction, above a level of the plane.
     pub fn of(
         triangles: impl Iterator<Item = [DVec3; 3]>,
@@ -78,11 +80,11 @@ impl End {
 
 /// A surface that a tool is pressed on.
 pub trait Relief {
-    /// Enters its heights.
+    /// Adds its heights.
     fn fill(&self, frame: &GridFrame, heights: &mut Heights);
 
-    /// How far it reaches along a direction in the plane, where it is higher than `lowest` over it, m; none if it has no end.
-    fn end(&self, _plane: &ContactPlane, _direction: DVec3, _lowest: f64) -> Option<End> {
+    /// End along a direction in the plane of the part higher than `lowest`, m; none if it has no end.
+    fn end(&self, _plane: &ContactPlane, _direction: DVec3, _lowest: f64) -> Option<SurfaceEnd> {
         None
     }
 }
@@ -95,9 +97,53 @@ pub struct Heights {
     /// Slopes along both axes of the grid.
     pub slopes: [Grid; 2],
     /// The point of the surface that carries the height, in coordinates of the grid, m.
-    pub carrier: [Grid; 3],
-    /// Change of the mean height with the sides of the cell.
+    pub surface_point: [Grid; 3],
+    /// Derivative of the mean height by the sides of the cell.
     pub by_side: [Grid; 2],
+    /// Additional compliance near a convex edge, over that of a half-space.
+    pub softening: Grid,
+    /// Slopes of that along both axes of the grid, 1/m.
+    pub softening_slopes: [Grid; 2],
+    /// Its derivative by a rotation of the surface about both axes.
+    pub softening_turns: [Grid; 2],
+    /// The point of that edge next to the cell, in coordinates of the grid, m.
+    pub edge: [Grid; 3],
+    /// Whether there is such an edge.
+    pub has_edge: bool,
+}
+
+/// A convex edge of a body and its compliance: a line load on the apex of a wedge with the interior angle `phi`
+/// moves it, at a distance, `pi/(phi + sin phi)` times as far as a half-space if it acts along the bisector, and
+/// `pi/(phi - sin phi)` times across (Michell's solution, Johnson, Contact Mechanics, 1985, section 2.2).
+#[derive(Clone, Copy, Debug)]
+pub struct Wedge {
+    /// Unit vector outwards.
+    bisector: DVec3,
+    /// Compliance over that of a half-space along the bisector and across it.
+    compliance: [f64; 2],
+}
+
+impl Wedge {
+    /// Between faces with these normals, the first to the left of the edge `along`; none at a concave edge. A wedge thinner than a
+    /// right angle bends as a plate, which the body's own compliance contains: it counts as a right angle.
+    pub fn new(first: DVec3, second: DVec3, along: DVec3) -> Option<Self> {
+        if first.cross(second).dot(along) <= 0.0 {
+            return None;
+        }
+        let angle = PI - first.dot(second).clamp(-1.0, 1.0).acos();
+        let wide = angle.max(FRAC_PI_2);
+        let compliance = [PI / (angle + angle.sin()), PI / (wide - wide.sin())];
+        Some(Self { bisector: (first + second).try_normalize()?, compliance })
+    }
+
+    /// Additional compliance under a load along the third axis of a grid, over that of a half-space, and its derivative by a
+    /// rotation about the first two axes. The bisector is given in the grid's axes.
+    fn softness(&self, bisector: DVec3) -> (f64, [f64; 2]) {
+        let [along, across] = self.compliance;
+        let (softening, by_cosine) =
+            (across + (along - across) * bisector.z * bisector.z - 1.0, 2.0 * (along - across) * bisector.z);
+        (softening, [by_cosine * bisector.y, -by_cosine * bisector.x])
+    }
 }
 
 /// An edge between two facets, in coordinates of the grid.
@@ -114,26 +160,65 @@ struct Crease {
 }
 
 impl Default for Heights {
-    /// Of nothing.
+    /// Without a surface.
     fn default() -> Self {
         let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
         Self {
             height: [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS],
             slopes: [zero; 2],
-            carrier: [zero; 3],
+            surface_point: [zero; 3],
             by_side: [zero; 2],
+            softening: zero,
+            softening_slopes: [zero; 2],
+            softening_turns: [zero; 2],
+            edge: [zero; 3],
+            has_edge: false,
         }
     }
 }
 
 impl Heights {
-    /// Forgets the surface.
+    /// Removes the surface.
     pub fn clear(&mut self) {
         self.height = [[f64::NEG_INFINITY; MAX_CELLS]; MAX_CELLS];
+        if self.has_edge {
+            self.softening = [[0.0; MAX_CELLS]; MAX_CELLS];
+            self.has_edge = false;
+        }
     }
 
-    /// Enters a height where it is larger than the one that is known.
-    pub fn raise(&mut self, (i, j): (usize, usize), height: f64, slopes: [f64; 2], carrier: DVec3) {
+    /// Adds a convex edge, near which the surface is softer, up to a distance `reach` from it, m.
+    pub fn soften(&mut self, frame: &GridFrame, edge: [DVec3; 2], wedge: &Wedge, reach: f64) {
+        let [from, to] = edge.map(|end| frame.coordinates(end));
+        let along = to - from;
+        let squared = along.truncate().length_squared().max(f64::MIN_POSITIVE);
+        let inverse = 1.0 / (reach * reach);
+        let (softening, turns) = wedge.softness(frame.axes.transpose() * wedge.bisector);
+        let [columns, rows] = frame.range([from, to, to], reach);
+        self.has_edge = true;
+        for j in rows {
+            for i in columns.clone() {
+                let [u, v] = frame.middle(i, j);
+                let offset = DVec3::new(u, v, 0.0) - from;
+                let part = (offset.truncate().dot(along.truncate()) / squared).clamp(0.0, 1.0);
+                let nearest = from + along * part;
+                let beside = [u - nearest.x, v - nearest.y];
+                let within = 1.0 - (beside[0] * beside[0] + beside[1] * beside[1]) * inverse;
+                let here = softening * within * within;
+                if within > 0.0 && here > self.softening[j][i] {
+                    self.softening[j][i] = here;
+                    for k in 0..2 {
+                        self.softening_slopes[k][j][i] = -4.0 * softening * within * beside[k] * inverse;
+                        self.softening_turns[k][j][i] = turns[k] * within * within;
+                    }
+                    (0..3).for_each(|k| self.edge[k][j][i] = nearest[k]);
+                }
+            }
+        }
+    }
+
+    /// Sets a height if it is larger than the present one.
+    pub fn raise(&mut self, (i, j): (usize, usize), height: f64, slopes: [f64; 2], surface_point: DVec3) {
         if height > self.height[j][i] {
             self.height[j][i] = height;
             for k in 0..2 {
@@ -141,14 +226,14 @@ impl Heights {
                 self.by_side[k][j][i] = 0.0;
             }
             for k in 0..3 {
-                self.carrier[k][j][i] = carrier[k];
+                self.surface_point[k][j][i] = surface_point[k];
             }
         }
     }
 
-    /// Enters a facet whose normal is no steeper than [`LEAST_COSINE`]. `bends` has for each edge `(k, k + 1)` how much the
+    /// Adds a facet whose normal is no steeper than [`LEAST_COSINE`]. `bulges` has for each edge `(k, k + 1)` how much the
     /// surface bulges over it, four times over its middle, m.
-    pub fn add_facet(&mut self, frame: &GridFrame, corners: [DVec3; 3], bends: [f64; 3]) {
+    pub fn add_facet(&mut self, frame: &GridFrame, corners: [DVec3; 3], bulges: [f64; 3]) {
         let [a, b, c] = corners.map(|corner| frame.coordinates(corner));
         let twice = |p: DVec3, q: DVec3, u: f64, v: f64| (q.x - p.x) * (v - p.y) - (q.y - p.y) * (u - p.x);
         let area = twice(a, b, c.x, c.y);
@@ -170,10 +255,10 @@ impl Heights {
                 let (mut height, mut slopes) = (0.0, [0.0; 2]);
                 for (k, corner) in [a, b, c].into_iter().enumerate() {
                     let next = (k + 1) % 3;
-                    height += part[k] * (corner.z + part[next] * bends[k]);
+                    height += part[k] * (corner.z + part[next] * bulges[k]);
                     for axis in 0..2 {
-                        slopes[axis] += gradients[k][axis] * (corner.z + part[next] * bends[k])
-                            + part[k] * gradients[next][axis] * bends[k];
+                        slopes[axis] += gradients[k][axis] * (corner.z + part[next] * bulges[k])
+                            + part[k] * gradients[next][axis] * bulges[k];
                     }
                 }
                 self.raise((i, j), height, slopes, DVec3::new(u, v, height));
@@ -181,21 +266,23 @@ impl Heights {
         }
     }
 
-    /// Evens the heights over an edge between two facets with the given normals, both of which have heights.
-    pub fn even_edge(&mut self, frame: &GridFrame, edge: [DVec3; 2], normals: [DVec3; 2]) {
-        if let Some(crease) = Crease::new(frame, edge, normals[0], Some(normals[1])) {
-            self.even(frame, &crease, false);
+    /// Replaces heights by their means over the cells at an edge between two facets. The facets have the given normals,
+    /// and both have heights.
+    pub fn smooth_edge(&mut self, frame: &GridFrame, edge: [DVec3; 2], normals: [DVec3; 2]) {
+        if let Some(crease) = Crease::new(frame, edge, normals.map(Some)) {
+            self.smooth_crease(frame, &crease, false);
         }
     }
 
-    /// Enters what falls off from an edge of a facet, beyond which the surface is steeper, and evens the heights over it.
-    pub fn add_edge(&mut self, frame: &GridFrame, edge: [DVec3; 2], normal: DVec3) {
-        if let Some(crease) = Crease::new(frame, edge, normal, None) {
-            self.even(frame, &crease, true);
+    /// Adds the slope beyond an edge of a facet where the surface is steeper than heights may be, with means over the cells at the
+    /// edge. The facet has a normal if it is not too steep itself.
+    pub fn add_edge(&mut self, frame: &GridFrame, edge: [DVec3; 2], normal: Option<DVec3>) {
+        if let Some(crease) = Crease::new(frame, edge, [normal, None]) {
+            self.smooth_crease(frame, &crease, true);
         }
     }
 
-    fn even(&mut self, frame: &GridFrame, crease: &Crease, falls: bool) {
+    fn smooth_crease(&mut self, frame: &GridFrame, crease: &Crease, falls: bool) {
         let (from, to) = (crease.from, crease.from + crease.along);
         let fall = if falls { ((from.z.max(to.z) - frame.lowest) / STEEPEST).max(0.0) } else { 0.0 };
         let squared = crease.along.truncate().length_squared().max(f64::MIN_POSITIVE);
@@ -205,37 +292,37 @@ impl Heights {
                 let [u, v] = frame.middle(i, j);
                 let offset = DVec3::new(u, v, 0.0) - from;
                 let part = offset.truncate().dot(crease.along.truncate()) / squared;
-                let carrier = from + crease.along * part.clamp(0.0, 1.0);
-                let beside = DVec3::new(u - carrier.x, v - carrier.y, 0.0).truncate();
+                let surface_point = from + crease.along * part.clamp(0.0, 1.0);
+                let beside = DVec3::new(u - surface_point.x, v - surface_point.y, 0.0).truncate();
                 let out = beside.x * crease.across[0] + beside.y * crease.across[1];
                 let passes = (0.0..1.0).contains(&part);
                 if falls && out >= 0.0 && (passes || out > 0.0) {
-                    // Round the ends of an edge it falls off in all directions.
+                    // Around the ends of an edge the height decreases in all directions.
                     let distance = beside.length();
                     let away = if distance > 0.0 { (beside / distance).to_array() } else { crease.across };
-                    let (lower, steeper, by_side) = crease.lowered(distance);
+                    let (lower, steeper, by_side) = crease.mean_drop(distance);
                     let slopes = away.map(|away| -(STEEPEST + steeper) * away);
-                    let height = carrier.z - STEEPEST * distance - lower;
+                    let height = surface_point.z - STEEPEST * distance - lower;
                     if height > self.height[j][i] {
-                        self.raise((i, j), height, slopes, carrier);
+                        self.raise((i, j), height, slopes, surface_point);
                         (0..2).for_each(|k| self.by_side[k][j][i] = -by_side[k]);
                     }
                 } else if passes {
-                    self.lower((i, j), crease, carrier.z, out);
+                    self.lower((i, j), crease, surface_point.z, out);
                 }
             }
         }
     }
 
-    /// Lowers a height that is one of the facets at a crease to its mean over the cell.
+    /// Lowers the height of a facet at a crease to its mean over the cell.
     fn lower(&mut self, (i, j): (usize, usize), crease: &Crease, edge: f64, out: f64) {
         let expected = edge + out * crease.slopes[usize::from(out > 0.0)];
         if out.abs() >= crease.width || (self.height[j][i] - expected).abs() > crease.width {
             return;
         }
-        let (lower, steeper, by_side) = crease.lowered(out);
+        let (lower, steeper, by_side) = crease.mean_drop(out);
         self.height[j][i] -= lower;
-        self.carrier[2][j][i] -= lower;
+        self.surface_point[2][j][i] -= lower;
         for k in 0..2 {
             self.slopes[k][j][i] -= steeper * crease.across[k];
             self.by_side[k][j][i] -= by_side[k];
@@ -244,25 +331,25 @@ impl Heights {
 }
 
 impl Crease {
-    /// Between a facet and one that is as steep as it may be, where none is given.
-    fn new(frame: &GridFrame, [from, to]: [DVec3; 2], first: DVec3, second: Option<DVec3>) -> Option<Self> {
+    /// Between two facets with these normals; one without a normal has the largest slope.
+    fn new(frame: &GridFrame, [from, to]: [DVec3; 2], [first, second]: [Option<DVec3>; 2]) -> Option<Self> {
         let (from, to) = (frame.coordinates(from), frame.coordinates(to));
         let along = to - from;
-        // Facets are turned to the left of their edges.
+        // Facets lie to the left of their edges.
         let across = glam::DVec2::new(along.y, -along.x).try_normalize()?;
         let slope = |normal: DVec3| {
             let normal = frame.axes.transpose() * normal;
             -(normal.x * across.x + normal.y * across.y) / normal.z
         };
-        let slopes = [slope(first), second.map_or(-STEEPEST, slope)];
+        let slopes = [first.map_or(STEEPEST, slope), second.map_or(-STEEPEST, slope)];
         let by_side = [0.5 * across.x.abs(), 0.5 * across.y.abs()];
         let width = by_side[0] * frame.sides[0] + by_side[1] * frame.sides[1];
         Some(Self { from, along, across: across.to_array(), slopes, width, by_side })
     }
 
-    /// How much lower the mean over a cell is than its middle at a distance, the derivative of that by the distance, and by the
-    /// sides of a cell.
-    fn lowered(&self, out: f64) -> (f64, f64, [f64; 2]) {
+    /// Difference of the height in the middle of a cell, at a distance from the edge, and of its mean; and the derivatives by that
+    /// distance and by the sides of a cell.
+    fn mean_drop(&self, out: f64) -> (f64, f64, [f64; 2]) {
         let (bend, width) = (self.slopes[0] - self.slopes[1], self.width);
         let within = width - out.abs();
         if within <= 0.0 {
@@ -291,7 +378,7 @@ impl GridFrame {
             let low = points.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min) - reach;
             let high = points.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max) + reach;
             let cell = |at: f64| (at - self.corner[k]) / self.sides[k] - 0.5;
-            // Negative ones, and what is no number, become zero.
+            // Negative numbers and NaN become zero.
             let first = cell(low).ceil().min(self.count as f64) as usize;
             let end = (cell(high).floor() + 1.0).min(self.count as f64) as usize;
             first..end

@@ -21,7 +21,7 @@ fn pressed(shape: &ToolShape, angles: DVec3, depth: f64) -> CellProblem<'_> {
     let rotation = DQuat::from_euler(EulerRot::XYZ, angles.x, angles.y, angles.z);
     let lowest = rotation * shape.support(rotation.inverse() * DVec3::NEG_Z);
     let pose = ToolPose { position: DVec3::NEG_Z * depth - lowest, rotation };
-    CellProblem { shape, pose, plane: plane(), effective_modulus: MODULUS, resolution: Resolution::Fine }
+    CellProblem { shape, pose, plane: plane(), effective_modulus: MODULUS, resolution: Resolution::Fine, width: 1.0 }
 }
 
 fn cold(problem: &CellProblem) -> CellContact {
@@ -55,8 +55,8 @@ fn held_shapes() -> Vec<(ToolShape, DVec3)> {
     ]
 }
 
-fn near(told: f64, expected: f64, tolerance: f64) -> bool {
-    (told / expected - 1.0).abs() < tolerance
+fn near(value: f64, expected: f64, tolerance: f64) -> bool {
+    (value / expected - 1.0).abs() < tolerance
 }
 
 #[test]
@@ -120,8 +120,11 @@ fn the_side_of_a_capsule_presses_like_a_cylinder() {
     // Its area is its length times its width, 2 sqrt(4 P R/(pi E*)).
     let across: Vec<f64> = (0..MAX_CELLS).map(|j| 0.5 * (state.q[j][7] + state.q[j][8])).collect();
     let share = across.iter().sum::<f64>() / state.q.iter().flatten().sum::<f64>();
-    let tool =
-        PosedTool { shape: &shape, rotation: DMat3::from_quat(problem.pose.rotation), tip: problem.pose.position };
+    let tool = ToolInSurfaceFrame {
+        shape: &shape,
+        rotation: DMat3::from_quat(problem.pose.rotation),
+        tip: problem.pose.position,
+    };
     let cells = Cells::new(tool.rectangle(), MAX_CELLS, MODULUS);
     let load = contact.normal_force * share / cells.sides[0];
     let largest =
@@ -183,12 +186,12 @@ fn the_energy_changes_with_the_plane_as_its_wrenches_have_it() {
             let raised = (energy(h, 0.0) - energy(-h, 0.0)) / (2.0 * h);
             let turned = (energy(0.0, angle) - energy(0.0, -angle)) / (2.0 * angle);
             let scale = contact.force.length();
-            let told = (contact.force - contact.body_force).dot(axis);
-            assert!((raised - told).abs() < 1e-4 * scale, "{shape:?} {raised} {told}");
+            let value = (contact.force - contact.body_force).dot(axis);
+            assert!((raised - value).abs() < 1e-4 * scale, "{shape:?} {raised} {value}");
             // A turn about the normal moves the grid of an upright tool.
             if axis != DVec3::Z {
-                let told = (moment - contact.body_torque).dot(axis);
-                assert!((turned - told).abs() < 1e-4 * scale * 0.006, "{shape:?} {turned} {told}");
+                let value = (moment - contact.body_torque).dot(axis);
+                assert!((turned - value).abs() < 1e-4 * scale * 0.006, "{shape:?} {turned} {value}");
             }
         }
     }
@@ -286,12 +289,12 @@ fn every_solution_ends_and_does_not_depend_on_its_start() {
                 let warm = problem.solve(&bent(curvature), &mut state, &mut scratch);
                 assert!(warm.convergence.products <= MAX_PRODUCTS);
                 assert!(
-                    warm.convergence.miss <= TOLERANCE * 4.0 * warm.depth,
+                    warm.convergence.residual <= TOLERANCE * 4.0 * warm.overlap,
                     "{shape:?} {resolution:?} {:?}",
                     warm.convergence
                 );
                 // On a surface that falls away nothing may overlap below the plane.
-                assert!(warm.depth == 0.0 || depth > 0.0);
+                assert!(warm.overlap == 0.0 || depth > 0.0);
                 let cold = cold_on(curvature, &problem);
                 assert!(warm.force.distance(cold.force) <= 1e-5 * cold.force.length(), "{shape:?} {resolution:?} {k}");
                 assert!((warm.energy - cold.energy).abs() <= 1e-9 * cold.energy);

@@ -1,7 +1,7 @@
 //! Contact below the size of elements: a local law in series with finite elements.
 //!
-//! The body carries the surface below the tool along by `u = C_reg(x) f` (`contact::regular`). What is left between the
-//! tool, at `p' = p - u`, and the smooth surface at rest is contact with a half-space: Sneddon's sphere, and friction. With the
+//! The body displaces the surface below the tool by `u = C_reg(x) f` (`contact::regular`). What remains between the tool, at
+//! `p' = p - u`, and the smooth surface at rest is contact with a half-space: Sneddon's sphere, and friction. With the
 //! energy `Phi(p')` of the one and `f^T C_reg f / 2` of the other, all of it is the stationary value over `u` of
 //!
 //! ```text
@@ -17,79 +17,87 @@
 //! The last term inclines the force as the surface under load is inclined. Whatever forces friction adds to `dPhi/dp'`, the
 //! work of the tool less that of friction is the change of one energy: `f . dp = d(f^T C f / 2) + f_local . dp'`.
 
-mod contact;
-mod friction;
-mod met;
+mod additional;
+mod contact_check;
+mod coupling;
+mod energy_surplus;
+mod foot_jumps;
+mod half_space;
 mod response;
+mod scratch;
+mod solve;
 mod wrench;
 
-pub(in crate::simulation) use contact::ASKED;
-pub use contact::LocalContact;
-pub use met::{LocalBody, LocalTool};
-pub use response::{Guess, LocalResponse, Others, evaluate};
-pub use wrench::{Cells, posed, takes_cells};
+pub use scratch::LocalScratch;
 
 use glam::{DMat3, DVec3};
 
-use super::{Approach, Law};
+use super::{Approach, Law, TickMemory};
 use crate::contact::Refusal;
-use crate::contact::footprint::{NearPiece, PosedShape, PressedSurface};
+use crate::contact::footprint::{NearPiece, PlacedShape, PressedSurface};
+use crate::contact::local::cells::PressureState;
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{FootPoint, Neighbourhood};
 use crate::simulation::body::LocalSurface;
-use crate::simulation::contacts::{Contact, Mode};
-use crate::simulation::covering::Covering;
-use crate::simulation::state::Entry;
+use crate::simulation::contacts::{Contact, LocalContact, STRAIN_REQUESTS};
+use crate::simulation::input::Controls;
+use crate::simulation::model::Model;
+use crate::simulation::state::{EntryDepth, State};
 use crate::simulation::tool::LawKind;
+use crate::simulation::weight_scratch::WeightScratch;
 
-/// A tool that goes farther than this in a tick, over its radius, has jumped: its contact ends.
+/// Longest motion of a tool in a tick, over its radius: beyond it the tool has jumped, and its contact ends.
 const JUMP: f64 = 2.0;
 
-/// A tool that begins to touch has come by no more than this, over the way that it has gone in the tick; smoothed surfaces are
-/// not quite the level sets of a distance.
-const WAY: f64 = 2.0;
+/// Largest change of a tool's depth in a tick, over its motion: smoothed surfaces are not quite level sets of a distance.
+const ENTRY_PER_MOTION: f64 = 2.0;
 
-/// A place is expected to go no farther than this many times as far as its tool.
-const AHEAD: f64 = 1.5;
+/// Longest extrapolated step of a position over the surface at rest, over the motion of its tool.
+const STEP_PER_MOTION: f64 = 1.5;
+
+impl LawKind {
+    /// Contact with a half-space in series with the finite element body: slides, with friction, and rolls off edges.
+    pub const LOCAL: Self = Self { name: "local", needs_moduli: true };
+}
 
 /// The law.
 pub struct Local;
 
-/// A tool that comes is followed from where it was in steps no longer than this, over its radius: within one of them it does not
-/// pass the middle of a part that is thicker than its radius.
-const STRIDE: f64 = 0.25;
-/// Most of these steps for a tool that is no sphere.
-const MOST_STRIDES: f64 = 8.0;
+/// Longest substep in which an approaching tool is followed from its previous position, over its radius: within one of them it does
+/// not pass the middle of a part that is thicker than its radius.
+const SUBSTEP: f64 = 0.25;
+/// Most substeps for a tool that is not a sphere.
+const MOST_SUBSTEPS: f64 = 8.0;
 
-/// The foot of a tool that comes to a place over the surface at rest: once the tool touches on its way, the foot is followed, so
-/// that it lies on the side that the tool has come from. And how far the tool reaches below the plane through it, m. `None` where
-/// it is too far to reach it.
-fn arrival(
+/// The foot of a sphere that arrives at a position over the surface at rest, and its depth below the plane through the foot, m.
+/// Once the sphere touches on its way, the foot is followed, so that it lies on the side that the sphere came from. `None` if it is
+/// too far away to touch.
+fn starting_foot(
     approach: &Approach<'_>,
     local: &LocalSurface,
     place: DVec3,
     near: &mut Neighbourhood,
 ) -> Option<(FootPoint, f64)> {
-    let (gone, radius) = (approach.gone, approach.tool.radius);
-    let strides = (gone.length() / (STRIDE * radius)).ceil();
-    if strides > JUMP / STRIDE {
+    let (displacement, radius) = (approach.displacement, approach.tool.radius);
+    let substeps = (displacement.length() / (SUBSTEP * radius)).ceil();
+    if substeps > JUMP / SUBSTEP {
         return first_foot(approach, local, place, near);
     }
-    let mut touched: Option<FootPoint> = None;
-    for left in (1..strides.max(1.0) as u32).rev() {
-        let at = place - gone * (f64::from(left) / strides);
-        touched = match touched {
+    let mut touching: Option<FootPoint> = None;
+    for left in (1..substeps.max(1.0) as u32).rev() {
+        let at = place - displacement * (f64::from(left) / substeps);
+        touching = match touching {
             Some(foot) => Some(follow(approach, local, at, &foot, near)?.0),
             None => first_foot(approach, local, at, near).filter(|(_, depth)| *depth > 0.0).map(|(foot, _)| foot),
         };
     }
-    match touched {
+    match touching {
         Some(foot) => follow(approach, local, place, &foot, near),
         None => first_foot(approach, local, place, near),
     }
 }
 
-/// The foot followed from an earlier one, and the depth.
+/// The foot followed from an earlier one, and the depth, m.
 fn follow(
     approach: &Approach<'_>,
     local: &LocalSurface,
@@ -101,8 +109,8 @@ fn follow(
     Some((foot, approach.tool.radius - foot.distance))
 }
 
-/// The foot of a sphere at a place over the surface at rest, and how far it reaches below the plane through it, m. `None` where
-/// it is too far to reach it.
+/// The foot of a sphere at a position over the surface at rest, and its depth below the plane through the foot, m. `None` if it is
+/// too far away to touch.
 fn first_foot(
     approach: &Approach<'_>,
     local: &LocalSurface,
@@ -111,131 +119,191 @@ fn first_foot(
 ) -> Option<(FootPoint, f64)> {
     let (body, tool) = (approach.body, approach.tool);
     let closest = body.closest(place)?;
-    if local.smooth.surely_beyond(tool.radius, &closest) {
+    if local.smooth.is_beyond(tool.radius, &closest) {
         return None;
     }
     let foot = local.smooth.foot_from(body.drawn(), place, &closest, near);
     Some((foot, tool.radius - foot.distance))
 }
 
-/// The footprint of a tool that is no sphere, as a foot, and how deep it is in the pieces below, m. `None` where it is near none.
+/// The footprint, as a foot, of a tool that is not a sphere, and its depth in the pieces below, m. `None` if no piece is near.
 ///
-/// The contact faces the side that the tool has come from: the first piece that it has been near on its way.
-fn shape_arrival(
+/// The contact lies on the side that the tool came from: at the first piece that it was near to on its way.
+fn starting_footprint(
     approach: &Approach<'_>,
     local: &LocalSurface,
     pressed: &PressedSurface,
     place: DVec3,
-    covering: &mut Covering,
+    weight_scratch: &mut WeightScratch,
 ) -> Option<(FootPoint, f64)> {
     let (body, shape) = (approach.body, &approach.tool.shape);
     let (drawn, rotation, thickness) = (body.drawn(), DMat3::from_quat(approach.orientation), shape.thickness());
     let closest = body.closest(place + rotation * shape.centre())?;
-    if closest.signed_distance > shape.bounding_radius() + pressed.margin + approach.gone.length() {
+    if closest.signed_distance > shape.bounding_radius() + pressed.margin + approach.displacement.length() {
         return None;
     }
-    let Covering { footprint, weights, .. } = covering;
-    let jumped = approach.gone.length() > JUMP * approach.tool.radius;
-    let gone = if jumped { DVec3::ZERO } else { approach.gone };
-    let strides = (gone.length() / (STRIDE * thickness)).ceil().clamp(1.0, MOST_STRIDES);
-    let mut at = PosedShape { shape, place, rotation, facing: DVec3::ZERO, sunk: 0.0 };
-    footprint.near.forget();
-    let mut met = None;
-    for left in (0..strides as u32).rev() {
-        at.place = place - gone * (f64::from(left) / strides);
-        footprint.near.gather(pressed, drawn.query, &at);
-        met = footprint.first_met(if approach.motion.is_some() { DVec3::ZERO } else { gone });
-        if met.is_some() {
+    let WeightScratch { footprint, weights, .. } = weight_scratch;
+    let has_jumped = approach.displacement.length() > JUMP * approach.tool.radius;
+    let displacement = if has_jumped { DVec3::ZERO } else { approach.displacement };
+    let substeps = (displacement.length() / (SUBSTEP * thickness)).ceil().clamp(1.0, MOST_SUBSTEPS);
+    let mut at = PlacedShape { shape, position: place, rotation, contact_normal: DVec3::ZERO, penetration: 0.0 };
+    footprint.near.invalidate();
+    let mut first_plane = None;
+    for left in (0..substeps as u32).rev() {
+        at.position = place - displacement * (f64::from(left) / substeps);
+        footprint.near.find(pressed, drawn.query, &at);
+        first_plane = footprint.first_touched(if approach.motion.is_some() { DVec3::ZERO } else { displacement });
+        if first_plane.is_some() {
             break;
         }
     }
-    let met = met?;
-    let at = PosedShape { place, sunk: gone.length(), facing: met.normal, ..at };
-    footprint.near.gather(pressed, drawn.query, &at);
-    let found = footprint.find(&pressed.fine, &local.smooth, met, weights)?;
-    let facing = |near: &&NearPiece| near.normal.dot(found.normal) > 0.0;
-    let deepest = footprint.near.pieces.iter().filter(facing).map(|near| -near.distance).fold(0.0, f64::max);
-    Some((found.foot(place), deepest))
+    let first_plane = first_plane?;
+    let at =
+        PlacedShape { position: place, penetration: displacement.length(), contact_normal: first_plane.normal, ..at };
+    footprint.near.find(pressed, drawn.query, &at);
+    let contact_footprint = footprint.find(&pressed.fine, &local.smooth, first_plane, weights)?;
+    let faces = |near: &&NearPiece| near.normal.dot(contact_footprint.normal) > 0.0;
+    let deepest = footprint.near.pieces.iter().filter(faces).map(|near| -near.distance).fold(0.0, f64::max);
+    Some((contact_footprint.foot(place), deepest))
 }
 
-/// How far a tool at `place` reaches below the plane through a foot, m; negative where it does not.
+/// Depth of a tool at `place` below the plane through a foot, m; negative above it.
 pub fn depth_below(shape: &ToolShape, (place, rotation): (DVec3, DMat3), foot: &FootPoint) -> f64 {
     let deepest = place + rotation * shape.support(-(rotation.transpose() * foot.normal));
     (foot.position - deepest).dot(foot.normal)
 }
 
+/// Puts a contact into an empty slot.
+fn add_contact(state: &mut State, new_contact: Contact) -> Option<usize> {
+    let State { contacts, pressures, .. } = &mut *state;
+    let slot = contacts.empty(new_contact.additional)?;
+    let serial = contacts.next_serial();
+    contacts.put(slot, Contact { serial, ..new_contact });
+    if let Some(pressures) = pressures.get_mut(slot) {
+        *pressures = PressureState::default();
+    }
+    Some(slot)
+}
+
 impl Law for Local {
+    fn kind(&self) -> LawKind {
+        LawKind::LOCAL
+    }
+
+    /// A grab is that of a patch.
+    fn grab_law(&self) -> LawKind {
+        LawKind::PATCH
+    }
+
     fn begin(
         &self,
         approach: &Approach<'_>,
-        entry: &mut Entry,
-        covering: &mut Covering,
+        entry: &mut EntryDepth,
+        weight_scratch: &mut WeightScratch,
     ) -> Result<Option<Contact>, Refusal> {
-        let (body, met) = (approach.body, approach.position - approach.carried());
+        let (body, relative_position) = (approach.body, approach.position - approach.surface_displacement());
         let Some(local) = &body.local else { return Ok(None) };
-        covering.near.forget();
-        let arrived = match approach.pressed {
-            Some(pressed) => shape_arrival(approach, local, pressed, met, covering),
-            None => arrival(approach, local, met, &mut covering.near),
+        weight_scratch.near.invalidate();
+        let start = match approach.pressed_surface {
+            Some(pressed) => starting_footprint(approach, local, pressed, relative_position, weight_scratch),
+            None => starting_foot(approach, local, relative_position, &mut weight_scratch.near),
         };
-        let Some((foot, depth)) = arrived else {
-            *entry = Entry::default();
+        let Some((foot, depth)) = start else {
+            *entry = EntryDepth::default();
             return Ok(None);
         };
-        let before = std::mem::replace(&mut entry.reached, depth.max(0.0));
-        entry.depth = entry.depth.min(entry.reached);
-        if approach.returned {
-            entry.depth = entry.reached;
+        let before = std::mem::replace(&mut entry.previous, depth.max(0.0));
+        entry.threshold = entry.threshold.min(entry.previous);
+        if approach.has_returned {
+            entry.threshold = entry.previous;
         }
-        if approach.motion.is_none() && approach.way() > 0.0 {
-            // A distance changes by no more than the way: where it seems to, the foot a tick ago was another one.
-            entry.depth = entry.depth.max(depth - before - WAY * approach.way());
+        if approach.motion.is_none() && approach.largest_motion() > 0.0 {
+            // A distance changes by no more than the motion. A larger change means another foot than a tick ago.
+            entry.threshold = entry.threshold.max(depth - before - ENTRY_PER_MOTION * approach.largest_motion());
         }
-        // Pieces do not show where between them a tool first touches: one that has come from outside is tried as soon as it is near.
-        let tried = approach.pressed.is_some() && entry.depth == 0.0;
-        if depth <= entry.depth && !tried {
+        // A tool may first touch between the middles of pieces: one from outside begins a contact as soon as it is near.
+        let starts_near = approach.pressed_surface.is_some() && entry.threshold == 0.0;
+        if depth <= entry.threshold && !starts_near {
             return Ok(None);
         }
         let local = LocalContact {
-            tool: approach.position,
+            tool_position: approach.position,
             orientation: approach.orientation,
-            relative: met,
-            turned: approach.orientation,
-            entry: entry.depth,
+            relative_position,
+            previous_orientation: approach.orientation,
+            entry_depth: entry.threshold,
             foot,
             part: 1.0,
-            share: 1.0,
-            asked: [foot.position; ASKED],
             ..LocalContact::default()
         };
         Ok(Some(Contact {
-            mode: Mode::Press,
-            law: LawKind::Local,
-            tool: approach.tool_index,
-            body: approach.body_index,
+            nonlinear: true,
             point: foot.position,
             normal: foot.normal,
             anchor: approach.position,
+            strain_requests: [foot.position; STRAIN_REQUESTS],
             local,
-            ..Contact::default()
+            ..Contact::new(LawKind::LOCAL, (approach.tool_index, approach.body_index))
         }))
+    }
+
+    /// Its patch is set when its force is known.
+    fn add(
+        &self,
+        _model: &Model,
+        state: &mut State,
+        new_contact: Contact,
+        _weight_scratch: &WeightScratch,
+    ) -> Option<usize> {
+        add_contact(state, new_contact)
     }
 
     fn update(&self, approach: &Approach<'_>, contact: &mut Contact) -> bool {
         let local = &mut contact.local;
-        let gone = approach.position.distance(local.tool);
-        let jumped = gone > JUMP * approach.tool.radius;
-        // A place over the surface at rest goes about as far as its tool, or less. What it has gone beyond is the remainder of the
-        // method, less than its tolerance a tick: it would be repeated until the tolerance is passed, then taken back at once.
+        let travel = approach.position.distance(local.tool_position);
+        let has_jumped = travel > JUMP * approach.tool.radius;
+        // A position over the surface at rest moves about as far as its tool, or less. Any excess is the residual of the method,
+        // below its tolerance in a tick: extrapolated, it would repeat until it exceeds the tolerance, and then be undone at once.
         if approach.motion.is_none() {
-            local.advance = local.advance.clamp_length_max(AHEAD * gone);
+            local.last_step = local.last_step.clamp_length_max(STEP_PER_MOTION * travel);
         }
-        (local.tool, local.orientation) = (approach.position, approach.orientation);
-        // Withdrawn, it may come in again as deep as it has been left.
-        !approach.grab && !jumped
+        (local.tool_position, local.orientation) = (approach.position, approach.orientation);
+        // After a jump a new contact starts from the depth stored in the tool's state.
+        !approach.grab && !has_jumped
     }
 
-    fn end(&self, contact: &Contact) -> bool {
-        contact.force == DVec3::ZERO && !contact.local.further
+    fn persists(&self, contact: &Contact) -> bool {
+        !contact.local.is_fading
+    }
+
+    /// Walls beside a tool that is not a sphere are found after it has been pressed.
+    fn find_additional(&self, model: &Model, state: &mut State, memory: TickMemory<'_>, (tool, body): (usize, usize)) {
+        if model.pressed_surfaces[tool][body].is_none() {
+            additional::find_additional_contacts(model, state, memory, (tool, body));
+        }
+    }
+
+    fn find_forces(&self, model: &Model, state: &mut State, memory: TickMemory<'_>, body: usize, controls: &Controls) {
+        solve::local_forces(model, state, memory, body, controls);
+    }
+
+    fn body_displacement(&self, contact: &Contact) -> f64 {
+        contact.local.tool_position.distance(contact.local.relative_position)
+    }
+
+    fn ends(&self, contact: &Contact) -> bool {
+        contact.force == DVec3::ZERO && !contact.additional
+    }
+
+    fn store_entry_depth(&self, _model: &Model, state: &mut State, contact: &Contact) {
+        state.tools[contact.tool].entry[contact.body].previous = contact.depth.max(0.0);
+    }
+
+    fn find_additional_by_force(&self, model: &Model, state: &mut State, memory: TickMemory<'_>, body: usize) {
+        additional::find_wall_contact(model, state, memory, body);
+    }
+
+    fn is_sound(&self, model: &Model, contact: &Contact, stiffness_scale: f64) -> bool {
+        contact_check::is_sound(model, contact, stiffness_scale)
     }
 }

@@ -1,4 +1,4 @@
-//! A tool that is no sphere on the body: the gradient of its energy by the tool's pose.
+//! Wrench of a tool that is not a sphere: the gradient of its energy by the tool's pose.
 //!
 //! Cells on the plane of the contact (origin `o`, normal `n`) give the energy `U`, its wrench on the tool `F`, `M` about `o`, and
 //! that on the body, `B`, `N`. As `U` does not change where tool, body and plane move together,
@@ -9,81 +9,100 @@
 //!
 //! where `o` and `n` follow the tool's pose (`contact::footprint`).
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
-use super::contact::LocalContact;
-use super::met::{HalfSpace, Indentation, LocalTool};
+use super::half_space::{HalfSpace, Indentation, LocalTool};
 use crate::contact::Tessellation;
-use crate::contact::footprint::{Footprint, FootprintScratch, NearRelief, PosedShape};
+use crate::contact::footprint::{Footprint, FootprintScratch, NearPieces, NearRelief, PlacedShape};
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
 use crate::contact::local::{ContactPlane, ToolPose};
 use crate::contact::shape::ToolShape;
+use crate::simulation::contacts::LocalContact;
 
-/// What pressure cells need beside the shape.
-pub struct Cells<'a> {
-    /// Where the solution starts, and what it leaves for the next.
+/// State and memory of pressure cells, and their resolution.
+pub struct CellMemory<'a> {
+    /// Start of the solution, updated to its result.
     pub state: &'a mut PressureState,
     pub scratch: &'a mut CellScratch,
     pub footprint: &'a mut FootprintScratch,
     pub resolution: Resolution,
 }
 
-/// Whether a shape has no closed form.
-pub fn takes_cells(shape: &ToolShape) -> bool {
-    !matches!(shape, ToolShape::Sphere { .. })
-}
-
-/// A tool as it is pressed: what it began with counts as if it were not so deep.
-pub fn posed<'a>(shape: &'a ToolShape, contact: &LocalContact, place: DVec3) -> PosedShape<'a> {
-    let facing = contact.foot.normal;
-    PosedShape {
+/// The shape of a tool as it is pressed: lifted by the approach at which the contact began.
+pub fn placed_shape<'a>(shape: &'a ToolShape, contact: &LocalContact, place: DVec3) -> PlacedShape<'a> {
+    let contact_normal = contact.foot.normal;
+    PlacedShape {
         shape,
-        place: place + facing * contact.entry,
+        position: place + contact_normal * contact.entry_depth,
         rotation: DMat3::from_quat(contact.orientation),
-        facing,
-        sunk: contact.sunk,
+        contact_normal,
+        penetration: contact.penetration,
     }
 }
 
-/// How deep a tool is below the plane of its footprint, m.
-pub fn sunk(tool: &PosedShape<'_>, footprint: &Footprint) -> f64 {
-    (footprint.origin - tool.support(-footprint.normal)).dot(footprint.normal)
+/// Largest overlap of a tool and the body over a footprint, along its normal, m. It is less than the depth below the plane, which
+/// is as high as the highest piece next to the tool.
+pub fn largest_overlap(
+    fine: &Tessellation,
+    (shape, place, rotation): (&ToolShape, DVec3, DQuat),
+    footprint: &Footprint,
+    near: &NearPieces,
+    scratch: &mut CellScratch,
+) -> f64 {
+    let problem = CellProblem {
+        shape,
+        pose: ToolPose { position: place, rotation },
+        plane: ContactPlane::new(footprint.origin, footprint.normal),
+        // The gaps do not depend on these.
+        effective_modulus: 1.0,
+        width: 1.0,
+        resolution: Resolution::Fine,
+    };
+    problem.largest_overlap(&NearRelief { near, fine }, scratch)
 }
 
-/// Energy of a tool at `place` over its footprint, and its gradient. `modulus_by_rotation` is that of `E*`, Pa.
+/// Energy of a tool at `place` over its footprint, and its gradient, given the gradients by rotation of `E*`, Pa, and of the width,
+/// m.
 pub fn indent_shape(
     fine: &Tessellation,
     tool: LocalTool<'_>,
     contact: &LocalContact,
     place: DVec3,
     footprint: &Footprint,
-    (half_space, modulus_by_rotation): (&HalfSpace, DVec3),
-    cells: Cells<'_>,
+    (half_space, [modulus_by_rotation, width_by_rotation]): (&HalfSpace, [DVec3; 2]),
+    cells: CellMemory<'_>,
 ) -> Indentation {
     let normal = footprint.normal;
-    let position = place + normal * contact.entry;
+    let position = place + normal * contact.entry_depth;
     let problem = CellProblem {
         shape: tool.shape,
         pose: ToolPose { position, rotation: contact.orientation },
         plane: ContactPlane::new(footprint.origin, normal),
         effective_modulus: half_space.modulus,
         resolution: cells.resolution,
+        width: half_space.width,
     };
     let relief = NearRelief { near: &cells.footprint.near, fine };
     let pressed = problem.solve(&relief, cells.state, cells.scratch);
     let moment = pressed.torque + (position - footprint.origin).cross(pressed.force);
     let by_origin = pressed.force - pressed.body_force;
-    let by_normal = (moment - pressed.body_torque).cross(normal) - pressed.force * contact.entry;
+    let by_normal = (moment - pressed.body_torque).cross(normal) - pressed.force * contact.entry_depth;
     let stiffer = pressed.energy / half_space.modulus;
     let [by_place, by_rotation] =
         [0, 1].map(|k| footprint.origin_by[k].transpose() * by_origin + footprint.normal_by[k].transpose() * by_normal);
     Indentation {
         force: pressed.normal_force,
+        depth: pressed.overlap,
         radius: pressed.stiffness / (2.0 * half_space.modulus),
         stiffness: pressed.stiffness,
         energy: pressed.energy,
-        gradient: by_place - pressed.force + half_space.slope * stiffer,
-        torque: pressed.torque - by_rotation - modulus_by_rotation * stiffer,
+        gradient: by_place - pressed.force
+            + half_space.slope * stiffer
+            + half_space.width_slope * pressed.energy_by_width,
+        torque: pressed.torque
+            - by_rotation
+            - modulus_by_rotation * stiffer
+            - width_by_rotation * pressed.energy_by_width,
         lever: if pressed.normal_force > 0.0 { pressed.centre_of_pressure - place } else { DVec3::ZERO },
         tangential: half_space.tangential,
     }
@@ -91,18 +110,16 @@ pub fn indent_shape(
 
 #[cfg(test)]
 mod tests {
-    use glam::DQuat;
-
     use super::*;
     use crate::contact::SurfaceQuery;
     use crate::contact::footprint::PressedSurface;
     use crate::contact::local::effective_modulus;
-    use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON};
+    use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, WIDTH};
     use crate::contact::smooth::tests::{ball, cube, near};
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
-    use crate::simulation::law::local::met::LocalBody;
-    use crate::simulation::law::local::response::{Guess, LocalResponse, Others, evaluate};
+    use crate::simulation::law::local::half_space::LocalBody;
+    use crate::simulation::law::local::response::{Guess, LocalResponse, OtherContacts, evaluate};
 
     /// A body whose modulus rises by a half over a length of two.
     struct Body {
@@ -120,6 +137,7 @@ mod tests {
             let fields = smooth.fans().iter().map(|fan| {
                 let mut fields = FanFields::default();
                 (fields[PLANE_STRAIN], fields[POISSON]) = (modulus(fan.position.z), 0.45);
+                fields[WIDTH] = 0.5 + 0.1 * fan.position.x;
                 fields
             });
             Self { fields: fields.collect(), smooth, query, surface }
@@ -129,26 +147,32 @@ mod tests {
             let drawn = DrawnSurface { surface: &self.surface, query: &self.query };
             let pressed =
                 PressedSurface::new(&self.surface, &self.query, &self.smooth, &self.fields, shape.thickness());
-            let body =
-                LocalBody { drawn, smooth: &self.smooth, fields: &self.fields, pressed: Some(&pressed), scale: 1.0 };
+            let body = LocalBody {
+                drawn,
+                smooth: &self.smooth,
+                fields: &self.fields,
+                pressed_surface: Some(&pressed),
+                scale: 1.0,
+            };
             let tool = LocalTool { shape, radius: shape.bounding_radius(), pad: None, coefficient: 0.0 };
             let mut contact = LocalContact { orientation, part: 1.0, ..LocalContact::default() };
             let mut weights = FanWeights::new(near(&self.smooth));
             let (mut state, mut scratch) = (PressureState::default(), CellScratch::default());
             let mut footprint = FootprintScratch::default();
-            let at = PosedShape { facing: DVec3::ZERO, ..posed(shape, &contact, place) };
-            footprint.near.gather(&pressed, &self.query, &at);
-            let met = footprint.first_met(DVec3::ZERO).expect("a piece");
-            (contact.foot.position, contact.foot.normal) = (met.point, met.normal);
-            contact.entry = 0.003;
+            let at = PlacedShape { contact_normal: DVec3::ZERO, ..placed_shape(shape, &contact, place) };
+            footprint.near.find(&pressed, &self.query, &at);
+            let first = footprint.first_touched(DVec3::ZERO).expect("a piece");
+            (contact.foot.position, contact.foot.normal) = (first.point, first.normal);
+            contact.entry_depth = 0.003;
             let mut response = LocalResponse::default();
             for _ in 0..8 {
                 let guess = Guess { place, force: response.force, foot: &contact.foot };
                 let resolution = Resolution::Medium;
-                let cells = Cells { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
-                let others = Others::default();
+                let cells =
+                    CellMemory { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };
+                let others = OtherContacts::default();
                 response = evaluate(body, tool, &contact, guess, others, &mut weights, cells).expect("an answer");
-                (contact.foot, contact.sunk) = (response.foot, response.sunk);
+                (contact.foot, contact.penetration) = (response.foot, response.indentation.depth);
             }
             response
         }
@@ -156,18 +180,18 @@ mod tests {
 
     /// Differences of the energy over small motions and rotations are force and torque.
     fn check(body: &Body, shape: &ToolShape, (place, orientation): (DVec3, DQuat), tolerance: f64) {
-        let told = body.press(shape, place, orientation).indentation;
-        assert!(told.force > 0.0);
+        let expected = body.press(shape, place, orientation).indentation;
+        assert!(expected.force > 0.0);
         let h = 1e-4;
         let energy = |place: DVec3, orientation: DQuat| body.press(shape, place, orientation).indentation.energy;
         for axis in DVec3::AXES {
             let [ahead, behind] = [h, -h].map(|h| energy(place + h * axis, orientation));
-            let miss = ((ahead - behind) / (2.0 * h) - told.gradient.dot(axis)).abs() / told.force;
-            assert!(miss < tolerance, "force {miss:e} {shape:?} {place}");
+            let error = ((ahead - behind) / (2.0 * h) - expected.gradient.dot(axis)).abs() / expected.force;
+            assert!(error < tolerance, "force {error:e} {shape:?} {place}");
             let turned = |h: f64| DQuat::from_scaled_axis(h * axis) * orientation;
             let [ahead, behind] = [h, -h].map(|h| energy(place, turned(h)));
-            let miss = ((ahead - behind) / (2.0 * h) + told.torque.dot(axis)).abs() / told.force;
-            assert!(miss < tolerance, "torque {miss:e} {shape:?} {place}");
+            let error = ((ahead - behind) / (2.0 * h) + expected.torque.dot(axis)).abs() / expected.force;
+            assert!(error < tolerance, "torque {error:e} {shape:?} {place}");
         }
     }
 
@@ -201,7 +225,7 @@ mod tests {
             for k in 0..9 {
                 let angle = (f64::from(k) * 11.25 + 0.3).to_radians();
                 let towards = DVec3::new(angle.sin(), 0.02, angle.cos()).normalize();
-                // Of one that stands upright the cells have no direction.
+                // For a capsule that stands upright the cells have no direction.
                 let lies = matches!(shape, ToolShape::Capsule { .. });
                 let lying = DQuat::from_rotation_x(if lies { 1.5 } else { 0.0 });
                 let orientation =
@@ -213,16 +237,16 @@ mod tests {
         }
     }
 
-    /// Round, it is the sphere of the closed form on the same curvatures.
+    /// Compared with the closed form of a sphere on the same curvatures.
     #[test]
     fn a_round_ellipsoid_is_a_sphere() {
         let body = Body::new(ball(24));
         let round = ToolShape::ellipsoid(DVec3::splat(0.2)).expect("a shape");
-        let told = body.press(&round, DVec3::Z * 1.18, DQuat::from_rotation_x(0.7)).indentation;
+        let expected = body.press(&round, DVec3::Z * 1.18, DQuat::from_rotation_x(0.7)).indentation;
         // The relative radius is 1/(5 + 1), the depth 0.02 less what it began with.
         let modulus = effective_modulus(1.25e4, 0.45, None);
         let sphere = crate::contact::local::indent_sphere(0.017, 1.0 / 6.0, modulus);
-        assert!((told.force / sphere.force - 1.0).abs() < 0.03, "{} {}", told.force, sphere.force);
-        assert!(told.torque.length() < 1e-3 * told.force * 0.2);
+        assert!((expected.force / sphere.force - 1.0).abs() < 0.03, "{} {}", expected.force, sphere.force);
+        assert!(expected.torque.length() < 1e-3 * expected.force * 0.2);
     }
 }

@@ -1,0 +1,48 @@
+//! State of a contact under the local law from tick to tick.
+
+use glam::{DQuat, DVec3};
+
+use crate::contact::footprint::Plane;
+use crate::contact::local::Friction;
+use crate::contact::smooth::FootPoint;
+
+/// State of a contact under the local law; vectors are in the body's frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LocalContact {
+    /// Position of the tool, m.
+    pub tool_position: DVec3,
+    /// Orientation of the tool.
+    pub orientation: DQuat,
+    /// Position of the tool over the surface at rest, `p' = p - u`, without the displacement `u` of the body below it, m.
+    pub relative_position: DVec3,
+    /// Displacement of that position in the last tick, m.
+    pub last_step: DVec3,
+    /// Orientation a tick ago.
+    pub previous_orientation: DQuat,
+    /// Approach at which the contact began, m: the force of a tool that appears inside starts from zero.
+    pub entry_depth: f64,
+    /// The closest point of the surface at rest; for a tool that is not a sphere, the middle of its footprint.
+    pub foot: FootPoint,
+    /// Depth of the tool in the surface, m.
+    pub penetration: f64,
+    /// Whether it has begun in this tick beside another contact of the tool; its approach then counts from the present depth.
+    pub is_new: bool,
+    /// Largest depth that the tool can have reached since the last search for additional contacts, m.
+    pub reachable_depth: f64,
+    /// Whether it fades, with its foot fixed on its plane, because the surface has no closest point there any more.
+    pub is_fading: bool,
+    /// Its part of the half-space's stiffness, and the change of that part in a tick.
+    pub part: f64,
+    pub part_rate: f64,
+    /// Friction at the end of the last tick.
+    pub friction: Friction,
+    /// Force on the body before the strain limit, N.
+    pub force: DVec3,
+}
+
+impl LocalContact {
+    /// Plane of the contact a tick ago, for a tool that is not a sphere.
+    pub fn plane(&self) -> Plane {
+        Plane { point: self.foot.position, normal: self.foot.normal }
+    }
+}

@@ -1,0 +1,237 @@
+//! Contacts whose closest point has jumped: fading of the old contact and start of the new one.
+//!
+//! Where a surface is concave with about the tool's radius or less, a minimum of the distance ends in a fold, and the next one lies
+//! elsewhere; beyond a ridge too. The contact then stays on its plane and fades within [`FADE_TICKS`] ticks. A new contact at the
+//! next minimum, if there is one on the same side, grows by the same part. Where it is deeper, its approach counts from that of the
+//! old one. So the force does not jump, and both together store no more energy than the old one did.
+//!
+//! Two contacts whose closest points coincide have merged: the later one fades.
+
+use glam::{DMat3, DVec3};
+
+use super::add_contact;
+use super::depth_below;
+use super::response::LocalResponse;
+use crate::contact::shape::ToolShape;
+use crate::contact::smooth::FootPoint;
+use crate::simulation::contacts::{Contact, Mode};
+use crate::simulation::model::Model;
+use crate::simulation::state::State;
+use crate::simulation::tool::ToolModel;
+
+/// Distance of the tool, over its radius, beyond which a pending contact ends; and depth beyond which a new one is rejected, for
+/// the tool did not come from its side.
+const PENDING_REACH: f64 = 0.6;
+pub const DEEPEST_START: f64 = 0.4;
+/// Ticks in which a contact fades.
+const FADE_TICKS: f64 = 100.0;
+/// Least part of the half-space that a contact has.
+const LEAST_PART: f64 = 1e-6;
+/// A foot has jumped if its travel in a tick exceeds this many times that of the tool plus this distance, over the tool's radius.
+const JUMP_RATIO: f64 = 4.0;
+const JUMP_DISTANCE: f64 = 0.02;
+/// Largest distance of a replacement from the old foot, over the tool's radius, and least cosine between their normals.
+const REPLACEMENT_DISTANCE: f64 = 0.25;
+const SAME_SIDE: f64 = 0.3;
+/// Feet closer than this, over the tool's radius, have merged.
+const MERGED_DISTANCE: f64 = 0.02;
+/// Planes of a tool that is not a sphere have merged if the cosine between their normals is larger than this.
+const MERGED_COSINE: f64 = 0.7;
+/// Distance of two contacts of a tool, over its radius, below which their compliance goes over to that of one contact: the nodes do
+/// not resolve them.
+const SHARED_DISTANCE: f64 = 0.5;
+
+/// Solution for the contacts of a body: responses, and positions of the tools over the surface at rest.
+#[derive(Clone, Copy)]
+pub struct SolvedContacts<'a> {
+    pub responses: &'a [LocalResponse],
+    pub positions: &'a [DVec3],
+}
+
+/// Whether a foot has moved much farther than its tool, or to another side.
+pub fn foot_has_jumped(model: &Model, contact: &Contact, response: &LocalResponse, place: DVec3) -> bool {
+    let (local, tool) = (&contact.local, &model.tools[contact.tool]);
+    if local.is_fading || local.is_new || tool.shape.needs_cells() {
+        return false;
+    }
+    let travel = place.distance(local.relative_position);
+    response.foot.position.distance(local.foot.position) > JUMP_RATIO * travel + JUMP_DISTANCE * tool.radius
+        || response.foot.normal.dot(local.foot.normal) < SAME_SIDE
+}
+
+/// Starts the fading of contacts whose feet have jumped, and begins their replacements. Returns whether there were any.
+pub fn replace_jumped_contacts(model: &Model, state: &mut State, solved: SolvedContacts<'_>, slots: &[usize]) -> bool {
+    let mut any = false;
+    for (a, &slot) in slots.iter().enumerate() {
+        let (response, place) = (&solved.responses[a], solved.positions[a]);
+        if !foot_has_jumped(model, &state.contacts.slots[slot], response, place) {
+            continue;
+        }
+        any = true;
+        let contact = state.contacts.slots[slot];
+        if contact.local.force == DVec3::ZERO {
+            match contact.additional {
+                true => state.contacts.clear(slot),
+                false => {
+                    move_foot(&model.tools[contact.tool], &mut state.contacts.slots[slot], &response.foot, place);
+                }
+            }
+            continue;
+        }
+        begin_fading(&mut state.contacts.slots[slot]);
+        if foot_is_taken(model, state, solved, slots, a) {
+            continue;
+        }
+        let radius = model.tools[contact.tool].radius;
+        let near = response.foot.position.distance(contact.local.foot.position) < REPLACEMENT_DISTANCE * radius;
+        if near && response.foot.normal.dot(contact.local.foot.normal) > SAME_SIDE {
+            begin_replacement(model, state, &contact, (response, place));
+        } else {
+            // The force of the next contact starts from zero.
+            state.tools[contact.tool].entry[contact.body].threshold = f64::INFINITY;
+        }
+    }
+    any
+}
+
+/// Starts the fading of a contact, with its foot fixed.
+fn begin_fading(contact: &mut Contact) {
+    contact.additional = true;
+    (contact.local.is_fading, contact.local.part_rate) = (true, -1.0 / FADE_TICKS);
+}
+
+/// Starts the fading of contacts for which Newton's method has diverged: those with the longest last steps. The force of the next
+/// contact starts from zero.
+pub fn fade_lost_contacts(state: &mut State, steps: &[DVec3], slots: &[usize]) {
+    let longest = steps.iter().map(|step| step.length()).fold(0.0, f64::max);
+    for (&slot, step) in slots.iter().zip(steps) {
+        let Contact { tool, body, local, .. } = state.contacts.slots[slot];
+        if step.length() < 0.5 * longest || local.is_fading {
+            continue;
+        }
+        state.tools[tool].entry[body].threshold = f64::INFINITY;
+        match local.force == DVec3::ZERO {
+            true => state.contacts.clear(slot),
+            false => begin_fading(&mut state.contacts.slots[slot]),
+        }
+    }
+}
+
+/// Part by which the compliance of two contacts of one tool at a distance is that of one contact.
+pub fn merge_share(distance: f64, radius: f64) -> f64 {
+    let t = (distance / (SHARED_DISTANCE * radius)).min(1.0);
+    1.0 - t * t * (3.0 - 2.0 * t)
+}
+
+/// Whether another contact of the same tool has the foot that this one has jumped to. A fading contact there grows again.
+fn foot_is_taken(model: &Model, state: &mut State, solved: SolvedContacts<'_>, slots: &[usize], a: usize) -> bool {
+    let (contact, foot) = (state.contacts.slots[slots[a]], &solved.responses[a].foot);
+    let merged = MERGED_DISTANCE * model.tools[contact.tool].radius;
+    for (b, &slot) in slots.iter().enumerate().filter(|&(b, _)| b != a) {
+        let other = &mut state.contacts.slots[slot];
+        let near = solved.responses[b].foot.position.distance(foot.position) < merged;
+        if near && (other.tool, other.body) == (contact.tool, contact.body) {
+            if other.local.is_fading {
+                (other.local.is_fading, other.local.part_rate) = (false, 1.0 / FADE_TICKS);
+                move_foot(&model.tools[contact.tool], other, foot, solved.positions[b]);
+            }
+            return true;
+        }
+    }
+    false
+}
+
+/// Begins a contact at the foot that another one has jumped to, with at most the same approach.
+fn begin_replacement(model: &Model, state: &mut State, before: &Contact, (response, place): (&LocalResponse, DVec3)) {
+    let tool = &model.tools[before.tool];
+    let mut next = *before;
+    move_foot(tool, &mut next, &response.foot, place);
+    next.additional = true;
+    let local = &mut next.local;
+    (local.relative_position, local.last_step) = (place, DVec3::ZERO);
+    (local.part, local.part_rate) = (LEAST_PART, 1.0 / FADE_TICKS);
+    (local.friction, local.force) = Default::default();
+    next.force = DVec3::ZERO;
+    add_contact(state, next);
+}
+
+/// Moves the foot of a contact. Where the tool is deeper, the approach is reduced to what it was.
+fn move_foot(tool: &ToolModel, contact: &mut Contact, foot: &FootPoint, place: DVec3) {
+    let before = contact_depth(tool, contact, place);
+    contact.local.foot = *foot;
+    contact.local.entry_depth += (contact_depth(tool, contact, place) - before).max(0.0);
+}
+
+/// Depth of a tool below the plane through its contact's foot, m.
+pub fn contact_depth(tool: &ToolModel, contact: &Contact, place: DVec3) -> f64 {
+    let foot = &contact.local.foot;
+    match tool.shape {
+        ToolShape::Sphere { radius } => radius - (place - foot.position).dot(foot.normal),
+        ref shape => depth_below(shape, (place, DMat3::from_quat(contact.local.orientation)), foot),
+    }
+}
+
+/// Advances the parts of fading and growing contacts by a tick. The energy that growing contacts of a tool gain is at most that
+/// which its fading ones lose: with an energy `part * Phi` at constant positions the stationary value is concave in the part, so
+/// that a gain is at most, and a loss at least, the change of the part times `Phi`.
+pub fn update_parts(state: &mut State, responses: &[LocalResponse], slots: &[usize]) {
+    for grows in [false, true] {
+        for (a, &slot) in slots.iter().enumerate() {
+            let Contact { mode, tool, local, .. } = state.contacts.slots[slot];
+            if mode == Mode::Free || local.part_rate == 0.0 || (local.part_rate > 0.0) != grows {
+                continue;
+            }
+            let whole = responses[a].indentation.energy / local.part;
+            let bound = if whole > 0.0 { state.tools[tool].released_energy / whole } else { f64::INFINITY };
+            let part = (local.part + local.part_rate.min(bound)).clamp(LEAST_PART, 1.0);
+            state.tools[tool].released_energy += (local.part - part) * whole;
+            let local = &mut state.contacts.slots[slot].local;
+            local.part = part;
+            local.part_rate = if local.part < 1.0 { local.part_rate } else { 0.0 };
+        }
+    }
+    for &slot in slots {
+        let tool = state.contacts.slots[slot].tool;
+        state.tools[tool].released_energy = 0.0;
+    }
+}
+
+/// Updates a contact at the end of a tick; false if it ends.
+pub fn continue_contact(tool: &ToolModel, contact: &mut Contact) -> bool {
+    let contact_depth = contact_depth(tool, contact, contact.local.relative_position);
+    let local = &mut contact.local;
+    if local.is_new {
+        (local.is_new, local.entry_depth) = (false, (contact_depth - local.reachable_depth).max(0.0));
+        return contact_depth < DEEPEST_START * tool.radius;
+    }
+    let touches = contact.force != DVec3::ZERO;
+    let fades = local.is_fading && (local.part <= LEAST_PART || !touches);
+    let far = contact.additional && !touches && contact_depth < -PENDING_REACH * tool.radius;
+    !(fades || far)
+}
+
+/// Whether two contacts of a tool have merged. One contact of a tool that is not a sphere covers a whole plane.
+fn have_merged(tool: &ToolModel, first: &FootPoint, second: &FootPoint) -> bool {
+    match tool.shape.needs_cells() {
+        true => first.normal.dot(second.normal) > MERGED_COSINE,
+        false => first.position.distance(second.position) < MERGED_DISTANCE * tool.radius,
+    }
+}
+
+/// Starts the fading of the later of two merged contacts.
+pub fn fade_merged_contacts(model: &Model, state: &mut State, slots: &[usize]) {
+    for (a, &slot) in slots.iter().enumerate() {
+        for &other in &slots[..a] {
+            let [first, second] = [other, slot].map(|slot| &state.contacts.slots[slot]);
+            let touch = first.mode != Mode::Free && second.mode != Mode::Free;
+            let same = touch && (first.tool, first.body) == (second.tool, second.body);
+            let last = same && !first.local.is_fading && !second.local.is_fading && first.law == second.law;
+            if last && have_merged(&model.tools[second.tool], &first.local.foot, &second.local.foot) {
+                match second.force == DVec3::ZERO {
+                    true => state.contacts.clear(slot),
+                    false => begin_fading(&mut state.contacts.slots[slot]),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! The two sides of a local contact, the half-space in place of the body there, and its indentation.
+
+use glam::DVec3;
+
+use crate::contact::footprint::PressedSurface;
+use crate::contact::local::effective_modulus;
+use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, WIDTH};
+use crate::contact::shape::ToolShape;
+use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
+
+/// Data of a body for one tool.
+#[derive(Clone, Copy)]
+pub struct LocalBody<'a> {
+    pub drawn: DrawnSurface<'a>,
+    pub smooth: &'a SmoothSurface,
+    /// Curvatures, moduli and regular compliance at the fans.
+    pub fields: &'a [FanFields],
+    /// The surface in pieces, for a tool that is not a sphere.
+    pub pressed_surface: Option<&'a PressedSurface>,
+    /// Young's modulus over the Green's function's.
+    pub scale: f64,
+}
+
+/// The tool and its friction.
+#[derive(Clone, Copy)]
+pub struct LocalTool<'a> {
+    /// Its shape.
+    pub shape: &'a ToolShape,
+    /// Size of the part that touches, m: of a sphere its radius.
+    pub radius: f64,
+    /// Young's modulus of its pad, Pa; a rigid one has none.
+    pub pad: Option<f64>,
+    /// Coulomb's coefficient.
+    pub coefficient: f64,
+}
+
+/// Fields blended at a foot.
+pub type Fields = Blended<{ size_of::<FanFields>() / size_of::<f64>() }>;
+
+/// The half-space below a tool.
+pub struct HalfSpace {
+    /// `E*`, Pa, and its gradient by the position of the foot's point.
+    pub modulus: f64,
+    pub slope: DVec3,
+    /// Its derivative by the body's own `E/(1 - nu^2)`.
+    pub by_body_modulus: f64,
+    /// `k_t / k_n`.
+    pub tangential: f64,
+    /// Radius over which the body's own compliance spreads a force, m, and its gradient by the position of the foot's point.
+    pub width: f64,
+    pub width_slope: DVec3,
+}
+
+impl HalfSpace {
+    /// From the body's constants at the foot and the tool's pad; a contact has a `part` of its modulus.
+    pub fn new(body: LocalBody<'_>, tool: LocalTool<'_>, fields: &Fields, part: f64) -> Self {
+        let own = body.scale * fields.values[PLANE_STRAIN];
+        let whole = effective_modulus(own, 0.0, tool.pad);
+        let modulus = part * whole;
+        let by_body_modulus = part * body.scale * (whole / own).powi(2);
+        let slope = fields.slope(PLANE_STRAIN) * by_body_modulus;
+        let poisson = fields.values[POISSON];
+        let tangential = 2.0 * (1.0 - poisson) / (2.0 - poisson);
+        Self {
+            modulus,
+            slope,
+            by_body_modulus,
+            tangential,
+            width: fields.values[WIDTH],
+            width_slope: fields.slope(WIDTH),
+        }
+    }
+}
+
+/// Energy of the local contact at a position, and its gradient without friction.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Indentation {
+    /// Depth of the tool in the surface, m.
+    pub depth: f64,
+    /// Normal force, N.
+    pub force: f64,
+    /// Contact radius, or that of the circle of the same stiffness, m.
+    pub radius: f64,
+    /// Normal stiffness, N/m.
+    pub stiffness: f64,
+    /// J.
+    pub energy: f64,
+    /// `dPhi/dp'`, N.
+    pub gradient: DVec3,
+    /// Torque on the tool about its tip, N m.
+    pub torque: DVec3,
+    /// Vector from the tip to the point where friction acts, m.
+    pub lever: DVec3,
+    /// `k_t / k_n`.
+    pub tangential: f64,
+}

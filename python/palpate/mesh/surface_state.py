@@ -1,0 +1,127 @@
+"""What is wrong with a surface, and which mesher fills it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.errors import MeshError, MeshWarning
+from palpate.mesh.crossings import first_crossing
+
+if TYPE_CHECKING:
+    import trimesh
+
+# NETGEN reads a surface in a time that grows with its triangles, whatever it makes of it: 6 s at 30,000.
+MOST_FOR_NETGEN = 20_000
+# A triangle whose height is below this part of its longest edge is a needle: NETGEN took 19 s for a cylinder of 2,000
+# sides.
+NEEDLE = 1e-3
+BY_HAND = "mend it in Blender or MeshLab"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceState:
+    """A surface without doubles, and its topology.
+
+    Attributes
+    ----------
+    shape
+        The surface.
+    open_edges, crowded_edges
+        How many edges have one triangle, and more than two.
+    consistent
+        Whether neighbours agree on which side is outside.
+    bodies
+        How many separate surfaces there are.
+
+    """
+
+    shape: trimesh.Trimesh
+    open_edges: int
+    crowded_edges: int
+    consistent: bool
+    bodies: int
+
+    @classmethod
+    def of(cls, shape: trimesh.Trimesh) -> SurfaceState:
+        """Merge doubles, in place, and count."""
+        shape.merge_vertices(merge_tex=True, merge_norm=True)
+        shape.update_faces(shape.nondegenerate_faces())
+        shape.update_faces(shape.unique_faces())
+        shape.remove_unreferenced_vertices()
+        _, counts = np.unique(shape.edges_sorted, axis=0, return_counts=True)
+        open_edges, crowded = int((counts == 1).sum()), int((counts > 2).sum())
+        consistent = bool(shape.is_winding_consistent)
+        return cls(shape, open_edges, crowded, consistent, int(shape.body_count))
+
+    def fault(self) -> str | None:
+        """Reason why NETGEN cannot fill it, after "the surface"; None for a closed surface of one part."""
+        if len(self.shape.faces) == 0:
+            return "has no triangle with an area"
+        if self.open_edges:
+            return f"is not closed ({self.open_edges} open edges)"
+        if self.crowded_edges:
+            return f"has {self.crowded_edges} edges that are shared by more than two triangles"
+        if not self.consistent:
+            return "has triangles that do not agree on which side is outside"
+        if self.bodies != 1:
+            return f"holds {self.bodies} separate surfaces, one is needed"
+        if self.shape.volume == 0:
+            return "encloses no volume"
+        return None
+
+    def doubt(self) -> str | None:
+        """Reason why NETGEN may be slow or fail on a closed surface, after "the surface"; None if there is none."""
+        if len(self.shape.faces) > MOST_FOR_NETGEN:
+            return f"has {len(self.shape.faces):,} triangles"
+        if self.crossing is not None:
+            return f"intersects itself near {self.crossing} m"
+        needles = self._needles()
+        return f"has {needles} triangles like needles" if needles else None
+
+    @cached_property
+    def crossing(self) -> str | None:
+        """Where the surface intersects itself, if it does."""
+        point = first_crossing(self.shape.vertices, self.shape.faces)
+        return None if point is None else f"({', '.join(f'{x:.4g}' for x in point)})"
+
+    def _needles(self) -> int:
+        corners = np.asarray(self.shape.vertices)[self.shape.faces]
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        height = 2.0 * self.shape.area_faces / longest
+        return int((height < NEEDLE * longest).sum())
+
+    def turn_outward(self, name: str) -> None:
+        """Turn a surface that is inside out round, in place, with a warning."""
+        if self.shape.volume < 0:
+            self.shape.invert()
+            warnings.warn(f"{name}: the surface was inside out and has been turned round", MeshWarning, stacklevel=3)
+
+
+def require_closed(name: str, shape: trimesh.Trimesh, hint: str = BY_HAND) -> SurfaceState:
+    """State of a closed surface of one part, its volume positive.
+
+    Raises
+    ------
+    MeshError
+        A surface that is not, and why.
+
+    """
+    require_finite(name, shape)
+    state = SurfaceState.of(shape)
+    fault = state.fault()
+    if fault is not None:
+        raise MeshError(f"{name}: the surface {fault}; {hint}")
+    state.turn_outward(name)
+    return state
+
+
+def require_finite(name: str, shape: trimesh.Trimesh) -> None:
+    """Refuse coordinates that are not finite."""
+    bad = np.flatnonzero(~np.isfinite(shape.vertices).all(axis=1))
+    if bad.size:
+        raise MeshError(f"{name}: vertex {bad[0]} has a coordinate that is not finite")

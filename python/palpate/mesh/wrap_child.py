@@ -1,0 +1,151 @@
+"""The wrapping mesher's own process: ``python -m palpate.mesh.wrap_child SURFACE.npz MESH.npz STAGES``.
+
+What the triangles of a surface enclose is wrapped, and the wrap filled by fTetWild (Hu, Schneider, Wang, Zorin and
+Panozzo 2020), where that is installed. The name of each stage is a line of the file STAGES.
+
+Exit status 1: no tetrahedra; the reason, if it is the surface's, is ``reason`` of the result.
+"""
+
+from __future__ import annotations
+
+import importlib.machinery
+import os
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from palpate._native import end_with_parent
+from palpate.mesh.solid_field import SolidField, cleaned, oriented
+from palpate.mesh.wrap import Wrap, WrapError, wrap
+
+# The wrap is kept to this part of its diagonal, or of the edge wanted, whichever is less.
+ENVELOPE, ENVELOPE_OF_EDGE = 4.5e-3, 0.06
+# AMIPS energy at which an element is good enough; 3 is that of a regular one.
+STOP_ENERGY = 15.0
+
+
+def main(given: str, made: str, stages: str) -> int:
+    """Mesh what the triangles of ``given`` enclose into ``made``."""
+    with np.load(given) as job:
+        vertices, faces, labels = job["vertices"], job["faces"].astype(np.int64), job["labels"]
+        size, part, cells, balls = float(job["size"]), int(job["part"]), int(job["cells"]), job["balls"]
+    _note(stages, "looking for the inside")
+    vertices, faces, labels = cleaned(vertices, faces, labels)
+    if len(faces) == 0:
+        np.savez(made, reason="its triangles have no area")
+        return 1
+    field = SolidField(vertices, oriented(vertices, faces))
+    _note(stages, "wrapping")
+    try:
+        wrapped = wrap(field, labels, part or None, cells)
+    except WrapError as error:
+        np.savez(made, reason=str(error))
+        return 1
+    target = _beside(field, wrapped)
+    found = {
+        "vertices": wrapped.vertices,
+        "faces": wrapped.faces,
+        "part_volumes": np.array([p.volume for p in wrapped.parts]),
+        "part_middles": np.array([p.middle for p in wrapped.parts]),
+        "part_sides": np.array([p.sides for p in wrapped.parts]),
+        "part_labels": np.array([p.label for p in wrapped.parts]),
+        "volume": wrapped.volume,
+        "cell": wrapped.cell,
+        "points": wrapped.points,
+        "lost_points": wrapped.lost_points,
+        "lost_share": wrapped.lost_share,
+        "target": field.faces[target],
+        "target_vertices": field.vertices,
+    }
+    # Another mesher may fill the wrap where this one fails.
+    nodes, tets = np.empty((0, 3)), np.empty((0, 4), dtype=np.int64)
+    np.savez(made, nodes=nodes, tets=tets, **found)
+    tetrahedralize = _tetrahedralizer()
+    if tetrahedralize is not None:
+        _note(stages, "filling with tetrahedra")
+        nodes, tets = _fill(tetrahedralize, wrapped, size, balls, Path(made).parent)
+        partial = Path(made).with_suffix(".partial.npz")
+        np.savez(partial, nodes=nodes, tets=tets, **found)
+        partial.replace(made)
+    return 0
+
+
+def _note(stages: str, name: str) -> None:
+    with Path(stages).open("a") as file:
+        file.write(name + "\n")
+
+
+def _tetrahedralizer() -> Callable | None:
+    """Take fTetWild from pytetwild without its package's first lines, which load PyVista and VTK; None without it."""
+    spec = importlib.machinery.PathFinder.find_spec("pytetwild")
+    if spec is None:
+        return None
+    package = types.ModuleType("pytetwild")
+    package.__path__ = list(spec.submodule_search_locations or [])
+    sys.modules["pytetwild"] = package
+    from pytetwild import pytetwild
+
+    return pytetwild.tetrahedralize
+
+
+def _fill(
+    tetrahedralize: Callable, wrapped: Wrap, size: float, balls: np.ndarray, folder: Path
+) -> tuple[np.ndarray, np.ndarray]:
+    vertices = np.ascontiguousarray(wrapped.vertices)
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    options = {} if len(balls) == 0 else _sizing(vertices, size, balls)
+    # fTetWild leaves a surface of its own in the working directory.
+    os.chdir(folder)
+    nodes, tets = tetrahedralize(
+        vertices,
+        np.ascontiguousarray(wrapped.faces, dtype=np.int32),
+        edge_length_abs=size,
+        epsilon=min(ENVELOPE, ENVELOPE_OF_EDGE * size / diagonal),
+        stop_energy=STOP_ENERGY,
+        coarsen=False,
+        num_threads=os.cpu_count() or 1,
+        **options,
+    )
+    used = np.unique(tets)
+    return nodes[used], np.searchsorted(used, tets)
+
+
+def _sizing(vertices: np.ndarray, size: float, balls: np.ndarray) -> dict[str, np.ndarray]:
+    """Edge lengths on a grid of cubes, six tetrahedra each, smaller in balls (k, 5) of centre, radius and size."""
+    low, high = vertices.min(axis=0) - 0.1, vertices.max(axis=0) + 0.1
+    counts = np.ceil((high - low) * 24).astype(np.int64) + 1
+    axes = [np.linspace(a, b, n) for a, b, n in zip(low, high, counts, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    values = np.full(len(points), size)
+    for x, y, z, radius, small in balls:
+        away = np.linalg.norm(points - [x, y, z], axis=1)
+        # No place of the grid may lie in a small ball, so what is near it counts as well.
+        values[away <= radius + 1 / 24] = np.minimum(values[away <= radius + 1 / 24], small)
+    corner = np.arange(len(points)).reshape(counts)
+    base = corner[:-1, :-1, :-1].ravel()
+    steps = np.array([corner[1, 0, 0], corner[0, 1, 0], corner[0, 0, 1]])
+    tets = []
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
+        path = np.cumsum([0, steps[a], steps[b], steps[c]])
+        tets.append(base[:, None] + path)
+    return {"bg_vertices": points, "bg_tets": np.concatenate(tets).astype(np.int32), "bg_values": values}
+
+
+def _beside(field: SolidField, wrapped: Wrap) -> np.ndarray:
+    """Mask of the triangles of the surface that lie on the wrap, not within it or on a part that is left out."""
+    corners = field.vertices[field.faces]
+    # Their corners and middles, and the middles of these.
+    weights = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
+    weights /= weights.sum(axis=1, keepdims=True)
+    near = np.zeros(len(corners), dtype=bool)
+    for weight in weights:
+        near |= wrapped.band.values[wrapped.band.indices(np.einsum("k,ikj->ij", weight, corners))]
+    return near
+
+
+if __name__ == "__main__":
+    end_with_parent()
+    sys.exit(main(*sys.argv[1:4]))

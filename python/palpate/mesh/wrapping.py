@@ -1,0 +1,265 @@
+"""Any surface filled: what it encloses is wrapped and meshed in a child process, and fitted to the surface."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from palpate import _native
+from palpate.errors import MeshError, MeshWarning
+from palpate.mesh.child import failure_of, run_limited
+from palpate.mesh.curve import curve, refine
+from palpate.mesh.elements import face_parts
+from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, PARTS, Ball, Element, Filling
+from palpate.mesh.fit import GOOD_LOSS, distances
+from palpate.mesh.size import size_text
+from palpate.mesh.snap import snap
+from palpate.mesh.surface_file import SurfaceFile
+from palpate.mesh.surface_state import SurfaceState
+from palpate.mesh.tetmesh import TetMesh
+
+Which = int | Literal["all"]
+
+# Cells of the grid along the longest side, at least and at most, and in an element.
+CELLS, MOST_CELLS, CELLS_IN_ELEMENT = 80, 200, 5.0
+# Nodes are put back on the given surface from at most so many cells, and this part of an element.
+REACH_CELLS, REACH_ELEMENT = 2.0, 0.4
+# A part of the tetrahedra that is smaller than this share of the largest is none.
+CRUMB = 0.01
+# Walls are reported as lost from this share of the surface on: at sharp edges a wrap is always a little off.
+LEAST_LOST_SHARE = 0.005
+# So many parts that are left out are named.
+MOST_NAMED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Wrapping:
+    """What is to be wrapped and filled, and how.
+
+    Attributes
+    ----------
+    surface
+        Triangles, m.
+    reason
+        Why it is wrapped, after "the surface".
+    element, size, refine, time_limit
+        As of :class:`palpate.mesh.filling.Filling`.
+    part
+        Part of the solid by its rank in volume from 1 on, or ``"all"``.
+    max_volume_loss
+        Share of the volume that the mesh may lose.
+    stage
+        Is called with the name of what is being done.
+
+    """
+
+    surface: SurfaceFile
+    reason: str
+    element: Element
+    size: float | None
+    refine: Sequence[Ball]
+    part: Which
+    max_volume_loss: float
+    time_limit: float
+    stage: Callable[[str], None]
+
+    @property
+    def name(self) -> str:
+        """Of the surface in messages."""
+        return self.surface.name
+
+    def mesh(self) -> TetMesh:
+        """Fill what the surface encloses.
+
+        Raises
+        ------
+        MeshError
+            A surface without an inside, a part that is not there, a mesher that failed, or a mesh that loses more of
+            the volume than allowed.
+
+        """
+        points = np.asarray(self.surface.shape.vertices)
+        origin, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
+        if not extent > 0:
+            raise MeshError(f"{self.name}: all of its points are one")
+        size = extent / PARTS[self.element] if self.size is None else self.size
+        made = self._run(origin, extent, size)
+        wrap = _Wrapped(made, origin, extent)
+        halvings = int(wrap.volume * IN_CUBE / size**3 > MOST_BY_NETGEN)
+        if halvings:
+            made = self._run(origin, extent, 2 * size)
+        mesh = self._tetrahedra(made, wrap, size)
+        self.stage("fitting to the surface")
+        reach = min(REACH_CELLS * wrap.cell, REACH_ELEMENT * size)
+        project = wrap.projection(reach)
+        mesh = snap(mesh, project)
+        for _ in range(halvings):
+            mesh = snap(refine(mesh, project), project)
+        if self.element == "quadratic":
+            mesh = curve(mesh, project)
+        self._report(mesh, wrap, extent)
+        return mesh
+
+    def _run(self, origin: np.ndarray, extent: float, size: float) -> dict[str, np.ndarray]:
+        """Results of the child, in a unit box; without tetrahedra where fTetWild failed or is not there."""
+        faces = np.asarray(self.surface.shape.faces)
+        labels = self.surface.part_of_face
+        balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.refine]
+        cells = np.clip(CELLS_IN_ELEMENT * extent / size, CELLS, MOST_CELLS)
+        with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
+            given, made, stages = (Path(folder) / name for name in ("surface.npz", "mesh.npz", "stages"))
+            np.savez(
+                given,
+                vertices=(np.asarray(self.surface.shape.vertices) - origin) / extent,
+                faces=faces,
+                labels=labels if len(labels) == len(faces) else np.full(len(faces), -1),
+                size=size / extent,
+                part=0 if self.part == "all" else self.part,
+                cells=int(cells),
+                balls=np.reshape(balls, (-1, 5)),
+            )
+            command = [sys.executable, "-m", "palpate.mesh.wrap_child", *map(str, (given, made, stages))]
+            status = run_limited(command, self.time_limit, lambda: self._watch(stages))
+            found: dict[str, np.ndarray] = {}
+            if made.exists():
+                with np.load(made) as result:
+                    found = dict(result)
+        if "reason" in found:
+            raise MeshError(f"{self.name}: the surface cannot be filled: {found['reason']}")
+        failure = failure_of(status, self.time_limit)
+        if "volume" not in found:
+            raise MeshError(
+                f"{self.name}: the surface could not be wrapped: its process {failure or 'returned no tetrahedra'}"
+            )
+        if failure is not None:
+            warnings.warn(f"{self.name}: fTetWild {failure}; NETGEN fills the wrap", MeshWarning, stacklevel=4)
+        elif len(found["nodes"]) == 0:
+            warnings.warn(
+                f"{self.name}: fTetWild is not installed (pip install pytetwild, for Linux and Windows); NETGEN fills "
+                "the wrap, which takes longer and may fail",
+                MeshWarning,
+                stacklevel=4,
+            )
+        return found
+
+    def _watch(self, stages: Path) -> None:
+        if stages.exists():
+            lines = stages.read_text().splitlines()
+            if lines:
+                self.stage(lines[-1])
+
+    def _tetrahedra(self, made: dict[str, np.ndarray], wrap: _Wrapped, size: float) -> TetMesh:
+        if len(made["nodes"]):
+            mesh = TetMesh(made["nodes"] * wrap.extent + wrap.origin, made["tets"])
+            return mesh if self.part == "all" else _without_crumbs(self.name, mesh)
+        import trimesh
+
+        shape = trimesh.Trimesh(wrap.to_metres(made["vertices"]), made["faces"], process=False)
+        return Filling(self.name, SurfaceState.of(shape), "linear", size, self.refine, self.time_limit).mesh()
+
+    def _report(self, mesh: TetMesh, wrap: _Wrapped, extent: float) -> None:
+        """Warn of what was done and lost, a line each, or refuse the mesh."""
+        loss = 1.0 - mesh.volume / wrap.volume
+        gap = float(distances(mesh, wrap.points).max()) if len(wrap.points) else 0.0
+        change = f"{'loses' if loss > 0 else 'adds'} {100 * abs(loss):.1f} % of the volume"
+        what = f"the mesh {change} and lies up to {_length(gap)} off the surface"
+        finer = f"--max-size {_length(0.5 * _mean_edge(mesh)).replace(' ', '')} makes a finer one"
+        if abs(loss) > self.max_volume_loss:
+            allow = f"--max-volume-loss {np.ceil(100 * abs(loss)):.0f}% takes it"
+            raise MeshError(f"{self.name}: the surface {self.reason}; {what}: {finer}, {allow}")
+        self._warn(f"the surface {self.reason} and was wrapped; {what}{f'; {finer}' if abs(loss) > GOOD_LOSS else ''}")
+        self._report_parts(wrap)
+        if wrap.lost_share > LEAST_LOST_SHARE:
+            place = wrap.lost_points[0]
+            self._warn(
+                f"walls thinner than about {_length(2 * wrap.cell)} were lost, {100 * wrap.lost_share:.1f} % of the "
+                f"surface, as near ({', '.join(f'{1e3 * x:.4g}' for x in place)}) mm"
+            )
+
+    def _report_parts(self, wrap: _Wrapped) -> None:
+        if self.part == "all" or len(wrap.parts) == 1:
+            return
+        total = sum(volume for volume, *_ in wrap.parts)
+        left_out = [rank for rank in range(len(wrap.parts)) if rank != self.part - 1]
+        for rank in left_out[:MOST_NAMED]:
+            volume, middle, sides, label = wrap.parts[rank]
+            title = f", '{self.surface.part_names[label]}'" if label >= 0 else ""
+            place = ", ".join(f"{1e3 * x:.4g}" for x in middle)
+            self._warn(
+                f"part {rank + 1} of {len(wrap.parts)}{title} ({size_text(sides)} around ({place}) mm, "
+                f"{100 * volume / total:.2g} % of the volume) was left out; --part {rank + 1} or --part all takes it"
+            )
+        if len(left_out) > MOST_NAMED:
+            self._warn(f"{len(left_out) - MOST_NAMED} smaller parts were left out")
+
+    def _warn(self, text: str) -> None:
+        warnings.warn(f"{self.name}: {text}", MeshWarning, stacklevel=6)
+
+
+class _Wrapped:
+    """What the child found, m."""
+
+    def __init__(self, made: dict[str, np.ndarray], origin: np.ndarray, extent: float):
+        self.origin, self.extent = origin, extent
+        self.volume, self.cell = float(made["volume"]) * extent**3, float(made["cell"]) * extent
+        self.points, self.lost_points = self.to_metres(made["points"]), self.to_metres(made["lost_points"])
+        self.lost_share = float(made["lost_share"])
+        self.parts = [
+            (float(volume) * extent**3, self.to_metres(middle), sides * extent, int(label))
+            for volume, middle, sides, label in zip(
+                *(made[f"part_{name}"] for name in ("volumes", "middles", "sides", "labels")), strict=True
+            )
+        ]
+        used = np.unique(made["target"])
+        self._target = np.ascontiguousarray(self.to_metres(made["target_vertices"][used]))
+        self._faces = np.searchsorted(used, made["target"]).astype(np.uint32)
+
+    def to_metres(self, points: np.ndarray) -> np.ndarray:
+        """Points of the unit box, m."""
+        return points * self.extent + self.origin
+
+    def projection(self, reach: float) -> Callable[[np.ndarray], np.ndarray]:
+        """Closest points of the given surface, where that is not farther than ``reach``; else the points themselves."""
+        search = _native.SurfaceSearch(self._target, self._faces) if len(self._faces) else None
+
+        def project(points: np.ndarray) -> np.ndarray:
+            if search is None or len(points) == 0:
+                return points
+            closest = search.closest(np.ascontiguousarray(points)).reshape(-1, 3)
+            near = np.linalg.norm(closest - points, axis=1) <= reach
+            return np.where(near[:, None], closest, points)
+
+        return project
+
+
+def _without_crumbs(name: str, mesh: TetMesh) -> TetMesh:
+    """Drop what fTetWild leaves hanging on edges and vertices, or beside the body: parts without a face to the rest."""
+    labels = face_parts(mesh.tets)
+    volumes = np.bincount(labels, mesh.volumes)
+    kept = (volumes >= CRUMB * volumes.max())[labels]
+    if kept.all():
+        return mesh
+    warnings.warn(
+        f"{name}: {(~kept).sum()} tetrahedra that share no face with the rest, {mesh.volumes[~kept].sum():.2g} m3 of "
+        f"{mesh.volume:.3g} m3, were dropped",
+        MeshWarning,
+        stacklevel=3,
+    )
+    used = np.unique(mesh.tets[kept])
+    return TetMesh(mesh.nodes[used], np.searchsorted(used, mesh.tets[kept]), mesh.regions[kept])
+
+
+def _mean_edge(mesh: TetMesh) -> float:
+    corners = mesh.nodes[mesh.surface_faces[:, :3]]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+
+def _length(metres: float) -> str:
+    return f"{1e3 * metres:.3g} mm"
