@@ -19,7 +19,10 @@ MOST_BULGE, LEAST_BULGE = 0.2, 1e-3
 KEPT_SHAPE, GOOD_SHAPE = 0.7, 0.5
 
 
-def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
+Projection = Callable[[np.ndarray], np.ndarray]
+
+
+def curve(mesh: TetMesh, project: Projection, inner: tuple[np.ndarray, Projection] | None = None) -> TetMesh:
     """10-node tetrahedra, the middles of surface edges on a shape, or as near as folds no element.
 
     Parameters
@@ -28,6 +31,8 @@ def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh
         4-node tetrahedra.
     project
         Points (p, 3), m, onto the shape.
+    inner
+        Faces (k, 3) within the body, and the projection of the middles of their edges, if there are any.
 
     """
 
@@ -35,7 +40,7 @@ def curve(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh
         low, high = _native.determinant_ranges(nodes, tets.astype(np.uint32)).reshape(-1, 2).T
         return low < LEAST_DETERMINANT * high
 
-    nodes, tets = _curve_edges(mesh, project, folded)
+    nodes, tets = _curve_edges(mesh, project, folded, inner)
     return TetMesh(nodes, tets, mesh.regions, mesh.region_names)
 
 
@@ -68,8 +73,9 @@ def refine(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMes
 
 def _curve_edges(
     mesh: TetMesh,
-    project: Callable[[np.ndarray], np.ndarray],
+    project: Projection,
     is_bad: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    inner: tuple[np.ndarray, Projection] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3), m, and elements (m, 10) with middles of surface edges moved as far as leaves no element bad.
 
@@ -77,13 +83,16 @@ def _curve_edges(
     """
     edges, of_element = unique_edges(mesh.tets)
     straight = mesh.nodes[edges].mean(axis=1)
-    ends = np.sort(mesh.surface_triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
-    outside = np.isin(edges @ [len(mesh.nodes), 1], ends @ [len(mesh.nodes), 1])
-    lengths = np.linalg.norm(np.diff(mesh.nodes[edges[outside]], axis=1)[:, 0], axis=1)
+    on_shape = outside = _edges_of(mesh, edges, mesh.surface_triangles)
     bulge = np.zeros_like(straight)
     bulge[outside] = project(straight[outside]) - straight[outside]
-    size = np.maximum(np.linalg.norm(bulge[outside], axis=1), np.finfo(float).tiny)
-    bulge[outside] *= np.minimum(1, MOST_BULGE * lengths / size)[:, None]
+    if inner is not None:
+        within = _edges_of(mesh, edges, inner[0]) & ~outside
+        bulge[within] = inner[1](straight[within]) - straight[within]
+        on_shape = outside | within
+    lengths = np.linalg.norm(np.diff(mesh.nodes[edges[on_shape]], axis=1)[:, 0], axis=1)
+    size = np.maximum(np.linalg.norm(bulge[on_shape], axis=1), np.finfo(float).tiny)
+    bulge[on_shape] *= np.minimum(1, MOST_BULGE * lengths / size)[:, None]
     tets = np.hstack([mesh.tets, len(mesh.nodes) + of_element])
     # Only these can be bad.
     moved = np.flatnonzero(bulge.any(axis=1)[of_element].any(axis=1))
@@ -94,6 +103,12 @@ def _curve_edges(
         if not bulge[bad].any():
             return nodes, tets
         bulge[bad] = np.where(np.linalg.norm(bulge[bad], axis=1) > least, 0.7, 0.0)[:, None] * bulge[bad]
+
+
+def _edges_of(mesh: TetMesh, edges: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Mask of the edges (e, 2) that belong to triangles (k, 3)."""
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    return np.isin(edges @ [len(mesh.nodes), 1], ends @ [len(mesh.nodes), 1])
 
 
 def _subelements(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:

@@ -17,7 +17,9 @@ BACK, LEAST_MOVE = 0.7, 1e-3
 ROUNDS = 3
 
 
-def snap(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
+def snap(
+    mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray], moving: np.ndarray | None = None
+) -> TetMesh:
     """4-node tetrahedra with their surface nodes on a shape, or as near as keeps every element's dihedral angles.
 
     Parameters
@@ -26,13 +28,15 @@ def snap(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
         4-node tetrahedra.
     project
         Points (p, 3), m, onto the shape; one that has no place there stays.
+    moving
+        Nodes (k,) that are moved; None: those on the surface.
 
     """
-    nodes, tets, on_surface = mesh.nodes.copy(), mesh.tets, mesh.surface_nodes
+    nodes, tets, moving = mesh.nodes.copy(), mesh.tets, mesh.surface_nodes if moving is None else moving
     least = LEAST_MOVE * np.linalg.norm(nodes[tets[:, 0]] - nodes[tets[:, 1]], axis=1).mean()
     for _ in range(ROUNDS):
         move = np.zeros_like(nodes)
-        move[on_surface] = project(nodes[on_surface]) - nodes[on_surface]
+        move[moving] = project(nodes[moving]) - nodes[moving]
         nodes += _allowed(nodes, tets, move, least)
     return TetMesh(nodes, tets, mesh.regions, mesh.region_names)
 

@@ -12,12 +12,14 @@ import numpy as np
 
 from palpate.errors import MeshError
 from palpate.mesh.filling import Ball, Element, Filling, MesherFailedError
+from palpate.mesh.segmented import segmented
 from palpate.mesh.size import scale_of
 from palpate.mesh.surface_file import SurfaceFile, load_surface
 from palpate.mesh.surface_state import BY_HAND, MOST_FOR_NETGEN, SurfaceState, require_closed, require_finite
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.wrapping import Which, Wrapping
 from palpate.progress import Reporter, progress_reporter
+from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.units import length, share
 from palpate.vectors import three_numbers
 
@@ -50,12 +52,15 @@ class FillOptions:
         Part of the solid by its rank in volume, from 1 on, or ``"all"``, for a surface that is wrapped.
     max_volume_loss
         Share of the volume that a wrapped mesh may lose, or text such as ``"10%"``.
+    segments
+        Names or labels of the segments of a label map.
 
     """
 
     mesher: Mesher | None = None
     part: Which = 1
     max_volume_loss: float | str = 0.05
+    segments: tuple[str | int, ...] = ()
 
     def __post_init__(self) -> None:
         if self.mesher not in (None, "netgen", "wrap"):
@@ -77,10 +82,11 @@ def tetrahedralize(
     mesher: Mesher | None = None,
     part: Which = 1,
     max_volume_loss: float | str = 0.05,
+    segments: Sequence[str | int] = (),
     time_limit: float = TIME_LIMIT,
     progress: bool | Callable[[int, int], None] = True,
 ) -> TetMesh:
-    """Fill a surface with 4-node tetrahedra.
+    """Fill a surface, or segments of a label map, with 4-node tetrahedra.
 
     A closed surface of one part is filled by NETGEN. One that is open, crosses itself, has several parts or very many
     triangles is wrapped: what its triangles enclose, by their winding number, gets a new surface, which fTetWild fills;
@@ -92,13 +98,13 @@ def tetrahedralize(
     Parameters
     ----------
     surface
-        STL, OBJ, PLY, OFF, GLB or glTF file, or a trimesh surface.
+        STL, OBJ, PLY, OFF, GLB or glTF file, a trimesh surface, or a segmentation: NRRD or NIfTI file.
     max_element_size
         Longest edge wanted, m or text such as ``"4mm"``; None: a fifteenth of the longest side, and where the surface
         is curved so strongly or the body so thin that more than a hundredth of the volume would be lost, down to a
         sixtieth. What is lost all the same, or by the size given, a :class:`palpate.MeshWarning` tells.
     unit
-        Unit of length of the surface; None: metres.
+        Unit of length of the surface; None: metres, of a segmentation that of the file, or millimetres.
     refine
         Finer balls: ``((x, y, z), radius, size)`` in m.
     mesher
@@ -107,6 +113,8 @@ def tetrahedralize(
         Which part of a solid of several: its rank in volume from 1 on, or ``"all"``. Wraps only.
     max_volume_loss
         Share of the volume that the mesh of a wrap may lose, or text such as ``"10%"``.
+    segments
+        Segments of a label map by name, or by label; each becomes a region of the mesh.
     time_limit
         Seconds after which the mesher is stopped.
     progress
@@ -122,7 +130,7 @@ def tetrahedralize(
         that is a warning.
 
     """
-    options = FillOptions(mesher, part, max_volume_loss)
+    options = FillOptions(mesher, part, max_volume_loss, tuple(segments))
     return tetrahedralize_with("linear", surface, max_element_size, unit, refine, options, time_limit, progress)
 
 
@@ -152,14 +160,41 @@ def tetrahedralize_with(
     with progress_reporter(title, progress) as report:
         stage = _stages(report)
         stage("reading")
-        loaded = load_surface(surface)
-        shape = loaded.shape.copy()
-        shape.apply_scale(scale_of(loaded.name, shape.vertices, unit))
-        given = SurfaceFile(loaded.name, shape, loaded.part_names, loaded.part_of_face)
-        stage("checking")
-        mesh = _filled(given, element, size, refine, options or FillOptions(), time_limit, stage)
-    mesh.warn_of_flat_elements(loaded.name)
+        options = options or FillOptions()
+        if isinstance(surface, (str, os.PathLike)) and is_segmentation(surface):
+            name, mesh = str(surface), _of_segments(element, surface, size, unit, refine, options, time_limit, stage)
+        else:
+            given = _scaled(surface, unit, options)
+            stage("checking")
+            name, mesh = given.name, _filled(given, element, size, refine, options, time_limit, stage)
+    mesh.warn_of_flat_elements(name)
     return mesh
+
+
+def _scaled(surface: str | os.PathLike[str] | trimesh.Trimesh, unit: str | None, options: FillOptions) -> SurfaceFile:
+    """Surface in metres."""
+    loaded = load_surface(surface)
+    if options.segments:
+        raise MeshError(f"{loaded.name}: is a surface; segments are parts of label maps ({', '.join(SEGMENTATION_ENDINGS)})")
+    shape = loaded.shape.copy()
+    shape.apply_scale(scale_of(loaded.name, shape.vertices, unit))
+    return SurfaceFile(loaded.name, shape, loaded.part_names, loaded.part_of_face)
+
+
+def _of_segments(
+    element: Element,
+    path: str | os.PathLike[str],
+    size: float | None,
+    unit: str | None,
+    refine: Sequence[Ball],
+    options: FillOptions,
+    time_limit: float,
+    stage: Callable[[str], None],
+) -> TetMesh:
+    if options.mesher == "netgen":
+        raise MeshError(f"{path}: NETGEN fills surfaces; leave out mesher = 'netgen' for a segmentation")
+    loss = float(options.max_volume_loss)
+    return segmented(element, path, options.segments, unit, size, refine, options.part, loss, time_limit, stage)
 
 
 def _stages(report: Reporter | None) -> Callable[[str], None]:

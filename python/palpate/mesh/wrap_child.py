@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate._native import end_with_parent
+from palpate.mesh.inner_triangles import Triangles, inner_triangles, within_surface
 from palpate.mesh.solid_field import SolidField, cleaned, oriented
 from palpate.mesh.wrap import Wrap, WrapError, wrap
 
@@ -32,6 +33,10 @@ def main(given: str, made: str, stages: str) -> int:
     with np.load(given) as job:
         vertices, faces, labels = job["vertices"], job["faces"].astype(np.int64), job["labels"]
         size, part, cells, balls = float(job["size"]), int(job["part"]), int(job["cells"]), job["balls"]
+        inner = [
+            (job[f"inner_vertices_{rank}"], job[f"inner_faces_{rank}"], float(own))
+            for rank, own in enumerate(job["inner_sizes"] if "inner_sizes" in job else ())
+        ]
     _note(stages, "looking for the inside")
     vertices, faces, labels = cleaned(vertices, faces, labels)
     if len(faces) == 0:
@@ -66,7 +71,8 @@ def main(given: str, made: str, stages: str) -> int:
     tetrahedralize = _tetrahedralizer()
     if tetrahedralize is not None:
         _note(stages, "filling with tetrahedra")
-        nodes, tets = _fill(tetrahedralize, wrapped, size, balls, Path(made).parent)
+        within = inner_triangles(wrapped.vertices, wrapped.faces, inner)
+        nodes, tets = _fill(tetrahedralize, wrapped, within, size, balls, Path(made).parent)
         partial = Path(made).with_suffix(".partial.npz")
         np.savez(partial, nodes=nodes, tets=tets, **found)
         partial.replace(made)
@@ -92,16 +98,21 @@ def _tetrahedralizer() -> Callable | None:
 
 
 def _fill(
-    tetrahedralize: Callable, wrapped: Wrap, size: float, balls: np.ndarray, folder: Path
+    tetrahedralize: Callable, wrapped: Wrap, within: Triangles | None, size: float, balls: np.ndarray, folder: Path
 ) -> tuple[np.ndarray, np.ndarray]:
-    vertices = np.ascontiguousarray(wrapped.vertices)
+    vertices, faces = np.ascontiguousarray(wrapped.vertices), wrapped.faces
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     options = {} if len(balls) == 0 else _sizing(vertices, size, balls)
+    if within is not None:
+        # fTetWild would count inner triangles, some of them open surfaces, in its own test of what is outside.
+        options["disable_filtering"] = True
+        faces = np.vstack([faces, within[1] + len(vertices)])
+        vertices = np.vstack([vertices, within[0]])
     # fTetWild leaves a surface of its own in the working directory.
     os.chdir(folder)
     nodes, tets = tetrahedralize(
         vertices,
-        np.ascontiguousarray(wrapped.faces, dtype=np.int32),
+        np.ascontiguousarray(faces, dtype=np.int32),
         edge_length_abs=size,
         epsilon=min(ENVELOPE, ENVELOPE_OF_EDGE * size / diagonal),
         stop_energy=STOP_ENERGY,
@@ -109,6 +120,8 @@ def _fill(
         num_threads=os.cpu_count() or 1,
         **options,
     )
+    if within is not None:
+        tets = tets[within_surface(nodes[tets].mean(axis=1), wrapped.vertices, wrapped.faces)]
     used = np.unique(tets)
     return nodes[used], np.searchsorted(used, tets)
 

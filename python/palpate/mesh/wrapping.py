@@ -19,6 +19,7 @@ from palpate.mesh.curve import curve, refine
 from palpate.mesh.elements import face_parts
 from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, PARTS, Ball, Element, Filling
 from palpate.mesh.fit import GOOD_LOSS, distances
+from palpate.mesh.inner import InnerRegions, faces_between
 from palpate.mesh.size import size_text
 from palpate.mesh.snap import snap
 from palpate.mesh.surface_file import SurfaceFile
@@ -57,6 +58,8 @@ class Wrapping:
         Share of the volume that the mesh may lose.
     stage
         Is called with the name of what is being done.
+    inner
+        Regions whose boundaries elements follow.
 
     """
 
@@ -69,6 +72,7 @@ class Wrapping:
     max_volume_loss: float
     time_limit: float
     stage: Callable[[str], None]
+    inner: InnerRegions | None = None
 
     @property
     def name(self) -> str:
@@ -102,8 +106,12 @@ class Wrapping:
         mesh = snap(mesh, project)
         for _ in range(halvings):
             mesh = snap(refine(mesh, project), project)
+        within = None
+        if self.inner is not None:
+            mesh = self.inner.snapped(self.inner.marked(mesh))
+            within = faces_between(mesh), self.inner.project
         if self.element == "quadratic":
-            mesh = curve(mesh, project)
+            mesh = curve(mesh, project, within)
         self._report(mesh, wrap, extent)
         return mesh
 
@@ -124,6 +132,7 @@ class Wrapping:
                 part=0 if self.part == "all" else self.part,
                 cells=int(cells),
                 balls=np.reshape(balls, (-1, 5)),
+                **({} if self.inner is None else self.inner.job(origin, extent)),
             )
             command = [sys.executable, "-m", "palpate.mesh.wrap_child", *map(str, (given, made, stages))]
             status = run_limited(command, self.time_limit, lambda: self._watch(stages))

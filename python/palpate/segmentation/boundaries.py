@@ -1,0 +1,115 @@
+"""Boundaries of chosen segments: one around all of them, and one around each that lies among the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import MeshError
+from palpate.segmentation.label_map import LabelMap, Segment
+from palpate.segmentation.smoothing import Boundary, smooth_boundary
+
+# A segment is covered by at most so many balls, each of so many times its thickness there.
+MOST_BALLS, COVER = 48, 1.6
+# A segment that was not chosen is named if this share of it lies in a cavity of those that were.
+IN_CAVITY = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Boundaries:
+    """Boundaries of segments.
+
+    Attributes
+    ----------
+    whole
+        Around all voxels of the chosen segments.
+    inner
+        Of each chosen segment but ``rest``, in the order in which they were given: where two overlap, the later counts.
+    rest
+        Rank of the largest segment, which is what the others leave of the whole.
+    volumes
+        Of the voxels of each chosen segment, less those that another counts, m^3.
+    in_cavities
+        Segments that were not chosen and lie in cavities of the whole, with their volumes, m^3.
+
+    """
+
+    segments: tuple[Segment, ...]
+    whole: Boundary
+    inner: dict[int, Boundary]
+    rest: int
+    volumes: list[float]
+    in_cavities: list[tuple[str, float]]
+
+
+def boundaries(labels: LabelMap, wanted: Sequence[str | int]) -> Boundaries:
+    """Boundaries of segments by their names.
+
+    Raises
+    ------
+    MeshError
+        A segment that is not there, that has no voxel, or that later ones cover.
+
+    """
+    segments = labels.choose(wanted)
+    masks = [labels.mask(segment) for segment in segments]
+    for segment, mask in zip(segments, masks, strict=True):
+        if not mask.any():
+            raise MeshError(f"{labels.name}: segment '{segment.name}' is empty: no voxel has its label")
+    counts = [int(np.count_nonzero(mask)) for mask in masks]
+    rest = int(np.argmax(counts))
+    union = masks[rest].copy()
+    others = [rank for rank in range(len(segments)) if rank != rest]
+    taken = np.zeros_like(union)
+    inner, own = {}, [0] * len(segments)
+    for rank in reversed(others):
+        left = masks[rank] & ~taken
+        own[rank] = int(np.count_nonzero(left))
+        if own[rank] == 0:
+            raise MeshError(f"{labels.name}: segment '{segments[rank].name}' is covered by those after it")
+        taken |= left
+        union |= left
+        inner[rank] = smooth_boundary(left, labels.affine)
+    own[rest] = counts[rest] - int(np.count_nonzero(masks[rest] & taken))
+    volumes = [count * labels.voxel_volume for count in own]
+    ordered = dict(sorted(inner.items()))
+    cavities = _in_cavities(labels, segments, union)
+    return Boundaries(segments, smooth_boundary(union, labels.affine), ordered, rest, volumes, cavities)
+
+
+def _in_cavities(labels: LabelMap, chosen: tuple[Segment, ...], union: np.ndarray) -> list[tuple[str, float]]:
+    from scipy import ndimage
+
+    cavity = ndimage.binary_fill_holes(union) & ~union
+    if not cavity.any():
+        return []
+    found = []
+    for segment in labels.segments:
+        if segment in chosen:
+            continue
+        mask = labels.mask(segment)
+        count = int(np.count_nonzero(mask))
+        if count and np.count_nonzero(mask & cavity) > IN_CAVITY * count:
+            found.append((segment.name, count * labels.voxel_volume))
+    return found
+
+
+def covering_balls(boundary: Boundary) -> np.ndarray:
+    """Balls (k, 5) over a segment: centre (3), radius, and half of the thickness there, m; the thickest come first."""
+    from scipy import ndimage
+
+    spacing = np.linalg.norm(boundary.affine[:3, :3], axis=0)
+    depth = ndimage.distance_transform_edt(boundary.field > 0, sampling=spacing)
+    places = np.argwhere(depth > 0)
+    depths = depth[tuple(places.T)]
+    points = places @ boundary.affine[:3, :3].T + boundary.affine[:3, 3]
+    balls = []
+    while len(points) and len(balls) < MOST_BALLS:
+        deepest = int(depths.argmax())
+        reach = COVER * max(depths[deepest], float(spacing.max()))
+        balls.append([*points[deepest], reach, depths[deepest]])
+        left = np.linalg.norm(points - points[deepest], axis=1) > reach
+        points, depths = points[left], depths[left]
+    return np.array(balls).reshape(-1, 5)
