@@ -72,7 +72,9 @@ def main(given: str, made: str, stages: str) -> int:
     if tetrahedralize is not None:
         _note(stages, "filling with tetrahedra")
         within = inner_triangles(wrapped.vertices, wrapped.faces, inner)
-        nodes, tets = _fill(tetrahedralize, wrapped, within, size, balls, Path(made).parent)
+        # The envelope is one for all surfaces, so it follows the finest.
+        finest = min([size, *(2 * own for *_, own in inner)])
+        nodes, tets = _fill(tetrahedralize, wrapped, within, (size, finest), balls, Path(made).parent)
         partial = Path(made).with_suffix(".partial.npz")
         np.savez(partial, nodes=nodes, tets=tets, **found)
         partial.replace(made)
@@ -98,8 +100,15 @@ def _tetrahedralizer() -> Callable | None:
 
 
 def _fill(
-    tetrahedralize: Callable, wrapped: Wrap, within: Triangles | None, size: float, balls: np.ndarray, folder: Path
+    tetrahedralize: Callable,
+    wrapped: Wrap,
+    within: Triangles | None,
+    sizes: tuple[float, float],
+    balls: np.ndarray,
+    folder: Path,
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Tetrahedra of a size, and of another where the balls are; the finest of sizes sets the envelope."""
+    size, finest = sizes
     vertices, faces = np.ascontiguousarray(wrapped.vertices), wrapped.faces
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     options = {} if len(balls) == 0 else _sizing(vertices, size, balls)
@@ -114,7 +123,7 @@ def _fill(
         vertices,
         np.ascontiguousarray(faces, dtype=np.int32),
         edge_length_abs=size,
-        epsilon=min(ENVELOPE, ENVELOPE_OF_EDGE * size / diagonal),
+        epsilon=min(ENVELOPE, ENVELOPE_OF_EDGE * finest / diagonal),
         stop_energy=STOP_ENERGY,
         coarsen=False,
         num_threads=os.cpu_count() or 1,

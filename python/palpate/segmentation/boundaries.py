@@ -12,7 +12,7 @@ from palpate.segmentation.label_map import LabelMap, Segment
 from palpate.segmentation.smoothing import Boundary, smooth_boundary
 
 # A segment is covered by at most so many balls, each of so many times its thickness there.
-MOST_BALLS, COVER = 48, 1.6
+MOST_BALLS, COVER = 48, 2.4
 # A segment that was not chosen is named if this share of it lies in a cavity of those that were.
 IN_CAVITY = 0.5
 

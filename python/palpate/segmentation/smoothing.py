@@ -1,9 +1,14 @@
 """Smooth boundary of a mask of voxels that encloses the volume of its voxels.
 
-The mask, 1 inside and 0 outside, is blurred with a Gaussian of standard deviation `w`, the same in mm along all axes,
-so that the steps between slices go. The boundary is where the blurred mask has a value `t`. At `t` = 1/2 a flat wall
-stays where it is, and one of mean curvature `H` moves inward by `w^2 H`: a ball of radius `r` by `w^2 / r`. So `t` is
-chosen such that the enclosed volume is that of the voxels.
+The signed distance `f` to the faces between voxels, clipped at the largest distance `h` of voxels, has steps from slice to
+slice. Each round of smoothing applies `T = 1 - (1 - G)^2`, `G` the Gaussian of standard deviation `h`, the same in mm
+along all axes. `T` takes waves short against `h` away and changes long ones of wave number `k` by `(k h)^4 / 4` only, so
+that curved walls stay where they are, whereas `G` would move them inward by `h^2` times their mean curvature. After each
+round, values at voxels are set to 0 where they have the wrong sign: as long as the centre of a voxel is inside, the
+boundary passes it outside (constrained smoothing: Whitaker 2000, "Reducing aliasing artifacts in iso-surfaces of binary
+volumes"). The boundary is where `f` has a value `t` near 0 at which the enclosed volume is that of the voxels.
+
+Blurring of the mask itself was tried: slices of 2.5 mm on a gentle slope left terraces of 0.8 mm, twice as high.
 """
 
 from __future__ import annotations
@@ -12,18 +17,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Width of the Gaussian in parts of the largest distance of voxels. Steps of one voxel in a slanted wall have a wave
-# length of that distance over the slope: with 0.6 the steepest keep exp(-2 (0.6 pi)^2) < 0.1 % of their height.
-WIDTH = 0.6
-# A boundary that needs a value outside of this range is one of walls about as thin as the Gaussian is wide: it is
-# blurred half as much, down to this part of the width.
-VALUES, LEAST_WIDTH = (0.25, 0.75), 0.2
+# Standard deviation of the Gaussian and limit of the distance, in parts of the largest distance of voxels; rounds.
+# Measured on an ellipsoid of 60 x 45 x 35 mm in voxels of 0.7 x 0.7 x 2.5 mm: 4 rounds leave 0.10 mm (root mean square), 10
+# leave 0.12 mm, the unsmoothed distance 0.38 mm.
+WIDTH, LIMIT, ROUNDS = 1.0, 1.0, 4
+# The last round, which smooths where the constraint has cut, is of this part of the width.
+LAST = 0.6
+# A boundary that needs a value beyond this part of the largest distance of voxels is one of walls as thin as that: it is
+# smoothed half as wide, down to this part of the width, and then not at all.
+FARTHEST, LEAST_WIDTH = 0.6, 0.2
 # The grid of the boundary has at most so many cells along the longest side of a segment.
 MOST_CELLS = 200
 # Share of the volume to which it is kept, and attempts.
 EXACT, ATTEMPTS = 5e-4, 6
-# Padding in widths, beyond which a Gaussian has nothing, and in cells.
-REACH, LEAST_PADDING = 4.0, 2
+# Where the Gaussian is cut off, in standard deviations.
+REACH = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +43,11 @@ class Boundary:
     vertices, faces
         (n, 3) m and (k, 3), outward.
     field, affine
-        Blurred mask less its value at the boundary (nx, ny, nz), positive inside; and (4, 4) from its indices to m.
+        Smoothed distance (nx, ny, nz), positive inside; and (4, 4) from its indices to m.
     voxel_volume, volume
         Of the voxels and within the triangles, m^3.
     width
-        Standard deviation of the Gaussian, m; 0: not blurred.
+        Standard deviation of the Gaussian, m; 0: not smoothed.
     at_edge
         Whether the mask reaches the edge of the image, where the boundary is flat.
 
@@ -73,17 +81,15 @@ def smooth_boundary(mask: np.ndarray, affine: np.ndarray) -> Boundary:
     at_edge = any(s.start == 0 or s.stop == count for s, count in zip(box, mask.shape, strict=True))
     start = np.array([s.start for s in box])
     share, affine = _pooled(mask[box], _shifted(affine, start))
-    spacing = np.linalg.norm(affine[:3, :3], axis=0)
     wanted = float(share.sum()) * abs(np.linalg.det(affine[:3, :3]))
-    width = WIDTH * float(spacing.max())
+    width = WIDTH * float(np.linalg.norm(affine[:3, :3], axis=0).max())
     least = LEAST_WIDTH * width
-    while True:
-        made = _at_width(share, affine, wanted, width if width > least else 0.0)
-        if made is not None or width <= least:
-            break
-        width /= 2
-    vertices, faces, field, placed, volume = _any_value(share, affine, wanted) if made is None else made
-    return Boundary(vertices, faces, field, placed, wanted, volume, width if made and width > least else 0.0, at_edge)
+    made = None
+    while made is None and width > least:
+        made = _at_width(share, affine, wanted, width)
+        width = width if made else width / 2
+    vertices, faces, field, placed, volume = made or _any_value(share, affine, wanted)
+    return Boundary(vertices, faces, field, placed, wanted, volume, width if made else 0.0, at_edge)
 
 
 _Made = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]
@@ -119,20 +125,49 @@ def _pooled(mask: np.ndarray, affine: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return share, affine
 
 
-def _blurred(share: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """Blur with a padding, on cells about as long along all axes."""
+def _distance(mask: np.ndarray, spacing: np.ndarray) -> np.ndarray:
+    """Signed distance of voxels' centres to the faces between inside and outside, positive inside.
+
+    The distance to the nearest centre on the other side, less half a voxel in that direction: with steps `u_k h_k` to it,
+    half of `sqrt(sum_k (u_k h_k)^2)`, `u` the unit direction. On an axis that is `h_k / 2`.
+    """
+    from scipy import ndimage
+
+    values = np.empty(mask.shape, np.float32)
+    for side, sign in ((mask, 1.0), (~mask, -1.0)):
+        away, nearest = ndimage.distance_transform_edt(side, sampling=spacing, return_indices=True)
+        squared = np.zeros(mask.shape, np.float32)
+        for axis, own in enumerate(np.ogrid[tuple(slice(n) for n in mask.shape)]):
+            squared += ((nearest[axis] - own) * (spacing[axis] ** 2)) ** 2
+        half = 0.5 * np.sqrt(squared) / np.maximum(away, np.finfo(np.float32).tiny)
+        values[side] = sign * (away - half)[side]
+    return values
+
+
+def _smoothed(mask: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Smoothed distance of a mask and its surroundings, on cells about as long along all axes."""
     from scipy import ndimage
 
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
-    padding = np.ceil(REACH * width / spacing).astype(int) + LEAST_PADDING
-    values = np.pad(share, [(int(p), int(p)) for p in padding])
+    largest = float(spacing.max())
+    limit = LIMIT * largest
+    # Beyond, the limited distance is constant.
+    padding = np.ceil(limit / spacing).astype(int) + 2
+    mask = np.pad(mask, [(int(p), int(p)) for p in padding])
     affine = _shifted(affine, -padding)
-    if width == 0:
-        return values, affine
-    values = ndimage.gaussian_filter(values, width / spacing, mode="constant", truncate=REACH)
-    # Between slices the blurred mask is smooth enough for cubic splines; a linear zero between them is not.
-    cell = max(float(spacing.min()), float((spacing * share.shape).max()) / MOST_CELLS)
+    values = np.clip(_distance(mask, spacing), -limit, limit)
+
+    def smooth(values: np.ndarray, width: float) -> np.ndarray:
+        once = ndimage.gaussian_filter(values, width / spacing, mode="nearest", truncate=REACH)
+        return 2 * once - ndimage.gaussian_filter(once, width / spacing, mode="nearest", truncate=REACH)
+
+    for _ in range(ROUNDS):
+        values = np.clip(smooth(values, width), -limit, limit)
+        values = np.where(mask, np.maximum(values, 0), np.minimum(values, 0))
+    values = smooth(values, LAST * width)
+    # Between slices a cubic spline follows the smoothed distance; a linear zero would not.
     counts = np.array(values.shape)
+    cell = max(float(spacing.min()), float((spacing * counts).max()) / MOST_CELLS)
     finer = np.maximum(np.rint((counts - 1) * spacing / cell), counts - 1).astype(int) + 1
     if (finer > counts).any():
         values = ndimage.zoom(values, finer / counts, order=3, mode="nearest", grid_mode=False)
@@ -142,33 +177,41 @@ def _blurred(share: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.nd
 
 
 def _at_width(share: np.ndarray, affine: np.ndarray, wanted: float, width: float) -> _Made | None:
-    """Boundary that keeps the volume, by the secant method in the value; None where there is none of such a value."""
-    values, placed = _blurred(share, affine, width)
-    low, high = VALUES
-    value, made = 0.5, None
+    """Boundary that keeps the volume, by the secant method in the value; None where there is none near 0."""
+    values, placed = _smoothed(share >= 0.5, affine, width)
+    farthest = FARTHEST * float(np.linalg.norm(affine[:3, :3], axis=0).max())
+    value = 0.0
     tried: list[tuple[float, float]] = []
     for _ in range(ATTEMPTS):
         made = _zero(values - np.float32(value), placed)
         if made is None:
             return None
-        tried.append((value, made[-1] / wanted - 1.0))
-        if abs(tried[-1][1]) < EXACT:
+        change = made[-1] / wanted - 1.0
+        tried.append((value, change))
+        if abs(change) < EXACT:
             return made
         if len(tried) == 1:
-            value += np.clip(tried[0][1], -0.1, 0.1) * 0.5
+            # A boundary that moves by `d` along its normal adds `d` times its area.
+            value += float(np.clip(change * wanted / _area(made), -0.5 * farthest, 0.5 * farthest))
         else:
             (a, at_a), (b, at_b) = tried[-2:]
             if at_a == at_b:
                 return None
             value = b - at_b * (b - a) / (at_b - at_a)
-        if not low <= value <= high:
+        if abs(value) > farthest:
             return None
-    return made
+    return None
+
+
+def _area(made: _Made) -> float:
+    corners = made[0][made[1]]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return 0.5 * float(np.linalg.norm(sides, axis=1).sum())
 
 
 def _any_value(share: np.ndarray, affine: np.ndarray, wanted: float) -> _Made:
     """Boundary of what is thinner than a few voxels: halfway between voxels, of whatever volume."""
-    values, placed = _blurred(share, affine, 0.0)
+    values, placed = np.pad(share, 2), _shifted(affine, np.full(3, -2))
     # Pooled voxels may all be less than half full.
     value = 0.5 * min(1.0, float(values.max()))
     made = _zero(values - np.float32(value), placed)
