@@ -17,14 +17,17 @@ from palpate.cli.bodies import (
     MaxVolumeLoss,
     MesherChoice,
     Part,
+    Segments,
     Unit,
     body_of,
     fill_options,
     in_unit,
     is_surface,
+    materials_of,
     read_any,
 )
 from palpate.cli.completion import precisions, units
+from palpate.segmentation.endings import is_segmentation
 from palpate.startup import restore_interrupts
 
 if TYPE_CHECKING:
@@ -93,13 +96,16 @@ def _print_error(message: str) -> int:
 
 @app.command()
 def mesh(
-    surface: Annotated[Path, typer.Argument(help="Surface: STL, OBJ, PLY, OFF, GLB or glTF.")],
+    surface: Annotated[
+        Path, typer.Argument(help="Surface (STL, OBJ, PLY, OFF, GLB, glTF) or segmentation (NRRD, NIfTI).")
+    ],
     out: Annotated[Path, typer.Argument(help="Volume mesh: .vtu, .msh, .vtk, .inp, .mesh, .vol or .node.")],
     unit: Unit = None,
     max_size: MaxSize = None,
     mesher: MesherChoice = None,
     part: Part = None,
     max_volume_loss: MaxVolumeLoss = None,
+    segment: Segments = None,
     quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
 ) -> None:
     """Fill a surface with tetrahedra, of 4 nodes unless --quadratic: other programs and formats expect those.
@@ -117,7 +123,7 @@ def mesh(
 
     require_writable(out, MeshError)
     size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
-    fill = fill_options(mesher, part, max_volume_loss)
+    fill = fill_options(mesher, part, max_volume_loss, segment)
     made = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, options=fill))
     made.write(out)
     print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
@@ -125,7 +131,7 @@ def mesh(
 
 @app.command()
 def precompute(
-    mesh: Annotated[Path, typer.Argument(help="Volume mesh, or a surface to be meshed.")],
+    mesh: Annotated[Path, typer.Argument(help="Volume mesh, or a surface or segmentation to be meshed.")],
     fix: Annotated[str, typer.Option(help="Supported nodes, such as 'z < 0.01' or 'z < min + 5mm'.")],
     youngs_modulus: Annotated[str, typer.Option("-E", help="Young's modulus, such as 10kPa.")] = "10kPa",
     poissons_ratio: Annotated[float, typer.Option("--nu", help="Poisson's ratio, below 0.5.")] = 0.45,
@@ -152,6 +158,7 @@ def precompute(
     mesher: MesherChoice = None,
     part: Part = None,
     max_volume_loss: MaxVolumeLoss = None,
+    segment: Segments = None,
     memory: Annotated[
         str | None, typer.Option(help="Peak memory allowed, such as 8GB; with --dask of each worker.")
     ] = None,
@@ -177,10 +184,10 @@ def precompute(
         require_writable(out, StoreError)
     material = Material(units.pressure(youngs_modulus), poissons_ratio, units.density(density))
     loads = None if gravity is None else Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
-    fill = fill_options(mesher, part, max_volume_loss)
+    fill = fill_options(mesher, part, max_volume_loss, segment)
     with cluster(dask) as workers:
         made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, fill))
-        body = body_of(made, material, fix, loads)
+        body = body_of(made, materials_of(made, material, segment), fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
         asked = {"precision": precision, "touch": region, "first": first}
         asked |= {"path": out, "memory": memory, "dask": workers}
@@ -235,7 +242,7 @@ def touch(
 
 @app.command()
 def info(
-    file: Annotated[Path, typer.Argument(help="A store, a file of modes, a scene file, a volume mesh, or a surface.")],
+    file: Annotated[Path, typer.Argument(help="A store, modes, a scene, a volume mesh, a surface or a segmentation.")],
     unit: Annotated[
         str | None,
         typer.Option(help="Unit of length; default: m, of a surface what fits its size.", autocompletion=units),
@@ -270,6 +277,11 @@ def info(
         if any(tool.radius is None or tool.contact_radius is None for tool in scene.tools):
             print("  radii of tools that are not given: a sixteenth of the longest side of the body")
         print("  lengths in m, pressures in Pa, forces in N, times in s")
+        return
+    if is_segmentation(file):
+        from palpate.cli.segmentations import print_segmentation
+
+        print_segmentation(file, unit)
         return
     if is_surface(file):
         from palpate.cli.surfaces import print_surface

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.completion import units
+from palpate.segmentation.endings import is_segmentation
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -53,6 +54,14 @@ Part = Annotated[
 MaxVolumeLoss = Annotated[
     str | None,
     typer.Option(metavar="SHARE", help="Most of the volume that the mesh of a wrapped surface may lose; default: 5%."),
+]
+Segments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--segment",
+        metavar="NAME[=E]",
+        help="Of a label map: name or label, and its Young's modulus, such as tumor=40kPa; again for the next.",
+    ),
 ]
 ElementChoice = Annotated[
     Element | None,
@@ -97,11 +106,52 @@ def is_surface(path: Path) -> bool:
     return path.suffix.lower() in SURFACE_ENDINGS
 
 
-def fill_options(mesher: Mesher | None, part: str | None, max_volume_loss: str | None) -> FillOptions:
+def segment_tables(typed: Sequence[str] | None) -> list[dict[str, str]]:
+    """Tables ``[[body.segment]]`` of what was typed, such as ``liver`` or ``tumor=40kPa``.
+
+    Raises
+    ------
+    UnitError
+        A modulus that is no pressure.
+
+    """
+    from palpate.units import pressure
+
+    tables = []
+    for text in typed or ():
+        name, sign, modulus = text.rpartition("=")
+        if not sign:
+            tables.append({"name": text})
+            continue
+        pressure(modulus)
+        tables.append({"name": name, "youngs_modulus": modulus})
+    return tables
+
+
+def materials_of(
+    mesh: TetMesh, material: Material, typed: Sequence[str] | None
+) -> Material | dict[int | str, Material]:
+    """Material of a body, or of each of its segments, as they were typed."""
+    from dataclasses import replace
+
+    from palpate.units import pressure
+
+    # The mesh has the names of the file, in the order in which segments were typed, where labels may stand.
+    tables = segment_tables(typed)
+    moduli = [pressure(table.get("youngs_modulus", material.youngs_modulus)) for table in tables]
+    names = list(mesh.region_names)[: len(tables)]
+    own = {name: replace(material, youngs_modulus=modulus) for name, modulus in zip(names, moduli, strict=True)}
+    return own or material
+
+
+def fill_options(
+    mesher: Mesher | None, part: str | None, max_volume_loss: str | None, segments: Sequence[str] | None = None
+) -> FillOptions:
     """Options of filling, as they were typed."""
     from palpate.mesh.tetrahedralize import FillOptions
 
     given: dict[str, Any] = {"mesher": None if mesher is None else mesher.value}
+    given["segments"] = tuple(table["name"] for table in segment_tables(segments))
     if part is not None:
         given["part"] = int(part) if part.isascii() and part.isdigit() else part
     if max_volume_loss is not None:
@@ -125,19 +175,24 @@ def read_any(
     from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
     from palpate.units import length
 
-    if is_surface(path):
+    if is_surface(path) or is_segmentation(path):
         size = None if max_size is None else length(max_size)
         chosen = "linear" if element == Element.LINEAR else "quadratic"
         return tetrahedralize_with(chosen, path, size, unit, options=fill)
     if max_size is not None or fill not in (None, FillOptions()):
-        raise MeshError(f"{path} is a volume mesh: --max-size, --mesher, --part and --max-volume-loss are for surfaces")
+        raise MeshError(
+            f"{path} is a volume mesh: --max-size, --mesher, --part, --max-volume-loss and --segment are for files that "
+            "are filled"
+        )
     mesh = TetMesh.read(path, unit)
     if element == Element.LINEAR and mesh.is_quadratic:
         raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or say quadratic")
     return mesh.to_quadratic() if element == Element.QUADRATIC else mesh
 
 
-def body_of(mesh: TetMesh, material: Material, fix: str, loads: Loads | None = None) -> Body:
+def body_of(
+    mesh: TetMesh, material: Material | Mapping[int | str, Material], fix: str, loads: Loads | None = None
+) -> Body:
     """Body that is held where a predicate says.
 
     Raises
@@ -165,6 +220,9 @@ def likely_units(path: Path) -> list[str]:
     from palpate.mesh.size import scale_of
     from palpate.mesh.tetrahedralize import read_surface
 
+    if is_segmentation(path):
+        # Whose unit is that of the file, or mm.
+        return ["mm"]
     try:
         if is_surface(path):
             scale_of(str(path), np.asarray(read_surface(path).vertices), None)

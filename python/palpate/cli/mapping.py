@@ -20,6 +20,7 @@ from palpate.cli.bodies import (
     MeshUnit,
     Part,
     PoissonsRatio,
+    Segments,
     ToolRadius,
     YoungsModulus,
 )
@@ -61,6 +62,7 @@ def map_command(
     mesher: MesherChoice = None,
     part: Part = None,
     max_volume_loss: MaxVolumeLoss = None,
+    segment: Segments = None,
 ) -> None:
     """Press a grid of points on a body, without a hand, and map its stiffness and what lies hidden in it.
 
@@ -79,6 +81,7 @@ def map_command(
     given = {"spacing": length("--grid", grid), "depth": length("--depth", depth), "speed": quickness("--speed", speed)}
     lengths = {"unit": unit, "max_size": max_size, "element": element}
     lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
+    lengths |= {"segment": tuple(segment) if segment else None}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio}
     built = _build_scene(file, RunOptions(radius=radius, fix=fix, **material, **lengths))
     folder = out if out is not None else Path(f"{file.stem}-palpation")

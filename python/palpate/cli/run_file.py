@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.cli.bodies import Element, Mesher, body_of, fill_options, likely_units, read_any
+from palpate.cli.bodies import (
+    Element,
+    Mesher,
+    body_of,
+    fill_options,
+    likely_units,
+    materials_of,
+    read_any,
+    segment_tables,
+)
 from palpate.errors import SceneError
+from palpate.segmentation.endings import is_segmentation
 
 if TYPE_CHECKING:
     from palpate.green import BackgroundPrecompute
@@ -32,6 +42,7 @@ class RunOptions:
     mesher: Mesher | None = None
     part: str | None = None
     max_volume_loss: str | None = None
+    segment: tuple[str, ...] | None = None
     cpus: str | None = None
     priority: int | None = None
     device: tuple[str, ...] | None = None
@@ -65,6 +76,7 @@ FLAGS = {
     "mesher": "--mesher",
     "part": "--part",
     "max_volume_loss": "--max-volume-loss",
+    "segment": "--segment",
 }
 
 
@@ -196,12 +208,12 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
 
     defaults = []
     unit = options.unit
-    if unit is None:
+    if unit is None and not is_segmentation(file):
         unit, *others = likely_units(file)
         defaults.append(f"unit {unit} (--unit{'; it may also be ' if others else ''}{' or '.join(others)})")
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
-    fill = fill_options(options.mesher, options.part, options.max_volume_loss)
+    fill = fill_options(options.mesher, options.part, options.max_volume_loss, options.segment)
     mesh = read_any(file, known, options.element, options.max_size, fill)
     low, high = mesh.bounds
     fix = options.fix
@@ -217,10 +229,11 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     if options.poissons_ratio is None:
         defaults.append(f"Poisson's ratio {ratio} (--nu)")
     material = Material(units.pressure(modulus), ratio, units.density(density))
-    body = body_of(mesh, material, fix)
-    green = precompute(body)
+    segments = segment_tables(options.segment)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
-    scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
+    scene = Scene(body={"mesh": str(file), "unit": unit, "segment": segments}, **tables)
+    body = body_of(mesh, materials_of(mesh, material, options.segment), fix)
+    green = precompute(body)
     of_loop = {name: getattr(options, name) for name in OF_LOOP}
     of_run = RunOptions(radius=options.radius, **of_loop)
     built = BuiltScene.of(scene_with(scene, of_run), body, green)

@@ -20,6 +20,7 @@ from palpate.cli.bodies import (
     MeshUnit,
     Part,
     PoissonsRatio,
+    Segments,
     ToolRadius,
     YoungsModulus,
 )
@@ -106,7 +107,7 @@ def demo(
 
 @app.command()
 def run(
-    file: Annotated[Path, typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, or surface.")],
+    file: Annotated[Path, typer.Argument(help="Scene (.toml), store, volume mesh, surface or segmentation.")],
     radius: ToolRadius = None,
     fix: Fix = None,
     youngs_modulus: YoungsModulus = None,
@@ -118,6 +119,7 @@ def run(
     mesher: MesherChoice = None,
     part: Part = None,
     max_volume_loss: MaxVolumeLoss = None,
+    segment: Segments = None,
     surface_map: Annotated[
         Path | None, typer.Option("--map", help="Map of 'palpate map' to show: stiffness.vtu or detection.vtu.")
     ] = None,
@@ -142,6 +144,8 @@ def run(
 
     Example: palpate run organ.stl --unit mm --fix "z < min + 5mm" -E 10kPa --radius 8mm
 
+    Example: palpate run ct.seg.nrrd --segment liver --segment tumor=40kPa
+
     Example: palpate run scene.toml --headless 3 --out results
 
     Example: palpate run scene.toml --device haply
@@ -156,6 +160,7 @@ def run(
 
     lengths = {"unit": unit, "max_size": max_size, "element": element}
     lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
+    lengths |= {"segment": tuple(segment) if segment else None}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
     of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
     # What opens when a part is ready goes on with the rest beside the loop.

@@ -52,7 +52,7 @@ class InnerRegions:
     regions: Sequence[InnerRegion]
 
     def names(self) -> Mapping[str, int]:
-        """Number of each region; 0 for the rest."""
+        """Return the number of each region; 0 for the rest."""
         return {self.rest: 0, **{region.name: rank for rank, region in enumerate(self.regions, 1)}}
 
     def job(self, origin: np.ndarray, extent: float) -> dict[str, np.ndarray]:
@@ -85,7 +85,7 @@ class InnerRegions:
         there = set(np.unique(mesh.regions).tolist())
         for title, number in self.names().items():
             if number not in there:
-                raise MeshError(f"{name}: segment '{title}' got no element: it is too small; --max-size makes finer ones")
+                raise MeshError(f"{name}: segment '{title}' is too small for the elements; --max-size makes finer ones")
 
     def snapped(self, mesh: TetMesh) -> TetMesh:
         """Put nodes between regions onto the boundaries, as far as no element becomes bad."""

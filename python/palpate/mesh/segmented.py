@@ -62,14 +62,25 @@ def segmented(
     _note_boundaries(name, found)
     reason = "bounds smoothed segments"
     wrapping = Wrapping(
-        SurfaceFile(name, shape), reason, element, size, [*refine, *balls], part, max_volume_loss, time_limit, stage, inner
+        SurfaceFile(name, shape),
+        reason,
+        element,
+        size,
+        [*refine, *balls],
+        part,
+        max_volume_loss,
+        time_limit,
+        stage,
+        inner,
     )
     mesh = wrapping.mesh()
     if inner is None:
         return TetMesh(mesh.nodes, mesh.tets, mesh.regions, {str(found["names"][0]): 0})
     inner.require_elements(name, mesh)
     _note_volumes(name, found, mesh)
-    return mesh
+    # In the order in which they were given, by which materials belong to them.
+    numbers = {str(title): mesh.region_names[str(title)] for title in found["names"]}
+    return TetMesh(mesh.nodes, mesh.tets, mesh.regions, numbers)
 
 
 def _boundaries(
@@ -122,7 +133,7 @@ def _note_boundaries(name: str, found: dict[str, np.ndarray]) -> None:
     if found["at_edge"]:
         _warn(f"{name}: a segment reaches the edge of the image: the body is cut flat there")
     for title, volume in zip(found["cavity_names"], found["cavity_volumes"], strict=True):
-        _warn(f"{name}: '{title}' ({_volume(volume)}) lies in a cavity of the body, which stays empty; --segment adds it")
+        _warn(f"{name}: '{title}' ({_volume(volume)}) lies in a cavity of the body, which stays empty; add --segment")
 
 
 def _note_volumes(name: str, found: dict[str, np.ndarray], mesh: TetMesh) -> None:

@@ -17,9 +17,7 @@ BACK, LEAST_MOVE = 0.7, 1e-3
 ROUNDS = 3
 
 
-def snap(
-    mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray], moving: np.ndarray | None = None
-) -> TetMesh:
+def snap(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray], moving: np.ndarray | None = None) -> TetMesh:
     """4-node tetrahedra with their surface nodes on a shape, or as near as keeps every element's dihedral angles.
 
     Parameters

@@ -175,7 +175,7 @@ def _scaled(surface: str | os.PathLike[str] | trimesh.Trimesh, unit: str | None,
     """Surface in metres."""
     loaded = load_surface(surface)
     if options.segments:
-        raise MeshError(f"{loaded.name}: is a surface; segments are parts of label maps ({', '.join(SEGMENTATION_ENDINGS)})")
+        raise MeshError(f"{loaded.name}: is a surface; label maps have segments ({', '.join(SEGMENTATION_ENDINGS)})")
     shape = loaded.shape.copy()
     shape.apply_scale(scale_of(loaded.name, shape.vertices, unit))
     return SurfaceFile(loaded.name, shape, loaded.part_names, loaded.part_of_face)

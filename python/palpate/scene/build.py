@@ -25,6 +25,7 @@ from palpate.scene.loads import together
 from palpate.scene.mistakes import located
 from palpate.scene.regions import MaterialTable
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
+from palpate.segmentation import is_segmentation, load_label_map
 from palpate.vectors import conjugate, rotated
 
 Progress = bool | Callable[[int, int], None]
@@ -201,6 +202,10 @@ class _Builder:
             self.body()
         else:
             with self._locating_errors_in_file(["body", self._rank, "mesh"]):
+                if is_segmentation(str(table.mesh)):
+                    labels = load_label_map(self._scene.folder / str(table.mesh), table.unit)
+                    labels.choose([segment.name for segment in table.segment])
+                    return
                 read = closed_surface if table.mesher == "netgen" else read_surface
                 surface = read(self._scene.folder / str(table.mesh))
                 vertices = surface.vertices * scale_of(str(table.mesh), surface.vertices, table.unit)
@@ -230,6 +235,9 @@ class _Builder:
         labels, of_file = _file_regions(mesh, len(regions))
         names: dict[str, int] = {}
         materials = {label: base.material() for label in np.unique(labels).tolist()}
+        for title, material in table.segment_materials(mesh, base).items():
+            # A mesh of one region has the label 0 alone.
+            materials[of_file.get(title, 0)] = material
         for rank, region in enumerate(regions):
             with self._locating_errors([*where, rank]):
                 labels[region.elements(mesh)] = rank + 1

@@ -22,6 +22,8 @@ SHAPES = {
 PLACES = tuple(dict.fromkeys(key for _, keys in SHAPES.values() for key in keys))
 
 
+_SEGMENT = one_of("the name or the label of a segment", lambda v: (isinstance(v, str) and v != "") or is_whole(v))
+
 _REGION = one_of("the number or the name of a region", lambda v: v is None or isinstance(v, str) or is_whole(v))
 
 
@@ -111,5 +113,22 @@ class RegionTable(PlaceTable):
 
     def material(self, base: MaterialTable) -> Material:
         """Material, completed from that of the body."""
-        own = {name: getattr(self, name) for name in MaterialTable.model_fields}
-        return Material(**{name: getattr(base, name) if value is None else value for name, value in own.items()})
+        return _completed(self, base)
+
+
+class SegmentTable(Table):
+    """A segment of a label map, and its material; what it does not give is that of ``[material]``."""
+
+    name: Annotated[int | str, _SEGMENT]
+    youngs_modulus: Pressure | None = None
+    poissons_ratio: PoissonsRatio | None = None
+    density: Density | None = None
+
+    def material(self, base: MaterialTable) -> Material:
+        """Material, completed from that of the body."""
+        return _completed(self, base)
+
+
+def _completed(table: RegionTable | SegmentTable, base: MaterialTable) -> Material:
+    own = {name: getattr(table, name) for name in MaterialTable.model_fields}
+    return Material(**{name: getattr(base, name) if value is None else value for name, value in own.items()})

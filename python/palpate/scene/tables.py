@@ -9,18 +9,20 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from palpate import models
-from palpate.body import parse
+from palpate.body import Material, parse
 from palpate.errors import BodyError, UnitError
 from palpate.fields import STRAIN_LIMIT
+from palpate.mesh import TetMesh
 from palpate.mesh.surface_file import SURFACE_ENDINGS
 from palpate.mesh.tetrahedralize import Element, FillOptions, Mesher
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
-from palpate.scene.regions import MaterialTable, RegionTable
+from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable
 from palpate.scene.table import Length, Number, Point, Pressure, Radius, Share, Table, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
 from palpate.scene.touch import TouchTable
+from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.units import length_scale
 
 # As many as the force loop takes.
@@ -64,13 +66,13 @@ class SupportsTable(Table):
 
 
 class BodyTable(Table):
-    """A solid, one of: a mesh file (volume, or surface to be filled), a built-in model, a precomputed store.
+    """A solid, one of: a mesh file (volume, surface or segmentation to be filled), a built-in model, a store.
 
     Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
     filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
     ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
     fix the middles between them. ``mesher``, ``part`` and ``max_volume_loss`` are those of
-    :func:`palpate.tetrahedralize`.
+    :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which become regions with their names.
 
     ``position`` (m) and ``orientation`` (unit quaternion w x y z) place the body's own frame in the scene; predicates
     and shapes speak of the body's own frame. ``material``, ``supports``, ``touch``, ``region``, ``loads`` and
@@ -89,6 +91,7 @@ class BodyTable(Table):
     mesher: Mesher | None = None
     part: Annotated[int | str, _PART] = 1
     max_volume_loss: Share = 0.05
+    segment: list[SegmentTable] = Field(default_factory=list)
     precision: str | None = Field(None, pattern="^f(16|32|64)$")
     position: Point = (0.0, 0.0, 0.0)
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -105,6 +108,8 @@ class BodyTable(Table):
             raise ValueError("give exactly one of mesh, model and store")
         if self.model is not None and self.model not in models.NAMES:
             raise ValueError(f"unknown model '{self.model}'; there are {', '.join(models.NAMES)}")
+        if self.segment and not is_segmentation(self.mesh or ""):
+            raise ValueError(f"segment is for a mesh that is a label map ({', '.join(SEGMENTATION_ENDINGS)})")
         if self.unit is not None:
             try:
                 length_scale(self.unit)
@@ -122,12 +127,19 @@ class BodyTable(Table):
     @property
     def fills_a_surface(self) -> bool:
         """Whether the mesh is yet to be made."""
-        return Path(self.mesh or "").suffix.lower() in SURFACE_ENDINGS
+        return Path(self.mesh or "").suffix.lower() in SURFACE_ENDINGS or is_segmentation(self.mesh or "")
 
     @property
     def fill_options(self) -> FillOptions:
         """How its surface is filled."""
-        return FillOptions(self.mesher, self.part, self.max_volume_loss)  # type: ignore[arg-type]
+        segments = tuple(table.name for table in self.segment)
+        return FillOptions(self.mesher, self.part, self.max_volume_loss, segments)  # type: ignore[arg-type]
+
+    def segment_materials(self, mesh: TetMesh, base: MaterialTable) -> dict[str, Material]:
+        """Material of each segment by its name in the file, for the mesh that was made of them."""
+        # The mesh has the names in the order of the tables, which may give labels instead.
+        names = list(mesh.region_names)[: len(self.segment)]
+        return {name: table.material(base) for name, table in zip(names, self.segment, strict=True)}
 
     @property
     def adds_middles(self) -> bool:

@@ -176,7 +176,7 @@ def _placement(path: Path, header: dict[str, Any], layered: bool) -> tuple[np.nd
 
 
 def _unit(path: Path, header: dict[str, Any]) -> str | None:
-    """Unit of length that the header names; None where it names none."""
+    """Find the unit of length that the header names; None where it names none."""
     units = header.get("space units")
     if units is None:
         return None

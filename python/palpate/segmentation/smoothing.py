@@ -1,12 +1,12 @@
 """Smooth boundary of a mask of voxels that encloses the volume of its voxels.
 
-The signed distance `f` to the faces between voxels, clipped at the largest distance `h` of voxels, has steps from slice to
-slice. Each round of smoothing applies `T = 1 - (1 - G)^2`, `G` the Gaussian of standard deviation `h`, the same in mm
-along all axes. `T` takes waves short against `h` away and changes long ones of wave number `k` by `(k h)^4 / 4` only, so
-that curved walls stay where they are, whereas `G` would move them inward by `h^2` times their mean curvature. After each
-round, values at voxels are set to 0 where they have the wrong sign: as long as the centre of a voxel is inside, the
-boundary passes it outside (constrained smoothing: Whitaker 2000, "Reducing aliasing artifacts in iso-surfaces of binary
-volumes"). The boundary is where `f` has a value `t` near 0 at which the enclosed volume is that of the voxels.
+The signed distance `f` to the faces between voxels, clipped at the largest distance `h` of voxels, has steps from slice
+to slice. Each round of smoothing applies `T = 1 - (1 - G)^2`, `G` the Gaussian of standard deviation `h`, the same in
+mm along all axes. `T` takes away waves that are short beside `h` and changes long ones of wave number `k` by `(k h)^4 /
+4` only, so that curved walls stay where they are, whereas `G` would move them inward by `h^2` times their mean
+curvature. After each round, values at voxels that have the wrong sign are set to 0: the boundary leaves the centres of
+voxels on their side (constrained smoothing: Whitaker 2000, "Reducing aliasing artifacts in iso-surfaces of binary
+volumes"). The boundary is where `f` has a value near 0 at which the enclosed volume is that of the voxels.
 
 Blurring of the mask itself was tried: slices of 2.5 mm on a gentle slope left terraces of 0.8 mm, twice as high.
 """
@@ -18,13 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 # Standard deviation of the Gaussian and limit of the distance, in parts of the largest distance of voxels; rounds.
-# Measured on an ellipsoid of 60 x 45 x 35 mm in voxels of 0.7 x 0.7 x 2.5 mm: 4 rounds leave 0.10 mm (root mean square), 10
-# leave 0.12 mm, the unsmoothed distance 0.38 mm.
+# Measured on an ellipsoid of 60 x 45 x 35 mm in voxels of 0.7 x 0.7 x 2.5 mm: 4 rounds leave 0.10 mm (root mean square),
+# 10 leave 0.12 mm, the unsmoothed distance 0.38 mm.
 WIDTH, LIMIT, ROUNDS = 1.0, 1.0, 4
 # The last round, which smooths where the constraint has cut, is of this part of the width.
 LAST = 0.6
-# A boundary that needs a value beyond this part of the largest distance of voxels is one of walls as thin as that: it is
-# smoothed half as wide, down to this part of the width, and then not at all.
+# A boundary that needs a value beyond this part of the largest distance of voxels is one of walls as thin as that: it
+# is smoothed half as wide, down to this part of the width, and then not at all.
 FARTHEST, LEAST_WIDTH = 0.6, 0.2
 # The grid of the boundary has at most so many cells along the longest side of a segment.
 MOST_CELLS = 200
@@ -128,8 +128,8 @@ def _pooled(mask: np.ndarray, affine: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _distance(mask: np.ndarray, spacing: np.ndarray) -> np.ndarray:
     """Signed distance of voxels' centres to the faces between inside and outside, positive inside.
 
-    The distance to the nearest centre on the other side, less half a voxel in that direction: with steps `u_k h_k` to it,
-    half of `sqrt(sum_k (u_k h_k)^2)`, `u` the unit direction. On an axis that is `h_k / 2`.
+    The distance to the nearest centre on the other side, less half a voxel in that direction: half of `sqrt(sum_k (u_k
+    h_k)^2)`, `u` the unit direction to it. Along an axis that is `h_k / 2`.
     """
     from scipy import ndimage
 
