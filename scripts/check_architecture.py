@@ -37,20 +37,8 @@ FORBIDDEN = {
 # Folders of the Python package, lowest first: each imports from those before it. The modules at its top come before
 # all of them. The package itself, which exports the public names, comes after them.
 PYTHON_ORDER = (
-    *(
-        "segmentation",
-        "mesh",
-        "body",
-        "fields",
-        "green",
-        "dynamics",
-        "models",
-        "scene",
-        "devices",
-        "simulation",
-        "palpation",
-    ),
-    *("sessions", "study"),
+    *("segmentation", "mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation"),
+    *("palpation", "sessions", "study"),
     *("viewer", "validation/plots", "exam", "validation/verify", "validation/ticks", "validation/doctor"),
     "cli",
 )

@@ -181,8 +181,8 @@ def read_any(
         return tetrahedralize_with(chosen, path, size, unit, options=fill)
     if max_size is not None or fill not in (None, FillOptions()):
         raise MeshError(
-            f"{path} is a volume mesh: --max-size, --mesher, --part, --max-volume-loss and --segment are for files that "
-            "are filled"
+            f"{path} is a volume mesh: --max-size, --mesher, --part, --max-volume-loss and --segment are for files "
+            "that are filled"
         )
     mesh = TetMesh.read(path, unit)
     if element == Element.LINEAR and mesh.is_quadratic:

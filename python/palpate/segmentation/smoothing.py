@@ -18,15 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 
 # Standard deviation of the Gaussian and limit of the distance, in parts of the largest distance of voxels; rounds.
-# Measured on an ellipsoid of 60 x 45 x 35 mm in voxels of 0.7 x 0.7 x 2.5 mm: 4 rounds leave 0.10 mm (root mean square),
-# 10 leave 0.12 mm, the unsmoothed distance 0.38 mm.
+# Measured on an ellipsoid of 60 x 45 x 35 mm in voxels of 0.7 x 0.7 x 2.5 mm: 4 rounds leave 0.10 mm (root mean
+# square), 10 leave 0.12 mm, the unsmoothed distance 0.38 mm.
 WIDTH, LIMIT, ROUNDS = 1.0, 1.0, 4
 # The last round, which smooths where the constraint has cut, is of this part of the width.
 LAST = 0.6
 # A boundary that needs a value beyond this part of the largest distance of voxels is one of walls as thin as that: it
 # is smoothed half as wide, down to this part of the width, and then not at all.
 FARTHEST, LEAST_WIDTH = 0.6, 0.2
-# The grid of the boundary has at most so many cells along the longest side of a segment.
+# The grid of the boundary has about so many cells along the longest side of a segment.
 MOST_CELLS = 200
 # Share of the volume to which it is kept, and attempts.
 EXACT, ATTEMPTS = 5e-4, 6
@@ -114,7 +114,7 @@ def _pooled(mask: np.ndarray, affine: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """Mean of blocks of voxels where these are finer than the grid of the boundary; the volume stays the same."""
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     cell = float((spacing * mask.shape).max()) / MOST_CELLS
-    factors = np.maximum(1, np.floor(cell / spacing + 1e-9)).astype(int)
+    factors = np.maximum(1, np.rint(cell / spacing)).astype(int)
     share = mask.astype(np.float32)
     if (factors > 1).any():
         share = np.pad(share, [(0, -count % factor) for count, factor in zip(mask.shape, factors, strict=True)])
