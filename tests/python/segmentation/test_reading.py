@@ -78,7 +78,10 @@ def test_unit_of_the_file_or_millimetres(tmp_path):
 
 def test_names_of_slicer_are_found_and_labels_without_a_name(tmp_path):
     labels, affine = marked()
-    found = load_label_map(write_nrrd(tmp_path / "a.seg.nrrd", labels, affine, {"Leber": 1, "Größe 3": 3}))
+    file = write_nrrd(tmp_path / "a.seg.nrrd", labels, affine, {"Leber": 1, "Groesse 3": 3})
+    # 3D Slicer writes UTF-8, pynrrd ASCII alone.
+    file.write_bytes(file.read_bytes().replace(b"Groesse", "Größe".encode()))
+    found = load_label_map(file)
     assert [s.name for s in found.segments] == ["Leber", "Größe 3", "2"]
     assert found.find("leber").value == 1
     assert found.find("Größe 3").value == 3
@@ -128,9 +131,11 @@ def _changed(path: Path, old: bytes, new: bytes) -> None:
     path.write_bytes(content.replace(old, new))
 
 
+# Two axes of the array in one direction.
+FLAT = np.array([[1.0, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 LABELS, AFFINE = labels_of([ball((0, 0, 0), 8)], (10, 10, 10))
 BAD = {
-    "cut short, gzip": ("a.nrrd", lambda p: (write_nrrd(p, LABELS, AFFINE), _cut(p, 0.7)), "cut short: "),
+    "cut short, gzip": ("a.nrrd", lambda p: (write_nrrd(p, LABELS, AFFINE), _cut(p, 0.95)), "cut short: "),
     "cut short, raw": ("a.nrrd", lambda p: (write_nrrd(p, LABELS, AFFINE, encoding="raw"), _cut(p, 0.7)), "cut short"),
     "cut short, header": ("a.nrrd", lambda p: p.write_bytes(b"NRRD0004\ntype: uchar\n"), "cut short in its header"),
     "cut short, nii.gz": ("a.nii.gz", lambda p: (write_nifti(p, LABELS, AFFINE), _cut(p, 0.7)), "cut short or damaged"),
@@ -150,11 +155,15 @@ BAD = {
     "no directions": (
         "a.nrrd",
         lambda p: write_nrrd(p, LABELS, AFFINE, space_directions=None),
-        "no 'space directions'",
+        "no 'space dir",
     ),
     "other space": ("a.nrrd", lambda p: write_nrrd(p, LABELS, AFFINE, space="3D-left-handed"), "is not read"),
     "no affine": ("a.nii", _without_forms, "neither sform nor qform"),
-    "flat": ("a.nii", lambda p: write_nifti(p, LABELS, np.diag([1.0, 1, 1e-9, 1])), "have no volume"),
+    "flat": (
+        "a.nii",
+        lambda p: write_nifti(p, LABELS, FLAT),
+        "have no volume",
+    ),
     "CT": ("a.nii", lambda p: write_nifti(p, _noise(np.int16, -1000, 900), AFFINE), "intensity image (values from -"),
     "floats": ("a.nii", lambda p: write_nifti(p, LABELS * np.float32(0.5), AFFINE), "intensity image (values with"),
     "MRI": ("a.nrrd", lambda p: write_nrrd(p, _noise(np.uint8, 0, 255), AFFINE), "intensity image (25"),
@@ -163,7 +172,7 @@ BAD = {
     "huge": ("a.nrrd", lambda p: _changed(p, b"sizes: 6 7 5", b"sizes: 60000 60000 60000"), "more than the 4 GiB"),
     "elsewhere": (
         "a.nrrd",
-        lambda p: _changed(p, b"encoding: gzip", b"encoding: gzip\ndata file: a.raw"),
+        lambda p: _changed(p, b"encoding: gzip", b"data file: a.raw\nencoding: gzip"),
         "another file",
     ),
     "encoding": ("a.nrrd", lambda p: _changed(p, b"encoding: gzip", b"encoding: hex"), "'hex' is not read"),

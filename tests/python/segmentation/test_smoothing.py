@@ -70,9 +70,9 @@ def test_a_cavity_stays_and_the_edge_of_the_image_is_reported():
 
 
 def test_fine_voxels_are_averaged_without_a_change_of_volume():
-    labels, affine = labels_of([ball((0, 0, 0), 30)], (31, 31, 31), (0.25, 0.25, 0.25))
+    labels, affine = labels_of([ball((0, 0, 0), 15)], (16, 16, 16), (0.1, 0.1, 0.5))
     made = boundary(labels > 0, affine)
-    assert made.volume == pytest.approx(4 / 3 * np.pi * 0.03**3, rel=2e-3)
-    assert max(made.field.shape) < 230
-    off = np.linalg.norm(made.vertices, axis=1) - 0.03
+    assert made.volume == pytest.approx(4 / 3 * np.pi * 0.015**3, rel=2e-3)
+    assert max(made.field.shape) < 200
+    off = np.linalg.norm(made.vertices, axis=1) - 0.015
     assert np.abs(off).max() < 3e-4
