@@ -25,7 +25,7 @@ from palpate.segmentation.smoothing import inside_field
 
 # Elements in and around an inner segment, in parts of half its thickness, by their kind: a ball of radius r gets edges
 # of so many r. What they do to the contrast of a nodule: docs/accuracy.md.
-SIZE_WITHIN = {"linear": 0.25, "quadratic": 0.4}
+SIZE_WITHIN = {"linear": 0.35, "quadratic": 0.4}
 # Segments thinner than this part of the body's elements are not resolved: elements there would be too many.
 THINNEST = 0.05
 
