@@ -59,7 +59,7 @@ def test_a_bare_volume_mesh_runs_too(capsys, tmp_path):
     built = built_from(tmp_path / "box.vtu", RunOptions())
     assert "unit mm (--unit;" in capsys.readouterr().out
     assert built.bodies[0].body.mesh.volume == pytest.approx(0.08 * 0.05 * 0.05)
-    with pytest.raises(palpate.MeshError, match="--mesher, --part and --max-volume-loss are for surfaces"):
+    with pytest.raises(palpate.MeshError, match="--part, --max-volume-loss and --segment are for files"):
         built_from(tmp_path / "box.vtu", RunOptions(part="all"))
 
 
