@@ -35,9 +35,11 @@ def main(job: str, made: str) -> int:
 
 
 def _arrays(found: Boundaries) -> dict[str, np.ndarray]:
-    whole = found.whole
+    whole, titles = found.whole, [segment.name for segment in found.segments]
+    # Segments of one name, chosen by their labels, have the labels in the names of their regions.
+    names = [s.name if titles.count(s.name) == 1 else f"{s.name} ({s.value})" for s in found.segments]
     arrays = {
-        "names": np.array([segment.name for segment in found.segments]),
+        "names": np.array(names),
         "volumes": np.array(found.volumes),
         "rest": np.array(found.rest),
         "whole": np.array([whole.voxel_volume, whole.volume, whole.width]),
