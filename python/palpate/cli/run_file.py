@@ -36,7 +36,7 @@ class RunOptions:
     priority: int | None = None
     device: tuple[str, ...] | None = None
 
-    def refuse(self, file: Path, allowed: set[str], reason: str) -> None:
+    def refuse(self, file: Path, allowed: set[str], reason: str, of_loop: bool = True) -> None:
         """Refuse options that the kind of file does not take.
 
         Raises
@@ -46,7 +46,7 @@ class RunOptions:
 
         """
         for field in fields(self):
-            if getattr(self, field.name) is not None and field.name not in allowed | OF_LOOP:
+            if getattr(self, field.name) is not None and field.name not in (allowed | OF_LOOP if of_loop else allowed):
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
@@ -65,6 +65,9 @@ FLAGS = {
     "mesher": "--mesher",
     "part": "--part",
     "max_volume_loss": "--max-volume-loss",
+    "cpus": "--cpus",
+    "priority": "--priority",
+    "device": "--device",
 }
 
 

@@ -55,7 +55,7 @@ Devices = Annotated[
         autocompletion=devices,
     ),
 ]
-Recordings = Annotated[Path, typer.Option(help="Folder of what the page records; default: this one.")]
+Recordings = Annotated[Path, typer.Option(help="Folder of what the page records and saves; default: this one.")]
 PORT = 8642
 
 
@@ -106,7 +106,10 @@ def demo(
 
 @app.command()
 def run(
-    file: Annotated[Path, typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, or surface.")],
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="Scene (.toml), store (.palpate), volume mesh, or surface; none opens an empty page."),
+    ] = None,
     radius: ToolRadius = None,
     fix: Fix = None,
     youngs_modulus: YoungsModulus = None,
@@ -151,9 +154,12 @@ def run(
     A scene whose [touch] says what comes first opens when that can be touched; the rest follows beside the loop.
 
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
+
+    Without a FILE the page is empty: drop a surface on it, and set the body up there.
     """
     from palpate.cli.run_file import RunOptions, built_from
 
+    page = _Page(host, port, browser, recordings)
     lengths = {"unit": unit, "max_size": max_size, "element": element}
     lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
@@ -161,6 +167,12 @@ def run(
     # What opens when a part is ready goes on with the rest beside the loop.
     growing: dict[int, BackgroundPrecompute] = {}
     options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
+    if file is None:
+        options.refuse(Path("an empty page"), set(), "what belongs to a body is chosen in the page", of_loop=False)
+        if surface_map is not None or headless is not None or record is not None:
+            raise typer.BadParameter("--map, --headless and --record need a FILE")
+        _view(None, page)
+        return
     built = built_from(file, options, growing if headless is None else None)
     _print_kept()
     _print_loose(built)
@@ -172,7 +184,7 @@ def run(
         from palpate.viewer.surface_map import read_map
 
         maps = read_map(surface_map, built)
-    _view(built, _Page(host, port, browser, recordings), record=record, maps=maps, growing=growing)
+    _view(built, page, record=record, maps=maps, growing=growing)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -193,7 +205,7 @@ class _Page:
 
 
 def _view(
-    built: BuiltScene,
+    built: BuiltScene | None,
     page: _Page,
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
@@ -201,13 +213,13 @@ def _view(
     maps: Sequence[SurfaceMap | None] | None = None,
     growing: Mapping[int, BackgroundPrecompute] | None = None,
 ) -> None:
-    from palpate.viewer.live import open_viewer
+    from palpate.viewer.live import PRESS, SET_UP, open_viewer
     from palpate.viewer.server import ViewerServer
 
     page.recordings.mkdir(parents=True, exist_ok=True)
     files = {"record": record, "recordings": page.recordings, "maps": maps, "growing": growing}
     server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
-    open_viewer(server, browser=page.browser)
+    open_viewer(server, browser=page.browser, hint=SET_UP if built is None else PRESS)
 
 
 def _print_kept() -> None:

@@ -23,6 +23,7 @@ from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
+from palpate.scene.node_file import is_node_file, read_nodes
 from palpate.scene.regions import MaterialTable
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
 from palpate.vectors import conjugate, rotated
@@ -275,6 +276,8 @@ class _Builder:
     def _fixed(self, mesh: TetMesh) -> Any:
         supports: SupportsTable = self._table_of_body("supports")[0]
         fixed = supports.fixed
+        if is_node_file(fixed):
+            fixed = read_nodes(self._scene.folder / str(fixed))
         if fixed is None and self._table.model is not None:
             return models.fixed(self._table.model, mesh)
         if fixed is None:
@@ -292,7 +295,7 @@ class _Builder:
 
 def _predicate_mask(fixed: Any, nodes: np.ndarray) -> np.ndarray | None:
     """Nodes that a predicate holds, of which there must be some; None for what is no predicate."""
-    if not isinstance(fixed, str):
+    if not isinstance(fixed, str) or is_node_file(fixed):
         return None
     mask = parse(fixed)(nodes)
     if not np.any(mask):

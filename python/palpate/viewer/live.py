@@ -13,6 +13,7 @@ from palpate.viewer.replay_session import ReplaySession
 from palpate.viewer.server import ViewerServer
 
 PRESS = "Hold the left mouse button on the body to press, drag to slide. Ctrl-C here ends."
+SET_UP = "Drop a surface file on the page. Ctrl-C here ends."
 REPLAY = "The time line is below the body: space plays and pauses. Ctrl-C here ends."
 
 
