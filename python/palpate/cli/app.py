@@ -50,9 +50,11 @@ def options(
 ) -> None:
     """Finite elements you can feel. Without a command: an empty page, in which a body is set up."""
     if context.invoked_subcommand is None:
-        from palpate.cli.running import run
-
-        run(None)
+        commands = context.command
+        assert isinstance(commands, typer.core.TyperGroup)
+        run = commands.get_command(context, "run")
+        assert run is not None
+        context.invoke(run)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""A body that is set up in the page, from the side of the server: its file, choices, loop, and the scene it is saved in."""
+"""A body that is set up in the page, as the server sees it: file, choices, loop, and the scene it is saved in."""
 
 from __future__ import annotations
 
