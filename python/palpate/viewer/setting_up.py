@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
@@ -23,6 +24,9 @@ from palpate.viewer.session import Session
 from palpate.viewer.setup_body import SetupBody
 from palpate.viewer.setup_session import SetupSession
 from palpate.viewer.upload import ENDINGS, MAX_FILE, MAX_PART, Upload
+
+# Where a mistake stands in a scene file: path, line, and table.
+_PLACE = re.compile(r"^\S.*?\.toml(:\d+)?: (\w+: )?")
 
 
 class Host(Protocol):
@@ -232,7 +236,14 @@ class SettingUp:
         scene = await server.call(body.scene)
         building = server.begin_building()
         columns = server.reporter("Computing what every touch needs", building)
-        make = lambda: Session(scene.build(columns, columns), folder=self._folder)  # noqa: E731
+
+        def make() -> Session:
+            try:
+                return Session(scene.build(columns, columns), folder=self._folder)
+            except Error as error:
+                # The line of a file that nobody has written is of no use.
+                raise type(error)(_PLACE.sub("", str(error))) from None
+
         text = "Assembling and factorising the stiffness"
         self._task = asyncio.create_task(self._switch_and_tell(text, make, building))
 

@@ -151,6 +151,23 @@ export class BodyView {
     if (states) this.solid.showMarks(this.largestOfVertices(states));
   }
 
+  /** Colours the vertices at whose place, at rest in the body's frame, a condition holds. */
+  markWhere(mark: number, holds: (place: Vec3) => boolean): void {
+    const { rest, count } = this.surface;
+    this.uniforms.marked.value = true;
+    const at = (i: number): Vec3 => [rest[3 * i]!, rest[3 * i + 1]!, rest[3 * i + 2]!];
+    this.solid.showMarks(Uint8Array.from({ length: count }, (_, i) => (holds(at(i)) ? mark : 0)));
+  }
+
+  /** Lets what is inside of the body be seen through it. */
+  setOpacity(opacity: number): void {
+    const { material } = this.solid.mesh;
+    material.transparent = opacity < 1;
+    material.depthWrite = opacity === 1;
+    material.opacity = opacity;
+    material.needsUpdate = true;
+  }
+
   /** Nodes of the whole surface that vertices stand for, ascending. */
   nodesOf(vertices: ReadonlySet<number>): Uint32Array {
     const { owners } = this.arrays;
