@@ -29,6 +29,8 @@ export interface UntouchedPoint {
 /** A point of a body that is seen. */
 export interface Pick extends UntouchedPoint {
   body: number;
+  /** Corners of the triangle that is seen there, as vertices. */
+  corners: [number, number, number];
   /** Where it is seen now. */
   shown: THREE.Vector3;
   /** How deep other tools have pressed the surface in there, along the normal, m. */
@@ -315,6 +317,7 @@ export class BodyView {
     return {
       ...untouched,
       body: this.index,
+      corners: place.corners,
       shown: shown.clone(),
       dent: this.touched ? -moved.dot(untouched.normal) : 0,
       inBody: { settled: surface.at(surface.settled, place), normal: surface.smoothPoint(place).normal },

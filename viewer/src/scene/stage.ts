@@ -61,6 +61,7 @@ export class Stage {
   }
 
   setScene({ header, bodies, tools }: SceneData): void {
+    const wasSetUp = this.bodies.length > 0 && this.shapes.length === 0;
     this.dispose();
     this.bodies = header.bodies.map((body, i) => new BodyView(i, body, bodies[i]!, header.size));
     this.shapes = header.tools.map((tool, i) => toolShape(tool, tools[i]!));
@@ -80,7 +81,10 @@ export class Stage {
     this.bounds.makeEmpty();
     for (const body of this.bodies) this.bounds.union(body.bounds);
     // Other tools on the same bodies are no reason to look from elsewhere.
-    if (this.bodies.length > 0 && !this.bounds.equals(before)) this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
+    const points = joined(this.bodies.map((body) => body.restInScene));
+    if (this.bodies.length > 0 && !this.bounds.equals(before)) this.viewport.frame(points, header);
+    // What is set up fills the picture; what is touched needs room for the tool, and is seen from the same side.
+    else if (wasSetUp !== (this.shapes.length === 0)) this.viewport.frame(points, header, this.viewport.towardsViewer());
     if (this.store.get().layers.cutaway) this.faceCut();
     this.show();
   }
