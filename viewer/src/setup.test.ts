@@ -18,7 +18,7 @@ const BODY: SetupBody = {
   filled: true, nodes: 9, tets: 4, notes: [], painted: true, held: null, plane: { axis: 2, above: false, depth: 0.01 },
   tissue: "soft", youngs_modulus: 5e3, poissons_ratio: 0.49, radius: 0.006, nodule: null, saved: "/a/organ.toml",
 };
-const MESSAGE: SetupMessage = { type: "setup", limit: 1000, part: 400, endings: [".stl", ".ply"], tissues: TISSUES, editing: true, body: BODY };
+const MESSAGE: SetupMessage = { type: "setup", limit: 1000, part: 400, endings: [".stl", ".ply"], tissues: TISSUES, editing: true, preparing: false, body: BODY };
 
 function settingUp(body: Partial<SetupBody> = {}) {
   const store = new Store();

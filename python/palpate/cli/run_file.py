@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.cli.bodies import Element, Mesher, body_of, fill_options, likely_units, read_any
+from palpate.cli.bodies import Element, Mesher, body_of, fill_options, is_surface, likely_units, read_any
 from palpate.errors import SceneError
 
 if TYPE_CHECKING:
-    from palpate.green import BackgroundPrecompute
+    from palpate.body import Body
+    from palpate.green import BackgroundPrecompute, GreensFunction
+    from palpate.progress import Reporter
     from palpate.scene import BuiltScene, Scene
 
 
@@ -50,6 +52,8 @@ class RunOptions:
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
+# A body that takes longer, s, is touched first around its highest point, within this part of its longest side.
+LONG, FIRST_SHARE = 20.0, 0.15
 # Of the loop, whatever the file.
 OF_LOOP = {"cpus", "priority", "device"}
 FLAGS = {
@@ -71,7 +75,33 @@ FLAGS = {
 }
 
 
-def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPrecompute] | None = None) -> BuiltScene:
+def surface_of(file: Path, options: RunOptions) -> tuple[np.ndarray, np.ndarray] | None:
+    """Vertices (k, 3), m, and triangles of a file's surface as it is, before it is filled; None for other files."""
+    from palpate.mesh.surface_file import load_surface
+    from palpate.scene import Scene
+    from palpate.units import length_scale
+    from palpate.viewer.setup_session import merged
+
+    path, unit = file, options.unit
+    if file.suffix == ".toml":
+        scene = Scene.read(file)
+        body = scene.bodies[0]
+        if len(scene.bodies) > 1 or not body.fills_a_surface or any(body.position):
+            return None
+        path, unit = scene.folder / str(body.mesh), body.unit or "m"
+    if not is_surface(path):
+        return None
+    shape = load_surface(path).shape
+    scale = length_scale(unit or likely_units(path)[0])
+    return merged(np.asarray(shape.vertices) * scale, np.asarray(shape.faces))
+
+
+def built_from(
+    file: Path,
+    options: RunOptions,
+    growing: dict[int, BackgroundPrecompute] | None = None,
+    progress: bool | Reporter = True,
+) -> BuiltScene:
     """Scene of a file, ready to run; what is computed on beside it goes into ``growing``, if there is one.
 
     Raises
@@ -91,11 +121,11 @@ def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPre
         options.refuse(file, places, "it stands in the table [body] of the scene")
         scene = scene_with(Scene.read(file), options)
     else:
-        return _bare(file, options)
+        return _bare(file, options, growing, progress)
     with status_line(f"preparing {scene.name}"):
         if growing is None:
-            return scene.build()
-        built, rest = scene.build_first()
+            return scene.build(progress)
+        built, rest = scene.build_first(progress)
         growing.update(rest)
         return built
 
@@ -188,12 +218,13 @@ def _radii(tool: Any, radius: str) -> dict[str, float]:
     return {"radius": value, "contact_radius": value} if tool.contact != "local" else {"radius": value}
 
 
-def _bare(file: Path, options: RunOptions) -> BuiltScene:
+def _bare(
+    file: Path, options: RunOptions, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter
+) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
     from palpate import units
     from palpate.body import Material
     from palpate.body.default_support import lowest_part
-    from palpate.green import precompute
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
 
@@ -205,7 +236,7 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
     fill = fill_options(options.mesher, options.part, options.max_volume_loss)
-    mesh = read_any(file, known, options.element, options.max_size, fill)
+    mesh = read_any(file, known, options.element, options.max_size, fill, progress)
     low, high = mesh.bounds
     fix = options.fix
     if fix is None:
@@ -221,7 +252,7 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
         defaults.append(f"Poisson's ratio {ratio} (--nu)")
     material = Material(units.pressure(modulus), ratio, units.density(density))
     body = body_of(mesh, material, fix)
-    green = precompute(body)
+    green = _green(body, growing, progress)
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     scene = Scene(body={"mesh": str(file), "unit": unit}, **tables)
     of_loop = {name: getattr(options, name) for name in OF_LOOP}
@@ -231,3 +262,28 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
         defaults.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
     print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(defaults)}" if defaults else ""))
     return built
+
+
+def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter) -> GreensFunction:
+    """Compute what touches need: at first only around the highest point, where the whole takes long."""
+    from palpate.green import BackgroundPrecompute, plan, precompute
+    from palpate.green.job import Job
+    from palpate.mesh import shapes
+    from palpate.progress import Reporter, progress_reporter
+
+    if Job.of(body, None, None, None, None).stored() is not None:
+        return precompute(body, progress=progress)
+    if isinstance(progress, Reporter):
+        progress.phase("planning")
+    planned = plan(body)
+    size, seconds = planned.store / 1e6, planned.seconds
+    print(f"computing {planned.columns} columns: at most {size:.3g} MB in the cache, about {seconds:.0f} s", flush=True)
+    if growing is None or seconds < LONG:
+        return precompute(body, progress=progress)
+    nodes = body.mesh.nodes
+    first = shapes.Sphere(nodes[nodes[:, 2].argmax()], FIRST_SHARE * float(np.ptp(nodes, axis=0).max()))
+    growing[0] = background = BackgroundPrecompute(body, first=first)
+    with progress_reporter("precomputing what is touched first", progress) as report:
+        if report is not None:
+            report.phase("factorising, and computing what is touched first")
+        return background.wait(report)

@@ -102,7 +102,7 @@ def build(
     growing: dict[int, BackgroundPrecompute] | None = None,
 ) -> BuiltScene:
     """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
-    builders = [_Builder(scene, rank, growing) for rank in range(len(scene.bodies))]
+    builders = [_Builder(scene, rank, growing, progress) for rank in range(len(scene.bodies))]
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
@@ -162,8 +162,14 @@ def require_files(scene: SceneTables) -> None:
 class _Builder:
     """Builds one body of a scene."""
 
-    def __init__(self, scene: SceneTables, rank: int, growing: dict[int, BackgroundPrecompute] | None = None):
-        self._scene, self._rank, self._growing = scene, rank, growing
+    def __init__(
+        self,
+        scene: SceneTables,
+        rank: int,
+        growing: dict[int, BackgroundPrecompute] | None = None,
+        filling: Progress = True,
+    ):
+        self._scene, self._rank, self._growing, self._filling = scene, rank, growing, filling
         self._table: BodyTable = scene.bodies[rank]
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
@@ -270,7 +276,8 @@ class _Builder:
         if table.fills_a_surface:
             finer = [(ball.center, ball.radius, ball.size) for ball in table.refine]
             element, options = table.element or "quadratic", table.fill_options
-            return tetrahedralize_with(element, source, table.max_element_size, table.unit, finer, options)
+            size, unit = table.max_element_size, table.unit
+            return tetrahedralize_with(element, source, size, unit, finer, options, progress=self._filling)
         return TetMesh.read(source, table.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:

@@ -31,6 +31,7 @@ from palpate.viewer.pages import load_pages, respond
 from palpate.viewer.session import Session, choices
 from palpate.viewer.setting_up import SettingUp
 from palpate.viewer.setup_session import SetupSession
+from palpate.viewer.status import StatusReporter, status
 from palpate.viewer.surface_map import SurfaceMap
 from palpate.viewer.upload import MAX_PART
 
@@ -84,7 +85,7 @@ class ViewerServer:
 
     def __init__(
         self,
-        built: BuiltScene | Session | None = None,
+        built: BuiltScene | Session | SetupSession | None = None,
         *,
         host: str = "127.0.0.1",
         port: int = DEFAULT_PORT,
@@ -99,7 +100,10 @@ class ViewerServer:
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
         self._maps, self._recordings = maps, recordings
-        self._session: Session | SetupSession = SetupSession() if built is None else self._first_session(built, record)
+        self._record = record
+        self._session: Session | SetupSession = (
+            built if isinstance(built, SetupSession) else SetupSession() if built is None else self.first_session(built)
+        )
         self._computing = Computing(growing)
         self._computing.begin()
         self._session.start()
@@ -122,10 +126,12 @@ class ViewerServer:
         names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
         return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
 
-    def _first_session(self, built: BuiltScene | Session, record: Path | None) -> Session:
+    def first_session(self, built: BuiltScene | Session, maps: Sequence[SurfaceMap | None] | None = None) -> Session:
+        """Session of what is touched first, recorded if that was asked for."""
+        self._maps = maps or self._maps
         session = built if isinstance(built, Session) else self._make_session(built)
-        if record is not None:
-            session.simulation.record(record)
+        if self._record is not None:
+            session.simulation.record(self._record)
         return session
 
     def _make_session(self, built: BuiltScene) -> Session:
@@ -220,7 +226,8 @@ class ViewerServer:
         models = choices(self._models)
         await client.send({"type": "welcome", "role": role, "version": VERSION, "models": models})
         await client.send(await self._worker.call(self._computing.message, self._session))
-        await client.send(await self._worker.call(self._setting_up.message))
+        if self._setting_up.is_offered:
+            await client.send(await self._worker.call(self._setting_up.message))
 
     async def _authenticate(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
@@ -360,10 +367,9 @@ class ViewerServer:
             await self.send_all(ended)
 
     async def send_all(self, message: dict[str, Any], but_control: bool = False) -> None:
-        """Send a message to all pages, or to those that only watch."""
-        for client in list(self._clients):
-            if not (but_control and client is self._controller):
-                await client.send(message)
+        """Send a message to all pages, or to those that watch."""
+        for client in [c for c in self._clients if not (but_control and c is self._controller)]:
+            await client.send(message)
 
     async def send_control(self, message: dict[str, Any]) -> None:
         """Send a message to the page in control."""
@@ -425,6 +431,15 @@ class ViewerServer:
         """Whether something long is under way."""
         return self._building is not None
 
+    async def finish_building(self) -> None:
+        """Let another long work begin, and tell pages that this one has ended."""
+        self._building = None
+        await self.send_all(status(""))
+
+    async def send_setup(self) -> None:
+        """Tell pages whether files may be brought, and what is set up."""
+        await self.send_all(await self._worker.call(self._setting_up.message))
+
     def end_building(self) -> None:
         """Let another long work begin."""
         self._building = None
@@ -434,7 +449,7 @@ class ViewerServer:
     ) -> None:
         """Make a session beside the one that runs, and put it in its place."""
         try:
-            await self.send_all({"type": "status", "text": text, "progress": None, "left_s": None})
+            await self.send_all(status(text))
             await self._worker.call(self._session.release)
             session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
@@ -449,7 +464,7 @@ class ViewerServer:
             await self.send_all(await self._worker.call(self._session.settings))
         finally:
             self._building = None
-            await self.send_all({"type": "status", "text": "", "progress": None, "left_s": None})
+            await self.send_all(status(""))
 
     def exchange(self, session: Session) -> None:
         """Put a session in the place of the one that runs, which goes on where the other does not start."""
@@ -474,24 +489,9 @@ class ViewerServer:
         self.exchange(session)
         session.press_on(before)
 
-    def reporter(self, text: str, work: CancellableTask) -> Callable[..., None]:
-        """Tell all pages how far a long work is, from any thread; it begins with the first call.
-
-        The work stops where a page has cancelled it. Of stages with names, the time left is not known.
-        """
-        loop, started = asyncio.get_running_loop(), None
-
-        def report(done: int, total: int, stage: str | None = None) -> None:
-            nonlocal started
-            work.require_wanted()
-            started = started or time.monotonic()
-            part = done / max(total, 1)
-            known = part > 0.02 and stage is None
-            left = (time.monotonic() - started) * (1.0 - part) / part if known else None
-            status = {"type": "status", "text": stage or text, "progress": part, "left_s": left}
-            loop.call_soon_threadsafe(lambda: loop.create_task(self.send_all(status)))
-
-        return report
+    def reporter(self, text: str, work: CancellableTask) -> StatusReporter:
+        """Tell all pages how far a long work is."""
+        return StatusReporter(text, work, self.send_all)
 
 
 def _bytes(token: str) -> bytes:

@@ -23,6 +23,7 @@ from palpate.viewer.messages import whole
 from palpate.viewer.session import Session
 from palpate.viewer.setup_body import SetupBody
 from palpate.viewer.setup_session import SetupSession
+from palpate.viewer.status import StatusReporter, status
 from palpate.viewer.upload import ENDINGS, MAX_FILE, MAX_PART, Upload
 
 # Where a mistake stands in a scene file: path, line, and table.
@@ -40,7 +41,7 @@ class Host(Protocol):
     def end_building(self) -> None: ...  # noqa: D102
     def exchange(self, session: Any) -> None: ...  # noqa: D102
     def follow(self, growing: Mapping[int, BackgroundPrecompute] | None) -> None: ...  # noqa: D102
-    def reporter(self, text: str, work: CancellableTask) -> Callable[..., None]: ...  # noqa: D102
+    def reporter(self, text: str, work: CancellableTask) -> StatusReporter: ...  # noqa: D102
     async def call(self, work: Callable[..., Any], *arguments: Any) -> Any: ...  # noqa: D102
     async def send_all(self, message: dict[str, Any], but_control: bool = False) -> None: ...  # noqa: D102
     async def send_control(self, message: dict[str, Any]) -> None: ...  # noqa: D102
@@ -101,10 +102,17 @@ class SettingUp:
             await self._server.send_control(self.message())
             raise
 
+    @property
+    def is_offered(self) -> bool:
+        """Whether pages are told of it: an exam and a replay have no place for it."""
+        session = self._server.session
+        return session.takes_files or isinstance(session, SetupSession)
+
     def message(self) -> dict[str, Any]:
         """Message with all that pages show of the body that is set up."""
         session = self._server.session
-        editing, touching = isinstance(session, SetupSession), session is self._touched
+        editing = isinstance(session, SetupSession) and session.takes_files
+        touching = session is self._touched
         return {
             "type": "setup",
             "limit": MAX_FILE if session.takes_files else 0,
@@ -112,6 +120,7 @@ class SettingUp:
             "endings": list(ENDINGS),
             "tissues": [asdict(tissue) for tissue in TISSUES],
             "editing": editing,
+            "preparing": isinstance(session, SetupSession) and not editing,
             "body": self._body.message() if self._body is not None and (editing or touching) else None,
         }
 
@@ -167,17 +176,18 @@ class SettingUp:
         server, loop = self._server, asyncio.get_running_loop()
         before, body_before = server.session, self._body
         drawn: list[Future[None]] = []
-        report = server.reporter("", building)
+        report = server.reporter(file, building)
 
         def on_read(read: ReadFile) -> None:
             drawn.append(asyncio.run_coroutine_threadsafe(self._show(SetupBody(read, folder), building), loop))
 
         def on_stage(name: str, done: int, total: int) -> None:
-            report(done, total, f"{name[:1].upper()}{name[1:]}: {file}")
+            report.phase(name)
+            report(done, total)
 
         process = FillProcess(folder, file, None, on_read, on_stage)
         try:
-            await server.send_all(_status(f"Reading: {file}"))
+            await server.send_all(status(f"{file}: reading"))
             mesh: TetMesh = await building.run(lambda: process.mesh(building.require_wanted), lambda _: None)
             for shown in drawn:
                 await asyncio.wrap_future(shown)
@@ -193,7 +203,7 @@ class SettingUp:
             shutil.rmtree(folder, ignore_errors=True)
         finally:
             server.end_building()
-            await server.send_all(_status(""))
+            await server.send_all(status(""))
             await server.send_all(self.message())
 
     async def _show(self, body: SetupBody, building: CancellableTask) -> None:
@@ -235,7 +245,7 @@ class SettingUp:
         body, server = self._edited(), self._server
         scene = await server.call(body.scene)
         building = server.begin_building()
-        columns = server.reporter("Computing what every touch needs", building)
+        columns = server.reporter(body.name, building)
 
         def make() -> Session:
             try:
@@ -244,7 +254,7 @@ class SettingUp:
                 # The line of a file that nobody has written is of no use.
                 raise type(error)(_PLACE.sub("", str(error))) from None
 
-        text = "Assembling and factorising the stiffness"
+        text = f"{body.name}: assembling"
         self._task = asyncio.create_task(self._switch_and_tell(text, make, building))
 
     async def _switch_and_tell(self, text: str, make: Callable[[], Session], building: CancellableTask) -> None:
@@ -277,7 +287,3 @@ class SettingUp:
         if self._body is not None and isinstance(session, Session) and session is self._touched:
             settings = session.settings()
             self._body.take_settings(settings["youngs_modulus"][0], settings["friction"][0])
-
-
-def _status(text: str) -> dict[str, Any]:
-    return {"type": "status", "text": text, "progress": None, "left_s": None}

@@ -69,17 +69,27 @@ class SetupSession:
         none: dict[str, list[Any]] = {name: [] for name in ("youngs_modulus", "contact_radius", "friction", "shape")}
         return {"type": "settings", **none, "strain_limit": 0.0, "time_scale": None}
 
+    def shown(self) -> ShownSurface | None:
+        """Surface that is drawn."""
+        body = self.body
+        if body is None:
+            return None
+        if body.mesh is not None:
+            return ShownSurface(body.name, *_outside(body.mesh))
+        assert body.read.vertices is not None and body.read.faces is not None
+        return ShownSurface(body.name, *merged(body.read.vertices, body.read.faces))
+
     def scene_message(self) -> bytes:
         """Geometry of what is set up."""
-        body = self.body
-        shown = [] if body is None else [_Shown(body)]
-        name = "empty" if body is None else body.name
+        surface = self.shown()
+        shown = [] if surface is None else [surface]
+        name = "empty" if surface is None else surface.name
         header = {
             "type": "scene",
             # Another one than that of the scene that is touched: choices of the page for that one are not for this.
             "name": f"set up {name}",
-            "title": "Palpate" if body is None else title_of(name),
-            "size": EMPTY_SIZE if body is None else float(max(body.message()["size"])),
+            "title": "Palpate" if surface is None else title_of(name),
+            "size": EMPTY_SIZE if surface is None else surface.size,
             "strain_limit": 0.0,
             "defaults": {"youngs_modulus": [], "contact_radius": [], "friction": [], "strain_limit": 0.0},
             "max_force": 0.0,
@@ -92,17 +102,16 @@ class SetupSession:
         return encode(header, numbered([one.arrays for one in shown]))
 
 
-class _Shown:
-    """The surface of a body, in the form of a scene message."""
+class ShownSurface:
+    """A surface of positions (s, 3), m, and triangles (k, 3), in the form of a scene message."""
 
-    def __init__(self, body: SetupBody):
-        mesh = body.mesh
-        positions, triangles = _merged(body) if mesh is None else _outside(mesh)
+    def __init__(self, name: str, positions: np.ndarray, triangles: np.ndarray):
+        self.name, self.size = name, float(np.ptp(positions, axis=0).max())
         drawn = drawn_triangles(positions, triangles, np.zeros(len(triangles), dtype=np.int64))
         count = len(drawn.nodes)
         self.header = {
-            "name": body.name,
-            "title": title_of(body.name),
+            "name": name,
+            "title": title_of(name),
             "nodes": count,
             "tets": 0,
             "surface_nodes": len(positions),
@@ -134,10 +143,8 @@ def _outside(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
     return mesh.nodes[mesh.surface_nodes], np.searchsorted(mesh.surface_nodes, mesh.surface_triangles)
 
 
-def _merged(body: SetupBody) -> tuple[np.ndarray, np.ndarray]:
-    """Do the same for the triangles of a surface file, whose corners may stand in it once for each triangle."""
-    vertices, faces = body.read.vertices, body.read.faces
-    assert vertices is not None and faces is not None
+def merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the same of the triangles of a surface file, whose corners may stand in it once for each triangle."""
     cell = SAME_POINT * max(float(np.ptp(vertices, axis=0).max()), np.finfo(float).tiny)
     _, first, ranks = np.unique(np.round(vertices / cell), axis=0, return_index=True, return_inverse=True)
     triangles = ranks.ravel()[faces]

@@ -1,4 +1,4 @@
-"""A body set up in a real Chromium by the pointer alone: a file dropped, a support painted, touched, saved, run again."""
+"""A body set up in a real Chromium by the pointer alone: file dropped, support painted, touched, saved, run again."""
 
 from __future__ import annotations
 

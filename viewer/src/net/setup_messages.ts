@@ -70,6 +70,8 @@ export interface SetupMessage {
   tissues: Tissue[];
   /** Whether a body is set up, or awaited; else one is touched. */
   editing: boolean;
+  /** Whether a scene is being prepared, of which nothing can be touched yet. */
+  preparing: boolean;
   body: SetupBody | null;
 }
 

@@ -101,7 +101,7 @@ export class SetupPanel {
   private show(state: Readonly<State>): void {
     const { setup } = state;
     const editing = setup?.editing === true;
-    document.body.classList.toggle("setting-up", editing);
+    document.body.classList.toggle("setting-up", editing || setup?.preparing === true);
     byId("setup").hidden = !editing || !setup.body;
     byId("touched").hidden = editing || !setup?.body;
     if (!setup?.body) return;
