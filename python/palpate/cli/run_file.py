@@ -52,8 +52,6 @@ class RunOptions:
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
-# A body that takes longer, s, is touched first around its highest point, within this part of its longest side.
-LONG, FIRST_SHARE = 20.0, 0.15
 # Of the loop, whatever the file.
 OF_LOOP = {"cpus", "priority", "device"}
 FLAGS = {
@@ -266,23 +264,24 @@ def _bare(
 
 def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter) -> GreensFunction:
     """Compute what touches need: at first only around the highest point, where the whole takes long."""
-    from palpate.green import BackgroundPrecompute, plan, precompute
-    from palpate.green.job import Job
+    from palpate.green import BackgroundPrecompute, precompute
     from palpate.mesh import shapes
     from palpate.progress import Reporter, progress_reporter
+    from palpate.scene.early import Expected
 
-    if Job.of(body, None, None, None, None).stored() is not None:
-        return precompute(body, progress=progress)
     if isinstance(progress, Reporter):
         progress.phase("planning")
-    planned = plan(body)
-    size, seconds = planned.store / 1e6, planned.seconds
-    print(f"computing {planned.columns} columns: at most {size:.3g} MB in the cache, about {seconds:.0f} s", flush=True)
-    if growing is None or seconds < LONG:
+    expected = Expected.of(body)
+    planned = expected.plan
+    if planned is not None:
+        size, seconds = planned.store / 1e6, max(planned.seconds, 1.0)
+        print(
+            f"computing {planned.columns} columns: at most {size:.3g} MB in the cache, about {seconds:.0f} s",
+            flush=True,
+        )
+    if growing is None or expected.first is None:
         return precompute(body, progress=progress)
-    nodes = body.mesh.nodes
-    first = shapes.Sphere(nodes[nodes[:, 2].argmax()], FIRST_SHARE * float(np.ptp(nodes, axis=0).max()))
-    growing[0] = background = BackgroundPrecompute(body, first=first)
+    growing[0] = background = BackgroundPrecompute(body, first=shapes.Sphere(*expected.first))
     with progress_reporter("precomputing what is touched first", progress) as report:
         if report is not None:
             report.phase("factorising, and computing what is touched first")

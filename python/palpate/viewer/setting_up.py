@@ -17,6 +17,10 @@ from palpate.errors import Error, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.mesh import TetMesh
 from palpate.mesh.fill_process import FillProcess, ReadFile
+from palpate.scene import Scene
+from palpate.scene.build import unsolved_body
+from palpate.scene.early import Expected
+from palpate.scene.touch import TouchTable
 from palpate.viewer.background import CancellableTask
 from palpate.viewer.computing import mask_of
 from palpate.viewer.messages import whole
@@ -70,6 +74,8 @@ class SettingUp:
         self._body: SetupBody | None = None
         # The session in which the body is touched.
         self._touched: Session | None = None
+        # What is computed of it beside its loop.
+        self._growing: Mapping[int, BackgroundPrecompute] = {}
         self._commands = {
             "upload": self._begin_upload,
             "setup": self._choose,
@@ -249,7 +255,9 @@ class SettingUp:
 
         def make() -> Session:
             try:
-                return Session(scene.build(columns, columns), folder=self._folder)
+                built, growing = _with_first(scene).build_first(columns)
+                self._growing = growing
+                return Session(built, folder=self._folder)
             except Error as error:
                 # The line of a file that nobody has written is of no use.
                 raise type(error)(_PLACE.sub("", str(error))) from None
@@ -262,7 +270,12 @@ class SettingUp:
             self._server.exchange(session)
             self._touched = session
 
+        self._growing = {}
         await self._server.switch(text, make, exchange, building)
+        if self._server.session is self._touched and self._touched is not None:
+            self._server.follow(self._growing)
+        else:
+            _end(self._growing)
         await self._server.send_all(self.message())
 
     async def _edit(self, _message: Mapping[str, Any]) -> None:
@@ -271,6 +284,7 @@ class SettingUp:
             raise ViewerError("what is shown was not set up in the page")
         await self._server.call(self._take_settings)
         await self._server.call(self._server.exchange, SetupSession(body))
+        self._server.follow(None)
         await self._server.send_all(self.message())
 
     async def _save(self, _message: Mapping[str, Any]) -> None:
@@ -287,3 +301,18 @@ class SettingUp:
         if self._body is not None and isinstance(session, Session) and session is self._touched:
             settings = session.settings()
             self._body.take_settings(settings["youngs_modulus"][0], settings["friction"][0])
+
+
+def _with_first(scene: Scene) -> Scene:
+    """Scene of which a part is computed first, where the whole takes long; its store is the same."""
+    first = Expected.of(unsolved_body(scene)).first
+    if first is None:
+        return scene
+    center, radius = first
+    table = TouchTable.model_validate({"first": {"shape": "sphere", "center": center, "radius": radius}})
+    return scene.model_copy(update={"touch": table})
+
+
+def _end(growing: Mapping[int, BackgroundPrecompute]) -> None:
+    for background in growing.values():
+        background.close()

@@ -164,6 +164,9 @@ export class BodyView {
   /** Lets what is inside of the body be seen through it. */
   setOpacity(opacity: number): void {
     const { material } = this.solid.mesh;
+    // The lines of the far side would cover what is inside.
+    this.wireframe.lines.visible &&= opacity === 1;
+    if (material.opacity === opacity) return;
     material.transparent = opacity < 1;
     material.depthWrite = opacity === 1;
     material.opacity = opacity;

@@ -172,7 +172,10 @@ export class Stage {
     const { setup } = this.store.get();
     const nodule = setup?.editing ? (setup.body?.nodule ?? null) : null;
     this.nodule.show(nodule);
-    this.bodies[0]?.setOpacity(nodule ? SEEN_THROUGH : 1);
+    for (const body of this.bodies) {
+      body.show(this.store.get().layers);
+      body.setOpacity(nodule ? SEEN_THROUGH : 1);
+    }
     this.viewport.invalidate();
   }
 
