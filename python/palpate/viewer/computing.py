@@ -35,6 +35,8 @@ class Computing:
     def step(self, session: Session) -> dict[str, Any] | None:
         """Give the loop what has become ready; the message for all pages, if there is something new to tell."""
         for body, background in self._growing.items():
+            if body >= len(session.built.bodies):
+                continue  # another body is set up in its place for now
             if session.simulation.recording is None:  # a recording is of one scene: the store waits
                 green = background.take()
                 if green is not None:

@@ -200,6 +200,7 @@ class SettingUp:
             assert self._body is not None
             self._body.take_mesh(mesh, process.notes)
             await server.call(server.exchange, SetupSession(self._body))
+            server.follow(None)
         except Exception as error:
             self._body = body_before
             if server.session is not before:
@@ -219,7 +220,6 @@ class SettingUp:
         self._body = body
         if body.read.vertices is not None:
             await self._server.call(self._server.exchange, SetupSession(body))
-            self._server.follow(None)
             await self._server.send_all(self.message())
 
     # Choices.

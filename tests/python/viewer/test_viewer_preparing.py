@@ -40,11 +40,11 @@ def test_the_surface_is_drawn_and_stages_are_shown_before_the_body_can_be_touche
             await client.say(type="upload", name="a.stl", size=10)
             assert "no body can be set up here" in (await client.receive("error"))[0]["text"]
             go_on.set()
-            status = {"progress": None}
-            while status["progress"] is None:
+            status = {"text": "", "progress": None}
+            while status["text"] != "block: columns" or status["progress"] is None:
                 status, _ = await client.receive("status")
             # Half of the columns took some milliseconds: what is left is known.
-            assert status["text"] == "block: columns" and status["progress"] == 0.5 and 0 <= status["left_s"] < 30
+            assert status["progress"] == 0.5 and 0 <= status["left_s"] < 30
             await client.frame_where(lambda header: len(header["tools"]) == 1)
             await preparing
 

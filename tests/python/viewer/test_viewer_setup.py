@@ -275,3 +275,28 @@ def test_tetrahedra_and_numbers_of_a_saved_scene_are_exact(tmp_path):
     (tmp_path / "a.toml").write_text(scene_text({"body": body, "supports": {"fixed": "z < 1mm"}, "region": [region]}))
     scene = palpate.Scene.read(tmp_path / "a.toml")
     assert list(scene.region[0].center) == numbers and scene.bodies[0].mesh == body["mesh"]
+
+
+def test_a_body_that_takes_long_is_touched_before_all_of_it_is_computed(ball, saves, monkeypatch):
+    monkeypatch.setattr("palpate.scene.early.LONG", 0.0)
+
+    async def session():
+        async with empty_page(saves) as (server, client):
+            await filled(client, ball)
+            await client.say(type="setup", unit="mm")
+            await client.say(type="touch")
+            # The ball around the top that comes first has its first columns as the loop begins.
+            await scene_where(client, lambda scene: len(scene["tools"]) == 1)
+            columns = 0
+            while True:
+                (body,) = (await client.receive("computed"))[0]["bodies"] or [{"columns": 0, "done": 1}]
+                columns = max(columns, body["columns"])
+                if body["columns"] and body["done"] == body["columns"]:
+                    break
+            surface = len(server._setting_up._body.mesh.surface_nodes)
+            assert columns == 3 * surface and server.session.built.scene.touch.first is not None
+            await client.say(type="save")
+            await setup_where(client, lambda m: m["body"]["saved"])
+
+    asyncio.run(session())
+    assert palpate.Scene.read(saves / "ball.toml").touch.first is None
