@@ -63,8 +63,10 @@ class Program:
 
 
 @contextlib.contextmanager
-def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, sharpness: float = 0.5):
+def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, sharpness: float = 0.5, ready=None):
     """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends.
+
+    ``ready`` is a condition of its state by which it is open; without it, that frames are drawn.
 
     Drawing in software takes most of the time of a test: half of the pixels along each side do, where a test does not
     look at them.
@@ -86,7 +88,7 @@ def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, 
         page.on("websocket", lambda socket: socket.on("framereceived", hear))
     try:
         page.goto(program.address)
-        until(page, lambda s: s["frames"] > 3)
+        until(page, ready or (lambda s: s["frames"] > 3))
         yield page
     finally:  # another page would only watch
         context.close()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
     from palpate.mesh.tetrahedralize import FillOptions
+    from palpate.progress import Reporter
 
 
 class Mesher(str, Enum):
@@ -110,7 +111,12 @@ def fill_options(mesher: Mesher | None, part: str | None, max_volume_loss: str |
 
 
 def read_any(
-    path: Path, unit: str | None, element: Element | None, max_size: str | None = None, fill: FillOptions | None = None
+    path: Path,
+    unit: str | None,
+    element: Element | None,
+    max_size: str | None = None,
+    fill: FillOptions | None = None,
+    progress: bool | Reporter = True,
 ) -> TetMesh:
     """Read a volume mesh, or fill a surface.
 
@@ -128,7 +134,7 @@ def read_any(
     if is_surface(path):
         size = None if max_size is None else length(max_size)
         chosen = "linear" if element == Element.LINEAR else "quadratic"
-        return tetrahedralize_with(chosen, path, size, unit, options=fill)
+        return tetrahedralize_with(chosen, path, size, unit, options=fill, progress=progress)
     if max_size is not None or fill not in (None, FillOptions()):
         raise MeshError(f"{path} is a volume mesh: --max-size, --mesher, --part and --max-volume-loss are for surfaces")
     mesh = TetMesh.read(path, unit)
