@@ -10,9 +10,13 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+import numpy as np
+import trimesh
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
@@ -20,7 +24,6 @@ sys.path.insert(0, str(ROOT / "tests" / "python"))
 from browser import (  # noqa: E402
     CHROMIUM,
     FLAGS,
-    STILL_CELLS,
     Program,
     drag,
     opened,
@@ -31,6 +34,8 @@ from browser import (  # noqa: E402
     until,
 )
 from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
+
+import palpate  # noqa: E402
 
 # So long the page has stood before its picture, s: the plots show ten seconds.
 STANDS = 2.5
@@ -43,7 +48,7 @@ def page_of(
     """Open the page of a program on the user's own cache; the hint is dismissed."""
     program = Program(None, *arguments, command=command)
     try:
-        with opened(chromium, program, size) as page:
+        with opened(chromium, program, size, sharpness=1.0) as page:
             page.emulate_media(color_scheme="dark")
             page.locator("#hint-close").click()
             yield page
@@ -106,7 +111,7 @@ def tools(chromium: Browser, out: Path) -> None:
         page.keyboard.down("Alt")
         drag(page, (x, y + 40), (x + 50, y + 30))
         page.keyboard.up("Alt")
-        settled_force(page, STILL_CELLS)
+        settled_force(page)
         time.sleep(STANDS)
         take(page, out / "tools.png", 1)
 
@@ -149,6 +154,43 @@ def nodule(chromium: Browser, out: Path) -> None:
         print(f"over it {state(page)['forceMagnitude']:.3f} N")
 
 
+def setup(chromium: Browser, out: Path) -> None:
+    """Set a liver up from a surface file in mm: paint where it is held, and place a nodule."""
+    mesh = palpate.models.load("liver")
+    triangles = np.searchsorted(mesh.surface_nodes, mesh.surface_triangles)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "liver.stl"
+        trimesh.Trimesh(1e3 * mesh.nodes[mesh.surface_nodes], triangles).export(file)
+        program = Program(None, "--recordings", folder, command="run")
+        try:
+            empty = lambda s: s["connected"] and s["scene"] == "set up empty"  # noqa: E731
+            with opened(chromium, program, (1280, 800), sharpness=1.0, ready=empty) as page:
+                page.emulate_media(color_scheme="dark")
+                page.get_by_test_id("file-input").set_input_files(file)
+                until(page, lambda s: s["filled"])
+                page.get_by_test_id("status").wait_for(state="hidden")
+                page.get_by_test_id("unit-mm").click()
+                page.get_by_test_id("setup-paint").click()
+                for line in (((250, 560), (640, 620)), ((250, 600), (600, 650)), ((280, 530), (560, 560))):
+                    page.mouse.move(*line[0])
+                    page.mouse.down()
+                    drag(page, *line)
+                    page.mouse.up()
+                time.sleep(STANDS)
+                page.screenshot(path=out / "setup.png")
+                page.get_by_test_id("setup-nodule").click()
+                page.get_by_test_id("setup-brush").click()
+                x, y = page.evaluate("p => window.palpate.project(p)", until(page, lambda s: s["nodule"])["nodule"])
+                page.mouse.move(x, y)
+                page.mouse.down()
+                drag(page, (x, y), (x - 110, y - 40))
+                page.mouse.up()
+                time.sleep(STANDS)
+                page.screenshot(path=out / "setup-nodule.png")
+        finally:
+            program.stop()
+
+
 PICTURES: dict[str, Callable[[Browser, Path], None]] = {
     "viewer": viewer,
     "two-fingers": two_fingers,
@@ -157,6 +199,7 @@ PICTURES: dict[str, Callable[[Browser, Path], None]] = {
     "cut": cut,
     "regions": regions,
     "nodule": nodule,
+    "setup": setup,
 }
 
 

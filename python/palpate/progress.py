@@ -20,7 +20,10 @@ class Reporter:
 
 @contextlib.contextmanager
 def progress_reporter(title: str, progress: bool | Callable[[int, int], None]) -> Iterator[Reporter | None]:
-    """Yield who is told of the progress, or None where nobody watches."""
+    """Yield who is told of the progress, or None where nobody watches; a reporter is told of phases too."""
+    if isinstance(progress, Reporter):
+        yield progress
+        return
     if callable(progress):
         yield Reporter(progress, lambda _: None)
         return

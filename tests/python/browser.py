@@ -63,8 +63,10 @@ class Program:
 
 
 @contextlib.contextmanager
-def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, sharpness: float = 0.5):
+def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, sharpness: float = 0.5, ready=None):
     """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends.
+
+    ``ready`` is a condition of its state by which it is open; without it, that frames are drawn.
 
     Drawing in software takes most of the time of a test: half of the pixels along each side do, where a test does not
     look at them.
@@ -86,7 +88,7 @@ def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, 
         page.on("websocket", lambda socket: socket.on("framereceived", hear))
     try:
         page.goto(program.address)
-        until(page, lambda s: s["frames"] > 3)
+        until(page, ready or (lambda s: s["frames"] > 3))
         yield page
     finally:  # another page would only watch
         context.close()
@@ -136,6 +138,19 @@ def press(page, notches: int = 0, place: tuple[float, float] | None = None, cont
     for _ in range(notches):
         wheel(page, 100)
     return (settled_depth(page) and state(page)) if notches else seen
+
+
+def repeated_after_overruns(page, attempt, tries: int = 3) -> None:
+    """What a test does with a running loop, once more after a reset where the machine left the loop too little time."""
+    for left in reversed(range(tries)):
+        try:
+            return attempt()
+        except AssertionError:
+            if left == 0 or "took too long" not in (state(page)["fault"] or ""):
+                raise
+        page.mouse.up()
+        page.locator("#fault-reset").click()
+        until(page, lambda s: s["fault"] is None)
 
 
 def wheel(page, pixels: float) -> None:

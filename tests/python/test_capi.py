@@ -121,7 +121,6 @@ def played(prefix: Path, scene: Path, positions: np.ndarray, folder: Path) -> np
     return np.fromfile(folder / "forces").reshape(2, *positions.shape)
 
 
-@pytest.mark.xfail(reason="ticks of a capsule beside a ball, both 10 mm deep, take more than 1 ms: an overrun latches")
 def test_a_packed_scene_has_the_forces_of_python_to_the_bit(prefix, scene, packed, tmp_path):
     positions = path_of(700, 2)
     recording = palpate.Simulation(scene).play(positions)

@@ -60,6 +60,9 @@ export class Control {
         return this.receiveExam(message);
       case "computed":
         return this.store.update({ computed: message });
+      case "setup":
+      case "uploaded":
+        return;
       case "error":
         this.store.update({ answering: false });
         return this.notice(message.text);

@@ -3,6 +3,7 @@
 import "./ui/style.css";
 import "./ui/session.css";
 import "./ui/paint.css";
+import "./ui/setup.css";
 
 import { showConnection, showPageMessage } from "./ui/notices";
 import { Viewer } from "./viewer";

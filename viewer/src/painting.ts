@@ -53,9 +53,29 @@ export function countStates(state: Readonly<State>): StateCounts {
   return counts;
 }
 
+/** Whether strokes are the supports of a body that is set up. */
+export function isPaintingSupports({ setup }: Readonly<State>): boolean {
+  return setup?.editing === true && setup.body?.filled === true && setup.body.painted;
+}
+
+/** What each surface node of a body that is set up is: painted, or nothing. */
+export function heldStates({ strokes, scene }: Readonly<State>): Uint8Array | null {
+  const count = scene?.bodies[0]?.surface_nodes;
+  if (!count) return null;
+  const states = new Uint8Array(count);
+  for (const [nodes] of strokes) for (const node of nodes ?? []) states[node] = PAINTED;
+  return states;
+}
+
+/** Mask of all nodes of the first body that strokes have marked; null for none. */
+export function heldMask(strokes: readonly Stroke[], count: number): string | null {
+  const nodes = strokes.flatMap(([of]) => Array.from(of ?? []));
+  return nodes.length > 0 ? maskOfNodes(nodes, count) : null;
+}
+
 export class Painting {
   constructor(private readonly store: Store, private readonly send: (message: ClientMessage) => void) {
-    store.subscribe(["role", "connection", "computed", "exam"], (state) => {
+    store.subscribe(["role", "connection", "computed", "exam", "setup"], (state) => {
       if (state.paintTool && !this.able(state)) store.update({ paintTool: null });
     });
   }
@@ -83,6 +103,10 @@ export class Painting {
   /** Keeps what of a stroke is not ready and not asked for; one that marks nothing is none. */
   add(stroke: Stroke): void {
     const state = this.store.get();
+    if (isPaintingSupports(state)) {
+      if (stroke.some((nodes) => nodes.length > 0)) this.hold([...state.strokes, stroke]);
+      return;
+    }
     const kept = stroke.map((nodes, body) => {
       const states = touchStates(state, body);
       return states ? nodes.filter((node) => states[node] === NOT_READY) : new Uint32Array(0);
@@ -91,17 +115,37 @@ export class Painting {
   }
 
   undo(): void {
-    this.store.update({ strokes: this.store.get().strokes.slice(0, -1) });
+    this.replace(this.store.get().strokes.slice(0, -1));
   }
 
   clear(): void {
-    if (this.store.get().strokes.length > 0) this.store.update({ strokes: [] });
+    if (this.store.get().strokes.length > 0) this.replace([]);
+  }
+
+  private replace(strokes: readonly Stroke[]): void {
+    if (isPaintingSupports(this.store.get())) this.hold(strokes);
+    else this.store.update({ strokes });
+  }
+
+  /** Takes strokes for the supports of the body that is set up. */
+  private hold(strokes: readonly Stroke[]): void {
+    const { setup, scene } = this.store.get();
+    const count = scene?.bodies[0]?.surface_nodes ?? 0;
+    if (!setup?.body) return;
+    this.store.update({ strokes, setup: { ...setup, body: { ...setup.body, held: heldMask(strokes, count), saved: null } } });
+    const nodes = new Set(strokes.flatMap(([of]) => Array.from(of ?? [])));
+    for (let first = 0; first < count; first += NODES_A_MESSAGE) {
+      const end = Math.min(first + NODES_A_MESSAGE, count);
+      const here = Array.from(nodes).filter((node) => node >= first && node < end).map((node) => node - first);
+      this.send({ type: "hold", first, nodes: maskOfNodes(here, end - first) });
+    }
   }
 
   /** Asks for all that is painted. */
   compute(): void {
     const state = this.store.get();
     const { strokes, scene } = state;
+    if (isPaintingSupports(state)) return this.leavePaintTool();
     if (!inControl(state) || !scene || strokes.length === 0) return;
     const wanted = scene.bodies.map((_, body) => new Set(strokes.flatMap((stroke) => Array.from(stroke[body] ?? []))));
     wanted.forEach((nodes, body) => this.ask(body, nodes, scene.bodies[body]!.surface_nodes));
@@ -118,6 +162,6 @@ export class Painting {
   }
 
   private able(state: Readonly<State>): boolean {
-    return inControl(state) && isGrowing(state);
+    return inControl(state) && (isGrowing(state) || isPaintingSupports(state));
   }
 }

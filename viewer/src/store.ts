@@ -3,6 +3,7 @@
 
 import type { ConnectionState } from "./net/connection";
 import type { ComputedMessage } from "./net/computed_messages";
+import type { SetupMessage } from "./net/setup_messages";
 import type { RecordedMessage } from "./net/session_messages";
 import type {
   Choice,
@@ -61,6 +62,8 @@ export interface State {
   recorded: RecordedMessage | null;
   /** How far the columns of the bodies are; null before the server has told. */
   computed: ComputedMessage | null;
+  /** The body that is set up in the page, and what files may be brought; null before the server has told. */
+  setup: SetupMessage | null;
   /** null where nothing is examined. */
   exam: ExamMessage | null;
   /** Whether an answer is on its way: the next body is not there yet. */
@@ -123,6 +126,7 @@ export function initialState(): State {
     notices: [],
     recorded: null,
     computed: null,
+    setup: null,
     exam: null,
     answering: false,
     layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },

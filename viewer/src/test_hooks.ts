@@ -42,6 +42,10 @@ export interface ViewerState {
   /** Where an exam stands, whether the next body is awaited, and how loud its tone is. */
   exam: { trial: number; finished: boolean; answering: boolean; loudness: number } | null;
   /** Of a body in motion, with the newest row of its history. */
+  /** Of a body that is set up: whether it has its tetrahedra, how many nodes are painted, and the middle of its nodule. */
+  filled: boolean;
+  held: number;
+  nodule: Vec3 | null;
   recording: RecordingStatus | null;
   replay: ReplayFrame | null;
   motion: (MotionFrame & ReturnType<HistoryLog["latest"]>) | null;
@@ -113,6 +117,9 @@ function viewerState({ store, pointer, statistics, history }: Parts): ViewerStat
     strain: frame?.strain ?? 0,
     field: frame?.fields[state.body] ?? null,
     fault: frame?.fault ?? null,
+    filled: state.setup?.body?.filled ?? false,
+    held: new Set(state.strokes.flatMap(([nodes]) => Array.from(nodes ?? []))).size,
+    nodule: state.setup?.body?.nodule?.center ?? null,
     recording: frame?.recording ?? null,
     replay: frame?.replay ?? null,
     exam: state.exam && {

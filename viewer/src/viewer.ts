@@ -1,6 +1,7 @@
 // The page put together: what arrives is kept until the next drawing, drawn, and acknowledged.
 
 import { Control } from "./control";
+import { NodulePointer } from "./input/nodule_pointer";
 import { PaintPointer } from "./input/paint_pointer";
 import { Pointer } from "./input/pointer";
 import { listenToKeys } from "./input/keyboard";
@@ -10,6 +11,7 @@ import type { ConnectionState } from "./net/connection";
 import { FrameQueue } from "./net/frame_queue";
 import type { SceneData } from "./net/protocol";
 import { Painting } from "./painting";
+import { Setup } from "./setup";
 import { Stage } from "./scene/stage";
 import { sidesOf } from "./scene/surface";
 import { Viewport } from "./scene/viewport";
@@ -28,6 +30,8 @@ import { Panel } from "./ui/panel";
 import { Plots } from "./ui/plots";
 import { RecordButton } from "./ui/record_button";
 import { Readout } from "./ui/readout";
+import { DropZone } from "./ui/drop_zone";
+import { SetupPanel } from "./ui/setup_panel";
 import { ScaleView } from "./ui/scale_view";
 import { SettingsPanel } from "./ui/settings_panel";
 import { Statistics } from "./ui/statistics";
@@ -43,6 +47,12 @@ export class Viewer {
   private readonly connection: Connection;
   private readonly frames = new FrameQueue((frame) => this.connection.send({ type: "ack", frame }));
   private readonly control = new Control(this.store, (message) => this.connection.send(message));
+  private readonly setup = new Setup(
+    this.store,
+    (message) => this.connection.send(message),
+    (bytes) => this.connection.sendBytes(bytes),
+    (text) => this.control.notice(text),
+  );
   private readonly stage: Stage;
   private readonly pointer: Pointer;
   private readonly plots: Plots;
@@ -54,7 +64,10 @@ export class Viewer {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     this.connection = new Connection(`${scheme}://${location.host}/socket`, token, {
       onState: (state) => this.receiveConnection(state),
-      onText: (message) => control.receiveText(message),
+      onText: (message) => {
+        this.setup.receive(message);
+        control.receiveText(message);
+      },
       onScene: (scene) => this.receiveScene(scene),
       onFrame: (frame) => this.frames.push(frame),
       onUnreadable: (reason) => control.notice(`A message could not be read: ${reason}`),
@@ -67,6 +80,8 @@ export class Viewer {
     );
     this.stage = new Stage(viewport, store);
     const painting = new Painting(store, (message) => this.connection.send(message));
+    // Before the pointers that paint and press.
+    new NodulePointer(this.stage, store, this.setup);
     // Before the pointer that presses.
     new PaintPointer(this.stage, store, painting, new PaintMarks());
     this.pointer = new Pointer(this.stage, store, control);
@@ -84,6 +99,8 @@ export class Viewer {
     new ToolPanel(store, control);
     new MotionPanel(store, control);
     new PaintPanel(store, painting);
+    new SetupPanel(store, this.setup, painting, (text) => control.notice(text));
+    new DropZone(store, this.setup);
     new RecordButton(store, control);
     new TimeLine(store, control);
     new ExamPanel(store, control);

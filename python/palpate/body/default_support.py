@@ -16,6 +16,11 @@ LEVEL = 0.005
 
 def lowest_part(mesh: TetMesh) -> str:
     """Predicate of the nodes below a height, so that at least `HELD_SHARE` of the surface's area lies there."""
+    return f"z < min + {1e3 * lowest_height(mesh):.3g}mm"
+
+
+def lowest_height(mesh: TetMesh) -> float:
+    """Height of that part above the lowest node, m."""
     faces, heights = mesh.surface_faces, mesh.nodes[:, 2]
     tops = heights[faces].max(axis=1)
     areas = surface_integrals(mesh.nodes, faces)[0].sum(axis=1)
@@ -23,4 +28,4 @@ def lowest_part(mesh: TetMesh) -> str:
     held = np.cumsum(areas[upwards])
     last = upwards[np.searchsorted(held, HELD_SHARE * held[-1])]
     low, high = mesh.bounds[:, 2]
-    return f"z < min + {1e3 * (tops[last] - low + LEVEL * (high - low)):.3g}mm"
+    return float(tops[last] - low + LEVEL * (high - low))

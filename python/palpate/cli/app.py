@@ -33,9 +33,7 @@ from palpate.startup import restore_interrupts
 if TYPE_CHECKING:
     from palpate.mesh import TetMesh
 
-app = typer.Typer(
-    help="Finite elements you can feel.", no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
-)
+app = typer.Typer(help="Finite elements you can feel.", pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 def _show_version(wanted: bool) -> None:
@@ -46,13 +44,20 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Say which version this is.")
     ] = False,
 ) -> None:
-    """Finite elements you can feel."""
+    """Finite elements you can feel. Without a command: an empty page, in which a body is set up."""
+    if context.invoked_subcommand is None:
+        commands = context.command
+        assert isinstance(commands, typer.core.TyperGroup)
+        run = commands.get_command(context, "run")
+        assert run is not None
+        context.invoke(run)
 
 
 def main() -> None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
     from palpate.mesh.tetrahedralize import FillOptions
+    from palpate.progress import Reporter
 
 
 class Mesher(str, Enum):
@@ -160,7 +161,12 @@ def fill_options(
 
 
 def read_any(
-    path: Path, unit: str | None, element: Element | None, max_size: str | None = None, fill: FillOptions | None = None
+    path: Path,
+    unit: str | None,
+    element: Element | None,
+    max_size: str | None = None,
+    fill: FillOptions | None = None,
+    progress: bool | Reporter = True,
 ) -> TetMesh:
     """Read a volume mesh, or fill a surface.
 
@@ -178,7 +184,7 @@ def read_any(
     if is_surface(path) or is_segmentation(path):
         size = None if max_size is None else length(max_size)
         chosen = "linear" if element == Element.LINEAR else "quadratic"
-        return tetrahedralize_with(chosen, path, size, unit, options=fill)
+        return tetrahedralize_with(chosen, path, size, unit, options=fill, progress=progress)
     if max_size is not None or fill not in (None, FillOptions()):
         raise MeshError(
             f"{path} is a volume mesh: --max-size, --mesher, --part, --max-volume-loss and --segment are for files "

@@ -14,6 +14,7 @@ from palpate.cli.bodies import (
     Mesher,
     body_of,
     fill_options,
+    is_surface,
     likely_units,
     materials_of,
     read_any,
@@ -23,7 +24,9 @@ from palpate.errors import SceneError
 from palpate.segmentation.endings import is_segmentation
 
 if TYPE_CHECKING:
-    from palpate.green import BackgroundPrecompute
+    from palpate.body import Body
+    from palpate.green import BackgroundPrecompute, GreensFunction
+    from palpate.progress import Reporter
     from palpate.scene import BuiltScene, Scene
 
 
@@ -47,7 +50,7 @@ class RunOptions:
     priority: int | None = None
     device: tuple[str, ...] | None = None
 
-    def refuse(self, file: Path, allowed: set[str], reason: str) -> None:
+    def refuse(self, file: Path, allowed: set[str], reason: str, of_loop: bool = True) -> None:
         """Refuse options that the kind of file does not take.
 
         Raises
@@ -57,7 +60,7 @@ class RunOptions:
 
         """
         for field in fields(self):
-            if getattr(self, field.name) is not None and field.name not in allowed | OF_LOOP:
+            if getattr(self, field.name) is not None and field.name not in (allowed | OF_LOOP if of_loop else allowed):
                 raise SceneError(f"{file}: {FLAGS[field.name]} is not for this file: {reason}")
 
 
@@ -77,10 +80,39 @@ FLAGS = {
     "part": "--part",
     "max_volume_loss": "--max-volume-loss",
     "segment": "--segment",
+    "cpus": "--cpus",
+    "priority": "--priority",
+    "device": "--device",
 }
 
 
-def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPrecompute] | None = None) -> BuiltScene:
+def surface_of(file: Path, options: RunOptions) -> tuple[np.ndarray, np.ndarray] | None:
+    """Vertices (k, 3), m, and triangles of a file's surface as it is, before it is filled; None for other files."""
+    from palpate.mesh.surface_file import load_surface
+    from palpate.scene import Scene
+    from palpate.units import length_scale
+    from palpate.viewer.setup_session import merged
+
+    path, unit = file, options.unit
+    if file.suffix == ".toml":
+        scene = Scene.read(file)
+        body = scene.bodies[0]
+        if len(scene.bodies) > 1 or not body.fills_a_surface or any(body.position):
+            return None
+        path, unit = scene.folder / str(body.mesh), body.unit or "m"
+    if not is_surface(path):
+        return None
+    shape = load_surface(path).shape
+    scale = length_scale(unit or likely_units(path)[0])
+    return merged(np.asarray(shape.vertices) * scale, np.asarray(shape.faces))
+
+
+def built_from(
+    file: Path,
+    options: RunOptions,
+    growing: dict[int, BackgroundPrecompute] | None = None,
+    progress: bool | Reporter = True,
+) -> BuiltScene:
     """Scene of a file, ready to run; what is computed on beside it goes into ``growing``, if there is one.
 
     Raises
@@ -100,11 +132,11 @@ def built_from(file: Path, options: RunOptions, growing: dict[int, BackgroundPre
         options.refuse(file, places, "it stands in the table [body] of the scene")
         scene = scene_with(Scene.read(file), options)
     else:
-        return _bare(file, options)
+        return _bare(file, options, growing, progress)
     with status_line(f"preparing {scene.name}"):
         if growing is None:
-            return scene.build()
-        built, rest = scene.build_first()
+            return scene.build(progress)
+        built, rest = scene.build_first(progress)
         growing.update(rest)
         return built
 
@@ -197,12 +229,13 @@ def _radii(tool: Any, radius: str) -> dict[str, float]:
     return {"radius": value, "contact_radius": value} if tool.contact != "local" else {"radius": value}
 
 
-def _bare(file: Path, options: RunOptions) -> BuiltScene:
+def _bare(
+    file: Path, options: RunOptions, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter
+) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
     from palpate import units
     from palpate.body import Material
     from palpate.body.default_support import lowest_part
-    from palpate.green import precompute
     from palpate.mesh import size_text
     from palpate.scene import BuiltScene, Scene
 
@@ -214,7 +247,7 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
     fill = fill_options(options.mesher, options.part, options.max_volume_loss, options.segment)
-    mesh = read_any(file, known, options.element, options.max_size, fill)
+    mesh = read_any(file, known, options.element, options.max_size, fill, progress)
     low, high = mesh.bounds
     fix = options.fix
     if fix is None:
@@ -233,7 +266,7 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
     tables = {"material": asdict(material), "supports": {"fixed": fix}}
     scene = Scene(body={"mesh": str(file), "unit": unit, "segment": segments}, **tables)
     body = body_of(mesh, materials_of(mesh, material, options.segment), fix)
-    green = precompute(body)
+    green = _green(body, growing, progress)
     of_loop = {name: getattr(options, name) for name in OF_LOOP}
     of_run = RunOptions(radius=options.radius, **of_loop)
     built = BuiltScene.of(scene_with(scene, of_run), body, green)
@@ -241,3 +274,29 @@ def _bare(file: Path, options: RunOptions) -> BuiltScene:
         defaults.append(f"tool of radius {1e3 * built.scene.tools[0].radius:.3g} mm (--radius)")
     print(f"{file}: {size_text(high - low)}" + (f"; by default {', '.join(defaults)}" if defaults else ""))
     return built
+
+
+def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter) -> GreensFunction:
+    """Compute what touches need: at first only around the highest point, where the whole takes long."""
+    from palpate.green import BackgroundPrecompute, precompute
+    from palpate.mesh import shapes
+    from palpate.progress import Reporter, progress_reporter
+    from palpate.scene.early import Expected
+
+    if isinstance(progress, Reporter):
+        progress.phase("planning")
+    expected = Expected.of(body)
+    planned = expected.plan
+    if planned is not None:
+        size, seconds = planned.store / 1e6, max(planned.seconds, 1.0)
+        print(
+            f"computing {planned.columns} columns: at most {size:.3g} MB in the cache, about {seconds:.0f} s",
+            flush=True,
+        )
+    if growing is None or expected.first is None:
+        return precompute(body, progress=progress)
+    growing[0] = background = BackgroundPrecompute(body, first=shapes.Sphere(*expected.first))
+    with progress_reporter("precomputing what is touched first", progress) as report:
+        if report is not None:
+            report.phase("factorising, and computing what is touched first")
+        return background.wait(report)

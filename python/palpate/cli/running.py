@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,10 +27,14 @@ from palpate.cli.bodies import (
 from palpate.cli.completion import devices, models
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from palpate.cli.run_file import RunOptions
     from palpate.cli.scripted import PressRecord
     from palpate.green import BackgroundPrecompute
+    from palpate.progress import Reporter
     from palpate.scene import BuiltScene, Scene
-    from palpate.viewer.surface_map import SurfaceMap
+    from palpate.viewer.preparing import Prepared
 
 Headless = Annotated[
     float | None, typer.Option(min=0.1, help="No viewer: this many seconds of a scripted press at 1 kHz.")
@@ -56,7 +60,7 @@ Devices = Annotated[
         autocompletion=devices,
     ),
 ]
-Recordings = Annotated[Path, typer.Option(help="Folder of what the page records; default: this one.")]
+Recordings = Annotated[Path, typer.Option(help="Folder of what the page records and saves; default: this one.")]
 PORT = 8642
 
 
@@ -107,7 +111,10 @@ def demo(
 
 @app.command()
 def run(
-    file: Annotated[Path, typer.Argument(help="Scene (.toml), store, volume mesh, surface or segmentation.")],
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="Scene (.toml), store, volume mesh, surface or segmentation; none: an empty page."),
+    ] = None,
     radius: ToolRadius = None,
     fix: Fix = None,
     youngs_modulus: YoungsModulus = None,
@@ -155,29 +162,31 @@ def run(
     A scene whose [touch] says what comes first opens when that can be touched; the rest follows beside the loop.
 
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
+
+    Without a FILE the page is empty: drop a surface on it, and set the body up there.
     """
     from palpate.cli.run_file import RunOptions, built_from
 
+    page = _Page(host, port, browser, recordings)
     lengths = {"unit": unit, "max_size": max_size, "element": element}
     lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
     lengths |= {"segment": tuple(segment) if segment else None}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
     of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
-    # What opens when a part is ready goes on with the rest beside the loop.
-    growing: dict[int, BackgroundPrecompute] = {}
     options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
-    built = built_from(file, options, growing if headless is None else None)
-    _print_kept()
-    _print_loose(built)
+    if file is None:
+        options.refuse(Path("an empty page"), set(), "what belongs to a body is chosen in the page", of_loop=False)
+        if surface_map is not None or headless is not None or record is not None:
+            raise typer.BadParameter("--map, --headless and --record need a FILE")
+        _view(None, page)
+        return
     if headless is not None:
+        built = built_from(file, options)
+        _print_kept()
+        _print_loose(built)
         _scripted(built, file.stem, headless, out, record)
         return
-    maps = None
-    if surface_map is not None:
-        from palpate.viewer.surface_map import read_map
-
-        maps = read_map(surface_map, built)
-    _view(built, _Page(host, port, browser, recordings), record=record, maps=maps, growing=growing)
+    _view_early(file, options, page, record, surface_map)
 
 
 def _build(scene: Scene) -> BuiltScene:
@@ -198,21 +207,49 @@ class _Page:
 
 
 def _view(
-    built: BuiltScene,
+    built: BuiltScene | None,
     page: _Page,
     models: Sequence[str] = (),
     scene_of: Callable[[str], Scene] | None = None,
     record: Path | None = None,
-    maps: Sequence[SurfaceMap | None] | None = None,
-    growing: Mapping[int, BackgroundPrecompute] | None = None,
 ) -> None:
-    from palpate.viewer.live import open_viewer
+    from palpate.viewer.live import PRESS, SET_UP, open_viewer
     from palpate.viewer.server import ViewerServer
 
     page.recordings.mkdir(parents=True, exist_ok=True)
-    files = {"record": record, "recordings": page.recordings, "maps": maps, "growing": growing}
+    files = {"record": record, "recordings": page.recordings}
     server = ViewerServer(built, host=page.host, port=page.port, models=models, scene_of=scene_of, **files)
-    open_viewer(server, browser=page.browser)
+    open_viewer(server, browser=page.browser, hint=SET_UP if built is None else PRESS)
+
+
+def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | None, surface_map: Path | None) -> None:
+    """Open the page at once, and prepare what is touched while it shows the surface and the stages."""
+    from palpate.cli.run_file import built_from, surface_of
+    from palpate.errors import SceneError
+    from palpate.input_file import require_file
+    from palpate.viewer.live import open_viewer
+    from palpate.viewer.preparing import Preparation, Prepared, PreparingSession
+    from palpate.viewer.server import ViewerServer
+    from palpate.viewer.surface_map import read_map
+
+    require_file(file, SceneError)
+    page.recordings.mkdir(parents=True, exist_ok=True)
+    files = {"record": record, "recordings": page.recordings}
+    server = ViewerServer(PreparingSession(), host=page.host, port=page.port, **files)
+
+    def build(reporter: Reporter, draw: Callable[[np.ndarray, np.ndarray], None]) -> Prepared:
+        surface = surface_of(file, options)
+        if surface is not None:
+            draw(*surface)
+        # What can be touched when a part is ready goes on with the rest beside the loop.
+        growing: dict[int, BackgroundPrecompute] = {}
+        built = built_from(file, options, growing, reporter)
+        _print_kept()
+        _print_loose(built)
+        maps = None if surface_map is None else read_map(surface_map, built)
+        return Prepared(built, growing, maps)
+
+    open_viewer(server, browser=page.browser, preparation=Preparation(file.name, build))
 
 
 def _print_kept() -> None:

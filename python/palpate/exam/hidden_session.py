@@ -42,6 +42,8 @@ class HiddenSession(Session):
 
     """
 
+    takes_files = False
+
     def __init__(self, built: BuiltScene, loud_force: float):
         super().__init__(built)
         self._loud_force = loud_force

@@ -85,7 +85,7 @@ class ExamServer(ViewerServer):
         trial = self._course.trial
         if trial is None:
             raise ViewerError("the exam is over")
-        building = self._begin_building()
+        building = self.begin_building()
         try:
             # A body that could not be shown was not asked about.
             if trial.number == self._shown:
@@ -113,11 +113,11 @@ class ExamServer(ViewerServer):
             await self._conclude(building)
         else:
             make = lambda: self._make_session(self._course.library.built(trial.nodule))  # noqa: E731
-            await self._switch("Next trial", make, self._show_next, building)
-        await self._send_all(self._exam_message())
+            await self.switch("Next trial", make, self._show_next, building)
+        await self.send_all(self._exam_message())
 
     def _show_next(self, session: Any) -> None:
-        self._exchange(session)
+        self.exchange(session)
         trial = self._course.trial
         assert trial is not None
         self._shown, self._began = trial.number, time.monotonic()
@@ -128,7 +128,7 @@ class ExamServer(ViewerServer):
             self.result = await building.run(lambda: finish(self._course, self._folder), lambda _: None)
             print("\n".join(self.result.lines()), flush=True)
         except (Error, OSError) as error:
-            await self._send_all({"type": "error", "text": f"{error}; the answers are in {self._folder}"})
+            await self.send_all({"type": "error", "text": f"{error}; the answers are in {self._folder}"})
         finally:
             self._building = None
 

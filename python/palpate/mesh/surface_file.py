@@ -45,8 +45,8 @@ class SurfaceFile:
     part_of_face: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
-def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh) -> SurfaceFile:
-    """Read a file, or take a surface of a program.
+def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile) -> SurfaceFile:
+    """Read a file, or take a surface of a program, or one that was read.
 
     Raises
     ------
@@ -56,6 +56,8 @@ def load_surface(surface: str | os.PathLike[str] | trimesh.Trimesh) -> SurfaceFi
     """
     import trimesh
 
+    if isinstance(surface, SurfaceFile):
+        return surface
     if isinstance(surface, trimesh.Trimesh):
         if len(surface.faces) == 0:
             raise MeshError("surface: holds no triangles")

@@ -136,7 +136,7 @@ def tetrahedralize(
 
 def tetrahedralize_with(
     element: Element,
-    surface: str | os.PathLike[str] | trimesh.Trimesh,
+    surface: str | os.PathLike[str] | trimesh.Trimesh | SurfaceFile,
     max_element_size: float | str | None = None,
     unit: str | None = None,
     refine: Sequence[Ball] = (),

@@ -23,6 +23,7 @@ from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
+from palpate.scene.node_file import is_node_file, read_nodes
 from palpate.scene.regions import MaterialTable
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
 from palpate.segmentation import is_segmentation, load_label_map
@@ -102,7 +103,7 @@ def build(
     growing: dict[int, BackgroundPrecompute] | None = None,
 ) -> BuiltScene:
     """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
-    builders = [_Builder(scene, rank, growing) for rank in range(len(scene.bodies))]
+    builders = [_Builder(scene, rank, growing, progress) for rank in range(len(scene.bodies))]
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
@@ -162,8 +163,14 @@ def require_files(scene: SceneTables) -> None:
 class _Builder:
     """Builds one body of a scene."""
 
-    def __init__(self, scene: SceneTables, rank: int, growing: dict[int, BackgroundPrecompute] | None = None):
-        self._scene, self._rank, self._growing = scene, rank, growing
+    def __init__(
+        self,
+        scene: SceneTables,
+        rank: int,
+        growing: dict[int, BackgroundPrecompute] | None = None,
+        filling: Progress = True,
+    ):
+        self._scene, self._rank, self._growing, self._filling = scene, rank, growing, filling
         self._table: BodyTable = scene.bodies[rank]
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
@@ -277,12 +284,15 @@ class _Builder:
         if table.fills_a_surface:
             finer = [(ball.center, ball.radius, ball.size) for ball in table.refine]
             element, options = table.element or "quadratic", table.fill_options
-            return tetrahedralize_with(element, source, table.max_element_size, table.unit, finer, options)
+            size, unit = table.max_element_size, table.unit
+            return tetrahedralize_with(element, source, size, unit, finer, options, progress=self._filling)
         return TetMesh.read(source, table.unit)
 
     def _fixed(self, mesh: TetMesh) -> Any:
         supports: SupportsTable = self._table_of_body("supports")[0]
         fixed = supports.fixed
+        if is_node_file(fixed):
+            fixed = read_nodes(self._scene.folder / str(fixed))
         if fixed is None and self._table.model is not None:
             return models.fixed(self._table.model, mesh)
         if fixed is None:
@@ -300,7 +310,7 @@ class _Builder:
 
 def _predicate_mask(fixed: Any, nodes: np.ndarray) -> np.ndarray | None:
     """Nodes that a predicate holds, of which there must be some; None for what is no predicate."""
-    if not isinstance(fixed, str):
+    if not isinstance(fixed, str) or is_node_file(fixed):
         return None
     mask = parse(fixed)(nodes)
     if not np.any(mask):

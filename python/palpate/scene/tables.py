@@ -18,6 +18,7 @@ from palpate.mesh.tetrahedralize import Element, FillOptions, Mesher
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable
+from palpate.scene.node_file import is_node_file
 from palpate.scene.regions import MaterialTable, RegionTable, SegmentTable
 from palpate.scene.table import Length, Number, Point, Pressure, Radius, Share, Table, is_whole, one_of
 from palpate.scene.tool_shape import ShapeTable
@@ -34,7 +35,7 @@ Quaternion = tuple[Number, Number, Number, Number]
 
 
 _NODES = one_of(
-    "a predicate, such as 'z < min + 5mm', or a list of node numbers",
+    "a predicate, such as 'z < min + 5mm', a list of node numbers, or a file of them, such as 'liver.nodes'",
     lambda v: v is None or isinstance(v, str) or (isinstance(v, (list, tuple)) and all(map(is_whole, v))),
 )
 
@@ -50,14 +51,14 @@ class RefineTable(Table):
 
 
 class SupportsTable(Table):
-    """Where the body is fixed: a predicate over x, y, z, or node indices; a model has its own."""
+    """Where the body is fixed: a predicate over x, y, z, node indices, or a file of them; a model has its own."""
 
     fixed: Annotated[str | list[int] | None, _NODES] = None
 
     @field_validator("fixed")
     @classmethod
     def _readable(cls, fixed: Any) -> Any:
-        if isinstance(fixed, str):
+        if isinstance(fixed, str) and not is_node_file(fixed):
             try:
                 parse(fixed)
             except BodyError as error:

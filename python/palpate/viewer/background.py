@@ -49,6 +49,11 @@ class CancellableTask:
         self._cancelled.set()
         self._stopped.set()
 
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether nobody wants it any more."""
+        return self._cancelled.is_set()
+
     def require_wanted(self) -> None:
         """Refuse to go on once it is cancelled.
 

@@ -35,6 +35,8 @@ class Computing:
     def step(self, session: Session) -> dict[str, Any] | None:
         """Give the loop what has become ready; the message for all pages, if there is something new to tell."""
         for body, background in self._growing.items():
+            if body >= len(session.built.bodies):
+                continue  # another body is set up in its place for now
             if session.simulation.recording is None:  # a recording is of one scene: the store waits
                 green = background.take()
                 if green is not None:
@@ -80,7 +82,7 @@ class Computing:
         if background is None or background.is_complete:
             raise ViewerError("paint: all of this body that may be touched is computed")
         first = whole(message, "first", 0, len(surface) - 1)
-        ranks = first + np.flatnonzero(_mask(message.get("nodes")))
+        ranks = first + np.flatnonzero(mask_of(message, "nodes"))
         if first % 8 or not len(ranks) or ranks.max() >= len(surface):
             raise ViewerError("paint: nodes must be a mask of surface nodes")
         background.paint(surface[ranks])
@@ -96,13 +98,22 @@ def mask_text(mask: np.ndarray) -> str:
     return base64.b64encode(np.packbits(mask, bitorder="little").tobytes()).decode()
 
 
-def _mask(text: Any) -> np.ndarray:
+def mask_of(message: Mapping[str, Any], key: str) -> np.ndarray:
+    """Read a mask of a client's message.
+
+    Raises
+    ------
+    ViewerError
+        What is none, or too long.
+
+    """
+    text, what = message.get(key), f"{message['type']}: {key} must be a mask in base64"
     if not isinstance(text, str) or len(text) > LONGEST_MASK:
-        raise ViewerError("paint: nodes must be a mask in base64")
+        raise ViewerError(what)
     try:
         data = base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        raise ViewerError("paint: nodes must be a mask in base64") from None
+        raise ViewerError(what) from None
     return np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little").astype(bool)
 
 

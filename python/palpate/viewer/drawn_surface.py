@@ -57,12 +57,19 @@ def drawn_surface(built: BuiltBody, of_element: np.ndarray, most: int | None = N
 
     ``of_element`` tells the region of each element.
     """
-    green, most = built.green, MOST_TRIANGLES if most is None else most
+    green = built.green
     triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)
     regions = _regions(built, of_element, len(triangles))
+    return drawn_triangles(green.surface_positions, triangles, regions, most)
+
+
+def drawn_triangles(
+    positions: np.ndarray, triangles: np.ndarray, regions: np.ndarray, most: int | None = None
+) -> DrawnSurface:
+    """Do the same for triangles (k, 3) of positions (s, 3), m, with the region behind each (k,)."""
+    most = MOST_TRIANGLES if most is None else most
     if len(triangles) <= most:
-        return DrawnSurface(np.arange(len(green.surface_nodes)), triangles, regions)
-    positions = green.surface_positions
+        return DrawnSurface(np.arange(len(positions)), triangles, regions)
     parts, deviation = [], 0.0
     seams = _on_seams(triangles, regions, len(positions))
     for region in np.unique(regions):

@@ -6,19 +6,31 @@ import asyncio
 import os
 import signal
 import webbrowser
+from asyncio import FIRST_COMPLETED
 
 from palpate.scene import Scene
 from palpate.simulation import Recording, ReplayedSimulation
+from palpate.viewer.preparing import Preparation, prepare
 from palpate.viewer.replay_session import ReplaySession
 from palpate.viewer.server import ViewerServer
 
 PRESS = "Hold the left mouse button on the body to press, drag to slide. Ctrl-C here ends."
+SET_UP = "Drop a surface file on the page. Ctrl-C here ends."
 REPLAY = "The time line is below the body: space plays and pauses. Ctrl-C here ends."
 
 
-def open_viewer(server: ViewerServer, *, browser: bool = True, hint: str = PRESS) -> None:
-    """Serve until Ctrl-C; the address is printed, and opened where there is a desktop."""
-    asyncio.run(_serve(server, browser, hint))
+def open_viewer(
+    server: ViewerServer, *, browser: bool = True, hint: str = PRESS, preparation: Preparation | None = None
+) -> None:
+    """Serve until Ctrl-C; the address is printed, and opened where there is a desktop.
+
+    Raises
+    ------
+    Error
+        A port in use, or a scene that cannot be prepared.
+
+    """
+    asyncio.run(_serve(server, browser, hint, preparation))
 
 
 def open_replay(
@@ -36,7 +48,7 @@ def open_replay(
     open_viewer(ViewerServer(session, host=host, port=port), browser=browser, hint=REPLAY)
 
 
-async def _serve(server: ViewerServer, browser: bool, hint: str) -> None:
+async def _serve(server: ViewerServer, browser: bool, hint: str, preparation: Preparation | None = None) -> None:
     await server.start()
     try:
         address, *others = server.addresses
@@ -50,12 +62,23 @@ async def _serve(server: ViewerServer, browser: bool, hint: str) -> None:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, finished.set)
-        await finished.wait()
+        if preparation is None:
+            await finished.wait()
+            return
+        preparing = asyncio.create_task(prepare(server, preparation))
+        await asyncio.wait({preparing, ended := asyncio.create_task(finished.wait())}, return_when=FIRST_COMPLETED)
+        if preparing.done():
+            # What went wrong ends the program.
+            preparing.result()
+        else:
+            preparing.cancel()
+            raise KeyboardInterrupt
+        await ended
     finally:
-        ended = await server.stop()
-        if ended is not None:
-            failed = "" if ended["error"] is None else f" up to where it failed ({ended['error']})"
-            print(f"recorded {ended['path']}{failed}: show it by: {ended['replay']}", flush=True)
+        recorded = await server.stop()
+        if recorded is not None:
+            failed = "" if recorded["error"] is None else f" up to where it failed ({recorded['error']})"
+            print(f"recorded {recorded['path']}{failed}: show it by: {recorded['replay']}", flush=True)
 
 
 def _has_desktop() -> bool:

@@ -19,7 +19,7 @@ from palpate.errors import ViewerError
 from palpate.units import to_float
 from palpate.vectors import three_numbers
 
-VERSION = 11
+VERSION = 12
 # Longest name in a client's message.
 LONGEST_WORD = 40
 DTYPES = {kind: np.dtype(f"<{kind}") for kind in ("f4", "u4", "u1")}

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import ipaddress
 import socket
+from collections.abc import Mapping
 from importlib import resources
+
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
 from palpate.errors import ViewerError
 
@@ -84,3 +88,29 @@ def _is_address(name: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def respond(pages: Mapping[str, tuple[str, bytes]], request: Request, bound: str, port: int) -> Response | None:
+    """Serve the page, let the websocket through (None), refuse everything else."""
+    host = _single_header(request.headers, "Host")
+    if host is None or not is_own_host(host, bound, port):
+        return _answer(403, "text/plain", b"wrong Host\n", "")
+    path = request.path.partition("?")[0]
+    if path == "/socket":
+        if _single_header(request.headers, "Origin") != f"http://{host}":
+            return _answer(403, "text/plain", b"wrong Origin\n", host)
+        return None
+    kind, content = pages.get(path, ("text/plain", b"not found\n"))
+    return _answer(200 if path in pages else 404, kind, content, host)
+
+
+def _single_header(headers: Headers, name: str) -> str | None:
+    """Value of a header that stands there once; None for none, or for several, of which a proxy may see another."""
+    values = headers.get_all(name)
+    return values[0] if len(values) == 1 else None
+
+
+def _answer(status: int, kind: str, content: bytes, host: str) -> Response:
+    reasons = {200: "OK", 403: "Forbidden", 404: "Not Found"}
+    fields = {**headers(host), "Content-Type": kind, "Content-Length": str(len(content)), "Connection": "close"}
+    return Response(status, reasons[status], Headers(fields), content)

@@ -33,6 +33,7 @@ class ReplaySession(Session):
     """
 
     controllable = False
+    takes_files = False
     from_all = frozenset({"replay"})
     log_sent = 600
 

@@ -6,18 +6,16 @@ import asyncio
 import contextlib
 import errno
 import gc
-import json
 import secrets
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from websockets.asyncio.server import Server, ServerConnection, serve
-from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
@@ -27,48 +25,33 @@ from palpate.scene import BuiltScene, Scene
 from palpate.viewer import messages
 from palpate.viewer.addresses import reachable
 from palpate.viewer.background import CancellableTask, Worker
+from palpate.viewer.client import Client
 from palpate.viewer.computing import Computing
-from palpate.viewer.pages import headers, is_own_host, load_pages
-from palpate.viewer.session import ClientView, Session, choices
+from palpate.viewer.pages import load_pages, respond
+from palpate.viewer.session import Session, choices
+from palpate.viewer.setting_up import SettingUp
+from palpate.viewer.setup_session import SetupSession
+from palpate.viewer.status import StatusReporter, status
 from palpate.viewer.surface_map import SurfaceMap
+from palpate.viewer.upload import MAX_PART
 
 VERSION = version("palpate")
 DEFAULT_PORT = 8642
 FRAME_RATE = 60.0
 # Bounds on what a client may send and how many there may be.
 MAX_MESSAGE = 4096
-MAX_RATE = 1500.0
 MAX_CLIENTS = 16
 HELLO_TIMEOUT = 5.0
 # A controller that says nothing for this long, not even that it drew a frame, is lost: its contact is released, s.
 LOST_AFTER = 2.0
 # Between two looks at a loop that does not run, s.
 STOPPED_PAUSE = 0.25
+# Between two looks whether a body that is set up has been drawn anew, s.
+SET_UP_PAUSE = 0.05
 BAD_TOKEN = 4401
 # So often threads pass on the interpreter's lock while the server runs, s; Python's own 5 ms add up to a visible halt
 # where the event loop takes the lock several times for one message.
 SWITCH_INTERVAL = 1e-3
-
-
-@dataclass(eq=False)
-class Client:
-    """One connected page."""
-
-    connection: ServerConnection
-    shown: Session | None = None
-    # Of which it was told that its loop does not run.
-    refused: Session | None = None
-    wants: ClientView = field(default_factory=ClientView)
-    sent: int = 0
-    log_seen: tuple[int, int] = (0, 0)
-    may_send: asyncio.Event = field(default_factory=asyncio.Event)
-    heard: float = field(default_factory=time.monotonic)
-    allowance: float = MAX_RATE
-
-    async def send(self, message: dict[str, Any]) -> None:
-        """Send a text message; a client that has gone is left to its own handler."""
-        with contextlib.suppress(ConnectionClosed):
-            await self.connection.send(json.dumps(message))
 
 
 class ViewerServer:
@@ -77,7 +60,7 @@ class ViewerServer:
     Parameters
     ----------
     built
-        What is shown first: a scene, or a session with one.
+        What is shown first: a scene, or a session with one; None is an empty page, in which a body is set up.
     host, port
         Where it listens; port 0 takes a free one.
     models
@@ -102,7 +85,7 @@ class ViewerServer:
 
     def __init__(
         self,
-        built: BuiltScene | Session,
+        built: BuiltScene | Session | SetupSession | None = None,
         *,
         host: str = "127.0.0.1",
         port: int = DEFAULT_PORT,
@@ -117,13 +100,15 @@ class ViewerServer:
         self.token = secrets.token_urlsafe(24)
         self._pages = load_pages()
         self._maps, self._recordings = maps, recordings
-        self._session = built if isinstance(built, Session) else self._make_session(built)
-        if record is not None:
-            self._session.simulation.record(record)
+        self._record = record
+        self._session: Session | SetupSession = (
+            built if isinstance(built, SetupSession) else SetupSession() if built is None else self.first_session(built)
+        )
         self._computing = Computing(growing)
         self._computing.begin()
         self._session.start()
         self._worker = Worker()
+        self._setting_up = SettingUp(self, recordings)
         self._models, self._scene_of = list(models), scene_of
         self._clients: list[Client] = []
         self._controller: Client | None = None
@@ -140,6 +125,14 @@ class ViewerServer:
         """All that a person may open: a server bound to every address is reached from other machines too."""
         names = [f"[{host}]" if ":" in host else host for host in reachable(self.host)]
         return [f"http://{name}:{self.port}/#token={self.token}" for name in names]
+
+    def first_session(self, built: BuiltScene | Session, maps: Sequence[SurfaceMap | None] | None = None) -> Session:
+        """Session of what is touched first, recorded if that was asked for."""
+        self._maps = maps or self._maps
+        session = built if isinstance(built, Session) else self._make_session(built)
+        if self._record is not None:
+            session.simulation.record(self._record)
+        return session
 
     def _make_session(self, built: BuiltScene) -> Session:
         """Session of what is shown first; a derived class may have a kind of its own."""
@@ -160,7 +153,7 @@ class ViewerServer:
                 self.host,
                 self.port,
                 process_request=self._request,
-                max_size=MAX_MESSAGE,
+                max_size=MAX_PART,
                 compression=None,
                 ping_interval=5,
                 ping_timeout=10,
@@ -196,23 +189,14 @@ class ViewerServer:
 
     def _close_session(self) -> dict[str, Any] | None:
         self._worker.close()
+        self._setting_up.close()
         self._computing.close()
         ended = self._session.recorder.stop()
         self._session.close()
         return ended
 
     def _request(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Serve the page, let the websocket through, refuse everything else."""
-        host = _single_header(request.headers, "Host")
-        if host is None or not is_own_host(host, self.host, self.port):
-            return _answer(403, "text/plain", b"wrong Host\n", "")
-        path = request.path.partition("?")[0]
-        if path == "/socket":
-            if _single_header(request.headers, "Origin") != f"http://{host}":
-                return _answer(403, "text/plain", b"wrong Origin\n", host)
-            return None
-        kind, content = self._pages.get(path, ("text/plain", b"not found\n"))
-        return _answer(200 if path in self._pages else 404, kind, content, host)
+        return respond(self._pages, request, self.host, self.port)
 
     async def _client(self, connection: ServerConnection) -> None:
         if not await self._authenticate(connection):
@@ -242,6 +226,8 @@ class ViewerServer:
         models = choices(self._models)
         await client.send({"type": "welcome", "role": role, "version": VERSION, "models": models})
         await client.send(await self._worker.call(self._computing.message, self._session))
+        if self._setting_up.is_offered:
+            await client.send(await self._worker.call(self._setting_up.message))
 
     async def _authenticate(self, connection: ServerConnection) -> bool:
         """Whether the first message carries the token."""
@@ -262,13 +248,17 @@ class ViewerServer:
         return True
 
     async def _message(self, client: Client, text: str | bytes) -> None:
-        now = time.monotonic()
-        client.allowance = min(client.allowance + (now - client.heard) * MAX_RATE, MAX_RATE) - 1.0
-        client.heard = now
-        if client.allowance < 0.0:
+        if not client.is_within_rate():
             await client.connection.close(1008, "too many messages")
             return
+        if isinstance(text, str) and len(text.encode("utf-8", "replace")) > MAX_MESSAGE:
+            await client.connection.close(1009, "message too big")
+            return
         try:
+            if isinstance(text, bytes):
+                self._require_control(client)
+                await self._setting_up.take_part(text)
+                return
             message = messages.parse(text)
             if message["type"] == "ack":
                 if message.get("frame") == client.sent:
@@ -278,12 +268,16 @@ class ViewerServer:
             elif message["type"] == "field":
                 name, full_scale = messages.word(message, "name"), messages.positive_or_none(message, "max")
                 client.wants = replace(client.wants, field=name, full_scale=full_scale)
-            elif client is not self._controller and message["type"] not in self._session.from_all:
-                raise ViewerError("another viewer has control; this one watches")
             else:
+                if message["type"] not in self._session.from_all:
+                    self._require_control(client)
                 await self._command(message)
         except Error as error:
             await client.send({"type": "error", "text": str(error)})
+
+    def _require_control(self, client: Client) -> None:
+        if client is not self._controller:
+            raise ViewerError("another viewer has control; this one watches")
 
     async def _command(self, message: dict[str, Any]) -> None:
         """Do what the controlling client says."""
@@ -294,6 +288,8 @@ class ViewerServer:
             await self._choose(message.get("name"))
         elif message["type"] == "shape":
             await self._reshape(message)
+        elif message["type"] in self._setting_up.kinds:
+            await self._setting_up.command(message)
         elif message["type"] == "paint":
             await self._worker.call(self._computing.paint, self._session, message)
             await self._send_computed()
@@ -302,7 +298,7 @@ class ViewerServer:
         else:
             session = self._session
             if await self._worker.call(session.handle, message):
-                await self._send_all(await self._worker.call(session.settings))
+                await self.send_all(await self._worker.call(session.settings))
 
     async def _send_frames(self, client: Client) -> None:
         """Send the latest frame whenever the client has drawn the one before; nothing is ever queued."""
@@ -314,6 +310,10 @@ class ViewerServer:
                 if client.shown is not session:
                     client.shown, client.log_seen = session, (0, 0)
                     await client.connection.send(await self._worker.call(session.scene_message))
+                    client.may_send.set()
+                    continue
+                if not isinstance(session, Session):
+                    await asyncio.sleep(SET_UP_PAUSE)
                     client.may_send.set()
                     continue
                 client.sent += 1
@@ -338,6 +338,7 @@ class ViewerServer:
         if client is not self._controller:
             return
         self._controller = self._clients[0] if self._clients else None
+        self._setting_up.drop_upload()
         await self._worker.call(self._session.release)
         if self._controller is not None:
             await self._controller.send({"type": "role", "role": "control"})
@@ -358,26 +359,47 @@ class ViewerServer:
         except Error as error:
             told = {"type": "error", "text": str(error)}
         if told is not None:
-            await self._send_all(told)
+            await self.send_all(told)
 
     async def _send_recording_end(self, ended: dict[str, Any] | None) -> None:
         """Tell of a recording that has ended."""
         if ended is not None:
-            await self._send_all(ended)
+            await self.send_all(ended)
 
-    async def _send_all(self, message: dict[str, Any]) -> None:
-        for client in list(self._clients):
+    async def send_all(self, message: dict[str, Any], but_control: bool = False) -> None:
+        """Send a message to all pages, or to those that watch."""
+        for client in [c for c in self._clients if not (but_control and c is self._controller)]:
             await client.send(message)
+
+    async def send_control(self, message: dict[str, Any]) -> None:
+        """Send a message to the page in control."""
+        if self._controller is not None:
+            await self._controller.send(message)
+
+    @property
+    def session(self) -> Session | SetupSession:
+        """What is shown."""
+        return self._session
+
+    async def call(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        """Do ``work(*arguments)`` on the thread of the session."""
+        return await self._worker.call(work, *arguments)
+
+    def follow(self, growing: Mapping[int, BackgroundPrecompute] | None) -> None:
+        """Take what is computed beside the loop of another scene, in place of what was."""
+        self._computing.close()
+        self._computing = Computing(growing)
+        self._computing.begin()
 
     async def _choose(self, name: Any) -> None:
         """Switch to another model; the one shown goes on until the new one is ready."""
         if self._scene_of is None or name not in self._models:
             raise ViewerError(f"there is no model '{str(name)[:40]}'")
-        scene, building = self._scene_of(name), self._begin_building()
-        solving = self._reporter(f"Solving the {name}", building)
-        modes = self._reporter(f"Computing the modes of the {name}", building)
+        scene, building = self._scene_of(name), self.begin_building()
+        solving = self.reporter(f"Solving the {name}", building)
+        modes = self.reporter(f"Computing the modes of the {name}", building)
         make = lambda: Session(scene.build(solving, modes), folder=self._recordings)  # noqa: E731
-        self._build_task = asyncio.create_task(self._switch(f"Loading the {name}", make, self._exchange, building))
+        self._build_task = asyncio.create_task(self.switch(f"Loading the {name}", make, self.exchange, building))
 
     async def _reshape(self, message: dict[str, Any]) -> None:
         """Give a tool another shape: another loop on the same bodies, while the one before goes on."""
@@ -386,39 +408,65 @@ class ViewerServer:
         if built is None:
             return
         make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
-        building = self._begin_building()
+        building = self.begin_building()
         text = "Preparing the tool: a press goes on with it"
-        self._build_task = asyncio.create_task(self._switch(text, make, self._keep_settings, building))
+        self._build_task = asyncio.create_task(self.switch(text, make, self._keep_settings, building))
 
-    def _begin_building(self) -> CancellableTask:
+    def begin_building(self) -> CancellableTask:
+        """Begin something long: one at a time.
+
+        Raises
+        ------
+        ViewerError
+            Another is not done.
+
+        """
         if self._building is not None:
             raise ViewerError("wait until what is being prepared is ready, or cancel it")
         self._building = CancellableTask()
         return self._building
 
-    async def _switch(
+    @property
+    def is_building(self) -> bool:
+        """Whether something long is under way."""
+        return self._building is not None
+
+    async def finish_building(self) -> None:
+        """Let another long work begin, and tell pages that this one has ended."""
+        self._building = None
+        await self.send_all(status(""))
+
+    async def send_setup(self) -> None:
+        """Tell pages whether files may be brought, and what is set up."""
+        await self.send_all(await self._worker.call(self._setting_up.message))
+
+    def end_building(self) -> None:
+        """Let another long work begin."""
+        self._building = None
+
+    async def switch(
         self, text: str, make: Callable[[], Session], exchange: Callable[[Session], None], building: CancellableTask
     ) -> None:
         """Make a session beside the one that runs, and put it in its place."""
         try:
-            await self._send_all({"type": "status", "text": text, "progress": None, "left_s": None})
+            await self.send_all(status(text))
             await self._worker.call(self._session.release)
             session = await building.run(make, Session.close)
             # Two loops at real-time priority would keep each other from their deadlines: the old one ends first.
             why = "a recording is of one scene, and this one has another now"
             await self._send_recording_end(await self._worker.call(self._session.recorder.stop, why))
             await self._worker.call(exchange, session)
-            await self._send_all(await self._worker.call(session.settings))
+            await self.send_all(await self._worker.call(session.settings))
         except Exception as error:
             # None of any kind may leave the pages without a word.
             why = str(error) if isinstance(error, Error) else f"a mistake within palpate, please report it: {error!r}"
-            await self._send_all({"type": "error", "text": why})
-            await self._send_all(await self._worker.call(self._session.settings))
+            await self.send_all({"type": "error", "text": why})
+            await self.send_all(await self._worker.call(self._session.settings))
         finally:
             self._building = None
-            await self._send_all({"type": "status", "text": "", "progress": None, "left_s": None})
+            await self.send_all(status(""))
 
-    def _exchange(self, session: Session) -> None:
+    def exchange(self, session: Session) -> None:
         """Put a session in the place of the one that runs, which goes on where the other does not start."""
         before = self._session
         before.close()
@@ -438,40 +486,14 @@ class ViewerServer:
     def _keep_settings(self, session: Session) -> None:
         before = self._session
         session.copy_settings(before)
-        self._exchange(session)
+        self.exchange(session)
         session.press_on(before)
 
-    def _reporter(self, text: str, work: CancellableTask) -> Callable[[int, int], None]:
-        """Tell all pages how far a long work is, from any thread; it begins with the first call.
-
-        The work stops where a page has cancelled it.
-        """
-        loop, started = asyncio.get_running_loop(), None
-
-        def report(done: int, total: int) -> None:
-            nonlocal started
-            work.require_wanted()
-            started = started or time.monotonic()
-            part = done / max(total, 1)
-            left = (time.monotonic() - started) * (1.0 - part) / part if part > 0.02 else None
-            status = {"type": "status", "text": text, "progress": part, "left_s": left}
-            loop.call_soon_threadsafe(lambda: loop.create_task(self._send_all(status)))
-
-        return report
-
-
-def _single_header(headers: Headers, name: str) -> str | None:
-    """Value of a header that stands there once; None for none, or for several, of which a proxy may see another."""
-    values = headers.get_all(name)
-    return values[0] if len(values) == 1 else None
+    def reporter(self, text: str, work: CancellableTask) -> StatusReporter:
+        """Tell all pages how far a long work is."""
+        return StatusReporter(text, work, self.send_all)
 
 
 def _bytes(token: str) -> bytes:
     """Bytes of any text of JSON, half surrogate pairs too, which UTF-8 has no bytes for."""
     return token.encode("utf-8", "surrogatepass")
-
-
-def _answer(status: int, kind: str, content: bytes, host: str) -> Response:
-    reasons = {200: "OK", 403: "Forbidden", 404: "Not Found"}
-    fields = {**headers(host), "Content-Type": kind, "Content-Length": str(len(content)), "Connection": "close"}
-    return Response(status, reasons[status], Headers(fields), content)

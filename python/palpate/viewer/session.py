@@ -62,8 +62,9 @@ class Session:
 
     """
 
-    # Whether a page may press and change things; types of messages that pages may send which only watch.
+    # Whether a page may press and change things, and bring a file; types of messages that watching pages may send.
     controllable = True
+    takes_files = True
     from_all: frozenset[str] = frozenset()
     # Rows of the log that are sent with a frame at most.
     log_sent = 64

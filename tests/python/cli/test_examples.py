@@ -16,8 +16,10 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
-# A loop that gets no measurement for 50 ms stops: on a machine that computes beside it that can happen.
+# A loop that gets no measurement for 50 ms stops: on a machine that computes beside it that can happen, a third of the
+# times where six programs share two processors.
 REAL_TIME = {"crtk_udp_device", "keyboard_device"}
+TRIES = 6
 
 
 @pytest.mark.parametrize(
@@ -27,10 +29,9 @@ REAL_TIME = {"crtk_udp_device", "keyboard_device"}
     ids=lambda path: path.stem,
 )
 def test_example(example, tmp_path, shared_cache):
-    tries, timeout = (3, 60) if example.stem in REAL_TIME else (1, 280)
-    for _ in range(tries):
+    for _ in range(TRIES if example.stem in REAL_TIME else 1):
         command = [sys.executable, example]
-        result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=timeout)
+        result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=280)
         if result.returncode == 0:
             break
     assert result.returncode == 0, result.stderr

@@ -87,7 +87,7 @@ def test_a_number_beyond_floats_is_named():
         ("[[tool]]\n[[tool]]\nfriction = 30", "a.toml:3: tool.friction: must be less than or equal to 10, got 30"),
         (
             "[supports]\nfixed = 3.5",
-            "a.toml:2: supports.fixed: give a predicate, such as .*, or a list of node numbers",
+            "a.toml:2: supports.fixed: give a predicate, such as .*, a list of node numbers, or a file of them",
         ),
         ("[[region]]\nmesh_region = 1.5", "a.toml:2: region.mesh_region: give the number or the name of a region"),
         ("[view]\nstrain_limit = 'x'", "a.toml:2: view.strain_limit: must be a number, got 'x'"),

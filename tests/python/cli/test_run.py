@@ -27,7 +27,9 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     shutil.copy(BLOCK, tmp_path)
     result = run("run", "block.obj", "--headless", "1", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    said = result.stdout.splitlines()[0]
+    computed, said, *_ = result.stdout.splitlines()
+    # The size is printed before it is written.
+    assert computed.startswith("computing 2526 columns: at most 51 MB in the cache")
     for word in (
         "80 x 50 x 50 mm",
         "unit mm (--unit; it may also be cm or in)",

@@ -1,6 +1,7 @@
 // The pointer as a brush or a lasso. While something is painted it does not press; beside the body a brush leaves it to the
 // camera, and two fingers are always the camera's.
 
+import { isPaintingSupports } from "../painting";
 import type { Painting } from "../painting";
 import type { SeenVertices } from "../scene/seen_vertices";
 import type { Stage } from "../scene/stage";
@@ -90,7 +91,14 @@ export class PaintPointer {
     drawing.seen.where(withinStroke(before, place, brushRadius)).forEach((vertices, body) => {
       for (const vertex of vertices) drawing.met[body]!.add(vertex);
     });
+    if (isPaintingSupports(this.store.get())) this.meetTriangle(place, drawing);
     this.stage.markStroke(this.strokeOf(drawing.met));
+  }
+
+  /** A support holds the triangle under the pointer, however small the brush is beside it. */
+  private meetTriangle(place: Place, drawing: Drawing): void {
+    const pick = this.stage.pick(this.stage.viewport.rayThrough(...place));
+    for (const vertex of pick?.corners ?? []) drawing.met[pick!.body]!.add(vertex);
   }
 
   /** Keeps what was drawn, or lets it go. */

@@ -120,7 +120,8 @@ export class Pointer {
     // A second finger while the first one orbits belongs to the camera.
     if (event.button !== 0 || !event.isPrimary) return;
     const state = this.store.get();
-    if (!inControl(state)) return;
+    // Without a tool the camera's controls take every drag.
+    if (!inControl(state) || state.scene?.tools.length === 0) return;
     if (state.scene?.motion && (event.altKey || state.strike)) {
       // The camera's controls see it too: a drag turns.
       this.aim = event;
@@ -235,7 +236,8 @@ export class Pointer {
   private onHover(event: PointerEvent): void {
     if (event.pointerType === "touch" || event.buttons !== 0) return;
     const triangles = this.stage.bodies.reduce((sum, { surface }) => sum + surface.triangles.length / 3, 0);
-    const able = inControl(this.store.get()) && triangles <= HOVER_TRIANGLES_MAX;
+    const { scene } = this.store.get();
+    const able = inControl(this.store.get()) && scene?.tools.length !== 0 && triangles <= HOVER_TRIANGLES_MAX;
     this.viewport.canvas.style.cursor = able && this.pick([event.clientX, event.clientY]) ? this.cursor(event) : "";
   }
 

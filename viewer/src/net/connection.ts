@@ -41,6 +41,10 @@ export class Connection {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
+  sendBytes(bytes: ArrayBuffer): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(bytes);
+  }
+
   private receive(data: string | ArrayBuffer): void {
     try {
       if (typeof data === "string") {

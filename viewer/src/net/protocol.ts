@@ -1,13 +1,14 @@
-// Messages of the websocket, version 10. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
+// Messages of the websocket, version 12. Lengths in m, forces in N, times in s unless a name says otherwise. Vectors are in
 // the frame of the scene, but for what belongs to one body: its arrays, places of contacts and of strikes are in its own.
 // A binary message is: uint32 header length L (little endian), L bytes of JSON, raw little-endian arrays. The server pads
 // the JSON so that every array starts at a multiple of eight bytes and can be viewed without a copy. An array of one body
 // is named "<index of the body>/<what it is>", one of a tool "tools/<index of the tool>/<what it is>".
 
 import type { ComputedMessage, PaintMessage } from "./computed_messages";
+import type { SetupCommand, SetupMessage, UploadedMessage } from "./setup_messages";
 import type { RecordedMessage, RecordingStatus, ReplayFrame, ReplayScene, SessionCommand } from "./session_messages";
 
-export const PROTOCOL_VERSION = 11;
+export const PROTOCOL_VERSION = 12;
 
 export type Vec3 = [number, number, number];
 /** w x y z, of length one. */
@@ -292,6 +293,8 @@ export type TextMessage =
   | RecordedMessage
   | ExamMessage
   | ComputedMessage
+  | SetupMessage
+  | UploadedMessage
   | { type: "error"; text: string };
 
 export type ClientMessage =
@@ -315,9 +318,10 @@ export type ClientMessage =
   | { type: "answer"; found: boolean }
   | { type: "ack"; frame: number }
   | PaintMessage
+  | SetupCommand
   | SessionCommand;
 
-const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "computed", "error"];
+const TEXT_TYPES = ["welcome", "role", "settings", "status", "recorded", "exam", "computed", "setup", "uploaded", "error"];
 
 interface ArrayEntry {
   name: string;

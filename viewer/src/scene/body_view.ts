@@ -29,6 +29,8 @@ export interface UntouchedPoint {
 /** A point of a body that is seen. */
 export interface Pick extends UntouchedPoint {
   body: number;
+  /** Corners of the triangle that is seen there, as vertices. */
+  corners: [number, number, number];
   /** Where it is seen now. */
   shown: THREE.Vector3;
   /** How deep other tools have pressed the surface in there, along the normal, m. */
@@ -149,6 +151,26 @@ export class BodyView {
   mark(states: Uint8Array | null): void {
     this.uniforms.marked.value = states !== null;
     if (states) this.solid.showMarks(this.largestOfVertices(states));
+  }
+
+  /** Colours the vertices at whose place, at rest in the body's frame, a condition holds. */
+  markWhere(mark: number, holds: (place: Vec3) => boolean): void {
+    const { rest, count } = this.surface;
+    this.uniforms.marked.value = true;
+    const at = (i: number): Vec3 => [rest[3 * i]!, rest[3 * i + 1]!, rest[3 * i + 2]!];
+    this.solid.showMarks(Uint8Array.from({ length: count }, (_, i) => (holds(at(i)) ? mark : 0)));
+  }
+
+  /** Lets what is inside of the body be seen through it. */
+  setOpacity(opacity: number): void {
+    const { material } = this.solid.mesh;
+    // The lines of the far side would cover what is inside.
+    this.wireframe.lines.visible &&= opacity === 1;
+    if (material.opacity === opacity) return;
+    material.transparent = opacity < 1;
+    material.depthWrite = opacity === 1;
+    material.opacity = opacity;
+    material.needsUpdate = true;
   }
 
   /** Nodes of the whole surface that vertices stand for, ascending. */
@@ -298,6 +320,7 @@ export class BodyView {
     return {
       ...untouched,
       body: this.index,
+      corners: place.corners,
       shown: shown.clone(),
       dent: this.touched ? -moved.dot(untouched.normal) : 0,
       inBody: { settled: surface.at(surface.settled, place), normal: surface.smoothPoint(place).normal },

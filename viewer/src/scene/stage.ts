@@ -4,14 +4,15 @@ import * as THREE from "three";
 
 import type { FrameData, FrameMessage, SceneData } from "../net/protocol";
 import { grouped } from "../regions";
-import { isGrowing, touchStates } from "../painting";
-import type { Store, Stroke, Theme } from "../store";
+import { PAINTED, heldStates, isGrowing, isPaintingSupports, touchStates } from "../painting";
+import type { State, Store, Stroke, Theme } from "../store";
 import { contactsOf } from "../tool_contacts";
 import { BodyView } from "./body_view";
 import type { Hit, Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
 import { ExamPlaces } from "./exam_places";
 import { FIELD, TISSUE } from "./field_material";
+import { NoduleView } from "./nodule_view";
 import { SeenVertices } from "./seen_vertices";
 import { toolShape } from "./tool_shape";
 import type { ToolShape } from "./tool_shape";
@@ -19,11 +20,15 @@ import { ToolView } from "./tool_view";
 import type { Viewport } from "./viewport";
 import { WatchedView } from "./watched_view";
 
+/** Opacity of a body while the nodule in it is placed. */
+const SEEN_THROUGH = 0.35;
+
 export class Stage {
   bodies: BodyView[] = [];
   shapes: ToolShape[] = [];
   readonly bounds = new THREE.Box3();
   private tools: ToolView[] = [];
+  readonly nodule = new NoduleView();
   private readonly examPlaces = new ExamPlaces();
   private stroke: Stroke | null = null;
   private watched: { view: WatchedView; body: number } | null = null;
@@ -37,14 +42,15 @@ export class Stage {
       this.show();
     });
     store.subscribe(["coloring", "layers"], () => this.color());
-    store.subscribe(["computed", "strokes", "exam"], () => this.mark());
+    store.subscribe(["computed", "strokes", "exam", "setup"], () => this.mark());
+    store.subscribe(["setup"], () => this.showNodule());
     store.subscribe(["theme"], ({ theme }) => this.setTheme(theme));
     store.subscribe(["cut"], () => this.cut());
     // Drawn with the next frame.
     store.subscribe(["shownScale"], ({ shownScale }) => {
       for (const body of this.bodies) body.exaggerate(shownScale);
     });
-    viewport.scene.add(this.examPlaces.group);
+    viewport.scene.add(this.examPlaces.group, this.nodule.mesh);
     store.subscribe(["exam", "scene"], ({ exam, scene }) => {
       this.examPlaces.show(exam?.places ?? [], scene?.size ?? 0);
       viewport.invalidate();
@@ -55,6 +61,7 @@ export class Stage {
   }
 
   setScene({ header, bodies, tools }: SceneData): void {
+    const wasSetUp = this.bodies.length > 0 && this.shapes.length === 0;
     this.dispose();
     this.bodies = header.bodies.map((body, i) => new BodyView(i, body, bodies[i]!, header.size));
     this.shapes = header.tools.map((tool, i) => toolShape(tool, tools[i]!));
@@ -63,6 +70,7 @@ export class Stage {
     for (const body of this.bodies) body.exaggerate(this.store.get().shownScale);
     this.color();
     this.mark();
+    this.showNodule();
     this.setTheme(this.store.get().theme);
     const moving = header.motion && this.bodies[header.motion.body];
     if (header.motion && moving) {
@@ -73,7 +81,10 @@ export class Stage {
     this.bounds.makeEmpty();
     for (const body of this.bodies) this.bounds.union(body.bounds);
     // Other tools on the same bodies are no reason to look from elsewhere.
-    if (!this.bounds.equals(before)) this.viewport.frame(joined(this.bodies.map((body) => body.restInScene)), header);
+    const points = joined(this.bodies.map((body) => body.restInScene));
+    if (this.bodies.length > 0 && !this.bounds.equals(before)) this.viewport.frame(points, header);
+    // What is set up fills the picture; what is touched needs room for the tool, and is seen from the same side.
+    else if (wasSetUp !== (this.shapes.length === 0)) this.viewport.frame(points, header, this.viewport.towardsViewer());
     if (this.store.get().layers.cutaway) this.faceCut();
     this.show();
   }
@@ -139,8 +150,32 @@ export class Stage {
   /** What of the bodies can be touched, and what is painted. */
   private mark(): void {
     const state = this.store.get();
+    this.viewport.invalidate();
+    if (state.setup?.editing) return this.markSupports(state);
     const shown = this.stroke ? { ...state, strokes: [...state.strokes, this.stroke] } : state;
     this.bodies.forEach((body, i) => body.mark(isGrowing(state) ? touchStates(shown, i) : null));
+  }
+
+  /** Where the body that is set up is held: what is painted, or what lies behind the plane. */
+  private markSupports(state: Readonly<State>): void {
+    const [body, of] = [this.bodies[0], state.setup?.body];
+    if (!body || !of?.filled) return;
+    if (isPaintingSupports(state)) {
+      return body.mark(heldStates(this.stroke ? { ...state, strokes: [...state.strokes, this.stroke] } : state));
+    }
+    const { axis, above, depth } = of.plane;
+    const bound = of.low[axis] + (above ? of.size[axis] - depth : depth);
+    body.markWhere(PAINTED, (place) => (above ? place[axis] > bound : place[axis] < bound));
+  }
+
+  private showNodule(): void {
+    const { setup } = this.store.get();
+    const nodule = setup?.editing ? (setup.body?.nodule ?? null) : null;
+    this.nodule.show(nodule);
+    for (const body of this.bodies) {
+      body.show(this.store.get().layers);
+      body.setOpacity(nodule ? SEEN_THROUGH : 1);
+    }
     this.viewport.invalidate();
   }
 
@@ -165,9 +200,10 @@ export class Stage {
   /** Regions and materials have the same colours in all bodies. */
   private color(): void {
     const { layers, coloring, scene } = this.store.get();
+    const shownAsTissue = !layers.colors || scene?.tools.length === 0;
     const grouping = scene && coloring !== "field" ? grouped(scene, coloring) : null;
     this.bodies.forEach((body, i) => {
-      if (!layers.colors) body.color(TISSUE);
+      if (shownAsTissue) body.color(TISSUE);
       else if (!grouping) body.color(FIELD);
       else body.color((grouping.of[i] ?? []).map((group) => new THREE.Color(grouping.groups[group]!.color)));
     });

@@ -53,14 +53,17 @@ export class Viewport {
     this.dirty = true;
   }
 
-  /** Looks at points of a scene: from its view if it has one, never closer than where all of them are seen. */
-  frame(points: Float32Array, scene: SceneMessage): void {
+  /**
+   * Looks at points of a scene: from its view if it has one, else along a direction towards the viewer, and never closer than
+   * where all of them are seen.
+   */
+  frame(points: Float32Array, scene: SceneMessage, direction = DEFAULT_DIRECTION): void {
     const { size, view } = scene;
     this.framed = { points, scene };
     this.centreInFreeRegion();
     const centre = new THREE.Box3().setFromArray(points).getCenter(new THREE.Vector3());
     const target = view ? new THREE.Vector3(...view.target) : centre;
-    const offset = view ? new THREE.Vector3(...view.position).sub(target) : DEFAULT_DIRECTION.clone();
+    const offset = view ? new THREE.Vector3(...view.position).sub(target) : direction.clone();
     const wanted = view ? offset.length() : 0;
     offset.normalize();
     if (!view) {

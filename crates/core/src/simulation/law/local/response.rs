@@ -47,6 +47,10 @@ pub struct LocalResponse {
     /// Contact point on the body at rest, m.
     pub point: DVec3,
     pub indentation: Indentation,
+    /// Force on the tool from the gradients of this place's compliance and of the body's motion, N, without other contacts; the
+    /// same by the tool's rotation, N m.
+    pub slope: DVec3,
+    pub turn: DVec3,
     pub friction: FrictionResponse,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
@@ -107,8 +111,8 @@ fn evaluate_sphere(
     // A new contact has no force: its approach counts from the present depth.
     let indentation = if contact.is_new { Indentation::default() } else { indent(body, tool, contact, &foot, &fields) };
     let mut response = LocalResponse::at(body, foot, &fields, indentation);
-    let slope = slope(body, guess.force, others, &fields).clamp_length_max(STEEPEST_INCLINATION * indentation.force);
-    response.add_force(tool, contact, guess.place, slope);
+    response.slope = slope(body, guess.force, others, &fields);
+    response.find_force(tool, contact, guess.place, others);
     Some(response)
 }
 
@@ -141,9 +145,8 @@ fn evaluate_shape(
     let fields = weights.blend(&pressed.fields);
     let half_space = HalfSpace::new(body, tool, &fields, contact.part);
     // Gradients by the tool's rotation of `E*`, of the width, and of `f^T C_reg f / 2`.
-    let motion_slope = others.motion_turn.map_or(DVec3::ZERO, |motion_slope| motion_slope * force);
-    let (mut modulus_turns, mut width_turns, mut compliance_turns) =
-        (DVec3::ZERO, DVec3::ZERO, others.turn + motion_slope);
+    let motion_turn = others.motion_turn.map_or(DVec3::ZERO, |motion_turn| motion_turn * force);
+    let (mut modulus_turns, mut width_turns, mut compliance_turns) = (DVec3::ZERO, DVec3::ZERO, motion_turn);
     for (fan, turn) in weights.with_turns() {
         let own = &pressed.fields[fan];
         modulus_turns += turn * own[PLANE_STRAIN];
@@ -162,24 +165,19 @@ fn evaluate_shape(
     );
     let mut response = LocalResponse::at(body, footprint.foot(place), &fields, indentation);
     response.point = place + indentation.lever;
-    let whole = slope(body, force, others, &fields);
-    let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
-    let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
-    response.add_force(tool, contact, place, slope);
-    if response.force != DVec3::ZERO {
-        response.torque += indentation.torque + compliance_turns * share;
-    }
+    (response.slope, response.turn) = (slope(body, force, others, &fields), compliance_turns);
+    response.find_force(tool, contact, place, others);
     Some(response)
 }
 
-/// Force on the tool from the gradient of the body's compliance and from the other contacts, N. It is computed from the guessed
-/// force, which agrees with the result when the steps have converged.
+/// Force on the tool from the gradients of the body's compliance and of its motion, N. It is computed from the guessed force, which
+/// agrees with the result when the steps have converged.
 fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fields) -> DVec3 {
     let [x, y, z] = force.to_array();
     let products = [x * x, 2.0 * x * y, 2.0 * x * z, y * y, 2.0 * y * z, z * z];
     let own: DVec3 = COMPLIANCE.zip(products).map(|(field, product)| fields.slope(field) * product).sum();
     let motion_slope = others.motion_slope.map_or(DVec3::ZERO, |motion_slope| motion_slope * force);
-    others.slope + own * (0.5 / body.scale) + motion_slope
+    own * (0.5 / body.scale) + motion_slope
 }
 
 /// Indentation by a sphere.
@@ -232,9 +230,12 @@ impl LocalResponse {
         Self { foot, compliance, normal, point, indentation, jacobian: DMat3::ZERO, ..Self::default() }
     }
 
-    /// Adds the force that follows from the indentation, inclined by `slope`, and friction.
-    fn add_force(&mut self, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3, slope: DVec3) {
+    /// Finds the wrench that follows from the indentation, inclined by the gradients of the compliance and by the other contacts,
+    /// and from friction. It costs little beside the indentation, so that it is found again when the other contacts are known.
+    pub fn find_force(&mut self, tool: LocalTool<'_>, contact: &LocalContact, place: DVec3, others: OtherContacts) {
         let indentation = self.indentation;
+        let whole = self.slope + others.slope;
+        let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
         let push = slope - indentation.gradient;
         let pressing = push.length();
         if indentation.force == 0.0 || pressing == 0.0 {
@@ -256,7 +257,8 @@ impl LocalResponse {
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force
             + self.friction.by_displacement
             - outer(self.friction.by_pressing, n) * indentation.stiffness;
-        self.torque = -lever.cross(self.friction.force);
+        let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
+        self.torque = indentation.torque - lever.cross(self.friction.force) + (self.turn + others.turn) * share;
     }
 
     /// The springs of friction; without a force none is stretched.

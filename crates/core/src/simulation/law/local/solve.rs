@@ -308,9 +308,10 @@ fn evaluate_contacts(
     controls: &Controls,
     step: usize,
 ) -> bool {
-    local.force_change = 0.0;
     let resolution = resolution(model, state);
+    let mut guessed = [DVec3::ZERO; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
+        guessed[a] = local.responses[a].force;
         let tool = state.contacts.slots[slot].tool;
         let response = local_body(model, state, tool, body).and_then(|surface| {
             let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =
@@ -324,8 +325,6 @@ fn evaluate_contacts(
         });
         match response {
             Some(response) => {
-                let change = (response.force - local.responses[a].force).length();
-                local.force_change = local.force_change.max(change / response.force.length().max(f64::MIN_POSITIVE));
                 local.responses[a] = response;
                 local.pressed_slot = contact_needs_cells(model, state, slot).then_some(slot);
             }
@@ -347,7 +346,17 @@ fn evaluate_contacts(
     }
     if slots.len() > 1 && step < COUPLING_STEPS {
         couple(model, state, local, slots, body);
+        // Otherwise the first step, which is without other contacts, would be that of another equation.
+        for (a, &slot) in slots.iter().enumerate() {
+            let Contact { tool, local: contact, .. } = &state.contacts.slots[slot];
+            let tool = local_tool(model, controls, *tool);
+            local.responses[a].find_force(tool, contact, local.positions[a], local.others[a]);
+        }
     }
+    local.force_change = slots.iter().enumerate().fold(0.0, |most: f64, (a, _)| {
+        let force = local.responses[a].force;
+        most.max((force - guessed[a]).length() / force.length().max(f64::MIN_POSITIVE))
+    });
     true
 }
 

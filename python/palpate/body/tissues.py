@@ -1,0 +1,71 @@
+"""Measured stiffness of tissues and phantoms, each with its source.
+
+Every source takes its material for incompressible: elastography finds the shear modulus `G` and reports `E = 3 G`, and
+indentation is evaluated with a Poisson's ratio of 0.495. Finite elements need a ratio below one half, so 0.49 stands
+here for what a source calls incompressible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+INCOMPRESSIBLE = 0.49
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """A material of which a measurement was published.
+
+    Attributes
+    ----------
+    name, title
+        What programs and people call it.
+    youngs_modulus
+        Pa.
+    spread
+        Standard deviation over the samples of the source, Pa; 0 where the source has none.
+    poissons_ratio
+        As taken by the source, below one half.
+    source
+        Authors, year, journal, and how it was measured.
+
+    """
+
+    name: str
+    title: str
+    youngs_modulus: float
+    spread: float
+    poissons_ratio: float
+    source: str
+
+
+TISSUES = (
+    Tissue(
+        *("liver", "Liver", 5.49e3, 1.59e3, INCOMPRESSIBLE),
+        "Roulot et al. 2008, J. Hepatol. 48:606, transient elastography of 429 healthy people",
+    ),
+    Tissue(
+        *("kidney", "Kidney, cortex", 5.0e3, 2.9e3, INCOMPRESSIBLE),
+        "Arda et al. 2011, Am. J. Roentgenol. 197:532, shear-wave elastography of 127 healthy people",
+    ),
+    Tissue(
+        *("spleen", "Spleen", 2.9e3, 1.8e3, INCOMPRESSIBLE),
+        "Arda et al. 2011, Am. J. Roentgenol. 197:532, shear-wave elastography of 127 healthy people",
+    ),
+    Tissue(
+        *("muscle", "Muscle, gastrocnemius", 11.1e3, 4.1e3, INCOMPRESSIBLE),
+        "Arda et al. 2011, Am. J. Roentgenol. 197:532, shear-wave elastography of 127 healthy people",
+    ),
+    Tissue(
+        *("fat", "Fat, breast", 3.25e3, 0.91e3, 0.495),
+        "Samani et al. 2007, Phys. Med. Biol. 52:1565, indentation of fresh samples",
+    ),
+    Tissue(
+        *("gelatine", "Gelatine, 5 %", 12.54e3, 2.52e3, INCOMPRESSIBLE),
+        "Nguyen et al. 2014, Ultrasound Med. Biol. 40:168, shear waves: G = 4.18 kPa",
+    ),
+    Tissue(
+        *("silicone", "Silicone, Ecoflex 00-30", 69e3, 0.0, INCOMPRESSIBLE),
+        "Smooth-On, technical bulletin of the Ecoflex series: modulus at 100 % strain, 10 psi",
+    ),
+)

@@ -1,0 +1,106 @@
+"""A process that reads a file of any kind: ``python -m palpate.mesh.fill_child FOLDER FILE UNIT REPORT``.
+
+A file from elsewhere may crash or hang what reads it, and the meshers too, so that nothing of it is read by the process
+of the page. ``UNIT`` is ``-`` where it is not known. Results are files in FOLDER: `SURFACE`, the triangles of a surface
+in their own unit, as soon as they are read; then `MESH`, the tetrahedra in metres. REPORT gets a line of JSON for each
+step: ``read`` with sizes and units, ``stage``, ``note``, and at the end ``filled`` or ``error``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate._native import end_with_parent
+from palpate.errors import Error, MeshError, UnclearUnitError
+from palpate.mesh.files import WRITERS
+from palpate.mesh.size import COMMON_UNITS, scale_of
+from palpate.mesh.surface_file import SURFACE_ENDINGS, load_surface
+from palpate.mesh.tetmesh import TetMesh
+from palpate.mesh.tetrahedralize import STAGES, tetrahedralize_with
+
+SURFACE, MESH = "surface.npz", "mesh.npz"
+# glTF is in metres by its specification (Khronos, glTF 2.0, section 3.4).
+IN_METRES = (".glb", ".gltf")
+
+
+def main(folder: str, file: str, unit: str, report: str) -> int:
+    """Read and fill a file; messages name it as it lies in the folder."""
+    os.chdir(folder)
+
+    def say(**line: Any) -> None:
+        with Path(report).open("a") as lines:
+            lines.write(json.dumps(line) + "\n")
+
+    warnings.showwarning = lambda message, *_args, **_kwargs: say(note=str(message).removeprefix(f"{file}: "))
+    warnings.simplefilter("always")
+    try:
+        mesh = _read(Path(file), None if unit == "-" else unit, say)
+    except Error as error:
+        say(error=str(error).removeprefix(f"{file}: "))
+        return 1
+    except MemoryError:
+        say(error="needs more memory than there is")
+        return 1
+    partial = Path(f"partial-{MESH}")
+    np.savez(partial, nodes=mesh.nodes, tets=mesh.tets, regions=mesh.regions)
+    partial.replace(MESH)
+    say(filled=True, names=mesh.region_names)
+    return 0
+
+
+def _read(path: Path, unit: str | None, say: Callable[..., None]) -> TetMesh:
+    ending = path.suffix.lower()
+    say(stage="reading", done=0, total=len(STAGES))
+    if ending in SURFACE_ENDINGS:
+        loaded = load_surface(path)
+        points = np.asarray(loaded.shape.vertices)
+        used = _unit(path, points, unit, say)
+        np.savez(SURFACE, vertices=points, faces=np.asarray(loaded.shape.faces))
+        say(stage="checking", done=1, total=len(STAGES), drawn=True)
+        progress = _StageLines(say)
+        return tetrahedralize_with("quadratic", loaded, unit=used, progress=progress)
+    if ending in WRITERS:
+        mesh = TetMesh.read(path, "m")
+        used = _unit(path, mesh.nodes, unit, say)
+        return TetMesh.read(path, used)
+    known = ", ".join((*SURFACE_ENDINGS, *WRITERS))
+    raise MeshError(f"{path}: no surface and no mesh by its ending; known are {known}")
+
+
+class _StageLines:
+    """Reports the stages of filling by their rank."""
+
+    def __init__(self, say: Callable[..., None]):
+        self._say, self._last = say, 1
+
+    def __call__(self, done: int, total: int) -> None:
+        if done > self._last:
+            self._last = done
+            self._say(stage=STAGES[done], done=done, total=total)
+
+
+def _unit(path: Path, points: np.ndarray, unit: str | None, say: Callable[..., None]) -> str:
+    """Report the sides of the body in the file's unit, and the units that it may be in; take the likeliest."""
+    fitting = ["m"]
+    if path.suffix.lower() not in IN_METRES:
+        try:
+            scale_of(str(path), points, None)
+        except UnclearUnitError as error:
+            fitting = list(error.fitting) or list(COMMON_UNITS)
+    used = unit or fitting[0]
+    sides = np.ptp(points, axis=0) if len(points) else np.zeros(3)
+    say(read=True, sides=sides.tolist(), fitting=fitting, unit=used)
+    return used
+
+
+if __name__ == "__main__":
+    end_with_parent()
+    sys.exit(main(*sys.argv[1:5]))

@@ -1,0 +1,318 @@
+"""Bodies that are set up in the page: files from the page in control, choices, and the loop that touches the body."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Protocol
+
+from palpate.body.tissues import TISSUES
+from palpate.errors import Error, ViewerError
+from palpate.green import BackgroundPrecompute
+from palpate.mesh import TetMesh
+from palpate.mesh.fill_process import FillProcess, ReadFile
+from palpate.scene import Scene
+from palpate.scene.build import unsolved_body
+from palpate.scene.early import Expected
+from palpate.scene.touch import TouchTable
+from palpate.viewer.background import CancellableTask
+from palpate.viewer.computing import mask_of
+from palpate.viewer.messages import whole
+from palpate.viewer.session import Session
+from palpate.viewer.setup_body import SetupBody
+from palpate.viewer.setup_session import SetupSession
+from palpate.viewer.status import StatusReporter, status
+from palpate.viewer.upload import ENDINGS, MAX_FILE, MAX_PART, Upload
+
+# Where a mistake stands in a scene file: path, line, and table.
+_PLACE = re.compile(r"^\S.*?\.toml(:\d+)?: (\w+: )?")
+
+
+class Host(Protocol):
+    """What this needs of the server."""
+
+    @property
+    def session(self) -> Session | SetupSession: ...  # noqa: D102
+    @property
+    def is_building(self) -> bool: ...  # noqa: D102
+    def begin_building(self) -> CancellableTask: ...  # noqa: D102
+    def end_building(self) -> None: ...  # noqa: D102
+    def exchange(self, session: Any) -> None: ...  # noqa: D102
+    def follow(self, growing: Mapping[int, BackgroundPrecompute] | None) -> None: ...  # noqa: D102
+    def reporter(self, text: str, work: CancellableTask) -> StatusReporter: ...  # noqa: D102
+    async def call(self, work: Callable[..., Any], *arguments: Any) -> Any: ...  # noqa: D102
+    async def send_all(self, message: dict[str, Any], but_control: bool = False) -> None: ...  # noqa: D102
+    async def send_control(self, message: dict[str, Any]) -> None: ...  # noqa: D102
+    async def switch(  # noqa: D102
+        self, text: str, make: Callable[[], Any], exchange: Callable[[Any], None], building: CancellableTask
+    ) -> None: ...
+
+
+class SettingUp:
+    """The body that is set up, its files, and what pages ask of it.
+
+    Parameters
+    ----------
+    server
+        Whose session this exchanges.
+    folder
+        Where scenes are saved.
+
+    """
+
+    def __init__(self, server: Host, folder: Path):
+        self._server, self._folder = server, folder
+        self._temporary: Path | None = None
+        self._count = 0
+        self._upload: Upload | None = None
+        self._body: SetupBody | None = None
+        # The session in which the body is touched.
+        self._touched: Session | None = None
+        # What is computed of it beside its loop.
+        self._growing: Mapping[int, BackgroundPrecompute] = {}
+        self._commands = {
+            "upload": self._begin_upload,
+            "setup": self._choose,
+            "hold": self._paint,
+            "touch": self._touch,
+            "edit": self._edit,
+            "save": self._save,
+        }
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Types of the messages that this takes."""
+        return frozenset(self._commands)
+
+    async def command(self, message: Mapping[str, Any]) -> None:
+        """Do what the page in control asks for.
+
+        Raises
+        ------
+        Error
+            What makes no sense, or cannot be done now.
+
+        """
+        if not self._server.session.takes_files:
+            raise ViewerError("no body can be set up here")
+        try:
+            await self._commands[message["type"]](message)
+        except Error:
+            # The page has shown its choice already.
+            await self._server.send_control(self.message())
+            raise
+
+    @property
+    def is_offered(self) -> bool:
+        """Whether pages are told of it: an exam and a replay have no place for it."""
+        session = self._server.session
+        return session.takes_files or isinstance(session, SetupSession)
+
+    def message(self) -> dict[str, Any]:
+        """Message with all that pages show of the body that is set up."""
+        session = self._server.session
+        editing = isinstance(session, SetupSession) and session.takes_files
+        touching = session is self._touched
+        return {
+            "type": "setup",
+            "limit": MAX_FILE if session.takes_files else 0,
+            "part": MAX_PART,
+            "endings": list(ENDINGS),
+            "tissues": [asdict(tissue) for tissue in TISSUES],
+            "editing": editing,
+            "preparing": isinstance(session, SetupSession) and not editing,
+            "body": self._body.message() if self._body is not None and (editing or touching) else None,
+        }
+
+    def close(self) -> None:
+        """Delete what has come and what was made of it; saved scenes stay."""
+        self.drop_upload()
+        if self._temporary is not None:
+            shutil.rmtree(self._temporary, ignore_errors=True)
+
+    def drop_upload(self) -> None:
+        """Give up a file on its way: the page that sends it is gone."""
+        if self._upload is not None:
+            self._upload.close()
+            self._upload = None
+
+    # Files.
+
+    async def _begin_upload(self, message: Mapping[str, Any]) -> None:
+        self.drop_upload()
+        if self._temporary is None:
+            self._temporary = Path(tempfile.mkdtemp(prefix="palpate-page-"))
+        self._count += 1
+        folder = self._temporary / str(self._count)
+        folder.mkdir()
+        self._upload = Upload(message, folder)
+        await self._server.send_control({"type": "uploaded", "bytes": 0})
+
+    async def take_part(self, part: bytes) -> None:
+        """Take the next part of a file.
+
+        Raises
+        ------
+        ViewerError
+            A part that was not announced.
+
+        """
+        upload = self._upload
+        if upload is None:
+            raise ViewerError("upload: announce a file before its parts")
+        try:
+            await self._server.call(upload.take, part)
+        except ViewerError:
+            self._upload = None
+            raise
+        if upload.is_complete:
+            self._upload = None
+            building = self._server.begin_building()
+            self._task = asyncio.create_task(self._fill(upload.folder, upload.file, building))
+        await self._server.send_control({"type": "uploaded", "bytes": upload.received})
+
+    async def _fill(self, folder: Path, file: str, building: CancellableTask) -> None:
+        """Read and fill a file; what was shown before comes back where that fails."""
+        server, loop = self._server, asyncio.get_running_loop()
+        before, body_before = server.session, self._body
+        drawn: list[Future[None]] = []
+        report = server.reporter(file, building)
+
+        def on_read(read: ReadFile) -> None:
+            drawn.append(asyncio.run_coroutine_threadsafe(self._show(SetupBody(read, folder), building), loop))
+
+        def on_stage(name: str, done: int, total: int) -> None:
+            report.phase(name)
+            report(done, total)
+
+        process = FillProcess(folder, file, None, on_read, on_stage)
+        try:
+            await server.send_all(status(f"{file}: reading"))
+            mesh: TetMesh = await building.run(lambda: process.mesh(building.require_wanted), lambda _: None)
+            for shown in drawn:
+                await asyncio.wrap_future(shown)
+            assert self._body is not None
+            self._body.take_mesh(mesh, process.notes)
+            await server.call(server.exchange, SetupSession(self._body))
+            server.follow(None)
+        except Exception as error:
+            self._body = body_before
+            if server.session is not before:
+                await server.call(server.exchange, before)
+            why = str(error) if isinstance(error, Error) else f"a mistake within palpate, please report it: {error!r}"
+            await server.send_all({"type": "error", "text": why})
+            shutil.rmtree(folder, ignore_errors=True)
+        finally:
+            server.end_building()
+            await server.send_all(status(""))
+            await server.send_all(self.message())
+
+    async def _show(self, body: SetupBody, building: CancellableTask) -> None:
+        """Draw a surface before it is filled."""
+        if building.is_cancelled:
+            return
+        self._body = body
+        if body.read.vertices is not None:
+            await self._server.call(self._server.exchange, SetupSession(body))
+            await self._server.send_all(self.message())
+
+    # Choices.
+
+    async def _choose(self, message: Mapping[str, Any]) -> None:
+        body = self._edited()
+        if await self._server.call(body.change, message):
+            await self._server.call(self._server.exchange, SetupSession(body))
+            await self._server.send_control(self.message())
+        await self._server.send_all(self.message(), but_control=True)
+
+    async def _paint(self, message: Mapping[str, Any]) -> None:
+        body = self._edited()
+        first = whole(message, "first", 0, max(0, len(body.mesh.surface_nodes) - 1) if body.mesh is not None else 0)
+        await self._server.call(body.paint, first, mask_of(message, "nodes"))
+        await self._server.send_all(self.message(), but_control=True)
+
+    def _edited(self) -> SetupBody:
+        """Body that is set up now."""
+        if self._server.is_building:
+            raise ViewerError("wait until what is being prepared is ready, or cancel it")
+        if self._body is None or not isinstance(self._server.session, SetupSession):
+            raise ViewerError("there is no body to be set up: drop a file on the page")
+        return self._body
+
+    # The loop.
+
+    async def _touch(self, _message: Mapping[str, Any]) -> None:
+        body, server = self._edited(), self._server
+        scene = await server.call(body.scene)
+        building = server.begin_building()
+        columns = server.reporter(body.name, building)
+
+        def make() -> Session:
+            try:
+                built, growing = _with_first(scene).build_first(columns)
+                self._growing = growing
+                return Session(built, folder=self._folder)
+            except Error as error:
+                # The line of a file that nobody has written is of no use.
+                raise type(error)(_PLACE.sub("", str(error))) from None
+
+        text = f"{body.name}: assembling"
+        self._task = asyncio.create_task(self._switch_and_tell(text, make, building))
+
+    async def _switch_and_tell(self, text: str, make: Callable[[], Session], building: CancellableTask) -> None:
+        def exchange(session: Session) -> None:
+            self._server.exchange(session)
+            self._touched = session
+
+        self._growing = {}
+        await self._server.switch(text, make, exchange, building)
+        if self._server.session is self._touched and self._touched is not None:
+            self._server.follow(self._growing)
+        else:
+            _end(self._growing)
+        await self._server.send_all(self.message())
+
+    async def _edit(self, _message: Mapping[str, Any]) -> None:
+        body = self._body
+        if body is None or self._server.session is not self._touched:
+            raise ViewerError("what is shown was not set up in the page")
+        await self._server.call(self._take_settings)
+        await self._server.call(self._server.exchange, SetupSession(body))
+        self._server.follow(None)
+        await self._server.send_all(self.message())
+
+    async def _save(self, _message: Mapping[str, Any]) -> None:
+        body, server = self._body, self._server
+        if body is None or not (isinstance(server.session, SetupSession) or server.session is self._touched):
+            raise ViewerError("what is shown was not set up in the page")
+        await server.call(self._take_settings)
+        await server.call(body.save, self._folder)
+        await server.send_all(self.message())
+
+    def _take_settings(self) -> None:
+        """Keep what sliders have changed while the body is touched."""
+        session = self._server.session
+        if self._body is not None and isinstance(session, Session) and session is self._touched:
+            settings = session.settings()
+            self._body.take_settings(settings["youngs_modulus"][0], settings["friction"][0])
+
+
+def _with_first(scene: Scene) -> Scene:
+    """Scene of which a part is computed first, where the whole takes long; its store is the same."""
+    first = Expected.of(unsolved_body(scene)).first
+    if first is None:
+        return scene
+    center, radius = first
+    table = TouchTable.model_validate({"first": {"shape": "sphere", "center": center, "radius": radius}})
+    return scene.model_copy(update={"touch": table})
+
+
+def _end(growing: Mapping[int, BackgroundPrecompute]) -> None:
+    for background in growing.values():
+        background.close()

@@ -1,0 +1,251 @@
+"""A body that is set up in the page: its file, its tetrahedra, the choices, and the scene file that they make."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.body import parse
+from palpate.body.default_support import lowest_height
+from palpate.body.tissues import TISSUES
+from palpate.errors import ViewerError
+from palpate.mesh import TetMesh
+from palpate.mesh.fill_process import ReadFile
+from palpate.mesh.shapes import Sphere
+from palpate.mesh.size import COMMON_UNITS
+from palpate.scene import Scene
+from palpate.scene.default_radius import PART_OF_BODY
+from palpate.scene.node_file import write_nodes
+from palpate.scene.writing import scene_text
+from palpate.units import length_scale
+from palpate.viewer.computing import mask_text
+from palpate.viewer.setup_choices import Choices, Plane
+
+# So many scenes of one name are saved in a folder.
+MOST_SAVED = 1000
+
+
+class SetupBody:
+    """A body with what is chosen for it.
+
+    Parameters
+    ----------
+    read
+        What its file holds.
+    folder
+        Where its scene is written to be touched.
+
+    Attributes
+    ----------
+    mesh
+        Its tetrahedra, m; None until they are made.
+    notes
+        What the mesher reported.
+    saved
+        Path of the scene file that was saved last, and still is what is chosen.
+
+    """
+
+    def __init__(self, read: ReadFile, folder: Path):
+        self.read, self.folder = read, folder
+        self.mesh: TetMesh | None = None
+        self.notes: list[str] = []
+        self.saved: Path | None = None
+        self._unit = read.unit
+        tissue, longest = TISSUES[0], max(read.sides) * length_scale(read.unit)
+        certain = read.unit if len(read.fitting) == 1 else None
+        plane = Plane(2, False, 0.1 * max(read.sides[2] * length_scale(read.unit), 1e-9))
+        material = (tissue.name, tissue.youngs_modulus, tissue.poissons_ratio)
+        self.choices = Choices(certain, False, plane, *material, radius=PART_OF_BODY * longest)
+        self._painted = np.zeros(0, dtype=bool)
+
+    @property
+    def name(self) -> str:
+        """Of the body: its file without the ending."""
+        return Path(self.read.file).stem
+
+    def take_mesh(self, mesh: TetMesh, notes: list[str]) -> None:
+        """Take the tetrahedra of the file in the unit that it was read in."""
+        factor = length_scale(self._unit) / length_scale(self.read.unit)
+        self.mesh = mesh if factor == 1 else _scaled(mesh, factor)
+        self.notes = notes
+        self._painted = np.zeros(len(mesh.surface_nodes), dtype=bool)
+        plane = Plane(2, False, lowest_height(self.mesh))
+        self.choices = replace(self.choices, plane=plane)
+
+    def change(self, message: Mapping[str, Any]) -> bool:
+        """Take choices of a message. Returns whether the body is larger or smaller now.
+
+        Raises
+        ------
+        ViewerError
+            Choices that make no sense for this body.
+
+        """
+        mesh = self._filled()
+        changed = self.choices.changed(message, *mesh.bounds)
+        self.saved = None
+        unit = changed.unit
+        if unit is None or unit == self._unit:
+            self.choices = changed
+            return False
+        factor = length_scale(unit) / length_scale(self._unit)
+        self._unit, self.mesh, self.choices = unit, _scaled(mesh, factor), changed.scaled(factor)
+        return True
+
+    def paint(self, first: int, mask: np.ndarray) -> None:
+        """Take a part of the painted supports: bits for the surface nodes from ``first`` on.
+
+        Raises
+        ------
+        ViewerError
+            Nodes that the surface does not have.
+
+        """
+        self._filled()
+        if first % 8 or first + np.flatnonzero(mask).max(initial=-1) >= len(self._painted):
+            raise ViewerError("hold: nodes must be a mask of surface nodes")
+        part = self._painted[first : first + len(mask)]
+        part[:] = mask[: len(part)]
+        self.saved = None
+
+    def take_settings(self, youngs_modulus: float | None, friction: float) -> None:
+        """Take what was changed while the body was touched."""
+        before = self.choices
+        if youngs_modulus is not None and youngs_modulus != before.youngs_modulus:
+            self.choices = replace(self.choices, youngs_modulus=youngs_modulus, tissue=None)
+        self.choices = replace(self.choices, friction=friction)
+        if self.choices != before:
+            self.saved = None
+
+    def message(self) -> dict[str, Any]:
+        """Part of the setup message: what is known of the body, and what is chosen."""
+        choices, mesh = self.choices, self.mesh
+        scale = length_scale(self._unit)
+        return {
+            "name": self.name,
+            "file": self.read.file,
+            "unit": choices.unit,
+            "units": [{"unit": unit, "size": self._size(length_scale(unit))} for unit in COMMON_UNITS],
+            "fitting": list(self.read.fitting),
+            "size": self._size(scale),
+            "low": [0.0] * 3 if mesh is None else mesh.bounds[0].tolist(),
+            "filled": mesh is not None,
+            "nodes": 0 if mesh is None else len(mesh.nodes),
+            "tets": 0 if mesh is None else len(mesh.tets),
+            "notes": self.notes,
+            "painted": choices.painted,
+            "held": mask_text(self._painted) if self._painted.any() else None,
+            "plane": asdict(choices.plane),
+            "tissue": choices.tissue,
+            "youngs_modulus": choices.youngs_modulus,
+            "poissons_ratio": choices.poissons_ratio,
+            "radius": choices.radius,
+            "nodule": None if choices.nodule is None else asdict(choices.nodule),
+            "saved": None if self.saved is None else str(self.saved),
+        }
+
+    def _size(self, scale: float) -> list[float]:
+        return [side * scale for side in self.read.sides]
+
+    def write(self, folder: Path, name: str) -> Path:
+        """Write the scene, its tetrahedra and its painted supports into a folder; return the scene file.
+
+        Raises
+        ------
+        ViewerError
+            Choices of which no scene can be made.
+
+        """
+        mesh, choices = self._filled(), self.choices
+        if choices.unit is None:
+            raise ViewerError("choose the unit of length of the file first")
+        held = self._held(mesh)
+        if choices.nodule is not None:
+            self._require_nodule(mesh)
+        mesh.write(folder / f"{name}.vtu")
+        tables: dict[str, Any] = {"body": {"name": self.name, "mesh": f"{name}.vtu", "unit": "m"}}
+        comments = {"": f"Set up in the page from {self.read.file}, in {choices.unit}."}
+        if choices.painted:
+            write_nodes(folder / f"{name}.nodes", held, f"Painted supports: nodes of {name}.vtu, counted from 0")
+            tables["supports"] = {"fixed": f"{name}.nodes"}
+        else:
+            tables["supports"] = {"fixed": choices.plane.predicate}
+        tables["material"] = {"youngs_modulus": choices.youngs_modulus, "poissons_ratio": choices.poissons_ratio}
+        tissue = next((tissue for tissue in TISSUES if tissue.name == choices.tissue), None)
+        if tissue is not None:
+            comments["material"] = f"{tissue.title}: {tissue.source}"
+        if choices.nodule is not None:
+            tables["region"] = [{"shape": "sphere", **asdict(choices.nodule)}]
+        tables["tool"] = {"radius": choices.radius}
+        if choices.friction is not None:
+            tables["tool"]["friction"] = choices.friction
+        path = folder / f"{name}.toml"
+        path.write_text(scene_text(tables, comments))
+        return path
+
+    def scene(self) -> Scene:
+        """Scene of what is chosen, from the files that it would be saved in.
+
+        Raises
+        ------
+        Error
+            Choices of which no scene can be made.
+
+        """
+        place = self.folder / "scene"
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir()
+        return Scene.read(self.write(place, self.name))
+
+    def save(self, folder: Path) -> Path:
+        """Save the scene under a name that no file in the folder has.
+
+        Raises
+        ------
+        Error
+            A folder that cannot be written.
+
+        """
+        names = [self.name, *(f"{self.name}-{number}" for number in range(2, MOST_SAVED + 1))]
+        endings = (".toml", ".vtu", ".nodes")
+        free = next((n for n in names if not any((folder / f"{n}{ending}").exists() for ending in endings)), None)
+        if free is None:
+            raise ViewerError(f"{folder}: there are {MOST_SAVED} scenes of this name already")
+        try:
+            self.saved = self.write(folder.absolute(), free)
+        except OSError as error:
+            raise ViewerError(f"cannot save in {folder}: {error.strerror or error}") from None
+        return self.saved
+
+    def _held(self, mesh: TetMesh) -> np.ndarray:
+        if self.choices.painted:
+            held = mesh.surface_nodes[self._painted]
+            if not len(held):
+                raise ViewerError("nothing is painted: paint where the body is held, or choose Plane")
+            return held
+        held = np.flatnonzero(parse(self.choices.plane.predicate)(mesh.nodes))
+        if len(held) == len(mesh.nodes):
+            raise ViewerError("all of the body is held: move the plane back")
+        return held
+
+    def _require_nodule(self, mesh: TetMesh) -> None:
+        """Refuse a nodule that no element lies in."""
+        nodule = self.choices.nodule
+        assert nodule is not None
+        if not Sphere(nodule.center, nodule.radius)(mesh.nodes[mesh.tets[:, :4]].mean(axis=1)).any():
+            raise ViewerError("the nodule is too small for the elements, or outside of the body: make it larger")
+
+    def _filled(self) -> TetMesh:
+        if self.mesh is None:
+            raise ViewerError("the body is still being filled with tetrahedra")
+        return self.mesh
+
+
+def _scaled(mesh: TetMesh, factor: float) -> TetMesh:
+    return TetMesh(mesh.nodes * factor, mesh.tets, mesh.regions, mesh.region_names)

@@ -1,0 +1,168 @@
+"""What a person chooses for a body that is set up in the page, and how messages change it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.body.tissues import TISSUES
+from palpate.errors import ViewerError
+from palpate.mesh.size import COMMON_UNITS
+from palpate.viewer.messages import number, vector, whole, word
+
+AXES = "xyz"
+# A nodule that is placed first: in the middle, of this part of the body's shortest side, and so many times as stiff.
+# Samani et al. 2007 found high-grade carcinoma up to 13 times as stiff as the tissue around it.
+NODULE_SIZE, NODULE_FACTOR = 0.15, 5.0
+# Tools and nodules are between these parts of the body's longest side.
+LEAST_RADIUS, MOST_RADIUS = 1 / 200, 1 / 3
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Supports between a side of the body's box and a plane along it: across an axis, so deep from that side, m."""
+
+    axis: int
+    above: bool
+    depth: float
+
+    @property
+    def predicate(self) -> str:
+        """As a scene has it."""
+        name, depth = AXES[self.axis], f"{1e3 * self.depth:.6g}mm"
+        return f"{name} > max - {depth}" if self.above else f"{name} < min + {depth}"
+
+
+@dataclass(frozen=True)
+class Nodule:
+    """A ball of another stiffness: m, Pa."""
+
+    center: tuple[float, float, float]
+    radius: float
+    youngs_modulus: float
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What is chosen.
+
+    Attributes
+    ----------
+    unit
+        Of the file; None where it may be one of several and nobody has chosen yet.
+    painted
+        Whether the supports are those that are painted, in place of those below a plane.
+    plane, nodule
+        m, Pa; a body without a nodule has None.
+    tissue
+        Name of a material of `TISSUES`.
+    youngs_modulus, poissons_ratio
+        Its values, or others that were chosen later; Pa.
+    radius, friction
+        Of the tool, m.
+
+    """
+
+    unit: str | None
+    painted: bool
+    plane: Plane
+    tissue: str | None
+    youngs_modulus: float
+    poissons_ratio: float
+    radius: float
+    friction: float | None = None
+    nodule: Nodule | None = None
+
+    def scaled(self, factor: float) -> Choices:
+        """Return the same of a body whose lengths are larger by a factor."""
+        nodule = self.nodule
+        if nodule is not None:
+            x, y, z = nodule.center
+            nodule = Nodule((x * factor, y * factor, z * factor), nodule.radius * factor, nodule.youngs_modulus)
+        plane = replace(self.plane, depth=self.plane.depth * factor)
+        return replace(self, plane=plane, radius=self.radius * factor, nodule=nodule)
+
+    def changed(self, message: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> Choices:
+        """Choices with those of a message, for a body between corners (3,), m.
+
+        Raises
+        ------
+        ViewerError
+            A message that makes no sense, or a value that the body cannot take.
+
+        """
+        known = {"unit", "painted", "plane", "tissue", "radius", "nodule"}
+        keys = set(message) - {"type"}
+        if not keys or not keys <= known:
+            raise ViewerError(f"setup takes {', '.join(sorted(known))}")
+        change: dict[str, Any] = {}
+        sides = high - low
+        if "unit" in message:
+            change["unit"] = _one_of(message, "unit", COMMON_UNITS)
+        if "painted" in message:
+            change["painted"] = _flag(message, "painted")
+        if "plane" in message:
+            change["plane"] = _plane(message, sides)
+        if "tissue" in message:
+            name = _one_of(message, "tissue", [tissue.name for tissue in TISSUES])
+            tissue = next(tissue for tissue in TISSUES if tissue.name == name)
+            material = {"youngs_modulus": tissue.youngs_modulus, "poissons_ratio": tissue.poissons_ratio}
+            change |= {"tissue": name, **material}
+        if "radius" in message:
+            change["radius"] = _radius(message, "radius", sides)
+        if "nodule" in message:
+            change["nodule"] = _nodule(message, low, high)
+        return replace(self, **change)
+
+
+def _one_of(message: Mapping[str, Any], key: str, known: Sequence[str]) -> str:
+    name = word(message, key)
+    if name not in known:
+        raise ViewerError(f"setup: {key} must be one of {', '.join(known)}")
+    return name
+
+
+def _flag(message: Mapping[str, Any], key: str) -> bool:
+    value = message.get(key)
+    if not isinstance(value, bool):
+        raise ViewerError(f"setup: {key} must be true or false")
+    return value
+
+
+def _table(message: Mapping[str, Any], key: str) -> dict[str, Any]:
+    value = message[key]
+    if not isinstance(value, dict):
+        raise ViewerError(f"setup: {key} must be an object")
+    return {**value, "type": f"setup: {key}"}
+
+
+def _radius(message: Mapping[str, Any], key: str, sides: np.ndarray) -> float:
+    radius, longest = number(message, key), float(sides.max())
+    # Rounded numbers of the page may lie just beyond.
+    if not 0.99 * LEAST_RADIUS * longest <= radius <= 1.01 * MOST_RADIUS * longest:
+        low, high = 1e3 * LEAST_RADIUS * longest, 1e3 * MOST_RADIUS * longest
+        raise ViewerError(f"setup: the radius goes from {low:.3g} to {high:.3g} mm on this body")
+    return radius
+
+
+def _plane(message: Mapping[str, Any], sides: np.ndarray) -> Plane:
+    table = _table(message, "plane")
+    axis, depth = whole(table, "axis", 0, 2), number(table, "depth")
+    if not 0 < depth <= 1.01 * sides[axis]:
+        raise ViewerError(f"setup: the plane goes up to {1e3 * sides[axis]:.3g} mm into this body")
+    return Plane(axis, _flag(table, "above"), depth)
+
+
+def _nodule(message: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> Nodule | None:
+    if message["nodule"] is None:
+        return None
+    table = _table(message, "nodule")
+    center, modulus = vector(table, "center"), number(table, "youngs_modulus")
+    if not (low <= center).all() or not (center <= high).all():
+        raise ViewerError("setup: the middle of the nodule must lie within the body's box")
+    if modulus <= 0:
+        raise ViewerError("setup: the nodule needs a positive Young's modulus")
+    return Nodule(center, _radius(table, "radius", high - low), modulus)

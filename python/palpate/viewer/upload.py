@@ -1,0 +1,104 @@
+"""A file that a page sends: its name and size first, then its bytes in parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import ViewerError
+from palpate.mesh.files import WRITERS
+from palpate.mesh.surface_file import SURFACE_ENDINGS
+from palpate.viewer.messages import whole
+
+# Endings of the files that a page may send: surfaces, and volume meshes that are one file.
+ENDINGS = (*SURFACE_ENDINGS, *(ending for ending in WRITERS if ending not in {".node", ".ele"}))
+# A binary STL of four million triangles has 200 MB.
+MAX_FILE = 200_000_000
+# Bytes of a part: one message, which the server answers before the next comes.
+MAX_PART = 262_144
+LONGEST_NAME = 120
+
+
+class Upload:
+    """A file on its way.
+
+    Parameters
+    ----------
+    message
+        What the page announces.
+    folder
+        Where the file goes.
+
+    Raises
+    ------
+    ViewerError
+        A file that is too large, or of a kind that is not read.
+
+    """
+
+    def __init__(self, message: Mapping[str, Any], folder: Path):
+        self.file = safe_name(message.get("name"))
+        if Path(self.file).suffix.lower() not in ENDINGS:
+            raise ViewerError(_wrong_kind(self.file))
+        if isinstance(message.get("size"), int) and message["size"] > MAX_FILE:
+            size, most = message["size"] / 1e6, MAX_FILE / 1e6
+            raise ViewerError(f"{self.file} has {size:.0f} MB: the page takes files up to {most:.0f} MB")
+        self.size = whole(message, "size", 1, MAX_FILE)
+        self.folder, self.received = folder, 0
+        self._output = (folder / self.file).open("wb")
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all bytes have come."""
+        return self.received == self.size
+
+    def take(self, part: bytes) -> None:
+        """Take the next part.
+
+        Raises
+        ------
+        ViewerError
+            More than was announced, or a disk that is full.
+
+        """
+        if self.received + len(part) > self.size or not part:
+            self.close()
+            raise ViewerError(f"{self.file}: its parts do not come to {self.size} bytes")
+        try:
+            self._output.write(part)
+            self.received += len(part)
+            if self.is_complete:
+                self._output.close()
+        except OSError as error:
+            self.close()
+            raise ViewerError(f"{self.file}: cannot be kept: {error.strerror or error}") from None
+
+    def close(self) -> None:
+        """Give up what has come."""
+        self._output.close()
+
+
+def safe_name(name: Any) -> str:
+    """Name of a file without a folder, and without characters that a file system or a terminal may not take.
+
+    Raises
+    ------
+    ViewerError
+        What is no name.
+
+    """
+    if not isinstance(name, str) or len(name) > LONGEST_NAME:
+        raise ViewerError(f"upload: name must be a text of at most {LONGEST_NAME} characters")
+    safe = re.sub(r"[^\w. -]", "_", name).strip(". ")
+    if not Path(safe).stem.strip(". _"):
+        raise ViewerError("upload: the file needs a name")
+    return safe
+
+
+def _wrong_kind(file: str) -> str:
+    ending = Path(file).suffix.lower()
+    if ending in {".toml", ".palpate"}:
+        return f"{file}: scenes and stores are opened where they lie: palpate run {file}"
+    return f"{file}: no surface and no mesh by its ending; the page takes {', '.join(ENDINGS)}"
