@@ -18,6 +18,21 @@ class Reporter:
         self._report(done, total)
 
 
+def reported_to(*reporters: Reporter | None) -> Reporter:
+    """Reporter that passes on to all that there are."""
+    given = [reporter for reporter in reporters if reporter is not None]
+
+    def report(done: int, total: int) -> None:
+        for reporter in given:
+            reporter(done, total)
+
+    def begin(phase: str) -> None:
+        for reporter in given:
+            reporter.phase(phase)
+
+    return Reporter(report, begin)
+
+
 @contextlib.contextmanager
 def progress_reporter(title: str, progress: bool | Callable[[int, int], None]) -> Iterator[Reporter | None]:
     """Yield who is told of the progress, or None where nobody watches; a reporter is told of phases too."""

@@ -227,6 +227,7 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
     from palpate.cli.run_file import built_from, surface_of
     from palpate.errors import SceneError
     from palpate.input_file import require_file
+    from palpate.progress import progress_reporter, reported_to
     from palpate.viewer.live import open_viewer
     from palpate.viewer.preparing import Preparation, Prepared, PreparingSession
     from palpate.viewer.server import ViewerServer
@@ -243,7 +244,8 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
             draw(*surface)
         # What can be touched when a part is ready goes on with the rest beside the loop.
         growing: dict[int, BackgroundPrecompute] = {}
-        built = built_from(file, options, growing, reporter)
+        with progress_reporter(file.name, True) as bar:
+            built = built_from(file, options, growing, reported_to(reporter, bar))
         _print_kept()
         _print_loose(built)
         maps = None if surface_map is None else read_map(surface_map, built)
