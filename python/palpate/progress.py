@@ -19,7 +19,7 @@ class Reporter:
 
 
 def reported_to(*reporters: Reporter | None) -> Reporter:
-    """Reporter that passes on to all that there are."""
+    """Make a reporter that passes on to all that there are."""
     given = [reporter for reporter in reporters if reporter is not None]
 
     def report(done: int, total: int) -> None:
