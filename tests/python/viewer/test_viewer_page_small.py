@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 
 import pytest
 from browser import MARKS, Program, opened, repeated_after_overruns, state, until
+from playwright.sync_api import Error
 
 pytestmark = MARKS
 
@@ -107,8 +109,10 @@ def test_a_press_goes_on_with_another_tool(chromium, block_program):
                 shape.value = 'punch';
                 shape.dispatchEvent(new Event('change'));
             }""")
-            # Choosing it has let go; the pointer presses again while the tool is being prepared.
+            # Choosing it has let go; the pointer presses again while the tool is being prepared, through the box that shows it.
             page.mouse.up()
+            with contextlib.suppress(Error):
+                page.locator("#status").wait_for(timeout=5e3)
             page.mouse.down()
             until(page, lambda s: s["shape"] == "punch" and s["forceMagnitude"] > 0.01)
             page.mouse.up()
