@@ -37,6 +37,12 @@ const FACING: [f64; 2] = [-0.4, 1.0];
 /// Cosines between the normals of a rising wall and of the contact's plane from which the wall belongs to the contact, and belongs
 /// fully.
 const SAME_CONTACT: [f64; 2] = [0.2, 0.7];
+/// Distance of a wall from the contact's middle, across the edge between them and over the tool's thickness, from which it need not
+/// be steep to be another place.
+const APART: f64 = 2.0;
+/// By how much a piece is more parallel to another plane of the tool, as a difference of cosines, from which it begins to belong to
+/// that one, and belongs to it fully.
+const BETTER_PLANE: [f64; 2] = [0.0, 0.3];
 /// Distances of the contact's middle in front of a piece, over the margin, from which the piece is such a wall, and fully one.
 const IN_FRONT: [f64; 2] = [0.0, 0.5];
 /// Share of a wall from which a piece is pressed by an additional contact.
@@ -88,11 +94,19 @@ pub struct Plane {
     pub normal: DVec3,
 }
 
+/// Most other planes that a tool presses on.
+pub const MAX_OTHERS: usize = 3;
+
+/// Planes that a tool presses on beside that of a contact, `None` for none.
+pub type OtherPlanes = [Option<Plane>; MAX_OTHERS];
+
 /// Memory of a search.
 #[derive(Clone, Debug, Default)]
 pub struct FootprintScratch {
     /// The pieces near the tool.
     pub near: NearPieces,
+    /// The tool's other planes: pieces that are more parallel to one of them belong to it.
+    pub others: OtherPlanes,
 }
 
 /// Mean normal of the pieces, and its derivatives by the tool's position and rotation.
@@ -140,14 +154,22 @@ impl FootprintScratch {
         first.map(|near| Plane { point: near.middle, normal: near.normal })
     }
 
-    /// Plane of the nearest piece of a wall that stands on all planes that a tool presses on, or faces them across the tool.
-    pub fn wall_beside(&self, known: &[Plane]) -> Option<Plane> {
-        let is_wall = |near: &&NearPiece| {
-            near.facing_cosine > LEAST_FACING
-                && known.iter().all(|plane| near.share_of_wall(plane, self.near.margin) > WALL_SHARE)
-        };
-        let pieces = self.near.pieces.iter().chain(&self.near.opposite);
-        let nearest = pieces.filter(is_wall).min_by(|a, b| a.distance.total_cmp(&b.distance))?;
+    /// Plane of the nearest piece of a wall that stands on all planes that a tool presses on, or faces them across the tool. Pieces
+    /// out of reach of the plane that was `pressed` last have no part in it, so that a less steep one is a wall too: a long tool lies
+    /// with both its ends in a flat valley.
+    pub fn wall_beside(&self, pressed: &Plane, thickness: f64) -> Option<Plane> {
+        let margin = self.near.margin;
+        let faces = |near: &&NearPiece| near.facing_cosine > LEAST_FACING;
+        let stands_on = |near: &NearPiece, plane: &Plane| near.share_of_wall(plane, margin) > WALL_SHARE;
+        let stands_on_others = |near: &&NearPiece| self.others.iter().flatten().all(|plane| stands_on(near, plane));
+        let within = self.near.pieces.iter().filter(|near| stands_on(near, pressed));
+        let beyond = self
+            .near
+            .opposite
+            .iter()
+            .filter(|near| stands_on(near, pressed) || near.faces_across(pressed, margin, APART * thickness));
+        let walls = within.chain(beyond).filter(faces).filter(stands_on_others);
+        let nearest = walls.min_by(|a, b| a.distance.total_cmp(&b.distance))?;
         Some(Plane { point: nearest.middle, normal: nearest.normal })
     }
 
@@ -183,15 +205,15 @@ impl FootprintScratch {
 
     /// Flattens walls to a plane.
     fn flatten_walls(&mut self, fine: &Tessellation, plane: Plane) {
-        let before = self.near.flattened_to.replace(plane);
-        if before == Some(plane) {
+        let before = self.near.flattened_to.replace((plane, self.others));
+        if before == Some((plane, self.others)) {
             return;
         }
         for near in &mut self.near.pieces {
             if before.is_some() {
                 near.corners = fine.corners(near.piece);
             }
-            near.flatten_walls(&plane, self.near.margin);
+            near.flatten_walls(&plane, &self.others, self.near.margin);
         }
     }
 
@@ -292,14 +314,30 @@ impl NearPiece {
     /// Share to which the piece is a wall rising over a plane: one if it is steep and the plane's point lies in front of it.
     fn share_of_wall(&self, plane: &Plane, margin: f64) -> f64 {
         let (belonging, _) = smooth_step(self.normal.dot(plane.normal), SAME_CONTACT);
-        let (before, _) = smooth_step((plane.point - self.middle).dot(self.normal) / margin, IN_FRONT);
-        (1.0 - belonging) * before
+        (1.0 - belonging) * self.share_in_front(plane, margin)
+    }
+
+    /// Share to which the plane's point lies in front of the piece.
+    fn share_in_front(&self, plane: &Plane, margin: f64) -> f64 {
+        smooth_step((plane.point - self.middle).dot(self.normal) / margin, IN_FRONT).0
+    }
+
+    /// Whether the piece and the plane face each other, at an angle at which they cannot be one contact, and at a distance from the
+    /// plane's point across their common edge, m.
+    fn faces_across(&self, plane: &Plane, margin: f64, distance: f64) -> bool {
+        let (edge, offset) = (self.normal.cross(plane.normal).normalize_or_zero(), self.middle - plane.point);
+        let is_apart = (offset - edge * offset.dot(edge)).length() > distance;
+        is_apart && self.normal.dot(plane.normal) < SAME_CONTACT[1] && self.share_in_front(plane, margin) > WALL_SHARE
     }
 
     /// Flattens a wall that rises over the contact to its plane, the more the steeper it is. Over a convex edge nothing is
     /// flattened: the middle lies behind both sides.
-    fn flatten_walls(&mut self, plane: &Plane, margin: f64) {
-        let share = self.share_of_wall(plane, margin);
+    fn flatten_walls(&mut self, plane: &Plane, others: &OtherPlanes, margin: f64) {
+        let cosine = self.normal.dot(plane.normal);
+        let better = others.iter().flatten().map(|other| self.normal.dot(other.normal)).fold(-1.0, f64::max);
+        let (belonging, _) = smooth_step(cosine, SAME_CONTACT);
+        let (elsewhere, _) = smooth_step(better - cosine, BETTER_PLANE);
+        let share = (1.0 - belonging * (1.0 - elsewhere)) * self.share_in_front(plane, margin);
         self.contact_share = 1.0 - share;
         if share > 0.0 {
             for corner in &mut self.corners {

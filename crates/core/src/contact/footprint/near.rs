@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Plane, PressedSurface};
+use super::{OtherPlanes, Plane, PressedSurface};
 use crate::contact::shape::ToolShape;
 use crate::contact::{SurfaceQuery, Tessellation};
 
@@ -72,8 +72,8 @@ pub struct NearPieces {
     pub centre: DVec3,
     /// Distance from which pieces count, m.
     pub margin: f64,
-    /// The plane to which walls have been flattened.
-    pub(super) flattened_to: Option<Plane>,
+    /// The plane to which walls have been flattened, beside which others.
+    pub(super) flattened_to: Option<(Plane, OtherPlanes)>,
     /// Key of the latest search, and the present position of the tool, m.
     key: Option<SearchKey>,
     position: DVec3,

@@ -18,9 +18,9 @@ use super::add_contact;
 use super::foot_jumps::DEEPEST_START;
 use super::wrench::{largest_overlap, placed_shape};
 use crate::contact::Concavities;
-use crate::contact::footprint::PlacedShape;
+use crate::contact::footprint::{OtherPlanes, PlacedShape};
 use crate::contact::smooth::FootPoint;
-use crate::simulation::contacts::{Contact, LocalContact, Mode, STRAIN_REQUESTS};
+use crate::simulation::contacts::{Contact, Contacts, LocalContact, Mode, STRAIN_REQUESTS};
 use crate::simulation::law::TickMemory;
 use crate::simulation::model::Model;
 use crate::simulation::solve::contact_displacement_at;
@@ -112,20 +112,15 @@ pub fn find_wall_contact(model: &Model, state: &mut State, memory: TickMemory<'_
     else {
         return;
     };
-    let mut planes = [local.plane(); MAX_PLACES];
-    let mut count = 0;
-    for place in state.contacts.of(tool, body) {
-        if count == MAX_PLACES {
-            return;
-        }
-        planes[count] = state.contacts.slots[place].local.plane();
-        count += 1;
-    }
-    if mode == Mode::Free || count == MAX_PLACES {
+    if mode == Mode::Free || state.contacts.of(tool, body).count() >= MAX_PLACES {
         return;
     }
     let footprint = &mut memory.local.footprint;
-    let Some(plane) = footprint.wall_beside(&planes[..count]) else { return };
+    footprint.others = other_planes(&state.contacts, slot);
+    let Some(plane) = footprint.wall_beside(&local.plane(), model.tools[tool].shape.thickness()) else { return };
+    if let Some(own) = footprint.others.iter_mut().find(|other| other.is_none()) {
+        *own = Some(local.plane());
+    }
     let contact = placed_shape(&model.tools[tool].shape, &local, local.relative_position);
     let at =
         PlacedShape { position: local.relative_position, contact_normal: plane.normal, penetration: 0.0, ..contact };
@@ -149,6 +144,17 @@ pub fn find_wall_contact(model: &Model, state: &mut State, memory: TickMemory<'_
         ..local_state(&local)
     };
     add_contact(state, additional_contact((tool, body), local));
+}
+
+/// Planes of the other contacts of a contact's tool on its body.
+pub fn other_planes(contacts: &Contacts, slot: usize) -> OtherPlanes {
+    let Contact { tool, body, .. } = contacts.slots[slot];
+    let mut planes = OtherPlanes::default();
+    let lasting = |&other: &usize| other != slot && !contacts.slots[other].local.is_fading;
+    for (plane, other) in planes.iter_mut().zip(contacts.of(tool, body).filter(lasting)) {
+        *plane = Some(contacts.slots[other].local.plane());
+    }
+    planes
 }
 
 /// Depth that a tool can have reached since the previous tick, m.

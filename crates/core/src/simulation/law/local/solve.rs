@@ -9,6 +9,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::additional::other_planes;
 use super::coupling::{blend_patch, couple};
 use super::energy_surplus::{commit_energy, observe_energy, remove_energy_surplus};
 use super::foot_jumps::{
@@ -261,6 +262,7 @@ fn follow_motion(
             // With the same weights as its compliance.
             Some(pressed) => {
                 let at = placed_shape(&tool.shape, contact, contact.relative_position);
+                local.footprint.others = other_planes(contacts, slot);
                 let near = &mut local.footprint.near;
                 near.find(pressed, &fixed.query, &at);
                 if local.footprint.find(&pressed.fine, &own.smooth, contact.plane(), weights).is_none() {
@@ -312,6 +314,7 @@ fn evaluate_contacts(
     let mut guessed = [DVec3::ZERO; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
         guessed[a] = local.responses[a].force;
+        local.footprint.others = other_planes(&state.contacts, slot);
         let tool = state.contacts.slots[slot].tool;
         let response = local_body(model, state, tool, body).and_then(|surface| {
             let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =
