@@ -139,9 +139,7 @@ OPEN = {
     ("ridge", 30, "capsule", "tilted"): (2, 1),
     ("ridge", 60, "capsule", "along"): (5, 1),
     ("valley", 30, "capsule", "yawed"): (1, 2),
-    ("valley", 120, "capsule", "yawed"): (6, 2),
-    ("valley", 120, "capsule", "across"): (6, 2),
-    ("valley", 120, "file", "across"): (6, 2),
+    ("concave", 120, "capsule", "yawed"): (2, 1),
 }
 
 
@@ -184,6 +182,7 @@ QUICK = [
     Crossing("concave", 90, "capsule", "across", 1e-3),
     Crossing("concave", 60, "ellipsoid", "across", 1e-3),
     Crossing("valley", 120, "capsule", "along", 1e-3),
+    Crossing("valley", 120, "capsule", "across", 1e-3),
 ]
 
 
@@ -206,6 +205,19 @@ def test_in_a_corner_a_tool_presses_both_walls(loops, tool):
     assert abs(both[-1, 2] / both[0, 2] - 1) < 0.15
     # One wall of the two missing, or a force of the wrong sign, would be seen.
     assert abs(both[0, 0] / alone - 1) > 0.15 and abs(above[-1, 2] / both[0, 2] - 1) > 0.15
+
+
+@pytest.mark.parametrize("degrees", [60, 90, 120, 150])
+def test_in_the_middle_of_a_valley_its_sides_press_alike(loops, degrees):
+    """A capsule lies across it with both ends: by symmetry they push along the valley's bisector."""
+    path, lead = Crossing("valley", degrees, "capsule", "across", 1e-3).path()
+    forces = played(loops.loop(f"valley {degrees}", "capsule"), path, ACROSS).forces[lead:]
+    # Against the part that one side alone has.
+    left, middle, right = (
+        forces[k, 0] / forces[k, 2] * np.tan(np.radians(degrees / 2)) for k in (0, len(forces) // 2, -1)
+    )
+    assert abs(middle) < 0.35
+    assert left > 0.4 and right < -0.4
 
 
 @pytest.mark.slow

@@ -109,7 +109,7 @@ def test_a_press_goes_on_with_another_tool(chromium, block_program):
                 shape.value = 'punch';
                 shape.dispatchEvent(new Event('change'));
             }""")
-            # Choosing it has let go; the pointer presses again while the tool is being prepared, through the box that shows it.
+            # Choosing it has let go; the pointer presses again through the box that shows what is being prepared.
             page.mouse.up()
             with contextlib.suppress(Error):
                 page.locator("#status").wait_for(timeout=5e3)
