@@ -14,7 +14,7 @@
 //!
 //! Heights over one plane cannot describe a floor and a wall that stands on it. A wall that rises over the plane of the previous
 //! tick is therefore flattened to that plane, completely if it is steeper than 78 degrees and not at all up to 45. It is pressed by
-//! an additional contact of the same tool, on a plane of its own.
+//! an additional contact of the same tool, on a plane of its own. A piece belongs to the plane that it is most parallel to.
 
 mod near;
 
