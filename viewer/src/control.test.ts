@@ -30,7 +30,7 @@ describe("tools that are pinned", () => {
     store = new Store();
     sent = [];
     control = new Control(store, (message) => sent.push(message));
-    store.update({ connection: "open", role: "control" });
+    store.update({ connection: "open", role: "control", coloring: "field" });
     control.receiveScene(scene(2));
   });
 
@@ -101,7 +101,7 @@ describe("what is shown", () => {
     store = new Store();
     sent = [];
     control = new Control(store, (message) => sent.push(message));
-    store.update({ connection: "open", role: "control" });
+    store.update({ connection: "open", role: "control", coloring: "field" });
     control.receiveScene({ ...scene(2), name: "block" });
   });
 
@@ -110,13 +110,32 @@ describe("what is shown", () => {
     vi.unstubAllGlobals();
   });
 
-  it("goes from field to field, and on to regions and materials", () => {
-    const seen = Array.from({ length: 4 }, () => {
+  it("goes from field to field, on to regions and materials, and to tissue", () => {
+    const seen = Array.from({ length: 5 }, () => {
       control.nextField();
       const { coloring, field } = store.get();
       return coloring === "field" ? field : coloring;
     });
-    expect(seen).toEqual(["strain", "region", "material", "displacement"]);
+    expect(seen).toEqual(["strain", "region", "material", "strained", "displacement"]);
+  });
+
+  it("begins with tissue that shows strain, and keeps to it on another body", () => {
+    store.update({ coloring: "strained" });
+    control.receiveScene({ ...scene(1), name: "another" });
+    expect(store.get().coloring).toBe("strained");
+    expect(sent.at(-1)).toEqual({ type: "field", name: "strain" });
+    // A map that was measured is what the scene was opened for.
+    const measured = scene(1);
+    measured.bodies[0]!.fields.unshift({ name: "palpated_stiffness", title: "Palpated stiffness" });
+    control.receiveScene({ ...measured, name: "measured" });
+    expect(store.get().coloring).toBe("field");
+  });
+
+  it("shows plots with all controls", () => {
+    control.togglePlots();
+    expect(store.get()).toMatchObject({ more: true, layers: { plots: true } });
+    control.togglePlots();
+    expect(store.get()).toMatchObject({ more: true, layers: { plots: false } });
   });
 
   it("ends where it was locked, each field by itself, until the lock or the scene goes", () => {
@@ -171,7 +190,7 @@ describe("an exam", () => {
     store = new Store();
     sent = [];
     control = new Control(store, (message) => sent.push(message));
-    store.update({ connection: "open", role: "control" });
+    store.update({ connection: "open", role: "control", coloring: "field" });
     control.receiveText({ ...exam, places: [] });
     control.receiveScene(scene(1));
   });

@@ -16,7 +16,7 @@ import type {
 } from "./net/protocol";
 import { groupings } from "./regions";
 import { NO_LAYERS, shownTool, inControl } from "./store";
-import type { Axis, Layer, Posture, Store, Theme } from "./store";
+import type { Axis, Coloring, Layer, Posture, Store, Theme } from "./store";
 
 /** A slider dragged quickly sends no more often than this. */
 const SEND_INTERVAL_MS = 40;
@@ -28,6 +28,8 @@ const NOTICES_MAX = 3;
 const LYING: Posture = { tilt: 90, turn: 0 };
 const UPRIGHT: Posture = { tilt: 0, turn: 0 };
 export const TILT_MAX = 90;
+/** The field in the colours of tissue that is strained. */
+export const STRAIN = "strain";
 /** Why a body from a store, or one of very many elements, is not cut open. */
 export const NO_INSIDE =
   "Only the surface of this body is known: a store holds no inside, and of more than 50,000 nodes none is computed. Open the scene or the mesh that a store was made from to cut it open.";
@@ -94,7 +96,7 @@ export class Control {
       postures: scene.tools.map(posture),
       body: scene.motion?.body ?? 0,
       field: offered ? field : null,
-      coloring: coloring !== "field" && groupings(scene).includes(coloring) ? coloring : "field",
+      coloring: coloringOf(scene, coloring),
       ranges: before?.name === scene.name ? ranges : {},
       tab: scene.motion ? "motion" : "force",
       strike: strike && scene.motion !== null,
@@ -102,7 +104,8 @@ export class Control {
     });
     // A bare store has no tetrahedra to be shown.
     if (layers.cutaway && !hasInside(scene)) this.toggleLayer("cutaway");
-    if (this.store.get().ranges !== ranges && field !== null) this.sendField(field);
+    if (this.store.get().coloring === "strained") this.sendField(STRAIN);
+    else if (this.store.get().ranges !== ranges && field !== null) this.sendField(field);
   }
 
   /** A pinned tool that has left the scene, by a fault or another way, is pinned no more. */
@@ -115,9 +118,10 @@ export class Control {
 
   /** What this page looks at, told again after a connection was lost. */
   sendView(): void {
-    const { layers, field } = this.store.get();
+    const { layers, field, coloring } = this.store.get();
     if (layers.cutaway) this.send({ type: "cutaway", on: true });
-    if (field !== null) this.sendField(field);
+    if (coloring === "strained") this.sendField(STRAIN);
+    else if (field !== null) this.sendField(field);
   }
 
   notice(text: string): void {
@@ -142,6 +146,13 @@ export class Control {
     this.store.update({ layers: { ...layers, [layer]: on } });
   }
 
+  /** Plots are seen with all controls: where those are hidden, the key shows both. */
+  togglePlots(): void {
+    const { layers, more, exam } = this.store.get();
+    if (more || exam) return this.toggleLayer("plots");
+    this.store.update({ more: true, layers: { ...layers, plots: true } });
+  }
+
   cutAcross(axis: Axis): void {
     this.store.update({ cut: { ...this.store.get().cut, axis } });
   }
@@ -157,25 +168,34 @@ export class Control {
     this.sendField(field);
   }
 
+  /** Tissue, with the colours of strain where it is strained. */
+  chooseStrained(): void {
+    const { layers } = this.store.get();
+    this.store.update({ coloring: "strained", layers: { ...layers, colors: true } });
+    this.sendField(STRAIN);
+  }
+
   /** Colours by region or by material. */
   chooseGrouping(coloring: "region" | "material"): void {
     const { layers } = this.store.get();
     this.store.update({ coloring, layers: { ...layers, colors: true } });
   }
 
-  /** The next field of the body, then its regions and materials, after the last one the first. */
+  /** The next field of the body, then its regions and materials, then tissue. */
   nextField(): void {
     const { scene, body, field, coloring } = this.store.get();
     const fields = scene?.bodies[body]?.fields ?? [];
     if (fields.length === 0) return;
     const groups = groupings(scene);
+    if (coloring === "strained") return this.chooseField(fields[0]!.name);
     const at =
       coloring === "field"
         ? Math.max(0, fields.findIndex(({ name }) => name === field))
         : fields.length + groups.indexOf(coloring);
-    const next = (at + 1) % (fields.length + groups.length);
+    const next = at + 1;
     if (next < fields.length) this.chooseField(fields[next]!.name);
-    else this.chooseGrouping(groups[next - fields.length]!);
+    else if (next < fields.length + groups.length) this.chooseGrouping(groups[next - fields.length]!);
+    else this.chooseStrained();
   }
 
   /** Ends the colours of a field at a value, in its unit; null lets them follow its largest one. */
@@ -183,6 +203,10 @@ export class Control {
     const others = Object.entries(this.store.get().ranges).filter(([name]) => name !== field);
     this.store.update({ field, ranges: Object.fromEntries(max === null ? others : [...others, [field, max]]) });
     this.sendField(field);
+  }
+
+  showMore(more: boolean): void {
+    this.store.update({ more });
   }
 
   chooseTheme(theme: Theme): void {
@@ -400,6 +424,14 @@ export class Control {
     this.limits.set(name, waiting);
     waiting.limit.request();
   }
+}
+
+/** What a new scene is coloured by: as the scene before, as far as it offers that. A map that was brought is shown at once. */
+function coloringOf(scene: SceneMessage, before: Coloring): Coloring {
+  const brought = scene.bodies.some(({ fields }) => fields[0]?.name.startsWith("palpated"));
+  if (before === "strained") return brought ? "field" : before;
+  if (before === "field") return before;
+  return groupings(scene).includes(before) ? before : "field";
 }
 
 /** How a tool of a shape is held at first. */

@@ -1,6 +1,8 @@
 // Starts the page with the token of its address. The token stands behind `#`, which browsers never send to a server.
 
 import "./ui/style.css";
+import "./ui/readout.css";
+import "./ui/more.css";
 import "./ui/session.css";
 import "./ui/paint.css";
 import "./ui/setup.css";

@@ -16,7 +16,7 @@ const TISSUES = [
 const BODY: SetupBody = {
   name: "organ", file: "organ.stl", unit: "mm", units: [], fitting: ["mm"], size: [0.1, 0.08, 0.06], low: [-0.05, 0, 0],
   filled: true, nodes: 9, tets: 4, notes: [], painted: true, held: null, plane: { axis: 2, above: false, depth: 0.01 },
-  tissue: "soft", youngs_modulus: 5e3, poissons_ratio: 0.49, radius: 0.006, nodule: null, saved: "/a/organ.toml",
+  tissue: "soft", youngs_modulus: 5e3, poissons_ratio: 0.49, radius: 0.006, nodule: null, segments: [], saved: "/a/organ.toml",
 };
 const MESSAGE: SetupMessage = { type: "setup", limit: 1000, part: 400, endings: [".stl", ".ply"], tissues: TISSUES, editing: true, preparing: false, body: BODY };
 
@@ -56,6 +56,14 @@ describe("setting up", () => {
   it("shows what the server has of the supports, in a page that is opened anew too", () => {
     const { store } = settingUp({ held: maskOfNodes([3, 4], COUNT) });
     expect(store.get().strokes.map(([nodes]) => Array.from(nodes!))).toEqual([[3, 4]]);
+  });
+
+  it("gives a segment a material of its own", () => {
+    const { store, sent, setup } = settingUp({ segments: [{ name: "tumor", tissue: "soft" }, { name: "cyst", tissue: "soft" }] });
+    setup.chooseSegment("cyst", "hard");
+    const segments = [{ name: "tumor", tissue: "soft" }, { name: "cyst", tissue: "hard" }];
+    expect(store.get().setup!.body).toMatchObject({ segments, saved: null });
+    expect(sent).toContainEqual({ type: "setup", segments });
   });
 
   it("sends choices together, the newest of each, and before the touch", () => {

@@ -85,6 +85,11 @@ export class Setup {
     this.limit.request();
   }
 
+  chooseSegment(name: string, tissue: string): void {
+    const body = editedBody(this.store.get());
+    if (body) this.choose({ segments: body.segments.map((segment) => (segment.name === name ? { name, tissue } : segment)) });
+  }
+
   toggleNodule(): void {
     const body = editedBody(this.store.get());
     if (body) this.choose({ nodule: body.nodule ? null : firstNodule(body) });

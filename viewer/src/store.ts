@@ -18,8 +18,8 @@ import type {
 
 export type Axis = "x" | "y" | "z";
 export type Layer = "colors" | "wireframe" | "supports" | "cutaway" | "plots";
-/** What the bodies are coloured by. */
-export type Coloring = "field" | "region" | "material";
+/** What the bodies are coloured by: tissue with the colours of strain where there is strain, a field, regions, materials. */
+export type Coloring = "strained" | "field" | "region" | "material";
 export type Theme = "dark" | "light";
 export type Tab = "motion" | "force" | "loop" | "modes";
 /** What the pointer marks nodes of the surface by. */
@@ -77,6 +77,8 @@ export interface State {
   /** Name of the field in colours; null until one is chosen. */
   field: string | null;
   coloring: Coloring;
+  /** Whether the controls behind More are shown. */
+  more: boolean;
   /** Where the colours of a field end, in its unit, by its name; a field that is not here follows its largest value. */
   ranges: Readonly<Record<string, number>>;
   theme: Theme;
@@ -129,11 +131,12 @@ export function initialState(): State {
     setup: null,
     exam: null,
     answering: false,
-    layers: { colors: true, wireframe: true, supports: true, cutaway: false, plots: true },
+    layers: { colors: true, wireframe: false, supports: false, cutaway: false, plots: true },
     cut: { axis: "y", share: CUT_SHARE },
     shownScale: 1,
     field: null,
-    coloring: "field",
+    coloring: "strained",
+    more: false,
     ranges: {},
     theme: "dark",
     body: 0,

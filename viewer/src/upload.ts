@@ -6,10 +6,10 @@ import type { SetupMessage } from "./net/setup_messages";
 /** Why a file cannot be sent; null if it can. */
 export function refusal(file: { name: string; size: number }, setup: Readonly<SetupMessage>): string | null {
   const ending = /\.[^.]*$/.exec(file.name)?.[0].toLowerCase() ?? "";
-  if (!setup.endings.includes(ending)) {
+  if (!setup.endings.some((known) => file.name.toLowerCase().endsWith(known))) {
     const scene = ending === ".toml" || ending === ".palpate";
     if (scene) return `${file.name}: scenes and stores are opened where they lie, by palpate run ${file.name}`;
-    return `${file.name}: no surface and no mesh by its ending; the page takes ${setup.endings.join(", ")}`;
+    return `${file.name}: no surface, mesh or segmentation by its ending; the page takes ${setup.endings.join(", ")}`;
   }
   if (file.size === 0) return `${file.name}: the file is empty`;
   if (file.size > setup.limit) {

@@ -5,6 +5,7 @@ import { NodulePointer } from "./input/nodule_pointer";
 import { PaintPointer } from "./input/paint_pointer";
 import { Pointer } from "./input/pointer";
 import { listenToKeys } from "./input/keyboard";
+import { PictureKeys } from "./input/picture_keys";
 import { TouchPan } from "./input/touch_pan";
 import { Connection } from "./net/connection";
 import type { ConnectionState } from "./net/connection";
@@ -34,6 +35,7 @@ import { DropZone } from "./ui/drop_zone";
 import { SetupPanel } from "./ui/setup_panel";
 import { ScaleView } from "./ui/scale_view";
 import { SettingsPanel } from "./ui/settings_panel";
+import { Spoken } from "./ui/spoken";
 import { Statistics } from "./ui/statistics";
 import { TimeLine } from "./ui/time_line";
 import { followTheme } from "./ui/theme";
@@ -74,7 +76,7 @@ export class Viewer {
     });
     const viewport = new Viewport(
       byId<HTMLCanvasElement>("canvas"),
-      ["readout", "legend", "hint"].map((id) => byId(id)),
+      ["readout", "legend", "hint", "panel"].map((id) => byId(id)),
       () => this.receiveFrames(),
       () => this.frames.answer(),
     );
@@ -86,12 +88,14 @@ export class Viewer {
     new PaintPointer(this.stage, store, painting, new PaintMarks());
     this.pointer = new Pointer(this.stage, store, control);
     new TouchPan(viewport);
+    new PictureKeys(viewport, store, (text) => control.notice(text));
     listenToKeys(control, painting, viewport, toggleHelp);
     // Before what reads its colours.
     followTheme(store, control);
     this.plots = new Plots(store);
     this.statistics = new Statistics(store);
     new Readout(store);
+    new Spoken(store);
     new Legend(store, control);
     new ScaleView(viewport, store);
     new Panel(store, control, viewport);

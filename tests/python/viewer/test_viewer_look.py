@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import MARKS, Program, drawn, eventually, opened, press, state, until, wheel
+from browser import MARKS, MORE_OPEN, Program, drawn, eventually, opened, press, state, until, wheel
 from PIL import Image
 
 pytestmark = MARKS
@@ -169,7 +169,6 @@ def body_hues(page, box: tuple[int, int, int, int]) -> np.ndarray:
 def test_a_body_at_rest_has_the_colour_of_zero_and_not_its_own(page):
     """The liver is red; viridis begins with blue."""
     page.get_by_test_id("field-select").select_option("displacement")
-    page.keyboard.press("w")
     drawn(page)
     x, y = (round(k) for k in page.evaluate("window.palpate.pickPoint()"))
     place = (x - 8, y + 30, x + 8, y + 46)
@@ -184,7 +183,6 @@ def test_a_body_at_rest_has_the_colour_of_zero_and_not_its_own(page):
     red, blue = eventually(page, red_and_blue, lambda seen: seen[0] > 1.5 * seen[1])
     assert red > 1.5 * blue
     page.keyboard.press("c")
-    page.keyboard.press("w")
 
 
 def test_regions_and_materials_have_colours_and_names(chromium, layered):
@@ -196,7 +194,6 @@ def test_regions_and_materials_have_colours_and_names(chromium, layered):
         field.select_option(label="Material")
         assert re.findall(r"[\d.]+ kPa", groups.inner_text()) == ["10.0 kPa", "40.0 kPa"]
         assert page.locator("#legend-field").is_hidden()
-        page.keyboard.press("w")
         for cut in (False, True):
             if cut:
                 page.keyboard.press("x")
@@ -225,8 +222,7 @@ def test_regions_and_materials_have_colours_and_names(chromium, layered):
 def test_a_cut_is_plane_and_closed(chromium, layered):
     """Cut across y the face is a rectangle, whose edges are straight to a pixel, whatever the elements are."""
     with opened(chromium, layered, sharpness=SHARPNESS) as page:
-        for key in ("w", "s", "x"):
-            page.keyboard.press(key)
+        page.keyboard.press("x")
         page.locator("#cut-y").click()
         page.get_by_test_id("field-select").select_option(label="Region")
         number = page.get_by_test_id("cut-share-value")
@@ -288,6 +284,7 @@ def test_a_store_says_why_it_is_not_cut_open(chromium, block_green, cache):
 def test_the_theme_is_that_of_the_system_until_it_is_chosen(chromium, program, tmp_path, system):
     other = "light" if system == "dark" else "dark"
     context = chromium.new_context(viewport={"width": 1280, "height": 720}, color_scheme=system)
+    context.add_init_script(MORE_OPEN)
     page = context.new_page()
 
     def brightness() -> dict[str, float]:
@@ -308,6 +305,7 @@ def test_the_theme_is_that_of_the_system_until_it_is_chosen(chromium, program, t
     page.emulate_media(color_scheme=other)
     is_light(other)
     page.emulate_media(color_scheme=system)
+    context.add_init_script(MORE_OPEN)
     page.get_by_test_id("theme").click()
     is_light(other)
     page.reload()

@@ -68,7 +68,7 @@ def test_a_stiffness_that_is_not_positive_is_not_taken(chromium, block_program):
         for typed in ("-5", "0", "-5 kPa"):
             number.fill(typed)
             number.press("Enter")
-            page.get_by_text(f"Stiffness must be positive: '{typed}' is not taken, {before} stays").wait_for()
+            page.get_by_text(f"Material stiffness must be positive: '{typed}' is not taken, {before} stays").wait_for()
             assert number.input_value() == before
 
 

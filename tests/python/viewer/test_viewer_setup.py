@@ -169,7 +169,7 @@ def test_a_plane_and_a_nodule_are_in_the_scene_and_nothing_is_written_over(ball,
     ("name", "content", "reason"),
     [
         ("wrong.stl", b"no triangles here", "cannot be read as a surface"),
-        ("wrong.xyz", b"1 2 3", "no surface and no mesh"),
+        ("wrong.xyz", b"1 2 3", "no surface, mesh or segmentation"),
         ("scene.toml", b"[body]", "palpate run"),
         ("../../flat.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "encloses"),
     ],
@@ -179,7 +179,7 @@ def test_a_wrong_file_is_one_line_and_what_was_set_up_stays(ball, saves, name, c
         async with empty_page(saves) as (server, client):
             before = await filled(client, ball)
             await client.say(type="upload", name=name, size=len(content))
-            if reason not in ("no surface and no mesh", "palpate run"):
+            if reason not in ("no surface, mesh or segmentation", "palpate run"):
                 await client.receive("uploaded")
                 await client.socket.send(content)
             error, _ = await client.receive("error")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from browser import MARKS, PATIENCE, Program, opened, press, settled_force, state, until
+from label_maps import ball, ellipsoid, labels_of, write_nifti
 
 import palpate
 
@@ -142,3 +143,23 @@ def test_filling_is_cancelled_and_a_nodule_is_dragged(chromium, empty, block):
         assert shown == pytest.approx([x + 60, y], abs=1.0)
         towards = np.array(page.evaluate("window.palpate.view()")["towards"])
         assert abs((after - before) @ towards) < 1e-6 and np.linalg.norm(after - before) > 2e-3
+
+
+def test_a_dropped_label_map_is_touched_with_a_material_for_each_segment(chromium, empty, tmp_path):
+    pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)
+    labels, affine = labels_of([ellipsoid((40, 30, 22)), ball((8, -4, 0), 14.0)], (46, 36, 28), (1.5, 1.5, 2.0))
+    path = write_nifti(tmp_path / "ct.nii.gz", labels, affine)
+    with opened(chromium, empty, ready=lambda s: s["connected"] and s["scene"] == "set up empty") as page:
+        drop(page, path)
+        until(page, lambda s: s["connected"] and s["scene"] == "set up ct" and s["filled"])
+        assert page.get_by_test_id("setup-question").is_hidden()
+        page.get_by_test_id("segment-2").select_option("silicone")
+        page.get_by_test_id("setup-touch").click()
+        until(page, lambda s: s["scene"] == "ct" and s["frames"] > 3, 3 * PATIENCE)
+        press(page, 3, place=page.evaluate("p => window.palpate.project(p)", [0.0, 0.0, 0.022]))
+        assert np.linalg.norm(settled_force(page)) > 0.02
+        page.mouse.up()
+        page.get_by_test_id("touched-save").click()
+        page.get_by_test_id("touched-saved").wait_for()
+    (region,) = palpate.Scene.read(tmp_path / "saved" / "ct.toml").region
+    assert region.youngs_modulus == 69e3

@@ -25,6 +25,10 @@ export const KEYS: readonly (readonly [key: string, what: string])[] = [
   ["Enter", "compute what is painted"],
   ["m", "in an exam: the nodule is where the tool touches"],
   ["0", "in an exam: there is none"],
+  ["Space", "press the middle of the picture, or let go; while it has the focus"],
+  ["Arrows", "slide the tool, or turn the picture; while it has the focus"],
+  ["PgDn PgUp", "deeper, or less deep; while the picture has the focus"],
+  ["+ -", "zoom; while the picture has the focus"],
   ["?", "this help"],
 ];
 
@@ -37,7 +41,7 @@ export function listenToKeys(control: Control, painting: Painting, viewport: Vie
     x: () => control.toggleLayer("cutaway"),
     s: () => control.toggleLayer("supports"),
     f: () => control.nextField(),
-    p: () => control.toggleLayer("plots"),
+    p: () => control.togglePlots(),
     g: () => control.toggleGrab(),
     k: () => control.toggleStrike(),
     n: () => control.togglePin(),

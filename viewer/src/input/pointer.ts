@@ -156,7 +156,8 @@ export class Pointer {
     const { viewport } = this;
     const { scene, grab: grabWanted, pinned } = state;
     viewport.controls.enabled = false;
-    viewport.canvas.setPointerCapture(event.pointerId);
+    // A press by keys has no pointer that could be caught.
+    if (event.isTrusted) viewport.canvas.setPointerCapture(event.pointerId);
     const { size, tools } = scene!;
     // Without another tool a dent that is still seen is the one that this tool has just left.
     const dent = pinned.length > 0 ? pick.dent : 0;

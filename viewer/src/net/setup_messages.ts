@@ -26,6 +26,12 @@ export interface Nodule {
   youngs_modulus: number;
 }
 
+/** A segment of a label map within the largest one, and the name of its material. */
+export interface SegmentChoice {
+  name: string;
+  tissue: string;
+}
+
 export interface SetupBody {
   name: string;
   file: string;
@@ -55,6 +61,8 @@ export interface SetupBody {
   /** Of the tool. */
   radius: number;
   nodule: Nodule | null;
+  /** All segments but the largest, which has the material of the body. */
+  segments: SegmentChoice[];
   /** Path of the scene that was saved and still is what is chosen. */
   saved: string | null;
 }
@@ -81,7 +89,7 @@ export interface UploadedMessage {
   bytes: number;
 }
 
-export type SetupChange = Partial<Pick<SetupBody, "painted" | "plane" | "tissue" | "radius" | "nodule">> & { unit?: string };
+export type SetupChange = Partial<Pick<SetupBody, "painted" | "plane" | "tissue" | "radius" | "nodule" | "segments">> & { unit?: string };
 
 export type SetupCommand =
   | { type: "upload"; name: string; size: number }

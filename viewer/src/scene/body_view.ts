@@ -5,8 +5,8 @@ import * as THREE from "three";
 import type { BodyArrays, BodyMessage, PoseArrays, Vec3 } from "../net/protocol";
 import type { Layer, Theme } from "../store";
 import { ColorMap } from "./color_map";
-import { FIELD, REGION, tissueColor } from "./field_material";
-import type { FieldUniforms, TISSUE } from "./field_material";
+import { tissueColor } from "./field_material";
+import type { FieldShares, FieldUniforms } from "./field_material";
 import { createGroundShadow } from "./ground_shadow";
 import { firstEntry } from "./ray_surface";
 import { regionTexture } from "./region_texture";
@@ -59,8 +59,8 @@ export interface Pose {
 
 /** Colour of the wire frame, seen against the backdrop as against the body, and how dark the shadow is. */
 const THEME_COLORS: Record<Theme, { wire: number; shadow: number }> = {
-  dark: { wire: 0xf2f5fa, shadow: 1 },
-  light: { wire: 0x1d2733, shadow: 0.4 },
+  dark: { wire: 0xf2f5fa, shadow: 0.85 },
+  light: { wire: 0x1d2733, shadow: 0.5 },
 };
 
 export class BodyView {
@@ -99,7 +99,10 @@ export class BodyView {
     this.uniforms = {
       colorMap: { value: ColorMap.sequential.texture },
       regionColors: { value: regionTexture([tissue]) },
-      coloring: { value: FIELD },
+      byRegion: { value: false },
+      fieldShares: { value: new THREE.Vector2(0, 1) },
+      signed: { value: false },
+      grain: { value: 1 / size },
       gaps: { value: false },
       marked: { value: false },
     };
@@ -115,7 +118,7 @@ export class BodyView {
     this.bothSides.matrixWorld.copy(this.placed.matrix);
     this.wireframe = new WireframeView(this.surface);
     this.supports = new SupportsView(arrays, size);
-    this.shadow = createGroundShadow(this.bounds, size);
+    this.shadow = createGroundShadow(this.restInScene, this.surface.triangles, size);
     this.placed.add(this.solid.mesh, this.wireframe.lines, this.supports.markers);
     this.group.add(this.shadow, this.placed);
   }
@@ -135,16 +138,18 @@ export class BodyView {
     this.drawn = null;
   }
 
-  /** Colours of tissue, of the field, or of regions, one for each; a body that tells of none keeps that of its tissue. */
-  color(coloring: typeof TISSUE | typeof FIELD | THREE.Color[]): void {
-    const { regionColors, coloring: shown } = this.uniforms;
-    if (typeof coloring === "number") {
-      shown.value = coloring;
-      return;
-    }
+  /** How much of the colours of the field is seen over the tissue. */
+  shareField({ everywhere, strained }: FieldShares): void {
+    this.uniforms.byRegion.value = false;
+    this.uniforms.fieldShares.value.set(everywhere, strained);
+  }
+
+  /** Colours of regions, one for each; a body that tells of none keeps that of its tissue. */
+  colorRegions(colors: THREE.Color[]): void {
+    const { regionColors, byRegion } = this.uniforms;
     regionColors.value.dispose();
-    regionColors.value = regionTexture(coloring.length > 0 ? coloring : [tissueColor(this.header.name)]);
-    shown.value = REGION;
+    regionColors.value = regionTexture(colors.length > 0 ? colors : [tissueColor(this.header.name)]);
+    byRegion.value = true;
   }
 
   /** Colours what cannot be touched yet: what each node of the whole surface is (see painting.ts); null where all can. */
@@ -228,6 +233,7 @@ export class BodyView {
     this.drawn = pose;
     this.touched = pose.touched;
     this.uniforms.colorMap.value = (pose.signed ? ColorMap.diverging : ColorMap.sequential).texture;
+    this.uniforms.signed.value = pose.signed;
     this.uniforms.gaps.value = pose.gaps;
     // A mode shape has a size of its own.
     const scale = pose.showsMode ? 1 : this.scale;

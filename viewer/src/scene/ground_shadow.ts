@@ -1,33 +1,29 @@
-// A soft dark patch under the body, so that it does not float.
+// The soft shadow on the ground below a body at rest: computed once from its shape, drawn as one textured rectangle.
 
 import * as THREE from "three";
 
-const TEXTURE_SIZE = 128;
+import { shadowOf } from "./shadow_map";
 
-export function createGroundShadow(
-  bounds: THREE.Box3,
-  size: number,
-): THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial> {
-  const extent = bounds.getSize(new THREE.Vector3());
-  const geometry = new THREE.PlaneGeometry(extent.x + 0.7 * size, extent.y + 0.7 * size);
-  const material = new THREE.MeshBasicMaterial({ map: radialTexture(), transparent: true, depthWrite: false });
-  const mesh = new THREE.Mesh(geometry, material);
-  bounds.getCenter(mesh.position);
-  mesh.position.z = bounds.min.z - 0.01 * size;
+/** The ground lies below the body by this share of the scene, so that neither cuts the other. */
+const BELOW = 0.012;
+/** Warm, as the light is. */
+const COLOR = [14, 9, 6] as const;
+
+export type GroundShadow = THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMaterial>;
+
+/** From points (n, 3) in the scene, m, and triangles (k, 3). */
+export function createGroundShadow(points: Float32Array, triangles: Uint32Array, size: number): GroundShadow {
+  const { darkness, width, left, bottom, ground } = shadowOf(points, triangles);
+  const pixels = Math.sqrt(darkness.length);
+  const texels = new Uint8Array(4 * darkness.length);
+  darkness.forEach((part, i) => texels.set([...COLOR, Math.round(255 * part)], 4 * i));
+  const texture = new THREE.DataTexture(texels, pixels, pixels);
+  texture.colorSpace = THREE.SRGBColorSpace;
+  texture.magFilter = texture.minFilter = THREE.LinearFilter;
+  texture.needsUpdate = true;
+  const material = new THREE.MeshBasicMaterial({ map: texture, transparent: true, depthWrite: false });
+  const mesh: GroundShadow = new THREE.Mesh(new THREE.PlaneGeometry(width, width), material);
+  mesh.position.set(left + width / 2, bottom + width / 2, ground - BELOW * size);
   mesh.renderOrder = -1;
   return mesh;
-}
-
-function radialTexture(): THREE.CanvasTexture {
-  const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = TEXTURE_SIZE;
-  const context = canvas.getContext("2d")!;
-  const half = TEXTURE_SIZE / 2;
-  const gradient = context.createRadialGradient(half, half, 0, half, half, half);
-  gradient.addColorStop(0, "rgba(0, 0, 0, 0.5)");
-  gradient.addColorStop(0.5, "rgba(0, 0, 0, 0.28)");
-  gradient.addColorStop(1, "rgba(0, 0, 0, 0)");
-  context.fillStyle = gradient;
-  context.fillRect(0, 0, TEXTURE_SIZE, TEXTURE_SIZE);
-  return new THREE.CanvasTexture(canvas);
 }

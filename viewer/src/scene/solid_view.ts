@@ -53,9 +53,7 @@ export class SolidView {
     const material = createFieldMaterial(
       {
         color,
-        roughness: 0.46,
-        clearcoat: 0.35,
-        clearcoatRoughness: 0.32,
+        roughness: 0.38,
         // Lines of the rest shape lie in the same place where nothing moves: push the solid behind them.
         polygonOffset: true,
         polygonOffsetFactor: 1,

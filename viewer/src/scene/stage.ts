@@ -11,7 +11,7 @@ import { BodyView } from "./body_view";
 import type { Hit, Pick } from "./body_view";
 import { cutPlane, facingAxis } from "./cut_plane";
 import { ExamPlaces } from "./exam_places";
-import { FIELD, TISSUE } from "./field_material";
+import { FieldFade } from "./field_fade";
 import { NoduleView } from "./nodule_view";
 import { SeenVertices } from "./seen_vertices";
 import { toolShape } from "./tool_shape";
@@ -30,6 +30,10 @@ export class Stage {
   private tools: ToolView[] = [];
   readonly nodule = new NoduleView();
   private readonly examPlaces = new ExamPlaces();
+  private readonly fade = new FieldFade((shares) => {
+    for (const body of this.bodies) body.shareField(shares);
+    this.viewport.invalidate();
+  });
   private stroke: Stroke | null = null;
   private watched: { view: WatchedView; body: number } | null = null;
 
@@ -201,12 +205,15 @@ export class Stage {
   private color(): void {
     const { layers, coloring, scene } = this.store.get();
     const shownAsTissue = !layers.colors || scene?.tools.length === 0;
-    const grouping = scene && coloring !== "field" ? grouped(scene, coloring) : null;
-    this.bodies.forEach((body, i) => {
-      if (shownAsTissue) body.color(TISSUE);
-      else if (!grouping) body.color(FIELD);
-      else body.color((grouping.of[i] ?? []).map((group) => new THREE.Color(grouping.groups[group]!.color)));
-    });
+    const grouping = scene && (coloring === "region" || coloring === "material") ? grouped(scene, coloring) : null;
+    if (shownAsTissue) this.fade.to({ everywhere: 0, strained: 0 });
+    else if (!grouping) this.fade.to({ everywhere: coloring === "field" ? 1 : 0, strained: 1 });
+    else {
+      this.fade.stop();
+      this.bodies.forEach((body, i) => {
+        body.colorRegions((grouping.of[i] ?? []).map((group) => new THREE.Color(grouping.groups[group]!.color)));
+      });
+    }
     this.viewport.invalidate();
   }
 

@@ -86,6 +86,25 @@ export class Viewport {
     if (this.framed) this.frame(this.framed.points, this.framed.scene);
   }
 
+  /** Turns the picture about what is looked at, degrees to the right and up. */
+  turn(right: number, up: number): void {
+    const { target } = this.controls;
+    const seen = new THREE.Spherical().setFromVector3(new THREE.Vector3(...toYUp(this.camera.position.clone().sub(target))));
+    seen.theta += THREE.MathUtils.degToRad(right);
+    seen.phi -= THREE.MathUtils.degToRad(up);
+    seen.makeSafe();
+    const { x, y, z } = new THREE.Vector3().setFromSpherical(seen);
+    this.camera.position.set(x, -z, y).add(target);
+    this.controls.update();
+  }
+
+  /** Makes the bodies larger by a factor, as far as the camera may go. */
+  zoom(factor: number): void {
+    const { target } = this.controls;
+    this.camera.position.sub(target).divideScalar(factor).add(target);
+    this.controls.update();
+  }
+
   /** Unit vector from what is looked at to the viewer. */
   towardsViewer(): THREE.Vector3 {
     return this.camera.position.clone().sub(this.controls.target).normalize();
@@ -185,11 +204,11 @@ export class Viewport {
 
   /** Key and fill travel with the camera, so that a dent shades the same from every side. */
   private addLights(): void {
-    const sky = new THREE.HemisphereLight(0xf4f7ff, 0x6b5c54, 1.6);
+    const sky = new THREE.HemisphereLight(0xfff6ec, 0x7d5a4c, 1.35);
     sky.position.set(0, 0, 1);
-    const key = new THREE.DirectionalLight(0xfff4e8, 2.6);
+    const key = new THREE.DirectionalLight(0xffedd8, 2.9);
     key.position.set(-0.55, 0.8, 1.5);
-    const fill = new THREE.DirectionalLight(0xc8d8ff, 1.1);
+    const fill = new THREE.DirectionalLight(0xf2ece6, 0.8);
     fill.position.set(1, -0.5, 1);
     for (const light of [key, fill]) {
       // A light shines towards its target; a target that is a child too keeps the direction fixed to the camera.
@@ -197,6 +216,11 @@ export class Viewport {
     }
     this.scene.add(this.camera, sky);
   }
+}
+
+/** three's spherical coordinates have y upwards; here it is z. */
+function toYUp({ x, y, z }: THREE.Vector3): [number, number, number] {
+  return [x, z, -y];
 }
 
 function drawsInSoftware(): boolean {

@@ -11,6 +11,11 @@ export function setText(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** How many CSS pixels a pixel of the design is: more on a very large screen, as the style has it. */
+export function designScale(): number {
+  return Number.parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+}
+
 /** Shows a button that stays down as pressed or not. */
 export function press(id: string, pressed: boolean): void {
   byId(id).setAttribute("aria-pressed", String(pressed));

@@ -19,7 +19,8 @@ export class DropZone {
     this.listen();
     store.subscribe(["setup"], ({ setup: told }) => {
       if (!told) return;
-      this.input.accept = told.endings.join();
+      // A dialog knows the last ending only: that of .nii.gz is .gz.
+      this.input.accept = told.endings.map((ending) => ending.slice(ending.lastIndexOf("."))).join();
       const kinds = told.endings.map((ending) => ending.slice(1).toUpperCase()).join(", ");
       setText(byId("empty-kinds"), `${kinds}; up to ${(told.limit / 1e6).toFixed(0)} MB`);
     });

@@ -16,6 +16,8 @@ const LARGER_UNITS: Record<string, { unit: string; factor: number }[]> = {
     { unit: "kPa", factor: 1e3 },
   ],
 };
+/** Below this share of its range a field is at rest. */
+const AT_REST = 0.02;
 /** More regions than these would cover the picture. */
 const GROUPS_MAX = 8;
 
@@ -48,8 +50,9 @@ export class Legend {
       if (sides) setText(byId("legend-size"), `Body of ${sizeText(sides)}`);
     });
     store.subscribe(["layers", "coloring"], ({ layers, coloring }) => {
-      byId("legend-field").hidden = !layers.colors || coloring !== "field";
-      byId("legend-groups").hidden = !layers.colors || coloring === "field";
+      const groups = coloring === "region" || coloring === "material";
+      byId("legend-field").hidden = !layers.colors || groups;
+      byId("legend-groups").hidden = !layers.colors || !groups;
       byId("legend-supports").hidden = !layers.supports;
       byId("legend-wireframe").hidden = !layers.wireframe;
     });
@@ -58,6 +61,7 @@ export class Legend {
       byId("legend-scale").hidden = shownScale === 1;
       setText(byId("legend-scale-text"), `Deformation drawn ${shownScale}x, colours and numbers true`);
     });
+    store.subscribe(["frame", "layers", "coloring", "shownScale"], (state) => this.quiet(state));
     store.subscribe(["frame", "body", "ranges"], ({ frame, body, ranges }) => {
       this.field = frame?.fields[body] ?? null;
       if (this.field) this.show(this.field, this.field.name in ranges);
@@ -82,6 +86,15 @@ export class Legend {
     byId("legend-lock").title = locked ? "Let the range follow the largest value again" : "Keep this range";
     byId("legend-largest").hidden = !locked;
     setText(byId("legend-largest"), `Range locked; largest now ${text(field.largest / factor)}`);
+  }
+
+  /** With few controls there is no legend until there is something to explain: tissue that is strained, or more. */
+  private quiet({ frame, body, layers, coloring, shownScale }: Readonly<State>): void {
+    const { largest = 0, max = 1 } = frame?.fields[body] ?? {};
+    const strained = largest > AT_REST * max;
+    const colored = layers.colors && (coloring !== "strained" || strained);
+    const quiet = !colored && !layers.supports && !layers.wireframe && shownScale === 1;
+    byId("legend").classList.toggle("quiet", quiet);
   }
 
   private drawBar(map: ColorMap): void {
@@ -118,7 +131,7 @@ export class Legend {
 
   private listGroups(state: Readonly<State>): void {
     const { scene, coloring } = state;
-    if (!scene || coloring === "field") return;
+    if (!scene || coloring === "field" || coloring === "strained") return;
     const { groups } = grouped(scene, coloring);
     const shown = groups.length > GROUPS_MAX ? groups.slice(0, GROUPS_MAX - 1) : groups;
     const entries = shown.map((group) => entry(group.color, titleOf(group, state)));

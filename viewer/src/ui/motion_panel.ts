@@ -64,7 +64,7 @@ export class MotionPanel {
   }
 
   private setMotion(motion: MotionScene | null): void {
-    for (const id of ["motion", "tab-motion", "tab-modes", "hint-strike"]) byId(id).hidden = !motion;
+    for (const id of ["motion", "tab-motion", "tab-modes"]) byId(id).hidden = !motion;
     byId("repeat").hidden = !motion?.strike;
     if (!motion) return;
     setText(byId("mode-count"), `the first ${motion.frequencies.length} of ${motion.modes}`);

@@ -55,9 +55,14 @@ export function percent(part: number): string {
   return `${Number((100 * part).toFixed(1))} %`;
 }
 
+/** A length in m, in mm, without the unit. */
+export function inMillimetres(metres: number): string {
+  return (1000 * metres).toFixed(1);
+}
+
 /** A length in m, told in mm. */
 export function millimetres(metres: number): string {
-  return `${(1000 * metres).toFixed(1)} mm`;
+  return `${inMillimetres(metres)} mm`;
 }
 
 /** A round length in m, in the unit that suits it. */

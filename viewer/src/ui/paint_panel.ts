@@ -1,12 +1,13 @@
 // Which part of the surface can be touched, and what is painted to be computed next.
 
-import { BRUSH_MAX, BRUSH_MIN, NOT_READY, NOT_TOUCHABLE, PAINTED, READY, WAITING, countStates, isGrowing } from "../painting";
+import { NOT_READY, NOT_TOUCHABLE, PAINTED, READY, WAITING, countStates, isGrowing } from "../painting";
 import type { Painting } from "../painting";
 import { inControl } from "../store";
 import type { State, Store } from "../store";
+import { brushSlider } from "./brush_slider";
 import { byId, press, setText } from "./dom";
 import { duration } from "./numbers";
-import { Slider } from "./slider";
+import type { Slider } from "./slider";
 
 const STATES = { ready: READY, waiting: WAITING, painted: PAINTED, later: NOT_READY, never: NOT_TOUCHABLE } as const;
 
@@ -14,17 +15,7 @@ export class PaintPanel {
   private readonly brush: Slider;
 
   constructor(store: Store, painting: Painting) {
-    Object.assign(byId<HTMLInputElement>("brush"), { min: String(BRUSH_MIN), max: String(BRUSH_MAX) });
-    this.brush = new Slider({
-      id: "brush",
-      name: "Brush",
-      format: (radius) => `${Math.round(radius)} px`,
-      units: { px: 1 },
-      usual: "px",
-      fallback: () => null,
-      choose: (radius) => painting.setBrush(radius),
-      showError: () => this.brush.show(store.get().brushRadius),
-    });
+    this.brush = brushSlider("brush", painting, () => this.brush.show(store.get().brushRadius));
     byId("paint-brush").onclick = () => painting.choose("brush");
     byId("paint-lasso").onclick = () => painting.choose("lasso");
     byId("paint-undo").onclick = () => painting.undo();

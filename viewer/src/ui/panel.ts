@@ -8,9 +8,12 @@ import type { Axis, Layer, Store } from "../store";
 import { byId, press, setText } from "./dom";
 import { download, takePicture } from "./screenshot";
 import { Slider } from "./slider";
+import { readStored, writeStored } from "./stored";
 
 const LAYERS: Layer[] = ["colors", "wireframe", "supports", "cutaway", "plots"];
 const AXES: Axis[] = ["x", "y", "z"];
+/** In the browser's storage: whether all controls are shown. */
+const MORE_KEY = "more";
 
 export class Panel {
   private readonly share: Slider;
@@ -35,6 +38,11 @@ export class Panel {
     byId("fault-reset").onclick = () => control.reset();
     byId("reset-view").onclick = () => viewport.reframe();
     byId("screenshot").onclick = () => void this.saveScreenshot(viewport);
+    byId("more").onclick = () => {
+      control.showMore(!store.get().more);
+      writeStored(MORE_KEY, store.get().more ? "1" : "0");
+    };
+    control.showMore(readStored(MORE_KEY) === "1");
     followSheet(viewport);
     leaveLists();
     this.follow();
@@ -46,6 +54,13 @@ export class Panel {
       for (const layer of LAYERS) press(`show-${layer}`, layers[layer]);
       byId("cut").hidden = !layers.cutaway;
       byId("plots").hidden = !layers.plots;
+    });
+    store.subscribe(["more"], ({ more }) => {
+      // The style places the panel beside the picture, or as a card over it.
+      document.documentElement.dataset["more"] = more ? "open" : "closed";
+      byId("more-body").hidden = !more;
+      byId("more").setAttribute("aria-expanded", String(more));
+      setText(byId("more-text"), more ? "Less" : "More");
     });
     store.subscribe(["cut"], ({ cut }) => {
       for (const axis of AXES) press(`cut-${axis}`, axis === cut.axis);
@@ -70,7 +85,6 @@ export class Panel {
       setText(byId("cut-whole"), `From a store, so whole: ${whole.map(({ title }) => title).join(", ")}`);
       const several = (scene?.tools.length ?? 0) > 1;
       byId("fingers").hidden = !several;
-      byId("hint-pin").hidden = !several;
     });
   }
 
@@ -90,7 +104,8 @@ function followSheet(viewport: Viewport): void {
     fold.setAttribute("aria-expanded", String(state !== "folded"));
     setText(fold, state === "folded" ? "Show" : "Hide");
     tall.hidden = state === "folded";
-    setText(tall, state === "tall" ? "Less" : "More");
+    tall.setAttribute("aria-pressed", String(state === "tall"));
+    tall.title = state === "tall" ? "Lower sheet" : "Taller sheet";
     viewport.invalidate();
   };
   fold.onclick = () => show(panel.classList.contains("folded") ? "half" : "folded");

@@ -3,12 +3,11 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
-import { byId } from "./dom";
+import { byId, designScale } from "./dom";
 import { themeColor } from "./theme";
 
 export const HEIGHT_PX = 112;
-// Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
-const FONT = "11px system-ui, sans-serif";
+const FONT_PX = 11;
 const TEXT_COLOR = () => themeColor("--muted");
 const GRID = { stroke: () => themeColor("--grid"), width: 1 };
 /** A colour of style.css, in the theme of the moment. */
@@ -26,21 +25,24 @@ export type Trail = () => { along: readonly number[]; up: readonly number[] };
 
 export function createPlot(id: string, along: AxisRange, label: string, colors: LineColor[], range: uPlot.Scale.Range, trail?: Trail): uPlot {
   const box = byId(id);
-  const axis = { font: FONT, labelFont: FONT, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
+  const scale = designScale();
+  // Whole pixels: uPlot scales the number for dense screens and does not read a fraction.
+  const font = `${Math.round(FONT_PX * scale)}px system-ui, sans-serif`;
+  const axis = { font, labelFont: font, stroke: TEXT_COLOR, grid: GRID, ticks: { ...GRID, size: 4 }, gap: 3 };
   const fifths = {
     splits: () => fifthsOf(...along.range()),
     values: (_plot: uPlot, splits: number[]) => splits.map((split) => String(Number(Math.abs(split).toPrecision(3)))),
   };
   const options: uPlot.Options = {
     width: 0,
-    height: HEIGHT_PX,
+    height: scale * HEIGHT_PX,
     padding: [8, 10, 0, 0],
     legend: { show: false },
     cursor: { show: false },
     scales: { x: { time: false, range: () => along.range() }, y: { range } },
     axes: [
-      { ...axis, size: 17, label: along.label(), labelSize: 13, labelGap: 0, ...(along.round ? { space: 30 } : fifths) },
-      { ...axis, size: 38, space: 20, label, labelSize: 14, labelGap: 0 },
+      { ...axis, size: 17 * scale, label: along.label(), labelSize: 13 * scale, labelGap: 0, ...(along.round ? { space: 30 } : fifths) },
+      { ...axis, size: 38 * scale, space: 20 * scale, label, labelSize: 14 * scale, labelGap: 0 },
     ],
     series: [{}, ...colors.map((color) => ({ stroke: () => themeColor(color), width: 1.25, points: { show: false } }))],
     hooks: {

@@ -5,7 +5,7 @@ import type uPlot from "uplot";
 import type { FrameData } from "../net/protocol";
 import { shownTool } from "../store";
 import type { Store, Tab } from "../store";
-import { byId } from "./dom";
+import { byId, designScale } from "./dom";
 import { HistoryLog } from "./history_log";
 import { LogWindow, WINDOW_S } from "./log_window";
 import { HEIGHT_PX, createPlot } from "./plot";
@@ -16,7 +16,7 @@ const REDRAW_INTERVAL_MS = 80;
 /** Above these stands what their lines mean. */
 const MOTION_HEIGHT_PX = 108;
 /** In a window lower than this plots give way by so much, or the statistics below would be out of sight. */
-const LOW_WINDOW_PX = 780;
+const LOW_WINDOW_PX = 920;
 const LOWER_PX = 22;
 /** Spans below these are noise, and would only dance: N, us, mm. */
 const FORCE_SPAN_MIN = 0.1;
@@ -86,7 +86,7 @@ export class Plots {
   }
 
   private follow(store: Store): void {
-    store.subscribe(["layers"], ({ layers }) => (this.shown = layers.plots));
+    store.subscribe(["layers", "more"], ({ layers, more }) => (this.shown = layers.plots && more));
     store.subscribe(["scene"], ({ scene }) => {
       this.log.clear();
       this.press.clear();
@@ -140,7 +140,7 @@ export class Plots {
     for (const plot of Object.values(this.plots)) {
       const width = plot.root.parentElement!.clientWidth;
       const tall = plot === displacement || plot === energy ? MOTION_HEIGHT_PX : HEIGHT_PX;
-      const height = window.innerHeight < LOW_WINDOW_PX ? tall - LOWER_PX : tall;
+      const height = Math.round(designScale() * (window.innerHeight < LOW_WINDOW_PX ? tall - LOWER_PX : tall));
       if (width > 0 && width !== plot.width) plot.setSize({ width, height });
     }
   }

@@ -4,7 +4,7 @@ import { shownTool } from "../store";
 import type { State, Store } from "../store";
 import { contactsOf, deepest, feltStiffness } from "../tool_contacts";
 import { byId, setText } from "./dom";
-import { MINUS, millimetres, newtonsPerMillimetre, percent, signed, threeDigits } from "./numbers";
+import { MINUS, inMillimetres, newtonsPerMillimetre, percent, signed, threeDigits } from "./numbers";
 
 /** Linear elasticity leaves out the square of the gradient; beyond about 10 % that shows. */
 const LINEAR_STRAIN_MAX = 0.1;
@@ -17,6 +17,7 @@ export class Readout {
   private readonly stiffness = byId("stiffness-felt");
   private readonly contactLabel = byId("contact-label");
   private readonly contact = byId("contact-value");
+  private readonly slides = byId("contact-slides");
   private readonly pinned = byId("pinned-value");
   private readonly depthLabel = byId("depth-label");
   private readonly depth = byId("depth-value");
@@ -44,7 +45,7 @@ export class Readout {
     force.forEach((component, axis) => setText(this.components[axis]!, signed(component)));
     byId("pinned-line").hidden = pinned.length === 0;
     const others = pinned.map((other) => threeDigits(Math.hypot(...(frame?.tools[other]?.force ?? [0]))));
-    setText(this.pinned, `${others.join(" · ")} N`);
+    setText(this.pinned, others.join(" · "));
     this.refused.hidden = !driven?.active || driven.refused === null;
     if (driven?.refused) setText(this.refused, driven.refused);
     this.thin.hidden = !driven?.thin;
@@ -61,11 +62,12 @@ export class Readout {
     const stiffness = feltStiffness(contacts, scene?.bodies ?? []);
     setText(this.stiffness, stiffness === null ? "–" : newtonsPerMillimetre(stiffness));
     const slides = contacts.every(({ slipping }) => slipping);
-    setText(this.contactLabel, contacts.length > 1 ? `${contacts.length} places` : "Contact");
-    setText(this.contact, contact ? `${millimetres(contact.radius)}, ${slides ? "slides" : "sticks"}` : "–");
+    setText(this.contactLabel, contacts.length > 1 ? `Radius, deepest of ${contacts.length}` : "Contact radius");
+    setText(this.contact, contact ? inMillimetres(contact.radius) : "–");
+    setText(this.slides, contact ? (slides ? "slides" : "sticks") : "–");
     setText(this.depthLabel, pressing?.grab ? "Pull" : "Depth");
     const depth = contact?.depth ?? pressing?.depth;
-    setText(this.depth, depth === undefined ? "–" : millimetres(depth).replace("-", MINUS));
+    setText(this.depth, depth === undefined ? "–" : inMillimetres(depth).replace("-", MINUS));
   }
 
   private showStrain({ frame, settings }: Readonly<State>): void {

@@ -4,11 +4,11 @@ import * as THREE from "three";
 
 import type { Viewport } from "../scene/viewport";
 import type { Store } from "../store";
-import { byId } from "./dom";
+import { byId, designScale } from "./dom";
 import { lengthText } from "./numbers";
 import { themeColor } from "./theme";
 
-/** CSS pixels. */
+/** Pixels of the design. */
 const BAR_MAX = 104;
 const BAR_TOP = 92;
 const AXIS_LENGTH = 26;
@@ -39,7 +39,8 @@ export class ScaleView {
     // The bar is true at the depth of the point that the view turns about.
     const metresPerPixel = viewport.metresPerPixel(viewport.controls.target);
     if (canvas.clientWidth === 0 || !(metresPerPixel > 0)) return;
-    const length = roundLength(BAR_MAX * metresPerPixel);
+    const scale = designScale();
+    const length = roundLength(BAR_MAX * scale * metresPerPixel);
     canvas.setAttribute("aria-label", `Axes of the scene, and a scale bar of ${lengthText(length)}`);
     canvas.dataset["metres"] = String(length);
     canvas.dataset["pixels"] = String(length / metresPerPixel);
@@ -47,9 +48,9 @@ export class ScaleView {
     canvas.width = Math.round(canvas.clientWidth * ratio);
     canvas.height = Math.round(canvas.clientHeight * ratio);
     const context = canvas.getContext("2d")!;
-    context.scale(ratio, ratio);
+    context.scale(ratio * scale, ratio * scale);
     drawAxes(context, viewport.camera);
-    drawBar(context, length / metresPerPixel, lengthText(length));
+    drawBar(context, length / metresPerPixel / scale, lengthText(length));
   }
 }
 

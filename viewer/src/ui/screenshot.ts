@@ -28,10 +28,10 @@ export function takePicture(viewport: Viewport): Promise<Blob | null> {
 
 /** As the style of the page has it: a little lighter in the middle. */
 function paintBackdrop(context: CanvasRenderingContext2D, width: number, height: number): void {
-  const [x, y] = [0.5 * width, 0.44 * height];
+  const [x, y] = [0.5 * width, 0.56 * height];
   const gradient = context.createRadialGradient(x, y, 0, x, y, 0.75 * Math.max(width, height));
   gradient.addColorStop(0.04, themeColor("--backdrop-middle"));
-  gradient.addColorStop(0.74, themeColor("--backdrop"));
+  gradient.addColorStop(0.78, themeColor("--backdrop"));
   context.fillStyle = gradient;
   context.fillRect(0, 0, width, height);
 }
@@ -41,6 +41,7 @@ function paint(context: CanvasRenderingContext2D, element: HTMLElement): void {
   const box = element.getBoundingClientRect();
   if (box.width === 0 || box.height === 0 || element instanceof HTMLButtonElement) return;
   const style = getComputedStyle(element);
+  if (style.visibility === "hidden") return;
   paintBox(context, box, style);
   if (element instanceof HTMLCanvasElement) {
     context.drawImage(element, box.left, box.top, box.width, box.height);

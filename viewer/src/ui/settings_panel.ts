@@ -18,8 +18,9 @@ const STRAIN_OFF_PERCENT = 51;
 const MODULI: Range = [1e-6, 1e15];
 const PASCALS = { Pa: 1, kPa: 1e3, MPa: 1e6, GPa: 1e9 };
 
-/** In the list of fields, before what is no field. */
+/** In the list of fields, before what is no field; and the first entry. */
 const GROUPED = "by-";
+const STRAINED = { name: "tissue", title: "Tissue and strain" };
 const GROUPING_TITLES = { region: "Region", material: "Material" };
 
 export class SettingsPanel {
@@ -39,7 +40,7 @@ export class SettingsPanel {
     this.strainLimit = strainSlider(store, control);
     this.scale = new Slider({
       id: "shown-scale",
-      name: "Deformation",
+      name: "Exaggeration",
       format: (value) => `${value}x`,
       units: { x: 1 },
       fallback: () => 1,
@@ -78,13 +79,14 @@ export class SettingsPanel {
   private listFields({ scene, body, field, coloring }: Readonly<State>): void {
     const fields = scene?.bodies[body]?.fields ?? [];
     const groups = groupings(scene);
-    const offered = [...fields, ...groups.map((by) => ({ name: GROUPED + by, title: GROUPING_TITLES[by] }))];
+    const offered = [STRAINED, ...fields, ...groups.map((by) => ({ name: GROUPED + by, title: GROUPING_TITLES[by] }))];
     const listed = [...this.field.options].map(({ value }) => value);
     if (listed.join() !== offered.map(({ name }) => name).join()) {
       this.field.replaceChildren(...offered.map(({ name, title }) => new Option(title, name)));
     }
     const shown = fields.find(({ name }) => name === field) ?? fields[0];
-    if (coloring !== "field") this.field.value = GROUPED + coloring;
+    if (coloring === "strained") this.field.value = STRAINED.name;
+    else if (coloring !== "field") this.field.value = GROUPED + coloring;
     else if (shown) this.field.value = shown.name;
   }
 
@@ -92,6 +94,7 @@ export class SettingsPanel {
     const { value } = this.field;
     const grouping = (["region", "material"] as const).find((by) => value === GROUPED + by);
     if (grouping) control.chooseGrouping(grouping);
+    else if (value === STRAINED.name) control.chooseStrained();
     else control.chooseField(value);
   }
 
@@ -107,7 +110,7 @@ export class SettingsPanel {
   private stiffnessSlider(store: Store, control: Control): Slider {
     return new Slider({
       id: "stiffness",
-      name: "Stiffness",
+      name: "Material stiffness",
       format: pascals,
       units: PASCALS,
       scale: {

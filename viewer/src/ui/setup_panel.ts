@@ -1,12 +1,12 @@
 // The controls of a body that is set up: its size and unit, supports, material, tool and nodule.
 
-import type { SetupBody, SetupMessage, SupportPlane } from "../net/setup_messages";
-import { BRUSH_MAX, BRUSH_MIN } from "../painting";
+import type { SetupBody, SetupMessage, SupportPlane, Tissue } from "../net/setup_messages";
 import type { Painting } from "../painting";
 import { editedBody, hindrance } from "../setup";
 import type { Setup } from "../setup";
 import { inControl } from "../store";
 import type { State, Store } from "../store";
+import { brushSlider } from "./brush_slider";
 import { byId, press, setText } from "./dom";
 import { millimetres, pascals, sizeText } from "./numbers";
 import { Slider } from "./slider";
@@ -50,17 +50,7 @@ export class SetupPanel {
     this.radius = this.lengthSlider("setup-radius", "Tool radius", (radius) => setup.choose({ radius }));
     this.noduleRadius = this.lengthSlider("nodule-radius", "Nodule", (radius) => setup.moveNodule({ radius }));
     this.noduleModulus = this.modulusSlider();
-    Object.assign(byId<HTMLInputElement>("setup-brush-size"), { min: String(BRUSH_MIN), max: String(BRUSH_MAX) });
-    this.brush = new Slider({
-      id: "setup-brush-size",
-      name: "Brush",
-      format: (radius) => `${Math.round(radius)} px`,
-      units: { px: 1 },
-      usual: "px",
-      fallback: () => null,
-      choose: (radius) => painting.setBrush(radius),
-      showError: notice,
-    });
+    this.brush = brushSlider("setup-brush-size", painting, notice);
     this.listen(painting);
     store.subscribe(["setup", "status", "role", "connection", "strokes"], (state) => this.show(state));
     store.subscribe(["paintTool"], ({ paintTool }) => {
@@ -190,6 +180,29 @@ export class SetupPanel {
     const spread = chosen && chosen.spread > 0 ? ` ± ${pascals(chosen.spread)}` : "";
     setText(byId("setup-modulus"), `E = ${pascals(body.youngs_modulus)}${spread}, ν = ${body.poissons_ratio}`);
     setText(byId("setup-source"), chosen?.source ?? "");
+    this.showSegments(setup, body);
+  }
+
+  /** A material for each segment of a label map within the largest. */
+  private showSegments({ tissues }: SetupMessage, { file, segments }: SetupBody): void {
+    const rows = byId("setup-segments");
+    const of = JSON.stringify([file, segments.map(({ name }) => name)]);
+    if (rows.dataset["of"] !== of) {
+      rows.dataset["of"] = of;
+      rows.replaceChildren(...segments.map(({ name }) => this.segmentRow(name, tissues)));
+    }
+    [...rows.querySelectorAll("select")].forEach((select, i) => (select.value = segments[i]!.tissue));
+  }
+
+  private segmentRow(name: string, tissues: readonly Tissue[]): HTMLElement {
+    const [row, title, select] = [document.createElement("label"), document.createElement("span"), document.createElement("select")];
+    row.className = "row";
+    title.textContent = name;
+    select.dataset["testid"] = `segment-${name}`;
+    select.replaceChildren(...tissues.map((tissue) => new Option(tissue.title, tissue.name)));
+    select.onchange = () => this.setup.chooseSegment(name, select.value);
+    row.append(title, select);
+    return row;
   }
 
   private showSaved({ saved }: SetupBody): void {

@@ -40,7 +40,7 @@ export class ToolPanel {
     });
     this.radius = new Slider({
       id: "radius",
-      name: "Patch",
+      name: "Patch radius",
       format: millimetres,
       units: { mm: 1e-3, cm: 1e-2, m: 1 },
       usual: "mm",
@@ -75,7 +75,7 @@ export class ToolPanel {
   private showPosture(state: Readonly<State>): void {
     const tool = shownTool(state) ?? 0;
     const [header, posture] = [state.scene?.tools[tool], state.postures[tool]];
-    for (const id of ["tilt-field", "turn-field", "hint-turn"]) byId(id).hidden = !header || header.shape === "sphere";
+    for (const id of ["tilt-field", "turn-field"]) byId(id).hidden = !header || header.shape === "sphere";
     if (!posture) return;
     this.tilt.show(posture.tilt);
     this.turn.show(posture.turn);
