@@ -43,12 +43,12 @@ STANDS = 2.5
 
 @contextlib.contextmanager
 def page_of(
-    chromium: Browser, *arguments: str, command: str = "demo", size: tuple[int, int] = (1280, 720)
+    chromium: Browser, *arguments: str, command: str = "demo", size: tuple[int, int] = (1280, 720), more: bool = True
 ) -> Iterator[Page]:
-    """Open the page of a program on the user's own cache; the hint is dismissed."""
+    """Open the page of a program on the user's own cache, with all controls or with few; the hint is dismissed."""
     program = Program(None, *arguments, command=command)
     try:
-        with opened(chromium, program, size, sharpness=1.0) as page:
+        with opened(chromium, program, size, sharpness=1.0, more=more) as page:
             page.emulate_media(color_scheme="dark")
             page.locator("#hint-close").click()
             yield page
@@ -72,10 +72,10 @@ def take(page: Page, path: Path, contacts: int) -> None:
 
 
 def viewer(chromium: Browser, out: Path) -> None:
-    """Press a finger on the liver, and show the stress around it."""
-    with page_of(chromium, "liver", size=(1280, 800)) as page:
-        choose(page, "field-select", "von_mises")
-        press(page, 2, place=(510, 250))
+    """Press a finger on the liver, as someone does who sees the page first."""
+    with page_of(chromium, "liver", size=(1280, 800), more=False) as page:
+        x, y = page.evaluate("window.palpate.pickPoint()")
+        press(page, 3, place=(x, y + 30))
         time.sleep(STANDS)
         take(page, out / "viewer.png", 1)
 
@@ -121,7 +121,6 @@ def cut(chromium: Browser, out: Path) -> None:
     with page_of(chromium, "liver", size=(1280, 800)) as page:
         choose(page, "field-select", "von_mises")
         page.keyboard.press("x")
-        page.keyboard.press("w")
         time.sleep(STANDS)
         press(page, 4)
         time.sleep(STANDS)
@@ -133,7 +132,6 @@ def regions(chromium: Browser, out: Path) -> None:
     with page_of(chromium, str(ROOT / "examples" / "nodule.toml"), command="run") as page:
         page.get_by_test_id("field-select").select_option(label="Region")
         page.keyboard.press("x")
-        page.keyboard.press("w")
         time.sleep(STANDS)
         take(page, out / "regions.png", 0)
 

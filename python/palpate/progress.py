@@ -35,7 +35,7 @@ def reported_to(*reporters: Reporter | None) -> Reporter:
 
 @contextlib.contextmanager
 def progress_reporter(title: str, progress: bool | Callable[[int, int], None]) -> Iterator[Reporter | None]:
-    """Yield who is told of the progress, or None where nobody watches; a reporter is told of phases too."""
+    """Yield the reporter of the progress, or None where there is no terminal. A reporter takes phases too."""
     if isinstance(progress, Reporter):
         yield progress
         return

@@ -62,17 +62,35 @@ class Program:
         return self.process.wait(20)
 
 
+# A browser in which someone has opened More before; a choice of the test itself stays.
+MORE_OPEN = """
+if (location.protocol === 'http:' && localStorage.getItem('palpate-more') === null)
+    localStorage.setItem('palpate-more', '1');
+"""
+
+
 @contextlib.contextmanager
-def opened(chromium, program, size: tuple[int, int] = (1280, 720), listen=None, sharpness: float = 0.5, ready=None):
+def opened(
+    chromium,
+    program,
+    size: tuple[int, int] = (1280, 720),
+    listen=None,
+    sharpness: float = 0.5,
+    ready=None,
+    more: bool = True,
+):
     """The page with a scene on it; anything on its console is a failure. ``listen`` gets all that the server sends.
 
-    ``ready`` is a condition of its state by which it is open; without it, that frames are drawn.
+    ``ready`` is a condition of its state by which it is open; without it, that frames are drawn. With ``more`` all
+    controls are shown, as to someone who has opened them before.
 
     Drawing in software takes most of the time of a test: half of the pixels along each side do, where a test does not
     look at them.
     """
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]}, device_scale_factor=sharpness)
     context.set_default_timeout(1e3 * PATIENCE)
+    if more:
+        context.add_init_script(MORE_OPEN)
     page = context.new_page()
     complaints = []
     page.on(

@@ -83,7 +83,7 @@ pub unsafe extern "C" fn palpate_scene_add_body(
         if options.youngs_modulus != 0.0 {
             let all = |value| vec![value; store.green.surface_count()];
             let (youngs, poissons) = (all(options.youngs_modulus), all(options.poissons_ratio));
-            body.moduli = Some(Moduli { youngs, poissons, homogeneous: true });
+            body.moduli = Some(Moduli::linear(youngs, poissons, true));
         }
         let id = scene.scene.add_body(body)?;
         handle.into_iter().for_each(|handle| *handle = id.0);

@@ -67,7 +67,7 @@ mod _native {
     #[pymodule_export]
     use crate::rerun::rerun;
     #[pymodule_export]
-    use crate::scene::checksum;
+    use crate::scene::{checksum, strain_terms};
     #[pymodule_export]
     use crate::simulation::SimulationCore;
     #[pymodule_export]

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::DQuat;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use palpate_core::contact::Moduli;
+use palpate_core::contact::local::StrainLaw;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Contact, LawKind, Mode, Model, Pose, Snapshot};
@@ -23,8 +24,10 @@ use crate::green::GreenCore;
 /// Eigenvalues (m), their shapes at the surface dofs (3s, m), the scheme, whether each mode is integrated exactly instead,
 /// and the spring between tools and patches, N/m.
 pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, SchemeArguments, bool, f64);
-/// Young's modulus (s, Pa) and Poisson's ratio (s) at the surface nodes, and whether all of the body is of one material.
-pub type ModuliArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, bool);
+/// Young's modulus (s, Pa) and Poisson's ratio (s) at the surface nodes, coefficients of finite strain (s, 3) of a material that is not
+/// linear, and whether all of the body is of one material.
+pub type ModuliArguments<'py> =
+    (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray2<'py, f64>>, bool);
 /// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, and its elastic constants.
 pub type BodyArguments<'py> =
     (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>, Option<ModuliArguments<'py>>);
@@ -50,13 +53,28 @@ pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
         .transpose()?;
     let moduli = moduli
         .as_ref()
-        .map(|(youngs, poissons, homogeneous)| -> PyResult<_> {
-            let (youngs, poissons) = (youngs.as_slice()?.to_vec(), poissons.as_slice()?.to_vec());
-            Ok(Moduli { youngs, poissons, homogeneous: *homogeneous })
+        .map(|(youngs, poissons, terms, homogeneous)| -> PyResult<_> {
+            let linear = Moduli::linear(youngs.as_slice()?.to_vec(), poissons.as_slice()?.to_vec(), *homogeneous);
+            let Some(terms) = terms else { return Ok(linear) };
+            Ok(Moduli { strain_terms: terms.as_slice()?.as_chunks().0.to_vec(), ..linear })
         })
         .transpose()?;
     let placement = placement(*position, *orientation);
     Ok(Body { name: String::new(), green: green.green.clone(), placement, moduli, motion, strain: None })
+}
+
+/// Coefficients of a sphere's contact at finite strain of a material, by its law, two ratios of its constants and Poisson's ratio;
+/// `None` outside of the table.
+#[pyfunction]
+pub fn strain_terms(law: &str, first: f64, second: f64, poisson: f64) -> Option<[f64; 3]> {
+    let law = match law {
+        "linear" => StrainLaw::Linear,
+        "neo-hookean" => StrainLaw::NeoHookean,
+        "mooney-rivlin" => StrainLaw::MooneyRivlin { share: first },
+        "yeoh" => StrainLaw::Yeoh { quadratic: first, cubic: second },
+        _ => return None,
+    };
+    law.is_known(poisson).then(|| palpate_core::contact::local::strain_terms(&law, poisson))
 }
 
 /// Hex BLAKE3 hash, as a packed scene names it.

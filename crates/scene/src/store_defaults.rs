@@ -42,7 +42,7 @@ pub fn moduli_of_store(green: &GreensFunction) -> Result<Option<Moduli>> {
         let reason = format!("is damaged (elastic constants at {} of {count} nodes); compute it again", youngs.len());
         return Err(Error::Store { path, reason });
     }
-    Ok(Some(Moduli { youngs, poissons, homogeneous }))
+    Ok(Some(Moduli::linear(youngs, poissons, homogeneous)))
 }
 
 /// Radius of a tool that suits a body, m: a sixteenth of its longest side.

@@ -4,7 +4,7 @@ from palpate.body.body import Body
 from palpate.body.free_end import free_end
 from palpate.body.loads import Loads, gravity_error
 from palpate.body.material import Material
-from palpate.body.moduli import surface_moduli
+from palpate.body.moduli import surface_moduli, surface_strain_terms
 from palpate.body.predicate import parse
 from palpate.body.problem import description, problem_arrays
 from palpate.body.supports import Fixed
@@ -23,4 +23,5 @@ __all__ = [
     "problem_arrays",
     "surface_moduli",
     "surface_region",
+    "surface_strain_terms",
 ]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 INCOMPRESSIBLE = 0.49
+NOT_CHECKED = "not checked at the source"
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Tissue:
         As taken by the source, below one half.
     source
         Authors, year, journal, and how it was measured.
+    checked
+        Whether the figures were compared with the source itself. The abstract alone, or another's quotation, is not it.
 
     """
 
@@ -37,6 +40,12 @@ class Tissue:
     spread: float
     poissons_ratio: float
     source: str
+    checked: bool = True
+
+    @property
+    def citation(self) -> str:
+        """Source, and whether its figures were not checked there."""
+        return self.source if self.checked else f"{self.source} ({NOT_CHECKED})"
 
 
 TISSUES = (
@@ -59,6 +68,8 @@ TISSUES = (
     Tissue(
         *("fat", "Fat, breast", 3.25e3, 0.91e3, 0.495),
         "Samani et al. 2007, Phys. Med. Biol. 52:1565, indentation of fresh samples",
+        # The abstract confirms that fat is as stiff as fibroglandular tissue, without figures.
+        checked=False,
     ),
     Tissue(
         *("gelatine", "Gelatine, 5 %", 12.54e3, 2.52e3, INCOMPRESSIBLE),
@@ -67,5 +78,7 @@ TISSUES = (
     Tissue(
         *("silicone", "Silicone, Ecoflex 00-30", 69e3, 0.0, INCOMPRESSIBLE),
         "Smooth-On, technical bulletin of the Ecoflex series: modulus at 100 % strain, 10 psi",
+        # Others quote 10 psi from the bulletin. It is stress over strain at 100 %, not the slope at small strains.
+        checked=False,
     ),
 )

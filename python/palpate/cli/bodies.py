@@ -15,6 +15,7 @@ from palpate.cli.completion import units
 from palpate.segmentation.endings import is_segmentation
 
 if TYPE_CHECKING:
+    import numpy as np
     from distributed import Client
 
     from palpate.body import Body, Loads, Material
@@ -167,8 +168,9 @@ def read_any(
     max_size: str | None = None,
     fill: FillOptions | None = None,
     progress: bool | Reporter = True,
+    drawn: Callable[[np.ndarray, np.ndarray], None] | None = None,
 ) -> TetMesh:
-    """Read a volume mesh, or fill a surface.
+    """Read a volume mesh, or fill a surface; ``drawn`` takes the boundary of a segmentation before it is filled.
 
     Raises
     ------
@@ -184,7 +186,7 @@ def read_any(
     if is_surface(path) or is_segmentation(path):
         size = None if max_size is None else length(max_size)
         chosen = "linear" if element == Element.LINEAR else "quadratic"
-        return tetrahedralize_with(chosen, path, size, unit, options=fill, progress=progress)
+        return tetrahedralize_with(chosen, path, size, unit, options=fill, progress=progress, drawn=drawn)
     if max_size is not None or fill not in (None, FillOptions()):
         raise MeshError(
             f"{path} is a volume mesh: --max-size, --mesher, --part, --max-volume-loss and --segment are for files "
@@ -223,17 +225,27 @@ def likely_units(path: Path) -> list[str]:
 
     from palpate.errors import UnclearUnitError
     from palpate.mesh.files import read_volume
-    from palpate.mesh.size import scale_of
     from palpate.mesh.tetrahedralize import read_surface
 
     if is_segmentation(path):
         # Whose unit is that of the file, or mm.
         return ["mm"]
+    if is_surface(path):
+        return units_of_size(path, np.asarray(read_surface(path).vertices))
     try:
-        if is_surface(path):
-            scale_of(str(path), np.asarray(read_surface(path).vertices), None)
-        else:
-            read_volume(path, None)
+        read_volume(path, None)
+    except UnclearUnitError as error:
+        return list(error.fitting) or ["m"]
+    return ["m"]
+
+
+def units_of_size(path: Path, positions: np.ndarray) -> list[str]:
+    """Return the units of :func:`likely_units` for positions (k, 3) that have been read."""
+    from palpate.errors import UnclearUnitError
+    from palpate.mesh.size import scale_of
+
+    try:
+        scale_of(str(path), positions, None)
     except UnclearUnitError as error:
         return list(error.fitting) or ["m"]
     return ["m"]

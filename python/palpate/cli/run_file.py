@@ -19,6 +19,7 @@ from palpate.cli.bodies import (
     materials_of,
     read_any,
     segment_tables,
+    units_of_size,
 )
 from palpate.errors import SceneError
 from palpate.segmentation.endings import is_segmentation
@@ -26,8 +27,10 @@ from palpate.segmentation.endings import is_segmentation
 if TYPE_CHECKING:
     from palpate.body import Body
     from palpate.green import BackgroundPrecompute, GreensFunction
+    from palpate.mesh.segmented import Draw
     from palpate.progress import Reporter
     from palpate.scene import BuiltScene, Scene
+    from palpate.scene.early import Expected
 
 
 @dataclass(frozen=True)
@@ -103,8 +106,9 @@ def surface_of(file: Path, options: RunOptions) -> tuple[np.ndarray, np.ndarray]
     if not is_surface(path):
         return None
     shape = load_surface(path).shape
-    scale = length_scale(unit or likely_units(path)[0])
-    return merged(np.asarray(shape.vertices) * scale, np.asarray(shape.faces))
+    vertices = np.asarray(shape.vertices)
+    scale = length_scale(unit or units_of_size(path, vertices)[0])
+    return merged(vertices * scale, np.asarray(shape.faces))
 
 
 def built_from(
@@ -112,8 +116,11 @@ def built_from(
     options: RunOptions,
     growing: dict[int, BackgroundPrecompute] | None = None,
     progress: bool | Reporter = True,
+    drawn: Draw | None = None,
 ) -> BuiltScene:
     """Scene of a file, ready to run; what is computed on beside it goes into ``growing``, if there is one.
+
+    ``drawn`` takes the boundary of a segmentation, vertices, m, and triangles, before it is filled.
 
     Raises
     ------
@@ -132,11 +139,11 @@ def built_from(
         options.refuse(file, places, "it stands in the table [body] of the scene")
         scene = scene_with(Scene.read(file), options)
     else:
-        return _bare(file, options, growing, progress)
+        return _bare(file, options, growing, progress, drawn)
     with status_line(f"preparing {scene.name}"):
         if growing is None:
-            return scene.build(progress)
-        built, rest = scene.build_first(progress)
+            return scene.build(progress, announce=print_expected)
+        built, rest = scene.build_first(progress, print_expected)
         growing.update(rest)
         return built
 
@@ -230,7 +237,11 @@ def _radii(tool: Any, radius: str) -> dict[str, float]:
 
 
 def _bare(
-    file: Path, options: RunOptions, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter
+    file: Path,
+    options: RunOptions,
+    growing: dict[int, BackgroundPrecompute] | None,
+    progress: bool | Reporter,
+    drawn: Draw | None,
 ) -> BuiltScene:
     """Take a mesh or a surface, with defaults for all that was not typed; which they are is printed."""
     from palpate import units
@@ -247,7 +258,7 @@ def _bare(
     # A body that is of no likely size in any unit is asked about, not taken for one in metres.
     known = None if options.unit is None and unit == "m" else unit
     fill = fill_options(options.mesher, options.part, options.max_volume_loss, options.segment)
-    mesh = read_any(file, known, options.element, options.max_size, fill, progress)
+    mesh = read_any(file, known, options.element, options.max_size, fill, progress, drawn)
     low, high = mesh.bounds
     fix = options.fix
     if fix is None:
@@ -276,8 +287,14 @@ def _bare(
     return built
 
 
+def print_expected(expected: Expected) -> None:
+    """Print how large a body is and what its store takes, before it is computed."""
+    if expected.plan is not None:
+        print(expected, flush=True)
+
+
 def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress: bool | Reporter) -> GreensFunction:
-    """Compute what touches need: at first only around the highest point, where the whole takes long."""
+    """Compute what touches need: at first only where the page shows the middle, if the whole takes long."""
     from palpate.green import BackgroundPrecompute, precompute
     from palpate.mesh import shapes
     from palpate.progress import Reporter, progress_reporter
@@ -286,13 +303,7 @@ def _green(body: Body, growing: dict[int, BackgroundPrecompute] | None, progress
     if isinstance(progress, Reporter):
         progress.phase("planning")
     expected = Expected.of(body)
-    planned = expected.plan
-    if planned is not None:
-        size, seconds = planned.store / 1e6, max(planned.seconds, 1.0)
-        print(
-            f"computing {planned.columns} columns: at most {size:.3g} MB in the cache, about {seconds:.0f} s",
-            flush=True,
-        )
+    print_expected(expected)
     if growing is None or expected.first is None:
         return precompute(body, progress=progress)
     growing[0] = background = BackgroundPrecompute(body, first=shapes.Sphere(*expected.first))

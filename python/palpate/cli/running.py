@@ -242,10 +242,10 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
         surface = surface_of(file, options)
         if surface is not None:
             draw(*surface)
-        # What can be touched when a part is ready goes on with the rest beside the loop.
+        # Where a part is touched first, the rest is computed beside the loop.
         growing: dict[int, BackgroundPrecompute] = {}
         with progress_reporter(file.name, True) as bar:
-            built = built_from(file, options, growing, reported_to(reporter, bar))
+            built = built_from(file, options, growing, reported_to(reporter, bar), draw)
         _print_kept()
         _print_loose(built)
         maps = None if surface_map is None else read_map(surface_map, built)

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 
 def print_segmentation(path: Path, unit: str | None) -> None:
     """Print the voxels, the segments with their volumes, and the command that makes a body of them."""
-    from palpate.segmentation import load_label_map
+    from palpate.mesh.label_summary import label_summary
 
-    labels = load_label_map(path, unit)
+    labels = label_summary(path, unit)
     sides = " x ".join(f"{1e3 * side:.4g}" for side in labels.spacing)
-    shape = " x ".join(map(str, labels.layers.shape[1:]))
+    shape = " x ".join(map(str, labels.shape))
     print(f"{path}: label map of {shape} voxels of {sides} mm, {len(labels.segments)} segments")
-    largest, most = labels.segments[0].name, -1
     for segment in labels.segments:
-        count = int(np.count_nonzero(labels.mask(segment)))
-        largest, most = (segment.name, count) if count > most else (largest, most)
-        size = f"{1e6 * count * labels.voxel_volume:.4g} cm3, {count:,} voxels" if count else "empty"
-        print(f"  '{segment.name}' (label {segment.value}): {size}")
-    print(f"  to touch it: palpate run {path} --segment '{largest}'")
+        volume = f"{1e6 * segment.voxels * labels.voxel_volume:.4g} cm3, {segment.voxels:,} voxels"
+        print(f"  '{segment.name}' (label {segment.value}): {volume if segment.voxels else 'empty'}")
+    largest = max(labels.segments, key=lambda segment: segment.voxels)
+    print(f"  to touch it: palpate run {path} --segment '{largest.name}'")

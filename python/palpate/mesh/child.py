@@ -9,6 +9,7 @@ import subprocess
 import time
 from collections.abc import Callable
 
+OUT_OF_PROCESSOR_TIME = "used up its processor time and was stopped"
 # How often a child's stage is looked at, s.
 LOOK = 0.1
 
@@ -47,7 +48,7 @@ def failure_of(status: int | None, time_limit: float) -> str | None:
     if status is None:
         return f"did not finish in {time_limit:g} s and was stopped"
     if hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU:
-        return "used up its processor time and was stopped"
+        return OUT_OF_PROCESSOR_TIME
     if status < 0:
         return f"crashed ({signal.Signals(-status).name})"
     return "returned no tetrahedra" if status else None

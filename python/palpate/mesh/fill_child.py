@@ -24,9 +24,17 @@ from palpate.mesh.files import WRITERS
 from palpate.mesh.size import COMMON_UNITS, scale_of
 from palpate.mesh.surface_file import SURFACE_ENDINGS, load_surface
 from palpate.mesh.tetmesh import TetMesh
-from palpate.mesh.tetrahedralize import STAGES, tetrahedralize_with
+from palpate.mesh.tetrahedralize import STAGES, FillOptions, tetrahedralize_with
+from palpate.segmentation.default_segments import default_segments, selectors
+from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
+from palpate.segmentation.reading import load_label_map
+from palpate.units import length_scale
 
 SURFACE, MESH = "surface.npz", "mesh.npz"
+# Label maps carry their unit; lengths are shown in this one.
+SHOWN_UNIT = "mm"
+# So many segments that are left out are named.
+MOST_NAMED = 5
 # glTF is in metres by its specification (Khronos, glTF 2.0, section 3.4).
 IN_METRES = (".glb", ".gltf")
 
@@ -71,8 +79,31 @@ def _read(path: Path, unit: str | None, say: Callable[..., None]) -> TetMesh:
         mesh = TetMesh.read(path, "m")
         used = _unit(path, mesh.nodes, unit, say)
         return TetMesh.read(path, used)
-    known = ", ".join((*SURFACE_ENDINGS, *WRITERS))
-    raise MeshError(f"{path}: no surface and no mesh by its ending; known are {known}")
+    if is_segmentation(path):
+        return _segments(path, unit, say)
+    known = ", ".join((*SURFACE_ENDINGS, *SEGMENTATION_ENDINGS, *WRITERS))
+    raise MeshError(f"{path}: no surface, mesh or segmentation by its ending; known are {known}")
+
+
+def _segments(path: Path, unit: str | None, say: Callable[..., None]) -> TetMesh:
+    """Fill the segments that hang together with the largest; its boundary is drawn as soon as it is known."""
+    labels = load_label_map(path, unit)
+    chosen, left_out = default_segments(labels)
+    names = selectors(labels, chosen)
+    del labels
+    if left_out:
+        shown = ", ".join(f"'{name}'" for name in left_out[:MOST_NAMED])
+        more = f" and {len(left_out) - MOST_NAMED} more" if len(left_out) > MOST_NAMED else ""
+        say(note=f"{shown}{more} were left out: small, or apart from '{chosen[0].name}'")
+
+    def drawn(vertices: np.ndarray, faces: np.ndarray) -> None:
+        points = vertices / length_scale(SHOWN_UNIT)
+        say(read=True, sides=np.ptp(points, axis=0).tolist(), fitting=[SHOWN_UNIT], unit=SHOWN_UNIT)
+        np.savez(SURFACE, vertices=points, faces=faces)
+        say(stage=STAGES[1], done=1, total=len(STAGES), drawn=True)
+
+    options = FillOptions(segments=tuple(names))
+    return tetrahedralize_with("quadratic", path, unit=unit, options=options, progress=_StageLines(say), drawn=drawn)
 
 
 class _StageLines:

@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate import _native
 from palpate.errors import MeshError, MeshWarning
-from palpate.mesh.child import failure_of, run_limited
+from palpate.mesh.child import OUT_OF_PROCESSOR_TIME, failure_of, run_limited
 from palpate.mesh.curve import curve, refine
 from palpate.mesh.fit import GOOD_LOSS, Fit
 from palpate.mesh.surface_state import SurfaceState
@@ -117,7 +117,8 @@ class Filling:
             fit = Fit.of(made, self.shape) if isinstance(made, TetMesh) else None
             if fit is not None and (found is None or abs(fit.loss) < abs(found[1].loss)):
                 found = made, fit
-            late = time.monotonic() > deadline
+            # What one run cannot do at a size, another is not given the time for: the surface is wrapped instead.
+            late = time.monotonic() > deadline or (isinstance(made, str) and OUT_OF_PROCESSOR_TIME in made)
             if late or size <= least or (fit is not None and fit.is_good(size)):
                 break
             if fit is None or abs(fit.loss) > (GOOD_LOSS if halvings else LOST):
@@ -208,6 +209,8 @@ class Filling:
                     with np.load(made) as result:
                         return result["nodes"], result["tets"]
                 failures.append(failure or "returned no tetrahedra")
+                if failure == OUT_OF_PROCESSOR_TIME:
+                    return f"{failure} when filling the surface"
         return f"{failures[0]} when remeshing the surface, and {failures[1]} when keeping it,"
 
     def _projected(self, points: np.ndarray) -> np.ndarray:

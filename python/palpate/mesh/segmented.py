@@ -23,6 +23,7 @@ from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.wrapping import Which, Wrapping
 from palpate.segmentation.smoothing import inside_field
 
+Draw = Callable[[np.ndarray, np.ndarray], None]
 # Elements in and around an inner segment, in parts of half its thickness, by their kind: a ball of radius r gets edges
 # of so many r. What they do to the contrast of a nodule: docs/accuracy.md.
 SIZE_WITHIN = {"linear": 0.35, "quadratic": 0.4}
@@ -41,8 +42,11 @@ def segmented(
     max_volume_loss: float,
     time_limit: float,
     stage: Callable[[str], None],
+    drawn: Draw | None = None,
 ) -> TetMesh:
     """Fill chosen segments of a label map; several become regions with their names.
+
+    ``drawn`` is called with the boundary, vertices (k, 3), m, and triangles, before it is filled.
 
     Raises
     ------
@@ -55,6 +59,8 @@ def segmented(
     require_file(Path(path), MeshError)
     found = _boundaries(path, segments, unit, time_limit)
     name = str(path)
+    if drawn is not None:
+        drawn(found["vertices"], found["faces"])
     shape = trimesh.Trimesh(found["vertices"], found["faces"], process=False)
     longest = float(np.ptp(found["vertices"], axis=0).max())
     size = longest / PARTS[element] if size is None else size

@@ -20,6 +20,8 @@ MOST_FOR_NETGEN = 20_000
 # A triangle whose height is below this part of its longest edge is a needle: NETGEN took 19 s for a cylinder of 2,000
 # sides.
 NEEDLE = 1e-3
+# So many triangles below this are as slow: NETGEN did not finish a cone of 2,000 sides in a minute.
+MOST_SLENDER, SLENDER = 500, 1e-2
 BY_HAND = "mend it in Blender or MeshLab"
 
 
@@ -69,7 +71,7 @@ class SurfaceState:
         if not self.consistent:
             return "has triangles that do not agree on which side is outside"
         if self.bodies != 1:
-            return f"holds {self.bodies} separate surfaces, one is needed"
+            return f"holds {self.bodies} separate surfaces instead of one"
         if self.shape.volume == 0:
             return "encloses no volume"
         return None
@@ -78,10 +80,11 @@ class SurfaceState:
         """Reason why NETGEN may be slow or fail on a closed surface, after "the surface"; None if there is none."""
         if len(self.shape.faces) > MOST_FOR_NETGEN:
             return f"has {len(self.shape.faces):,} triangles"
-        if self.crossing is not None:
-            return f"intersects itself near {self.crossing} m"
+        # Before the crossings, whose search takes long where thousands of needles meet in one point.
         needles = self._needles()
-        return f"has {needles} triangles like needles" if needles else None
+        if needles:
+            return f"has {needles} triangles like needles"
+        return None if self.crossing is None else f"intersects itself near {self.crossing} m"
 
     @cached_property
     def crossing(self) -> str | None:
@@ -93,7 +96,8 @@ class SurfaceState:
         corners = np.asarray(self.shape.vertices)[self.shape.faces]
         longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         height = 2.0 * self.shape.area_faces / longest
-        return int((height < NEEDLE * longest).sum())
+        needles, slender = (int((height < share * longest).sum()) for share in (NEEDLE, SLENDER))
+        return slender if slender > MOST_SLENDER else needles
 
     def turn_outward(self, name: str) -> None:
         """Turn a surface that is inside out round, in place, with a warning."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.errors import MeshError
 from palpate.mesh.filling import Ball, Element, Filling, MesherFailedError
-from palpate.mesh.segmented import segmented
+from palpate.mesh.segmented import Draw, segmented
 from palpate.mesh.size import scale_of
 from palpate.mesh.surface_file import SurfaceFile, load_surface
 from palpate.mesh.surface_state import BY_HAND, MOST_FOR_NETGEN, SurfaceState, require_closed, require_finite
@@ -31,7 +31,7 @@ Mesher = Literal["netgen", "wrap"]
 TIME_LIMIT = 300.0  # s
 # Seconds of processor time that a run of NETGEN gets at a size of its own before the surface is wrapped: which mesher
 # it is must not depend on what else the machine does.
-PATIENCE = 15.0
+PATIENCE = 8.0
 # What a progress bar shows, in order.
 STAGES = (
     *("reading", "checking", "looking for the inside", "wrapping", "filling with tetrahedra"),
@@ -143,8 +143,11 @@ def tetrahedralize_with(
     options: FillOptions | None = None,
     time_limit: float = TIME_LIMIT,
     progress: bool | Callable[[int, int], None] = True,
+    drawn: Draw | None = None,
 ) -> TetMesh:
     """Fill a surface as :func:`tetrahedralize` does, with either element; None: a size that suits it.
+
+    ``drawn`` is called with the boundary of a segmentation before that is filled.
 
     The mid-side nodes of 10-node elements lie on the surface, so these may be several times larger than a curve is wide
     before they lose volume.
@@ -162,7 +165,10 @@ def tetrahedralize_with(
         stage("reading")
         options = options or FillOptions()
         if isinstance(surface, (str, os.PathLike)) and is_segmentation(surface):
-            name, mesh = str(surface), _of_segments(element, surface, size, unit, refine, options, time_limit, stage)
+            name, mesh = (
+                str(surface),
+                _of_segments(element, surface, size, unit, refine, options, time_limit, stage, drawn),
+            )
         else:
             given = _scaled(surface, unit, options)
             stage("checking")
@@ -190,11 +196,12 @@ def _of_segments(
     options: FillOptions,
     time_limit: float,
     stage: Callable[[str], None],
+    drawn: Draw | None,
 ) -> TetMesh:
     if options.mesher == "netgen":
         raise MeshError(f"{path}: NETGEN fills surfaces; leave out mesher = 'netgen' for a segmentation")
     loss = float(options.max_volume_loss)
-    return segmented(element, path, options.segments, unit, size, refine, options.part, loss, time_limit, stage)
+    return segmented(element, path, options.segments, unit, size, refine, options.part, loss, time_limit, stage, drawn)
 
 
 def _stages(report: Reporter | None) -> Callable[[str], None]:

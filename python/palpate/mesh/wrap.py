@@ -23,6 +23,10 @@ SIMPLIFIED = 0.3
 # Points on the surface that are looked for on the wrap; one farther than so many cells is on a wall that was lost.
 # Where these are more than this share, the grid is made finer, at most to so many cells.
 SAMPLES, LOST_WALL, LOST_SHARE, MOST_CELLS = 8000, 1.5, 0.02, 160
+# What an open surface encloses lies behind its triangles. Of a sheet it lies before more than this share of them.
+BOTH_SIDES = 0.15
+# Points on the wrap that are looked for on the surface.
+WRAP_SAMPLES = 2000
 
 
 class WrapError(Exception):
@@ -59,6 +63,8 @@ class Wrap:
         Points (k, 3) of walls that the grid lost.
     lost_share
         Of the surface of what is wanted.
+    closed_share
+        Of the wrap that closes holes: no triangle of the surface is near.
     band
         Mask of the points within so many cells of the wrap.
 
@@ -72,6 +78,7 @@ class Wrap:
     points: np.ndarray
     lost_points: np.ndarray
     lost_share: float
+    closed_share: float
     band: Grid
 
 
@@ -95,6 +102,8 @@ def wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int) ->
 def _wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int, moved: float) -> Wrap:
     low, high = field.vertices.min(axis=0), field.vertices.max(axis=0)
     grid, whole = field.on_grid(low, high, 1.0 / cells)
+    if not whole:
+        _require_one_side(field, grid.cell)
     label, parts, crumbs = _parts(grid, field, labels)
     wanted = range(len(parts)) if part is None else [part - 1]
     if part is not None and not 1 <= part <= len(parts):
@@ -113,7 +122,38 @@ def _wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int, m
     vertices, faces = _zero(only, moved)
     points, lost = _beside_and_lost(field, vertices, faces, grid, label if fine is None else None, kept)
     share = len(lost) / max(len(lost) + len(points), 1)
-    return Wrap(vertices, faces, parts, volume, grid.cell, points, lost, share, _band(only))
+    closed = _closed_share(field, vertices, faces, grid.cell)
+    return Wrap(vertices, faces, parts, volume, grid.cell, points, lost, share, closed, _band(only))
+
+
+def _require_one_side(field: SolidField, cell: float) -> None:
+    """Refuse a sheet: what it encloses lies on both of its sides.
+
+    Raises
+    ------
+    WrapError
+        With the reason.
+
+    """
+    points, normals = field.samples(SAMPLES)
+    before, behind = (field.winding(points + sign * 0.05 * cell * normals) > 0.5 for sign in (1, -1))
+    bounding = before != behind
+    if bounding.any():
+        share = float(before[bounding].mean())
+        if min(share, 1 - share) > BOTH_SIDES:
+            raise WrapError("it encloses nothing: it is a sheet, which has no inside")
+
+
+def _closed_share(field: SolidField, vertices: np.ndarray, faces: np.ndarray, cell: float) -> float:
+    """Share of the area of a wrap without a triangle of the surface near."""
+    corners = vertices[faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    total = np.cumsum(areas)
+    random = np.random.default_rng(0)
+    chosen = np.minimum(np.searchsorted(total, random.uniform(size=WRAP_SAMPLES) * total[-1]), len(faces) - 1)
+    weights = random.dirichlet(np.ones(3), WRAP_SAMPLES)
+    points = np.einsum("ik,ikj->ij", weights, corners[chosen])
+    return float((field.distances(points) > LOST_WALL * cell).mean())
 
 
 def _enclosed(field: SolidField) -> float:

@@ -8,7 +8,7 @@ Exit status 1: no tetrahedra; the reason, if it is the surface's, is ``reason`` 
 
 from __future__ import annotations
 
-import importlib.machinery
+import importlib.util
 import os
 import sys
 import types
@@ -62,6 +62,7 @@ def main(given: str, made: str, stages: str) -> int:
         "points": wrapped.points,
         "lost_points": wrapped.lost_points,
         "lost_share": wrapped.lost_share,
+        "closed_share": wrapped.closed_share,
         "target": field.faces[target],
         "target_vertices": field.vertices,
     }
@@ -88,7 +89,10 @@ def _note(stages: str, name: str) -> None:
 
 def _tetrahedralizer() -> Callable | None:
     """Take fTetWild from pytetwild without its package's first lines, which load PyVista and VTK; None without it."""
-    spec = importlib.machinery.PathFinder.find_spec("pytetwild")
+    try:
+        spec = importlib.util.find_spec("pytetwild")
+    except ImportError:
+        return None
     if spec is None:
         return None
     package = types.ModuleType("pytetwild")

@@ -17,7 +17,7 @@ from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import failure_of, run_limited
 from palpate.mesh.curve import curve, refine
 from palpate.mesh.elements import face_parts
-from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, PARTS, Ball, Element, Filling
+from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, PARTS, Ball, Element, Filling, MesherFailedError
 from palpate.mesh.fit import GOOD_LOSS, distances
 from palpate.mesh.inner import InnerRegions, faces_between
 from palpate.mesh.size import size_text
@@ -36,8 +36,11 @@ REACH_CELLS, REACH_ELEMENT = 2.0, 0.4
 CRUMB = 0.01
 # Walls are reported as lost from this share of the surface on: at sharp edges a wrap is always a little off.
 LEAST_LOST_SHARE = 0.005
+# Holes are reported from this share of the new surface on: what lies behind them is a guess.
+LEAST_CLOSED_SHARE = 0.02
 # So many parts that are left out are named.
 MOST_NAMED = 3
+INSTALL = "Install it by 'pip install pytetwild' (for Linux and Windows)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,11 +154,12 @@ class Wrapping:
             warnings.warn(f"{self.name}: fTetWild {failure}; NETGEN fills the wrap", MeshWarning, stacklevel=4)
         elif len(found["nodes"]) == 0:
             warnings.warn(
-                f"{self.name}: fTetWild is not installed (pip install pytetwild, for Linux and Windows); NETGEN fills "
-                "the wrap, which takes longer and may fail",
+                f"{self.name}: fTetWild is not installed, so NETGEN fills the wrap: it is slower, makes flatter "
+                f"elements, and may fail. {INSTALL}",
                 MeshWarning,
                 stacklevel=4,
             )
+            found["missing"] = np.array(True)
         return found
 
     def _watch(self, stages: Path) -> None:
@@ -171,7 +175,17 @@ class Wrapping:
         import trimesh
 
         shape = trimesh.Trimesh(wrap.to_metres(made["vertices"]), made["faces"], process=False)
-        return Filling(self.name, SurfaceState.of(shape), "linear", size, self.refine, self.time_limit).mesh()
+        filling = Filling(self.name, SurfaceState.of(shape), "linear", size, self.refine, self.time_limit)
+        with warnings.catch_warnings():
+            # What is lost is measured when its nodes are on the given surface.
+            warnings.simplefilter("ignore", MeshWarning)
+            try:
+                return filling.mesh()
+            except MesherFailedError:
+                advice = INSTALL if "missing" in made else "Try another --max-size"
+                raise MeshError(
+                    f"{self.name}: the surface {self.reason}; it was wrapped, and NETGEN cannot fill the wrap. {advice}"
+                ) from None
 
     def _report(self, mesh: TetMesh, wrap: _Wrapped, extent: float) -> None:
         """Warn of what was done and lost, a line each, or refuse the mesh."""
@@ -185,6 +199,8 @@ class Wrapping:
             raise MeshError(f"{self.name}: the surface {self.reason}; {what}: {finer}, {allow}")
         self._warn(f"the surface {self.reason} and was wrapped; {what}{f'; {finer}' if abs(loss) > GOOD_LOSS else ''}")
         self._report_parts(wrap)
+        if wrap.closed_share > LEAST_CLOSED_SHARE:
+            self._warn(f"{100 * wrap.closed_share:.0f} % of the new surface closes holes, where its shape is a guess")
         if wrap.lost_share > LEAST_LOST_SHARE:
             place = wrap.lost_points[0]
             self._warn(
@@ -219,7 +235,7 @@ class _Wrapped:
         self.origin, self.extent = origin, extent
         self.volume, self.cell = float(made["volume"]) * extent**3, float(made["cell"]) * extent
         self.points, self.lost_points = self.to_metres(made["points"]), self.to_metres(made["lost_points"])
-        self.lost_share = float(made["lost_share"])
+        self.lost_share, self.closed_share = float(made["lost_share"]), float(made["closed_share"])
         self.parts = [
             (float(volume) * extent**3, self.to_metres(middle), sides * extent, int(label))
             for volume, middle, sides, label in zip(

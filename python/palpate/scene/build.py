@@ -16,17 +16,19 @@ from palpate.errors import Error, SceneError, UnclearUnitError
 from palpate.green import BackgroundPrecompute, GreensFunction, precompute, require_precise
 from palpate.mesh import TetMesh
 from palpate.mesh.elements import EDGES
+from palpate.mesh.label_summary import label_summary
 from palpate.mesh.size import scale_of
 from palpate.mesh.tetrahedralize import closed_surface, read_surface, tetrahedralize_with
 from palpate.progress import progress_reporter
 from palpate.scene.default_radius import with_radii
 from palpate.scene.dynamics import BodyMotion
+from palpate.scene.early import Expected
 from palpate.scene.loads import together
 from palpate.scene.mistakes import located
 from palpate.scene.node_file import is_node_file, read_nodes
 from palpate.scene.regions import MaterialTable
 from palpate.scene.tables import BodyTable, SceneTables, SupportsTable
-from palpate.segmentation import is_segmentation, load_label_map
+from palpate.segmentation.endings import is_segmentation
 from palpate.vectors import conjugate, rotated
 
 Progress = bool | Callable[[int, int], None]
@@ -101,9 +103,10 @@ def build(
     progress: Progress,
     modes_progress: Progress | None,
     growing: dict[int, BackgroundPrecompute] | None = None,
+    announce: Callable[[Expected], None] | None = None,
 ) -> BuiltScene:
     """See :meth:`palpate.Scene.build`, and with ``growing`` :meth:`palpate.Scene.build_first`."""
-    builders = [_Builder(scene, rank, growing, progress) for rank in range(len(scene.bodies))]
+    builders = [_Builder(scene, rank, growing, progress, announce) for rank in range(len(scene.bodies))]
     return BuiltScene(scene, tuple(builder.build(progress, modes_progress) for builder in builders))
 
 
@@ -169,8 +172,10 @@ class _Builder:
         rank: int,
         growing: dict[int, BackgroundPrecompute] | None = None,
         filling: Progress = True,
+        announce: Callable[[Expected], None] | None = None,
     ):
         self._scene, self._rank, self._growing, self._filling = scene, rank, growing, filling
+        self._announce = announce
         self._table: BodyTable = scene.bodies[rank]
 
     def build(self, progress: Progress, modes_progress: Progress | None) -> BuiltBody:
@@ -194,6 +199,8 @@ class _Builder:
         area, where = self._table_of_body("touch")
         with self._locating_errors(where):
             asked = {"precision": self._table.precision, **area.areas(self._file_mesh)}
+            if self._announce is not None:
+                self._announce(Expected.of(body, **asked))
             if self._growing is None or area.first is None:
                 return precompute(body, **asked, progress=progress)
             background = self._growing[self._rank] = BackgroundPrecompute(body, **asked)
@@ -210,8 +217,8 @@ class _Builder:
         else:
             with self._locating_errors_in_file(["body", self._rank, "mesh"]):
                 if is_segmentation(str(table.mesh)):
-                    labels = load_label_map(self._scene.folder / str(table.mesh), table.unit)
-                    labels.choose([segment.name for segment in table.segment])
+                    wanted = [segment.name for segment in table.segment]
+                    label_summary(self._scene.folder / str(table.mesh), table.unit, wanted)
                     return
                 read = closed_surface if table.mesher == "netgen" else read_surface
                 surface = read(self._scene.folder / str(table.mesh))

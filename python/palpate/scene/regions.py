@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import model_validator
 
 from palpate.body import Material
-from palpate.errors import MeshError
+from palpate.errors import BodyError, MeshError
 from palpate.mesh import TetMesh, shapes
 from palpate.scene.table import Density, Direction, Length, Point, PoissonsRatio, Pressure, Table, is_whole, one_of
 
@@ -27,16 +27,32 @@ _SEGMENT = one_of("the name or the label of a segment", lambda v: (isinstance(v,
 _REGION = one_of("the number or the name of a region", lambda v: v is None or isinstance(v, str) or is_whole(v))
 
 
+Law = Literal["linear", "neo-hookean", "mooney-rivlin", "yeoh"]
+
+# Young's modulus, Pa, of a scene that gives none.
+DEFAULT_MODULUS = 10e3
+
+
 class MaterialTable(Table):
     """Isotropic material of the whole body, but for its regions."""
 
-    youngs_modulus: Pressure = 10e3
+    youngs_modulus: Pressure = DEFAULT_MODULUS
     poissons_ratio: PoissonsRatio = 0.45
     density: Density = 1000.0
+    law: Law = "linear"
+    c10: Pressure | None = None
+    c01: Pressure | None = None
+    c20: Pressure | None = None
+    c30: Pressure | None = None
+
+    @model_validator(mode="after")
+    def _one_material(self) -> MaterialTable:
+        self.material()
+        return self
 
     def material(self) -> Material:
         """As the rest of the package knows it."""
-        return Material(self.youngs_modulus, self.poissons_ratio, self.density)
+        return _material({name: getattr(self, name) for name in self.model_fields_set})
 
 
 class PlaceTable(Table):
@@ -110,6 +126,11 @@ class RegionTable(PlaceTable):
     youngs_modulus: Pressure | None = None
     poissons_ratio: PoissonsRatio | None = None
     density: Density | None = None
+    law: Law | None = None
+    c10: Pressure | None = None
+    c01: Pressure | None = None
+    c20: Pressure | None = None
+    c30: Pressure | None = None
 
     def material(self, base: MaterialTable) -> Material:
         """Material, completed from that of the body."""
@@ -123,6 +144,11 @@ class SegmentTable(Table):
     youngs_modulus: Pressure | None = None
     poissons_ratio: PoissonsRatio | None = None
     density: Density | None = None
+    law: Law | None = None
+    c10: Pressure | None = None
+    c01: Pressure | None = None
+    c20: Pressure | None = None
+    c30: Pressure | None = None
 
     def material(self, base: MaterialTable) -> Material:
         """Material, completed from that of the body."""
@@ -130,5 +156,23 @@ class SegmentTable(Table):
 
 
 def _completed(table: RegionTable | SegmentTable, base: MaterialTable) -> Material:
-    own = {name: getattr(table, name) for name in MaterialTable.model_fields}
-    return Material(**{name: getattr(base, name) if value is None else value for name, value in own.items()})
+    given = {name: getattr(base, name) for name in base.model_fields_set}
+    own = {name: getattr(table, name) for name in MaterialTable.model_fields if getattr(table, name) is not None}
+    if "law" in own:
+        # Constants belong to a law.
+        given = {
+            name: value for name, value in given.items() if name in ("poissons_ratio", "density", "youngs_modulus")
+        }
+        if own["law"] in ("mooney-rivlin", "yeoh"):
+            given.pop("youngs_modulus", None)
+    return _material(given | own)
+
+
+def _material(given: dict[str, Any]) -> Material:
+    """Return the material of what is given; laws without constants of their own have the default modulus."""
+    if given.get("law", "linear") in ("linear", "neo-hookean"):
+        given = {"youngs_modulus": DEFAULT_MODULUS} | given
+    try:
+        return Material(**given)
+    except BodyError as error:
+        raise ValueError(str(error)) from None

@@ -13,6 +13,7 @@ from palpate.errors import SceneError
 from palpate.green import BackgroundPrecompute
 from palpate.input_file import read_toml
 from palpate.scene.build import BuiltScene, build, require_files
+from palpate.scene.early import Expected
 from palpate.scene.mistakes import explain, located
 from palpate.scene.tables import BodyTable, SceneTables
 
@@ -109,10 +110,12 @@ class Scene(SceneTables):
         self,
         progress: bool | Callable[[int, int], None] = True,
         modes_progress: bool | Callable[[int, int], None] | None = None,
+        announce: Callable[[Expected], None] | None = None,
     ) -> BuiltScene:
         """Mesh if need be, precompute, and find the modes of bodies that move, or take it all from the cache.
 
         ``progress`` is shown, or told of done and expected; of modes ``modes_progress`` is, unless it is None.
+        ``announce`` is called with the expected size of each body before it is computed.
 
         Raises
         ------
@@ -120,10 +123,12 @@ class Scene(SceneTables):
             A mesh that cannot be read or made, supports that leave it free to move, a store that does not match.
 
         """
-        return build(self, progress, modes_progress)
+        return build(self, progress, modes_progress, announce=announce)
 
     def build_first(
-        self, progress: bool | Callable[[int, int], None] = True
+        self,
+        progress: bool | Callable[[int, int], None] = True,
+        announce: Callable[[Expected], None] | None = None,
     ) -> tuple[BuiltScene, dict[int, BackgroundPrecompute]]:
         """Build what is touched first, and go on with the rest in processes beside this one, by rank of the body.
 
@@ -137,7 +142,7 @@ class Scene(SceneTables):
         """
         growing: dict[int, BackgroundPrecompute] = {}
         try:
-            return build(self, progress, None, growing), growing
+            return build(self, progress, None, growing, announce), growing
         except BaseException:
             for background in growing.values():
                 background.close()

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
+from palpate.body import surface_strain_terms
 from palpate.errors import BodyError, Error, SceneError
 from palpate.scene import BuiltBody
 from palpate.scene.mistakes import located
@@ -53,11 +54,16 @@ def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
     return body.green._core, body.position, body.orientation, moving, _moduli(body, local)
 
 
-def _moduli(body: BuiltBody, needed: bool) -> tuple[np.ndarray, np.ndarray, bool] | None:
+def _moduli(body: BuiltBody, needed: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, bool] | None:
     known = body.green._core.surface_moduli()
     if known is None and needed:
         raise BodyError(
             "this store of several materials does not say which is at the surface: compute it again, or give the tool "
             "contact = 'patch'"
         )
-    return known
+    if known is None:
+        return None
+    young, poisson, is_even = known
+    # A store has the constants at small strain only: the law beyond is that of the scene's material.
+    terms = None if body.body is None else surface_strain_terms(body.body)
+    return young, poisson, terms, is_even

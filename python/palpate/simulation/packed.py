@@ -118,7 +118,9 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
     _, position, orientation, moving, moduli = arguments
     arrays: dict[str, np.ndarray] = {}
     if moduli is not None:
-        arrays["youngs"], arrays["poissons"] = moduli[:2]
+        arrays["youngs"], arrays["poissons"], terms, _ = moduli
+        if terms is not None and terms.any():
+            arrays["strain_terms"] = terms
     motion = None
     if moving is not None:
         arrays["eigenvalues"], arrays["shapes"], (dt, alpha, delta, mass, stiffness), exact, coupling = moving
@@ -134,7 +136,7 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
         "arrays": _written(path, arrays),
         "position": list(position),
         "orientation": list(orientation),
-        "one_material": bool(moduli is not None and moduli[2]),
+        "one_material": bool(moduli is not None and moduli[3]),
         "motion": motion,
     }
 

@@ -51,7 +51,7 @@ class CancellableTask:
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether nobody wants it any more."""
+        """Whether it has been cancelled."""
         return self._cancelled.is_set()
 
     def require_wanted(self) -> None:

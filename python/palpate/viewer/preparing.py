@@ -50,7 +50,7 @@ class Preparation:
     name
         Of the scene.
     build
-        Is called on a thread of its own, with whom to tell of stages, and a function that draws a surface: its vertices
+        Is called on a thread of its own, with a reporter of stages and a function that draws a surface: its vertices
         (k, 3), m, and triangles. Returns the scene and what is computed of it later.
 
     """
@@ -65,7 +65,7 @@ async def prepare(server: ViewerServer, preparation: Preparation) -> None:
     Raises
     ------
     Error
-        A scene that cannot be prepared, or that a page has cancelled; pages are told.
+        A scene that cannot be prepared, or that a page has cancelled. The pages show why.
 
     """
     building, loop = server.begin_building(), asyncio.get_running_loop()

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
-from palpate.body.tissues import TISSUES
+from palpate.body.tissues import TISSUES, Tissue
 from palpate.errors import Error, ViewerError
 from palpate.green import BackgroundPrecompute
 from palpate.mesh import TetMesh
@@ -124,7 +124,7 @@ class SettingUp:
             "limit": MAX_FILE if session.takes_files else 0,
             "part": MAX_PART,
             "endings": list(ENDINGS),
-            "tissues": [asdict(tissue) for tissue in TISSUES],
+            "tissues": [_tissue_message(tissue) for tissue in TISSUES],
             "editing": editing,
             "preparing": isinstance(session, SetupSession) and not editing,
             "body": self._body.message() if self._body is not None and (editing or touching) else None,
@@ -301,6 +301,12 @@ class SettingUp:
         if self._body is not None and isinstance(session, Session) and session is self._touched:
             settings = session.settings()
             self._body.take_settings(settings["youngs_modulus"][0], settings["friction"][0])
+
+
+def _tissue_message(tissue: Tissue) -> dict[str, Any]:
+    known = asdict(tissue)
+    del known["checked"]
+    return {**known, "source": tissue.citation}
 
 
 def _with_first(scene: Scene) -> Scene:

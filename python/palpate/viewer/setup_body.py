@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -24,8 +25,10 @@ from palpate.scene.node_file import write_nodes
 from palpate.scene.writing import scene_text
 from palpate.units import length_scale
 from palpate.viewer.computing import mask_text
-from palpate.viewer.setup_choices import Choices, Plane
+from palpate.viewer.setup_choices import Choices, Plane, SegmentChoice, first_segments, tissue_named
 
+# Of files with two endings both are left out.
+_ENDINGS = re.compile(r"(\.seg\.nrrd|\.nii\.gz|\.[^.]*)$", re.IGNORECASE)
 # So many scenes of one name are saved in a folder.
 MOST_SAVED = 1000
 
@@ -67,7 +70,7 @@ class SetupBody:
     @property
     def name(self) -> str:
         """Of the body: its file without the ending."""
-        return Path(self.read.file).stem
+        return _ENDINGS.sub("", self.read.file) or Path(self.read.file).stem
 
     def take_mesh(self, mesh: TetMesh, notes: list[str]) -> None:
         """Take the tetrahedra of the file in the unit that it was read in."""
@@ -76,7 +79,8 @@ class SetupBody:
         self.notes = notes
         self._painted = np.zeros(len(mesh.surface_nodes), dtype=bool)
         plane = Plane(2, False, lowest_height(self.mesh))
-        self.choices = replace(self.choices, plane=plane)
+        # The first region is the largest: it has the material of the body.
+        self.choices = replace(self.choices, plane=plane, segments=first_segments(_regions_of(mesh)))
 
     def change(self, message: Mapping[str, Any]) -> bool:
         """Take choices of a message. Returns whether the body is larger or smaller now.
@@ -143,6 +147,7 @@ class SetupBody:
             "held": mask_text(self._painted) if self._painted.any() else None,
             "plane": asdict(choices.plane),
             "tissue": choices.tissue,
+            "segments": [asdict(segment) for segment in choices.segments],
             "youngs_modulus": choices.youngs_modulus,
             "poissons_ratio": choices.poissons_ratio,
             "radius": choices.radius,
@@ -179,9 +184,15 @@ class SetupBody:
         tables["material"] = {"youngs_modulus": choices.youngs_modulus, "poissons_ratio": choices.poissons_ratio}
         tissue = next((tissue for tissue in TISSUES if tissue.name == choices.tissue), None)
         if tissue is not None:
-            comments["material"] = f"{tissue.title}: {tissue.source}"
+            comments["material"] = f"{tissue.title}: {tissue.citation}"
+        regions = [_segment_table(mesh, segment) for segment in choices.segments]
+        if regions:
+            numbered = (f"{mesh.region_names[segment.name]} {segment.name}" for segment in choices.segments)
+            comments["region"] = f"Segments by their number in the mesh: {', '.join(numbered)}"
         if choices.nodule is not None:
-            tables["region"] = [{"shape": "sphere", **asdict(choices.nodule)}]
+            regions.append({"shape": "sphere", **asdict(choices.nodule)})
+        if regions:
+            tables["region"] = regions
         tables["tool"] = {"radius": choices.radius}
         if choices.friction is not None:
             tables["tool"]["friction"] = choices.friction
@@ -245,6 +256,19 @@ class SetupBody:
         if self.mesh is None:
             raise ViewerError("the body is still being filled with tetrahedra")
         return self.mesh
+
+
+def _regions_of(mesh: TetMesh) -> list[str]:
+    """Names of the regions that have elements."""
+    there = set(np.unique(mesh.regions).tolist())
+    return [name for name, number in mesh.region_names.items() if number in there]
+
+
+def _segment_table(mesh: TetMesh, segment: SegmentChoice) -> dict[str, Any]:
+    """Table of a region for a segment."""
+    tissue = tissue_named(segment.tissue)
+    material = {"youngs_modulus": tissue.youngs_modulus, "poissons_ratio": tissue.poissons_ratio}
+    return {"mesh_region": mesh.region_names[segment.name], **material}
 
 
 def _scaled(mesh: TetMesh, factor: float) -> TetMesh:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.body.tissues import TISSUES
+from palpate.body.tissues import TISSUES, Tissue
 from palpate.errors import ViewerError
 from palpate.mesh.size import COMMON_UNITS
 from palpate.viewer.messages import number, vector, whole, word
@@ -46,6 +46,14 @@ class Nodule:
 
 
 @dataclass(frozen=True)
+class SegmentChoice:
+    """A segment of a label map, and the name of its material."""
+
+    name: str
+    tissue: str
+
+
+@dataclass(frozen=True)
 class Choices:
     """What is chosen.
 
@@ -63,6 +71,8 @@ class Choices:
         Its values, or others that were chosen later; Pa.
     radius, friction
         Of the tool, m.
+    segments
+        Those of a label map within the largest one, which has the material of the body.
 
     """
 
@@ -75,6 +85,7 @@ class Choices:
     radius: float
     friction: float | None = None
     nodule: Nodule | None = None
+    segments: tuple[SegmentChoice, ...] = ()
 
     def scaled(self, factor: float) -> Choices:
         """Return the same of a body whose lengths are larger by a factor."""
@@ -94,7 +105,7 @@ class Choices:
             A message that makes no sense, or a value that the body cannot take.
 
         """
-        known = {"unit", "painted", "plane", "tissue", "radius", "nodule"}
+        known = {"unit", "painted", "plane", "tissue", "radius", "nodule", "segments"}
         keys = set(message) - {"type"}
         if not keys or not keys <= known:
             raise ViewerError(f"setup takes {', '.join(sorted(known))}")
@@ -108,14 +119,42 @@ class Choices:
             change["plane"] = _plane(message, sides)
         if "tissue" in message:
             name = _one_of(message, "tissue", [tissue.name for tissue in TISSUES])
-            tissue = next(tissue for tissue in TISSUES if tissue.name == name)
+            tissue = tissue_named(name)
             material = {"youngs_modulus": tissue.youngs_modulus, "poissons_ratio": tissue.poissons_ratio}
             change |= {"tissue": name, **material}
         if "radius" in message:
             change["radius"] = _radius(message, "radius", sides)
         if "nodule" in message:
             change["nodule"] = _nodule(message, low, high)
+        if "segments" in message:
+            change["segments"] = _segments(message, self.segments)
         return replace(self, **change)
+
+
+def tissue_named(name: str) -> Tissue:
+    """Material of the list."""
+    return next(tissue for tissue in TISSUES if tissue.name == name)
+
+
+def first_segments(names: Sequence[str]) -> tuple[SegmentChoice, ...]:
+    """Choices for all segments but the first: the material that a segment is called by, else that of the body."""
+
+    def tissue(name: str) -> str:
+        return next((t.name for t in TISSUES if t.name in name.lower()), TISSUES[0].name)
+
+    return tuple(SegmentChoice(name, tissue(name)) for name in names[1:])
+
+
+def _segments(message: Mapping[str, Any], before: Sequence[SegmentChoice]) -> tuple[SegmentChoice, ...]:
+    """Materials of the same segments."""
+    tables = message["segments"]
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise ViewerError("setup: segments must be a list of objects")
+    names = [tissue.name for tissue in TISSUES]
+    chosen = [SegmentChoice(word(table, "name"), _one_of(table, "tissue", names)) for table in tables]
+    if [segment.name for segment in chosen] != [segment.name for segment in before]:
+        raise ViewerError("setup: segments must be those of the file, in its order")
+    return tuple(chosen)
 
 
 def _one_of(message: Mapping[str, Any], key: str, known: Sequence[str]) -> str:

@@ -10,10 +10,11 @@ from typing import Any
 from palpate.errors import ViewerError
 from palpate.mesh.files import WRITERS
 from palpate.mesh.surface_file import SURFACE_ENDINGS
+from palpate.segmentation.endings import SEGMENTATION_ENDINGS
 from palpate.viewer.messages import whole
 
-# Endings of the files that a page may send: surfaces, and volume meshes that are one file.
-ENDINGS = (*SURFACE_ENDINGS, *(ending for ending in WRITERS if ending not in {".node", ".ele"}))
+# Endings of the files that a page may send: surfaces, segmentations, and volume meshes that are one file.
+ENDINGS = (*SURFACE_ENDINGS, *SEGMENTATION_ENDINGS, *(ending for ending in WRITERS if ending not in {".node", ".ele"}))
 # A binary STL of four million triangles has 200 MB.
 MAX_FILE = 200_000_000
 # Bytes of a part: one message, which the server answers before the next comes.
@@ -40,7 +41,7 @@ class Upload:
 
     def __init__(self, message: Mapping[str, Any], folder: Path):
         self.file = safe_name(message.get("name"))
-        if Path(self.file).suffix.lower() not in ENDINGS:
+        if not self.file.lower().endswith(ENDINGS):
             raise ViewerError(_wrong_kind(self.file))
         if isinstance(message.get("size"), int) and message["size"] > MAX_FILE:
             size, most = message["size"] / 1e6, MAX_FILE / 1e6
@@ -101,4 +102,4 @@ def _wrong_kind(file: str) -> str:
     ending = Path(file).suffix.lower()
     if ending in {".toml", ".palpate"}:
         return f"{file}: scenes and stores are opened where they lie: palpate run {file}"
-    return f"{file}: no surface and no mesh by its ending; the page takes {', '.join(ENDINGS)}"
+    return f"{file}: no surface, mesh or segmentation by its ending; the page takes {', '.join(ENDINGS)}"

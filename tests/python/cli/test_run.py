@@ -30,6 +30,7 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     computed, said, *_ = result.stdout.splitlines()
     # The size is printed before it is written.
     assert computed.startswith("computing 2526 columns: at most 51 MB in the cache")
+    assert computed.endswith(", 842 on the surface)")
     for word in (
         "80 x 50 x 50 mm",
         "unit mm (--unit; it may also be cm or in)",
@@ -41,6 +42,28 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     assert "tool of radius 5 mm (--radius)" in said
     log = np.genfromtxt(tmp_path / "block.csv", delimiter=",", names=True)
     assert log["fz_N"].max() > 0.05
+
+
+@pytest.mark.parametrize("growing", [None, {}])
+def test_the_size_of_a_scene_is_printed_before_it_is_computed(capsys, monkeypatch, tmp_path, growing):
+    box_mesh().write(tmp_path / "box.vtu", unit="m")
+    (tmp_path / "a.toml").write_text('[body]\nmesh = "box.vtu"\nunit = "m"\n[supports]\nfixed = "z < min + 1mm"\n')
+
+    def stop(*_, **__):
+        raise palpate.Error("computing now")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("palpate.scene.build.precompute", stop)
+        with pytest.raises(palpate.Error, match="computing now"):
+            built_from(tmp_path / "a.toml", RunOptions(), growing)
+    mesh = palpate.TetMesh.read(tmp_path / "box.vtu", "m")
+    counts = f"({len(mesh.nodes)} nodes, {len(mesh.surface_nodes)} on the surface)"
+    line = capsys.readouterr().out.strip()
+    assert line.startswith(f"computing {3 * len(mesh.surface_nodes)} columns: at most ") and line.endswith(counts)
+    # The second time its store is there.
+    for printed in (True, False):
+        built_from(tmp_path / "a.toml", RunOptions(), growing)
+        assert ("computing" in capsys.readouterr().out) is printed
 
 
 def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):

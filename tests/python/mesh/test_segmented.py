@@ -11,7 +11,9 @@ from label_maps import ball, ellipsoid, labels_of, turned, write_nifti, write_nr
 
 import palpate
 from palpate.mesh.inner import faces_between
+from palpate.mesh.label_summary import label_summary
 from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
+from palpate.progress import Reporter
 
 pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)
 
@@ -162,3 +164,38 @@ def test_mistakes_of_the_command_line_are_one_line(tmp_path):
     labels = labels.astype(np.int16) * 300 - 1000
     write_nifti(tmp_path / "ct.nii", labels, affine)
     refused(run("run", "ct.nii", "--segment", "1", cwd=tmp_path), "ct.nii", "intensity image")
+
+
+def test_the_boundary_is_drawn_before_it_is_filled(tmp_path):
+    labels, affine = labels_of([ellipsoid((20, 15, 12))], (24, 19, 16), (1.5, 1.5, 2.0))
+    path = write_nrrd(tmp_path / "ct.nrrd", labels, affine)
+    events: list[str] = []
+    drawn: list[np.ndarray] = []
+
+    def draw(vertices: np.ndarray, faces: np.ndarray) -> None:
+        events.append("drawn")
+        drawn.extend((vertices, faces))
+
+    reporter = Reporter(lambda *_: None, events.append)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", palpate.MeshWarning)
+        tetrahedralize_with("quadratic", path, progress=reporter, drawn=draw)
+    assert events.index("drawn") < events.index("wrapping")
+    np.testing.assert_allclose(np.ptp(drawn[0], axis=0), [0.04, 0.03, 0.024], atol=2e-3)
+
+
+def test_a_summary_is_read_in_a_process_with_a_time_limit(tmp_path, monkeypatch):
+    labels, affine = oblique()
+    path = write_nrrd(tmp_path / "ct.seg.nrrd", labels, affine, NAMES)
+    # What this process would read is not asked for.
+    monkeypatch.setattr("palpate.segmentation.nrrd_file.read_nrrd", None)
+    summary = label_summary(path)
+    assert [(s.name, s.value, s.voxels) for s in summary.segments] == [
+        ("liver", 1, int((labels == 1).sum())),
+        ("tumor", 2, int((labels == 2).sum())),
+    ]
+    assert summary.spacing == pytest.approx([7e-4, 7e-4, 2.5e-3])
+    with pytest.raises(palpate.MeshError, match="spleen"):
+        label_summary(path, segments=["spleen"])
+    with pytest.raises(palpate.MeshError, match=r"its process did not finish in 0.01 s and was stopped"):
+        label_summary(path, time_limit=0.01)

@@ -12,7 +12,9 @@ import trimesh
 from conftest import box_mesh
 
 import palpate
+from palpate.mesh.child import OUT_OF_PROCESSOR_TIME
 from palpate.mesh.elements import smallest_dihedral_angles
+from palpate.mesh.filling import Filling
 from palpate.mesh.snap import LEAST_ANGLE, snap
 from palpate.mesh.solid_field import SolidField, cleaned, oriented
 from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
@@ -123,6 +125,45 @@ def test_the_field_of_a_ball(damage):
     wrong = (distance > 0.02) & (grid.values < 0) | (distance < -0.02) & (grid.values > 0)
     # A plane caps the hole: the winding number there is a half near the middle between cap and sphere.
     assert wrong.sum() == 0 or (damage == "open" and places[wrong][:, 2].min() * grid.cell + grid.origin[2] > 0.9)
+
+
+def test_needles_are_thinned_out():
+    """The winding number of a cylinder of 2,000 sides took a minute and a half."""
+    shape = trimesh.creation.cylinder(radius=0.2, height=1.0, sections=2000)
+    points = np.asarray(shape.vertices) - shape.vertices.min(axis=0)
+    vertices, faces, _ = cleaned(points, np.asarray(shape.faces), np.full(len(shape.faces), -1))
+    assert len(faces) < len(shape.faces) / 4
+    thinned = trimesh.Trimesh(vertices, faces, process=False)
+    assert thinned.is_watertight and thinned.volume == pytest.approx(shape.volume, rel=2e-3)
+    # A surface with few needles stays as it is.
+    few = trimesh.creation.cylinder(radius=0.2, height=1.0, sections=100)
+    assert len(cleaned(np.asarray(few.vertices) + 0.5, np.asarray(few.faces), np.zeros(400))[1]) == len(few.faces)
+
+
+def test_a_surface_that_netgen_takes_long_for_is_wrapped(monkeypatch):
+    runs = []
+    monkeypatch.setattr(Filling, "_run", lambda filling, *_: runs.append(1) or OUT_OF_PROCESSOR_TIME)
+    with pytest.warns(palpate.MeshWarning, match="could not be filled by NETGEN and was wrapped"):
+        palpate.tetrahedralize(trimesh.creation.icosphere(subdivisions=3, radius=RADIUS), unit="mm")
+    # No second attempt at another size.
+    assert len(runs) == 1
+
+
+def test_a_wavy_sheet_is_refused_and_closed_holes_are_noted():
+    x, y = np.meshgrid(np.linspace(0, 0.1, 40), np.linspace(0, 0.1, 40), indexing="ij")
+    corner = (np.arange(39)[:, None] * 40 + np.arange(39)).ravel()
+    faces = np.vstack([corner + [[0], [40], [1]], corner + [[40], [41], [1]]]).reshape(2, 3, -1)
+    faces = np.concatenate([part.T for part in faces])
+    points = np.column_stack([x.ravel(), y.ravel(), (0.01 * np.sin(40 * x) * np.cos(50 * y)).ravel()])
+    with pytest.raises(palpate.MeshError, match="it is a sheet, which has no inside"):
+        palpate.tetrahedralize(trimesh.Trimesh(points, faces, process=False), unit="m")
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
+    ball.update_faces(ball.triangles_center[:, 2] < 0.8 * RADIUS)
+    with pytest.warns(palpate.MeshWarning) as said:
+        palpate.tetrahedralize(ball, 0.012, "mm")
+    (note,) = [str(w.message) for w in said if "closes holes" in str(w.message)]
+    # A tenth of the sphere is missing; the flatter wrap across it has less.
+    assert 5 <= int(note.split(" %")[0].split()[-1]) <= 11
 
 
 def test_what_encloses_nothing_is_refused():

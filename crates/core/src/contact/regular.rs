@@ -25,6 +25,7 @@
 
 use glam::DMat3;
 
+use super::local::StrainTerms;
 use super::smooth::{Fan, SmoothSurface};
 use super::{PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, smallest_eigenvalue};
 use crate::contact::Patch;
@@ -70,15 +71,24 @@ pub struct Moduli {
     pub youngs: Vec<f64>,
     /// Poisson's ratio.
     pub poissons: Vec<f64>,
+    /// Coefficients of the contact at finite strain; zero for a linear material.
+    pub strain_terms: Vec<StrainTerms>,
     /// Whether all of the body, not only its surface, is of one material.
     pub homogeneous: bool,
 }
 
 impl Moduli {
+    /// Of a linear material.
+    pub fn linear(youngs: Vec<f64>, poissons: Vec<f64>, homogeneous: bool) -> Self {
+        let strain_terms = vec![[0.0; 3]; youngs.len()];
+        Self { youngs, poissons, strain_terms, homogeneous }
+    }
+
     /// Adds the memory that a tick reads.
     pub(crate) fn add_memory(&self, ranges: &mut Ranges) {
         ranges.add(&self.youngs);
         ranges.add(&self.poissons);
+        ranges.add(&self.strain_terms);
     }
 
     /// `E / (1 - nu^2)` of a node, Pa.
@@ -88,11 +98,11 @@ impl Moduli {
 }
 
 /// Fields at a fan: mean and Gaussian curvature (1/m, 1/m^2), `E/(1 - nu^2)` (Pa) and `nu`, `C_reg` by
-/// `xx, xy, xz, yy, yz, zz` (m/N; zero where the body is not touchable), `b` (m), and how its normal part changes with the square
-/// of the contact radius (1/(N m)).
+/// `xx, xy, xz, yy, yz, zz` (m/N; zero where the body is not touchable), `b` (m), how its normal part changes with the square
+/// of the contact radius (1/(N m)), and the coefficients of finite strain.
 pub type FanFields = [f64; FIELDS];
 /// Numbers of an entry.
-pub const FIELDS: usize = 12;
+pub const FIELDS: usize = 15;
 /// Field of the mean curvature.
 pub const MEAN: usize = 0;
 /// Field of the Gaussian curvature.
@@ -107,6 +117,8 @@ pub const COMPLIANCE: std::ops::Range<usize> = 4..10;
 pub const WIDTH: usize = 10;
 /// Field of the change with the square of the contact radius.
 pub const WIDENING: usize = 11;
+/// Fields of the coefficients of finite strain.
+pub const STRAIN_TERMS: std::ops::Range<usize> = 12..15;
 
 /// Regular compliance of a body for tools of one radius.
 pub struct RegularCompliance {
@@ -156,7 +168,11 @@ impl RegularCompliance {
             let FanCompliance { regular: c, width, widening } = at;
             let (modulus, poisson) = (body.moduli.plane_strain(fan.node), body.moduli.poissons[fan.node as usize]);
             let [x, y, z] = [c.x_axis, c.y_axis, c.z_axis];
-            [fan.mean, fan.gauss, modulus, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, widening]
+            let body_fields = [fan.mean, fan.gauss, modulus, poisson, x.x, x.y, x.z, y.y, y.z, z.z, width, widening];
+            let mut fields = [0.0; FIELDS];
+            fields[..WIDENING + 1].copy_from_slice(&body_fields);
+            fields[STRAIN_TERMS].copy_from_slice(&body.moduli.strain_terms[fan.node as usize]);
+            fields
         });
         Self { fields: fields.collect() }
     }

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::arrays_file::ArraysKind;
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const KIND: ArraysKind = ArraysKind { format: "palpate-contact", name: "file of contacts", version: VERSION };
 /// Suffix of the files, after the beginning of the key.
 const ENDING: &str = "contact.palpate";
@@ -74,6 +74,7 @@ fn key(body: CompliantBody<'_>, radius: f64, max_stiffness: f64) -> String {
     for numbers in [
         &body.moduli.youngs[..],
         &body.moduli.poissons[..],
+        body.moduli.strain_terms.as_flattened(),
         &[radius, max_stiffness, f64::from(u8::from(body.moves)), f64::from(u8::from(body.moduli.homogeneous))],
     ] {
         hash.update(&(numbers.len() as u64).to_le_bytes());

@@ -101,7 +101,7 @@ impl BodyModel {
     /// Elastic constants that are not given at every surface node, or out of range.
     pub fn with_moduli(self, moduli: Moduli) -> Result<Self> {
         let (nodes, given) = (self.green.surface_count(), moduli.youngs.len());
-        if given != nodes || moduli.poissons.len() != nodes {
+        if given != nodes || moduli.poissons.len() != nodes || moduli.strain_terms.len() != nodes {
             return Err(Error::Invalid(format!("elastic constants at {given} nodes, the surface has {nodes}")));
         }
         let valid = |(&e, &nu): (&f64, &f64)| e > 0.0 && e.is_finite() && nu > -1.0 && nu < 0.5;

@@ -80,11 +80,18 @@ fn body(folder: &Path, described: BodyDescription) -> Result<Body> {
     let green = Arc::new(GreensFunction::load(&store, Some(&described.store.key))?);
     let arrays = Arrays::read(folder, &described.arrays)?;
     let (youngs, poissons) = (arrays.optional("youngs", Dtype::F64, 1)?, arrays.optional("poissons", Dtype::F64, 1)?);
-    let moduli = youngs.zip(poissons);
+    let strain_terms: Option<Vec<f64>> = arrays.optional("strain_terms", Dtype::F64, 3)?;
+    let moduli = youngs.zip(poissons).map(|(youngs, poissons)| {
+        let linear = Moduli::linear(youngs, poissons, described.one_material);
+        match strain_terms {
+            Some(terms) => Moduli { strain_terms: terms.as_chunks().0.to_vec(), ..linear },
+            None => linear,
+        }
+    });
     Ok(Body {
         name: described.name,
         placement: placement(described.position, described.orientation),
-        moduli: moduli.map(|(youngs, poissons)| Moduli { youngs, poissons, homogeneous: described.one_material }),
+        moduli,
         motion: described.motion.map(|described| motion(&arrays, &described)).transpose()?,
         strain: Some(Arc::new(strain(&arrays, &green)?)),
         green,

@@ -61,7 +61,7 @@ pub fn single_with(tool: ToolModel) -> Arc<Model> {
 pub fn sliding(moving: bool, shapes: [ToolShape; 2]) -> Arc<Model> {
     let body = BodyModel::new(green(&cube(6)), Placement::default()).expect("a valid body");
     let nodes = body.green().surface_count();
-    let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes], homogeneous: true };
+    let moduli = Moduli::linear(vec![10e3; nodes], vec![0.4; nodes], true);
     let body = body.with_moduli(moduli).expect("constants that match");
     let body = if moving { set_in_motion(body) } else { body };
     let tools = shapes.map(|shape| ToolModel { shape, radius: 0.01, law: LawKind::LOCAL, ..TOOL });

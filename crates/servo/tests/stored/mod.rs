@@ -43,7 +43,7 @@ pub fn recording(scene: &Scene) -> PathBuf {
 pub fn model(scene: &Scene) -> Arc<Model> {
     let green = Arc::new(GreensFunction::load(&store(), None).expect("a store that the release build has written"));
     let nodes = green.surface_count();
-    let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes], homogeneous: true };
+    let moduli = Moduli::linear(vec![10e3; nodes], vec![0.4; nodes], true);
     let mut body = BodyModel::new(green, Placement::default()).expect("a valid body");
     body = body.with_moduli(moduli).expect("constants that match");
     if scene.moving {

@@ -160,7 +160,7 @@ impl FootprintScratch {
     pub fn wall_beside(&self, pressed: &Plane, thickness: f64) -> Option<Plane> {
         let margin = self.near.margin;
         let faces = |near: &&NearPiece| near.facing_cosine > LEAST_FACING;
-        let stands_on = |near: &NearPiece, plane: &Plane| near.share_of_wall(plane, margin) > WALL_SHARE;
+        let stands_on = |near: &NearPiece, plane: &Plane| near.share_of_wall(plane, &[], margin) > WALL_SHARE;
         let stands_on_others = |near: &&NearPiece| self.others.iter().flatten().all(|plane| stands_on(near, plane));
         let within = self.near.pieces.iter().filter(|near| stands_on(near, pressed));
         let beyond = self
@@ -311,10 +311,14 @@ impl NearPiece {
         Some((area * nearness * nearness * eta, by))
     }
 
-    /// Share to which the piece is a wall rising over a plane: one if it is steep and the plane's point lies in front of it.
-    fn share_of_wall(&self, plane: &Plane, margin: f64) -> f64 {
-        let (belonging, _) = smooth_step(self.normal.dot(plane.normal), SAME_CONTACT);
-        (1.0 - belonging) * self.share_in_front(plane, margin)
+    /// Share to which the piece is a wall rising over a plane: one if it is steep, or more parallel to one of the `others`, and the
+    /// plane's point lies in front of it.
+    fn share_of_wall(&self, plane: &Plane, others: &[Option<Plane>], margin: f64) -> f64 {
+        let cosine = self.normal.dot(plane.normal);
+        let better = others.iter().flatten().map(|other| self.normal.dot(other.normal)).fold(-1.0, f64::max);
+        let (belonging, _) = smooth_step(cosine, SAME_CONTACT);
+        let (elsewhere, _) = smooth_step(better - cosine, BETTER_PLANE);
+        (1.0 - belonging * (1.0 - elsewhere)) * self.share_in_front(plane, margin)
     }
 
     /// Share to which the plane's point lies in front of the piece.
@@ -333,11 +337,7 @@ impl NearPiece {
     /// Flattens a wall that rises over the contact to its plane, the more the steeper it is. Over a convex edge nothing is
     /// flattened: the middle lies behind both sides.
     fn flatten_walls(&mut self, plane: &Plane, others: &OtherPlanes, margin: f64) {
-        let cosine = self.normal.dot(plane.normal);
-        let better = others.iter().flatten().map(|other| self.normal.dot(other.normal)).fold(-1.0, f64::max);
-        let (belonging, _) = smooth_step(cosine, SAME_CONTACT);
-        let (elsewhere, _) = smooth_step(better - cosine, BETTER_PLANE);
-        let share = (1.0 - belonging * (1.0 - elsewhere)) * self.share_in_front(plane, margin);
+        let share = self.share_of_wall(plane, others, margin);
         self.contact_share = 1.0 - share;
         if share > 0.0 {
             for corner in &mut self.corners {

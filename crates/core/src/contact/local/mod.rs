@@ -5,13 +5,18 @@
 
 pub mod cells;
 mod contact_plane;
+mod finite_strain;
 mod friction;
 mod modulus;
 mod sphere;
+mod strain_law;
+mod strain_table;
 mod widening;
 
 pub use contact_plane::{ContactPlane, ToolPose};
+pub use finite_strain::{StrainTerms, correct_sphere, terms_with_pad};
 pub use friction::{Friction, FrictionResponse};
 pub use modulus::effective_modulus;
 pub use sphere::{SphereContact, indent_sphere};
+pub use strain_law::{StrainLaw, strain_terms};
 pub use widening::{WidenedContact, Widening};

@@ -11,6 +11,7 @@
 //!
 //! so that force, stiffness and the forces along a surface on which anything changes follow from one energy.
 
+use super::finite_strain::{StrainCorrection, StrainTerms, correct_sphere};
 use super::sphere::{SphereContact, indent_sphere};
 
 /// Newton's steps for the approach of the sphere alone. Three are usual.
@@ -36,18 +37,26 @@ pub struct WidenedContact {
     pub energy_by_modulus: f64,
     /// By `kappa`, J N m.
     pub energy_by_rate: f64,
+    /// By the coefficients of finite strain, J.
+    pub energy_by_terms: StrainTerms,
 }
 
 impl Widening {
-    /// A sphere of effective `radius` (m) that approaches a half-space of modulus `E*` (Pa) by `approach` (m).
-    pub fn indent(self, approach: f64, radius: f64, effective_modulus: f64) -> WidenedContact {
+    /// A sphere of effective `radius` (m) that approaches a half-space of modulus `E*` (Pa) and of coefficients of finite strain by
+    /// `approach` (m).
+    pub fn indent(self, approach: f64, radius: f64, effective_modulus: f64, terms: &StrainTerms) -> WidenedContact {
+        let indent = |approach: f64| {
+            let correction = correct_sphere(approach, radius, effective_modulus, terms);
+            (indent_sphere(approach, radius, effective_modulus).corrected(&correction), correction)
+        };
         let whole = approach.max(0.0);
         let mut own = whole;
-        let mut sphere = indent_sphere(own, radius, effective_modulus);
+        let (mut sphere, mut correction) = indent(own);
         if self.rate == 0.0 {
             // A body of one material.
             let energy_by_modulus = sphere.energy / effective_modulus;
-            return WidenedContact { sphere, energy_by_modulus, energy_by_rate: 0.0 };
+            let energy_by_terms = correction.energy_by_terms;
+            return WidenedContact { sphere, energy_by_modulus, energy_by_rate: 0.0, energy_by_terms };
         }
         let mut growth = 1.0;
         for _ in 0..MOST_STEPS {
@@ -58,13 +67,19 @@ impl Widening {
                 break;
             }
             own = (own - residual / growth).max(0.1 * own);
-            sphere = indent_sphere(own, radius, effective_modulus);
+            (sphere, correction) = indent(own);
         }
-        self.whole(sphere, growth, radius, effective_modulus)
+        self.whole((sphere, correction), growth, radius, effective_modulus)
     }
 
     /// State of the whole from that of the sphere; `growth` is the derivative of the approach by the sphere's own.
-    fn whole(self, sphere: SphereContact, growth: f64, radius: f64, effective_modulus: f64) -> WidenedContact {
+    fn whole(
+        self,
+        (sphere, correction): (SphereContact, StrainCorrection),
+        growth: f64,
+        radius: f64,
+        effective_modulus: f64,
+    ) -> WidenedContact {
         let (force, area) = (sphere.force, hertz_area(sphere.force, radius, effective_modulus));
         let wide = 0.5 * force * force * (area - self.reference);
         let by_area = self.rate * force * force * area / 3.0;
@@ -77,6 +92,7 @@ impl Widening {
             },
             energy_by_modulus: (sphere.energy + by_area) / effective_modulus,
             energy_by_rate: -wide,
+            energy_by_terms: correction.energy_by_terms,
         }
     }
 }
@@ -92,6 +108,7 @@ mod tests {
 
     const MODULUS: f64 = 6e3;
     const RADIUS: f64 = 5e-3;
+    const TERMS: StrainTerms = [-0.05, -0.04, -0.05];
 
     fn widenings() -> impl Iterator<Item = Widening> {
         let unit = 1.0 / (MODULUS * RADIUS.powi(3));
@@ -110,7 +127,7 @@ mod tests {
     fn force_and_stiffness_are_derivatives_of_the_energy() {
         for widening in widenings() {
             for depth in [0.02, 0.1, 0.3, 0.8].map(|d| d * RADIUS) {
-                let at = |d: f64| widening.indent(d, RADIUS, MODULUS).sphere;
+                let at = |d: f64| widening.indent(d, RADIUS, MODULUS, &TERMS).sphere;
                 let contact = at(depth);
                 assert!((slope(|d| at(d).energy, depth) / contact.force - 1.0).abs() < 1e-6, "{widening:?} {depth}");
                 assert!((slope(|d| at(d).force, depth) / contact.stiffness - 1.0).abs() < 1e-6, "{widening:?} {depth}");
@@ -122,9 +139,10 @@ mod tests {
     fn derivatives_by_radius_modulus_and_rate_are_those_of_the_energy() {
         for widening in widenings() {
             let depth = 0.3 * RADIUS;
-            let energy =
-                |rate, radius, modulus| Widening { rate, ..widening }.indent(depth, radius, modulus).sphere.energy;
-            let contact = widening.indent(depth, RADIUS, MODULUS);
+            let energy = |rate, radius, modulus| {
+                Widening { rate, ..widening }.indent(depth, radius, modulus, &TERMS).sphere.energy
+            };
+            let contact = widening.indent(depth, RADIUS, MODULUS, &TERMS);
             let close = |a: f64, b: f64| (a - b).abs() < 1e-6 * b.abs().max(1e-3 * contact.sphere.energy);
             assert!(close(slope(|r| energy(widening.rate, r, MODULUS), RADIUS), contact.sphere.energy_by_radius));
             assert!(close(slope(|e| energy(widening.rate, RADIUS, e), MODULUS), contact.energy_by_modulus));
@@ -141,6 +159,6 @@ mod tests {
         let area = hertz_area(alone.force, RADIUS, MODULUS);
         let widening = Widening { rate: 0.5 / (MODULUS * RADIUS.powi(3)), reference: area };
         let approach = 0.25 * RADIUS + widening.rate * alone.force * area / 3.0;
-        assert!((widening.indent(approach, RADIUS, MODULUS).sphere.force / alone.force - 1.0).abs() < 1e-12);
+        assert!((widening.indent(approach, RADIUS, MODULUS, &[0.0; 3]).sphere.force / alone.force - 1.0).abs() < 1e-12);
     }
 }

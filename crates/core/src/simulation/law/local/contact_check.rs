@@ -59,7 +59,7 @@ mod tests {
     fn pressed(shape: ToolShape) -> (Model, State) {
         let green = precompute(&bodies::cube(4), Precision::F32, &|_, _| true).expect("a solvable cube");
         let nodes = green.surface_count();
-        let moduli = Moduli { youngs: vec![10e3; nodes], poissons: vec![0.4; nodes], homogeneous: true };
+        let moduli = Moduli::linear(vec![10e3; nodes], vec![0.4; nodes], true);
         let body = BodyModel::new(Arc::new(green), Placement::default()).expect("a body");
         let body = body.with_moduli(moduli).expect("constants that match");
         let tool =

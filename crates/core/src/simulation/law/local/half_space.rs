@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::contact::footprint::PressedSurface;
-use crate::contact::local::effective_modulus;
-use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, WIDTH};
+use crate::contact::local::{StrainTerms, effective_modulus, terms_with_pad};
+use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
 
@@ -46,6 +46,9 @@ pub struct HalfSpace {
     pub by_body_modulus: f64,
     /// `k_t / k_n`.
     pub tangential: f64,
+    /// Coefficients of finite strain, and their gradients by the position of the foot's point.
+    pub strain_terms: StrainTerms,
+    pub strain_slopes: [DVec3; 3],
     /// Radius over which the body's own compliance spreads a force, m, and its gradient by the position of the foot's point.
     pub width: f64,
     pub width_slope: DVec3,
@@ -61,11 +64,20 @@ impl HalfSpace {
         let slope = fields.slope(PLANE_STRAIN) * by_body_modulus;
         let poisson = fields.values[POISSON];
         let tangential = 2.0 * (1.0 - poisson) / (2.0 - poisson);
+        let body_terms: StrainTerms = std::array::from_fn(|k| fields.values[STRAIN_TERMS.start + k]);
+        let share = whole / own;
+        let (strain_terms, by_own) = terms_with_pad(&body_terms, share, own);
+        let body_slope = fields.slope(PLANE_STRAIN) * body.scale;
+        let strain_slopes = std::array::from_fn(|k| {
+            fields.slope(STRAIN_TERMS.start + k) * share.powi(k as i32 + 2) + body_slope * by_own[k]
+        });
         Self {
             modulus,
             slope,
             by_body_modulus,
             tangential,
+            strain_terms,
+            strain_slopes,
             width: fields.values[WIDTH],
             width_slope: fields.slope(WIDTH),
         }

@@ -203,11 +203,14 @@ fn indent(
     let radius_slope = product_slope * (-0.5 * radius * radius * radius * share);
     let rate_slope = fields.slope(WIDENING) / body.scale;
     let widening = Widening { rate: fields.values[WIDENING] / body.scale, reference: reference_area(tool.radius) };
-    let WidenedContact { sphere, energy_by_modulus, energy_by_rate } =
-        widening.indent(depth, radius, half_space.modulus);
-    let gradient =
-        radius_slope * sphere.energy_by_radius + half_space.slope * energy_by_modulus + rate_slope * energy_by_rate
-            - foot.normal * sphere.force;
+    let WidenedContact { sphere, energy_by_modulus, energy_by_rate, energy_by_terms } =
+        widening.indent(depth, radius, half_space.modulus, &half_space.strain_terms);
+    let by_terms: DVec3 = half_space.strain_slopes.iter().zip(energy_by_terms).map(|(&slope, by)| slope * by).sum();
+    let gradient = radius_slope * sphere.energy_by_radius
+        + half_space.slope * energy_by_modulus
+        + rate_slope * energy_by_rate
+        + by_terms
+        - foot.normal * sphere.force;
     Indentation {
         depth,
         force: sphere.force,

@@ -314,7 +314,9 @@ fn evaluate_contacts(
     let mut guessed = [DVec3::ZERO; MAX_CONTACTS];
     for (a, &slot) in slots.iter().enumerate() {
         guessed[a] = local.responses[a].force;
-        local.footprint.others = other_planes(&state.contacts, slot);
+        if contact_needs_cells(model, state, slot) {
+            local.footprint.others = other_planes(&state.contacts, slot);
+        }
         let tool = state.contacts.slots[slot].tool;
         let response = local_body(model, state, tool, body).and_then(|surface| {
             let LocalScratch { positions, responses, others, weights, cells, footprint, no_pressures, .. } =

@@ -1,0 +1,1 @@
+"""Finite strain references: full Newton solutions that the laws for large strains are compared with."""

@@ -1,0 +1,105 @@
+"""Spheres on hyperelastic blocks beside full Newton solutions (`benches/strain`), and materials that are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import palpate
+from palpate.body import surface_strain_terms
+from palpate.errors import SceneError
+from palpate.scene import Scene
+from palpate.validation.verify.contact.loop import pressed, sphere
+from palpate.validation.verify.contact.reference import Block, finer_in_the_middle
+
+RADIUS = 0.01
+DEPTHS = np.array([1.0, 2.0, 5.0, 10.0]) * 1e-3
+# Forces, N, on a sphere of 10 mm in the middle of a cylinder of 100 mm radius and 50 mm height on a table, E = 10 kPa:
+# 9-node axisymmetric elements, full Newton's method, by Poisson's ratio.
+FORCES = {
+    0.45: np.array([0.05548, 0.15871, 0.62977, 1.70484]),
+    0.3: np.array([0.04996, 0.14438, 0.58629, 1.63822]),
+}
+
+
+def forces_on(material: palpate.Material) -> np.ndarray:
+    body = finer_in_the_middle(Block((0.2, 0.2, 0.05), material), 0.005, 0.02, quadratic=True)
+    return pressed(body, sphere(RADIUS), RADIUS, DEPTHS, 0.02)
+
+
+# Of elements of 5 mm, whose linear part alone is 1 to 2 % too stiff.
+ALLOWED = 4.5e-2
+
+
+@pytest.mark.parametrize("ratio", FORCES)
+def test_a_neo_hookean_block_has_the_force_of_a_full_solution(ratio):
+    found = forces_on(palpate.Material(10e3, ratio, law="neo-hookean"))
+    np.testing.assert_allclose(found, FORCES[ratio], rtol=ALLOWED)
+
+
+def test_the_linear_law_fails_the_same_bound():
+    errors = np.abs(forces_on(palpate.Material(10e3, 0.45)) / FORCES[0.45] - 1.0)
+    assert errors[2] > 1.5 * ALLOWED
+    assert errors[3] > 2.5 * ALLOWED
+
+
+def test_a_yeoh_material_stiffens_and_two_ways_of_writing_one_agree():
+    yeoh = palpate.Material(law="yeoh", c10=1.7e3, c20=1.7e3, poissons_ratio=0.45)
+    plain = palpate.Material(law="yeoh", c10=1.7e3, poissons_ratio=0.45)
+    first, second = (forces_on(material) for material in (plain, yeoh))
+    assert (second > first).all() and second[3] > 1.1 * first[3]
+    rivlin = palpate.Material(law="mooney-rivlin", c10=1.7e3, c01=0.0, poissons_ratio=0.45)
+    np.testing.assert_allclose(forces_on(rivlin), first, rtol=1e-12)
+
+
+def test_moduli_follow_from_constants():
+    material = palpate.Material(law="mooney-rivlin", c10="1.2kPa", c01="0.4kPa", poissons_ratio=0.45)
+    # E = 2 mu (1 + nu), mu = 2 (c10 + c01).
+    assert material.youngs_modulus == pytest.approx(4 * 1.45 * 1600)
+    assert not palpate.Material(10e3, 0.45).strain_terms.any()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"law": "hooke"}, "law must be one of"),
+        ({"law": "yeoh"}, "'c10' is missing"),
+        ({"law": "yeoh", "c10": 1e3, "c01": 1.0}, "'c01' does not belong"),
+        ({"law": "neo-hookean", "youngs_modulus": 1e4, "poissons_ratio": 0.49}, "between 0 and 0.45"),
+        ({"law": "mooney-rivlin", "c10": 1e3, "poissons_ratio": 0.2}, "between 0.3 and 0.45"),
+        ({"law": "yeoh", "c10": 1e3, "youngs_modulus": 1e3}, "leave one out"),
+        ({"law": "yeoh", "c10": -1e3}, "c10 must be positive"),
+        ({"poissons_ratio": 0.4}, "needs a Young's modulus"),
+    ],
+)
+def test_wrong_materials_are_refused(given, message):
+    with pytest.raises(palpate.BodyError, match=message):
+        palpate.Material(**given)
+
+
+def test_regions_have_laws_of_their_own():
+    region = {"shape": "half-space", "point": (0, 0, 0), "normal": (0, 0, 1), "law": "yeoh", "c10": "2kPa"}
+    scene = Scene(
+        body={"model": "liver"},
+        material={"law": "neo-hookean", "youngs_modulus": "6kPa", "poissons_ratio": 0.4},
+        region=[region],
+    )
+    own = scene.region[0].material(scene.material)
+    assert (own.law, own.poissons_ratio) == ("yeoh", 0.4)
+    assert own.youngs_modulus == pytest.approx(4 * 1.4 * 2e3)
+    assert scene.material.material().law == "neo-hookean"
+
+
+def test_a_mistake_in_a_scene_names_its_key(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text('[body]\nmodel = "liver"\n[material]\nlaw = "mooney-rivlin"\n')
+    with pytest.raises(SceneError, match="'c10' is missing"):
+        Scene.read(path)
+
+
+def test_terms_at_the_surface_are_those_of_the_elements_there():
+    material = palpate.Material(10e3, 0.3, law="neo-hookean")
+    body = finer_in_the_middle(Block(material=material), 0.02, 0.02, quadratic=False)
+    terms = surface_strain_terms(body)
+    assert terms.shape == (len(body.mesh.surface_nodes), 3)
+    np.testing.assert_allclose(terms, np.broadcast_to(material.strain_terms, terms.shape))
