@@ -15,7 +15,7 @@ use crate::safety::{FaultReason, SafetyStage};
 /// Ticks that a recorder may be behind: four seconds at 1 kHz, about 20 MB.
 const RECORDS: usize = 4096;
 /// Exchanges that may be under way.
-const EXCHANGES: usize = 2;
+const EXCHANGES: usize = 16;
 
 /// The state that a recording starts from: at rest, without contacts.
 pub(crate) struct StartState {

@@ -90,7 +90,7 @@ def test_the_scenes_of_the_page_on_scene_files_are_read(tmp_path):
     shutil.copy(ROOT / "examples" / "block.obj", tmp_path)
     page = (ROOT / "docs" / "scene.md").read_text()
     texts = [text.split("```")[0] for text in page.split("```toml\n")[1:]]
-    assert len(texts) == 5
+    assert len(texts) == 6
     for text in texts:
         whole = text if "[[body]]" in text else f'[body]\nmodel = "liver"\n{text}'
         (tmp_path / "page.toml").write_text(whole)

@@ -55,8 +55,8 @@ def test_the_log_is_kept_on_ctrl_c(tmp_path):
     )
     command = [sys.executable, "-c", program, "run", "a.toml", "--headless", "60"]
     child = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert child.stdout.readline().startswith("kept in the cache: ")
-    assert child.stdout.readline() == "running\n"
+    # The plan and the place in the cache come first.
+    assert "running\n" in [child.stdout.readline() for _ in range(3)]
     time.sleep(1.5)
     child.send_signal(signal.SIGINT)
     said, complained = child.communicate(timeout=280)

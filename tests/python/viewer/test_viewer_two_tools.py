@@ -79,8 +79,8 @@ def test_two_tools_on_two_bodies(chromium, pair):
         # Bodies do not feel each other.
         assert np.allclose(second["tools"][0]["force"], alone, rtol=1e-3)
         assert second["force"] == second["tools"][1]["force"] and second["force"][2] > 0
-        told = page.get_by_test_id("pinned-line").inner_text()
-        assert float(told.split()[1]) == pytest.approx(np.linalg.norm(alone), abs=0.006)
+        shown = float(page.locator("#pinned-value").inner_text())
+        assert shown == pytest.approx(np.linalg.norm(alone), abs=0.006)
         # Letting go of the second leaves the first; Escape takes that too.
         page.mouse.up()
         until(page, lambda s: s["contacts"] == 1 and s["tools"][0]["active"] and not s["tools"][1]["active"])
