@@ -12,6 +12,7 @@ from benches.paper import paper
 from benches.precompute import precompute
 from benches.record import record
 from benches.scale import scale
+from benches.strain.patch_table import patch_table
 from benches.strain.table import strain_table
 from benches.surface import surface
 from benches.tick import tick
@@ -31,6 +32,7 @@ for command in (
     *(tick, contact, scale, precompute, surface, elements),
     *(paper, dynamics, record, viewer, zwidth, touches, fill),
     strain_table,
+    patch_table,
 ):
     app.command()(command)
 

@@ -19,7 +19,19 @@ MAX_FILE_LINES = 500
 MAX_PAGE_LINES = 100
 
 # The chapters of core, numbered from 1; each may import earlier ones.
-CHAPTERS = ("element", "mesh", "fem", "solver", "green", "capacitance", "contact", "strain", "dynamics", "simulation")
+CHAPTERS = (
+    "element",
+    "mesh",
+    "fem",
+    "solver",
+    "green",
+    "capacitance",
+    "contact",
+    "strain",
+    "dynamics",
+    "simulation",
+    "series",
+)
 
 # What the online part of core builds without.
 OFFLINE_ONLY = {"faer", "metis-sys", "rayon"}

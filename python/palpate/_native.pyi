@@ -154,6 +154,14 @@ class StrainMeasure:
     def gradients(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
 
 def strain_terms(law: str, first: float, second: float, poisson: float, /) -> list[float] | None: ...
+def series(
+    arguments: tuple,
+    law_arguments: tuple[list[tuple[str, float, float]], np.ndarray],
+    radius: float,
+    store: Path,
+    green_key: str,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[np.ndarray, np.ndarray]: ...
 def checksum(data: bytes) -> str: ...
 
 class StrainResponse:

@@ -13,6 +13,7 @@ import pytest
 
 import palpate
 from palpate.scene import BuiltScene
+from palpate.scene.series import with_series
 
 ROOT = Path(__file__).resolve().parents[2]
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
@@ -135,6 +136,22 @@ def test_a_packed_scene_has_the_forces_of_python_to_the_bit(prefix, scene, packe
     script, ticks = played(prefix, tmp_path / "free.pack", positions, tmp_path)
     assert np.array_equal(script, forces) and np.array_equal(ticks, forces)
     assert np.abs(forces - recording.forces).max() > 0.01
+
+
+def test_a_hyperelastic_body_too(prefix, block, block_green, tmp_path):
+    material = palpate.Material(10e3, 0.4, law="neo-hookean")
+    body = palpate.Body(block.mesh, material=material, fixed=block.fixed_nodes)
+    table = {"model": "beam"}
+    tables = palpate.Scene(body=table, tool={"radius": 0.006}, view={"strain_limit": 0}, device={"ramp": 0})
+    built = with_series(BuiltScene.of(tables, body, block_green))
+    assert built.bodies[0].series
+    palpate.pack(built, tmp_path / "neo-hookean.pack")
+    positions = path_of(400, 1)
+    script, ticks = played(prefix, tmp_path / "neo-hookean.pack", positions, tmp_path)
+    forces = palpate.Simulation(built).run(positions)
+    assert np.array_equal(script, forces) and np.array_equal(ticks, forces)
+    linear = palpate.Simulation(BuiltScene.of(tables, block, block_green)).run(positions)
+    assert np.abs(forces - linear).max() > 1e-3 * np.abs(linear).max()
 
 
 def test_a_body_in_motion_and_a_bare_store_too(prefix, block, block_green, tmp_path):

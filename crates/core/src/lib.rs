@@ -1,7 +1,7 @@
 //! Finite elements, Green's functions, capacitance and contact: the numerics and physics of Palpate.
 //!
-//! The folders are the ten chapters of docs/theory.md, in order: `element`, `mesh`, `fem`, `solver`, `green`, `capacitance`,
-//! `contact`, `strain`, `dynamics`, `simulation`. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
+//! The folders are the eleven chapters of docs/theory.md, in order: `element`, `mesh`, `fem`, `solver`, `green`, `capacitance`,
+//! `contact`, `strain`, `dynamics`, `simulation`, `series`. SI units everywhere, `f = K u` on all dofs, dof = 3 * node + axis.
 //!
 //! The feature `offline` brings what is computed before anyone touches: assembly, factorisation, precomputation, changes of
 //! boundary conditions. Without it the crate reads stores and answers a tick, and depends on neither faer, METIS nor
@@ -24,6 +24,8 @@ pub mod green;
 mod header;
 pub mod memory;
 pub mod mesh;
+#[cfg(feature = "offline")]
+pub mod series;
 pub mod simulation;
 #[cfg(feature = "offline")]
 pub mod solver;

@@ -22,6 +22,7 @@ mod recording;
 mod replay;
 mod rerun;
 mod scene;
+mod series;
 mod simulation;
 mod strain;
 mod surface;
@@ -68,6 +69,8 @@ mod _native {
     use crate::rerun::rerun;
     #[pymodule_export]
     use crate::scene::{checksum, strain_terms};
+    #[pymodule_export]
+    use crate::series::series;
     #[pymodule_export]
     use crate::simulation::SimulationCore;
     #[pymodule_export]

@@ -28,9 +28,16 @@ pub type DynamicsArguments<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<
 /// linear, and whether all of the body is of one material.
 pub type ModuliArguments<'py> =
     (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray2<'py, f64>>, bool);
-/// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, and its elastic constants.
-pub type BodyArguments<'py> =
-    (PyRef<'py, GreenCore>, [f64; 3], [f64; 4], Option<DynamicsArguments<'py>>, Option<ModuliArguments<'py>>);
+/// Green's function, position (m), orientation (unit quaternion w x y z), what moves the body, its elastic constants, and series by the
+/// radius of tools, m.
+pub type BodyArguments<'py> = (
+    PyRef<'py, GreenCore>,
+    [f64; 3],
+    [f64; 4],
+    Option<DynamicsArguments<'py>>,
+    Option<ModuliArguments<'py>>,
+    Vec<(f64, PyReadonlyArray2<'py, f64>)>,
+);
 /// What a tool looks like: a kind and its lengths in m, three at most; of a surface vertices and triangles.
 pub type ShapeArguments = (String, [f64; 3], Vec<[f64; 3]>, Vec<[u32; 3]>);
 /// Shape, contact law, largest stiffness (N/m), Young's modulus of the pad (Pa), settings by their names.
@@ -42,7 +49,7 @@ pub type ContactRecord = (usize, usize, &'static str, [[f64; 3]; 6], [bool; 2], 
 
 /// Takes arguments out of the interpreter's hands.
 pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
-    let (green, position, orientation, dynamics, moduli) = arguments;
+    let (green, position, orientation, dynamics, moduli, series) = arguments;
     let motion = dynamics
         .as_ref()
         .map(|(eigenvalues, shapes, arguments, exact, coupling)| -> PyResult<_> {
@@ -60,20 +67,29 @@ pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
         })
         .transpose()?;
     let placement = placement(*position, *orientation);
-    Ok(Body { name: String::new(), green: green.green.clone(), placement, moduli, motion, strain: None })
+    let of_radius = |(radius, fields): &(f64, PyReadonlyArray2<'_, f64>)| -> PyResult<_> {
+        Ok((*radius, fields.as_slice()?.as_chunks().0.into()))
+    };
+    let series = series.iter().map(of_radius).collect::<PyResult<_>>()?;
+    Ok(Body { name: String::new(), green: green.green.clone(), placement, moduli, motion, strain: None, series })
+}
+
+/// A law by its name and two ratios of its constants.
+pub fn strain_law(name: &str, first: f64, second: f64) -> Option<StrainLaw> {
+    Some(match name {
+        "linear" => StrainLaw::Linear,
+        "neo-hookean" => StrainLaw::NeoHookean,
+        "mooney-rivlin" => StrainLaw::MooneyRivlin { share: first },
+        "yeoh" => StrainLaw::Yeoh { quadratic: first, cubic: second },
+        _ => return None,
+    })
 }
 
 /// Coefficients of a sphere's contact at finite strain of a material, by its law, two ratios of its constants and Poisson's ratio;
 /// `None` outside of the table.
 #[pyfunction]
 pub fn strain_terms(law: &str, first: f64, second: f64, poisson: f64) -> Option<[f64; 3]> {
-    let law = match law {
-        "linear" => StrainLaw::Linear,
-        "neo-hookean" => StrainLaw::NeoHookean,
-        "mooney-rivlin" => StrainLaw::MooneyRivlin { share: first },
-        "yeoh" => StrainLaw::Yeoh { quadratic: first, cubic: second },
-        _ => return None,
-    };
+    let law = strain_law(law, first, second)?;
     law.is_known(poisson).then(|| palpate_core::contact::local::strain_terms(&law, poisson))
 }
 

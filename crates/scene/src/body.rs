@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat};
 use palpate_core::Result;
-use palpate_core::contact::Moduli;
+use palpate_core::contact::{Moduli, SeriesFields};
 use palpate_core::dynamics::{Integration, ModalModel, Newmark, Rayleigh};
 use palpate_core::green::GreensFunction;
 use palpate_core::simulation::{BodyDynamics, BodyModel, Placement};
@@ -57,6 +57,8 @@ pub struct Body {
     pub motion: Option<Motion>,
     /// How its strain is measured; without it, it is not limited.
     pub strain: Option<Arc<StrainMeasure>>,
+    /// Higher orders of its displacement by the radius of spheres, m; without them contacts have those of a half-space.
+    pub series: Vec<(f64, Arc<[SeriesFields]>)>,
 }
 
 impl Body {
@@ -73,6 +75,7 @@ impl Body {
             strain: Some(Arc::new(StrainMeasure::of_surface(&green.surface))),
             placement: Placement::default(),
             motion: None,
+            series: vec![],
             green,
         })
     }
@@ -85,6 +88,9 @@ impl Body {
         let mut body = BodyModel::new(self.green.clone(), self.placement)?;
         if let Some(moduli) = &self.moduli {
             body = body.with_moduli(moduli.clone())?;
+            for (radius, series) in &self.series {
+                body = body.with_series(*radius, series.clone())?;
+            }
         }
         match &self.motion {
             Some(motion) => body.with_dynamics(motion.dynamics()?),

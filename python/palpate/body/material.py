@@ -103,9 +103,14 @@ class Material:
         return law, modulus
 
     @property
+    def strain_law(self) -> StrainLaw:
+        """Law beyond small strain, with the ratios of its constants."""
+        return self._law_and_modulus(self.poissons_ratio)[0]
+
+    @property
     def strain_terms(self) -> np.ndarray:
         """Coefficients (3,) of a sphere's contact at finite strain; zero of a linear material."""
-        return self._law_and_modulus(self.poissons_ratio)[0].terms(self.poissons_ratio)
+        return self.strain_law.terms(self.poissons_ratio)
 
 
 def material_rows(mesh: TetMesh, material: Material | Mapping[int | str, Material]) -> np.ndarray:
@@ -122,6 +127,20 @@ def strain_term_rows(mesh: TetMesh, material: Material | Mapping[int | str, Mate
     for region, m in _by_region(mesh, material).items():
         rows[mesh.regions == region] = m.strain_terms
     return rows
+
+
+def element_laws(
+    mesh: TetMesh, material: Material | Mapping[int | str, Material]
+) -> tuple[list[tuple[str, float, float]], np.ndarray]:
+    """Laws beyond small strain with the ratios of their constants, and the number of that of each element (m,)."""
+    known: list[tuple[str, float, float]] = []
+    numbers = np.empty(len(mesh.tets), np.uint32)
+    for region, m in _by_region(mesh, material).items():
+        law = (m.strain_law.name, *m.strain_law.parameters)
+        if law not in known:
+            known.append(law)
+        numbers[mesh.regions == region] = known.index(law)
+    return known, numbers
 
 
 def _by_region(mesh: TetMesh, material: Material | Mapping[int | str, Material]) -> dict[int, Material]:

@@ -50,6 +50,8 @@ class BuiltBody:
         What it is called.
     position, orientation
         Of its own frame in the scene: m, and a unit quaternion w x y z.
+    series
+        Coefficients (k, 7) of its displacement beyond small strain by the radius of a sphere, m.
 
     """
 
@@ -59,6 +61,7 @@ class BuiltBody:
     name: str = "body"
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    series: tuple[tuple[float, np.ndarray], ...] = ()
 
     def points_to_scene(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) of the body's own frame in the scene, m."""

@@ -15,6 +15,7 @@ from palpate.input_file import read_toml
 from palpate.scene.build import BuiltScene, build, require_files
 from palpate.scene.early import Expected
 from palpate.scene.mistakes import explain, located
+from palpate.scene.series import with_series
 from palpate.scene.tables import BodyTable, SceneTables
 
 
@@ -123,7 +124,7 @@ class Scene(SceneTables):
             A mesh that cannot be read or made, supports that leave it free to move, a store that does not match.
 
         """
-        return build(self, progress, modes_progress, announce=announce)
+        return with_series(build(self, progress, modes_progress, announce=announce), progress)
 
     def build_first(
         self,
@@ -142,7 +143,9 @@ class Scene(SceneTables):
         """
         growing: dict[int, BackgroundPrecompute] = {}
         try:
-            return build(self, progress, None, growing, announce), growing
+            built = build(self, progress, None, growing, announce)
+            # While columns are computed, their processes have the processor.
+            return (built if growing else with_series(built, progress)), growing
         except BaseException:
             for background in growing.values():
                 background.close()

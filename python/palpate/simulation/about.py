@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ def about(
         "folder": str(scene.folder.absolute()),
         "bodies": json.dumps([body.name for body in bodies]),
         "keys": json.dumps(keys),
+        "series": json.dumps([[radius for radius, _ in body.series] for body in bodies]),
         "rate": repr(scene.device.rate),
         "tools": str(len(scene.tools)),
         "devices": json.dumps(devices),
@@ -111,6 +113,16 @@ def require_same(about: dict[str, str], built: BuiltScene) -> None:
                 f"'{name}' is not the body that was recorded: its {what} differ (made by Palpate {about['version']}); "
                 f"give the scene as it was then"
             )
+
+
+def with_recorded_series(about: dict[str, str], built: BuiltScene) -> BuiltScene:
+    """Leave out the series that the recorded loop had not; one that the page drove may have begun without them."""
+    recorded = json.loads(about.get("series", "[]")) or [[] for _ in built.bodies]
+    bodies = [
+        replace(body, series=tuple((radius, fields) for radius, fields in body.series if radius in radii))
+        for body, radii in zip(built.bodies, recorded, strict=True)
+    ]
+    return replace(built, bodies=tuple(bodies))
 
 
 def shown_of(about: dict[str, str]) -> tuple[int, bool]:

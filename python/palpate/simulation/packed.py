@@ -115,12 +115,15 @@ def _place_store(green: GreensFunction, target: Path) -> None:
 
 
 def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) -> dict[str, Any]:
-    _, position, orientation, moving, moduli = arguments
+    _, position, orientation, moving, moduli, series = arguments
     arrays: dict[str, np.ndarray] = {}
     if moduli is not None:
         arrays["youngs"], arrays["poissons"], terms, _ = moduli
         if terms is not None and terms.any():
             arrays["strain_terms"] = terms
+    if series:
+        arrays["series_radii"] = np.array([radius for radius, _ in series])
+        arrays["series"] = np.concatenate([fields for _, fields in series])
     motion = None
     if moving is not None:
         arrays["eigenvalues"], arrays["shapes"], (dt, alpha, delta, mass, stiffness), exact, coupling = moving

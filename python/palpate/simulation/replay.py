@@ -12,7 +12,7 @@ import numpy as np
 from palpate import _native
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
-from palpate.simulation.about import require_same, scene_of
+from palpate.simulation.about import require_same, scene_of, with_recorded_series
 from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.recording import Recording
 from palpate.simulation.simulation import Simulation
@@ -92,7 +92,7 @@ def built_scene_of(recording: Recording, scene: Scene | BuiltScene | None = None
     given = scene_of(dict(recording.about)) if scene is None else scene
     built = given if isinstance(given, BuiltScene) else given.build()
     require_same(dict(recording.about), built)
-    return built
+    return with_recorded_series(dict(recording.about), built)
 
 
 def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None) -> Simulation:

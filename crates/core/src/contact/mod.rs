@@ -23,10 +23,13 @@ pub(crate) use closest::barycentric;
 pub use closest::{SurfacePoint, SurfaceQuery};
 pub use compliance::{Touch, smallest_eigenvalue, touch};
 pub use concavities::Concavities;
+pub use local::SeriesFields;
+#[cfg(feature = "offline")]
+pub use patch::wide_patch_weights;
 pub use patch::{MAX_PATCH_NODES, Patch, PatchScratch, patch_weights};
 pub use quadrature::PatchGeometry;
 pub use refusal::Refusal;
-pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, known_fans};
+pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, centre_of, known_fans};
 pub use regular_store::remove_compliance_files;
 pub use tessellation::Tessellation;
 pub use touch_patch::TouchPatch;

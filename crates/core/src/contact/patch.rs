@@ -149,7 +149,7 @@ fn weights_on<F: Face<N>, const N: usize>(
 ) -> Result<(), Refusal> {
     patch.count = 0;
     let walk = Walk::<F, N>::new(surface, faces, geometry, centre, radius);
-    let finished = walk.collect_sums(centre.triangle, scratch);
+    let finished = walk.collect_sums(centre.triangle, MAX_PATCH_NODES, scratch);
     let total: f64 = scratch.touched.iter().map(|&n| scratch.sums[n as usize]).sum();
     for &node in &scratch.touched {
         let sum = std::mem::take(&mut scratch.sums[node as usize]);
@@ -165,6 +165,40 @@ fn weights_on<F: Face<N>, const N: usize>(
         walk.point_weights(centre, patch);
     }
     Ok(())
+}
+
+/// The same with any number of nodes, as pairs of node and weight; none where the patch is smaller than a point of quadrature's
+/// share of the surface.
+#[cfg(feature = "offline")]
+pub fn wide_patch_weights(
+    surface: &Surface,
+    geometry: &PatchGeometry,
+    centre: &SurfacePoint,
+    radius: f64,
+    scratch: &mut PatchScratch,
+) -> Vec<(u32, f64)> {
+    match &surface.faces {
+        Faces::Linear(faces) => wide_weights_on::<Tri3, 3>(surface, faces, geometry, centre, radius, scratch),
+        Faces::Quadratic(faces) => wide_weights_on::<Tri6, 6>(surface, faces, geometry, centre, radius, scratch),
+    }
+}
+
+#[cfg(feature = "offline")]
+fn wide_weights_on<F: Face<N>, const N: usize>(
+    surface: &Surface,
+    faces: &[[u32; N]],
+    geometry: &PatchGeometry,
+    centre: &SurfacePoint,
+    radius: f64,
+    scratch: &mut PatchScratch,
+) -> Vec<(u32, f64)> {
+    let walk = Walk::<F, N>::new(surface, faces, geometry, centre, radius);
+    walk.collect_sums(centre.triangle, usize::MAX, scratch);
+    let PatchScratch { touched, sums, .. } = scratch;
+    let weights: Vec<(u32, f64)> =
+        touched.iter().map(|&node| (node, std::mem::take(&mut sums[node as usize]))).collect();
+    let total: f64 = weights.iter().map(|&(_, sum)| sum).sum();
+    if total > 0.0 { weights.into_iter().map(|(node, sum)| (node, sum / total)).collect() } else { Vec::new() }
 }
 
 impl PatchGeometry {
@@ -252,8 +286,8 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
     }
 
     /// Walks the connected triangles inside the ball, from triangle `first`, and adds `int N_i phi dA` to each node's sum.
-    /// False where there are too many nodes.
-    fn collect_sums(&self, first: u32, scratch: &mut PatchScratch) -> bool {
+    /// False where there are more than `most` nodes.
+    fn collect_sums(&self, first: u32, most: usize, scratch: &mut PatchScratch) -> bool {
         scratch.touched.clear();
         scratch.queue.clear();
         scratch.visit = scratch.visit.wrapping_add(1);
@@ -269,7 +303,7 @@ impl<'a, F: Face<N>, const N: usize> Walk<'a, F, N> {
             if moments.overlaps_mask {
                 for (node, sum) in self.faces[t as usize / F::PARTS.len()].into_iter().zip(moments.of_shapes::<N>()) {
                     if scratch.touched_by[node as usize] != scratch.visit {
-                        if scratch.touched.len() == MAX_PATCH_NODES {
+                        if scratch.touched.len() == most {
                             return false;
                         }
                         scratch.touched_by[node as usize] = scratch.visit;

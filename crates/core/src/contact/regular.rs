@@ -23,9 +23,11 @@
 //! radius is stored (`local::widening`). In a body of one material it changes only with the distance to edges
 //! and supports, and extrapolating would only enlarge the error of the elements.
 
+use std::sync::Arc;
+
 use glam::DMat3;
 
-use super::local::StrainTerms;
+use super::local::{SeriesFields, StrainTerms};
 use super::smooth::{Fan, SmoothSurface};
 use super::{PatchGeometry, PatchScratch, Refusal, SurfacePoint, TouchPatch, patch_weights, smallest_eigenvalue};
 use crate::contact::Patch;
@@ -48,6 +50,9 @@ const SAME_MOMENT: f64 = 1.6;
 /// of the first.
 const SECOND_WIDTH: f64 = 1.5;
 const LEAST_APART: f64 = 0.4;
+/// Least `b` over the tool's radius in a body of one material. The error of the elements is a share of `c_half(b)`, so that it would
+/// grow as the mesh is refined if `b` followed the elements alone.
+const EVEN_WIDTH: f64 = 1.1;
 /// How fast the regular part may fall and rise with the square of the contact radius, over `1 / (E* R^3)`: up to `a = R` the
 /// approach then grows with the force by at least half of what it does on the half-space (see [`super::local::Widening`]).
 const WIDENING_RANGE: [f64; 2] = [-0.11, 7.0];
@@ -124,6 +129,8 @@ pub const STRAIN_TERMS: std::ops::Range<usize> = 12..15;
 pub struct RegularCompliance {
     /// One entry for each fan of the smooth surface.
     pub fields: Vec<FanFields>,
+    /// Higher orders of the displacement at each fan, where they are known.
+    pub series: Option<Arc<[SeriesFields]>>,
 }
 
 /// Data of a body for its regular compliance.
@@ -174,7 +181,7 @@ impl RegularCompliance {
             fields[STRAIN_TERMS].copy_from_slice(&body.moduli.strain_terms[fan.node as usize]);
             fields
         });
-        Self { fields: fields.collect() }
+        Self { fields: fields.collect(), series: None }
     }
 }
 
@@ -233,7 +240,11 @@ fn fan_compliance(
     let spacing = body.smooth.spacing_around(fan);
     let least = LEAST_SPACINGS * spacing;
     let mut probe = Probe { body, centre: centre_of(&body.green.surface, fan), least, scratch, patch };
-    let (compliance, width) = probe.compliance((SPACINGS * spacing).max((SAME_MOMENT * reference_area(radius)).sqrt()));
+    let floor = match body.moduli.homogeneous {
+        true => EVEN_WIDTH * radius,
+        false => (SAME_MOMENT * reference_area(radius)).sqrt(),
+    };
+    let (compliance, width) = probe.compliance((SPACINGS * spacing).max(floor));
     let (mut regular, mut widening) = (compliance - half_space(body.moduli, fan, width), 0.0);
     let unit = 1.0 / (body.moduli.plane_strain(fan.node) * radius);
     if !body.moduli.homogeneous {
@@ -306,7 +317,7 @@ pub fn known_fans(green: &GreensFunction, geometry: &PatchGeometry, smooth: &Smo
 }
 
 /// The node of a fan, as a point of its triangle.
-fn centre_of(surface: &Surface, fan: &Fan) -> SurfacePoint {
+pub fn centre_of(surface: &Surface, fan: &Fan) -> SurfacePoint {
     let corner = surface.triangles[fan.triangle as usize].iter().position(|&n| n == fan.node).unwrap_or(0);
     let mut barycentric = [0.0; 3];
     barycentric[corner] = 1.0;

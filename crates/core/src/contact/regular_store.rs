@@ -8,7 +8,7 @@ use crate::Result;
 use crate::arrays_file::ArraysKind;
 
 /// Version of the computation and of the file's layout; part of the key.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const KIND: ArraysKind = ArraysKind { format: "palpate-contact", name: "file of contacts", version: VERSION };
 /// Suffix of the files, after the beginning of the key.
 const ENDING: &str = "contact.palpate";
@@ -93,7 +93,7 @@ fn load(path: &Path, key: &str, fans: usize) -> Option<RegularCompliance> {
     let mut file = KIND.read(path).ok()?;
     let (shape, numbers) = file.take("fields").ok()?;
     let right = shape == [fans, FIELDS] && file.text("key") == key;
-    right.then(|| RegularCompliance { fields: numbers.as_chunks().0.to_vec() })
+    right.then(|| RegularCompliance { fields: numbers.as_chunks().0.to_vec(), series: None })
 }
 
 #[cfg(test)]

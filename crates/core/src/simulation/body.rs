@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::input::Placement;
 use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
-use crate::contact::{Moduli, PatchGeometry, SurfacePoint, SurfaceQuery, barycentric, known_fans};
+use crate::contact::{Moduli, PatchGeometry, SeriesFields, SurfacePoint, SurfaceQuery, barycentric, known_fans};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
 use crate::memory::Ranges;
@@ -76,6 +76,8 @@ pub struct PreparedBody {
     pub(super) mean_edge: f64,
     /// Data of the local law; without them only the laws `patch` and `node` can be used.
     pub(super) local: Option<LocalSurface>,
+    /// Higher orders of the displacement at the fans of the smooth surface, by the radius of the tool, m.
+    pub(super) series: Vec<(f64, Arc<[SeriesFields]>)>,
 }
 
 impl BodyModel {
@@ -91,7 +93,17 @@ impl BodyModel {
         let query = SurfaceQuery::new(&loaded)?;
         let geometry = PatchGeometry::new(&green.surface);
         let mean_edge = mean_edge(&green.surface);
-        let prepared = PreparedBody { green, free, query, loaded, geometry, dynamics: None, mean_edge, local: None };
+        let prepared = PreparedBody {
+            green,
+            free,
+            query,
+            loaded,
+            geometry,
+            dynamics: None,
+            mean_edge,
+            local: None,
+            series: vec![],
+        };
         Ok(Self { placement, prepared: Arc::new(prepared) })
     }
 
@@ -116,6 +128,18 @@ impl BodyModel {
             |of: fn(DVec3, DVec3) -> DVec3| self.loaded.positions.iter().copied().reduce(of).unwrap_or_default();
         let bounds = [corner(DVec3::min), corner(DVec3::max)];
         self.preparing(|prepared| prepared.local = Some(LocalSurface { smooth, moduli, largest_modulus, bounds }))
+    }
+
+    /// The same body with higher orders of its displacement for spheres of `radius`, m, at the fans of its smooth surface.
+    ///
+    /// # Errors
+    /// A body without elastic constants, or coefficients of another surface.
+    pub fn with_series(self, radius: f64, series: Arc<[SeriesFields]>) -> Result<Self> {
+        let fans = self.local.as_ref().map_or(0, |local| local.smooth.fans().len());
+        if series.len() != fans {
+            return Err(Error::Invalid(format!("a series at {} places, the surface has {fans}", series.len())));
+        }
+        self.preparing(|prepared| prepared.series.push((radius, series)))
     }
 
     /// The same body in motion.

@@ -33,6 +33,7 @@ impl Model {
         self.bodies.iter().for_each(|body| body.add_memory(&mut ranges));
         for compliance in self.regular_compliances.iter().flatten().flatten() {
             ranges.add(&compliance.fields);
+            compliance.series.iter().for_each(|series| ranges.add(series));
         }
         self.pressed_surfaces.iter().flatten().flatten().for_each(|surface| surface.add_memory(&mut ranges));
         self.concavities.iter().flatten().for_each(|concavities| concavities.add_memory(&mut ranges));
@@ -140,5 +141,11 @@ fn regular_compliance(body: &BodyModel, tool: &ToolModel) -> Result<Option<Arc<R
     let (green, geometry) = (&*body.green, &body.geometry);
     let (smooth, moduli, moves) = (&local.smooth, &local.moduli, body.moves());
     let compliant = CompliantBody { green, geometry, smooth, moduli, moves };
-    Ok(Some(Arc::new(RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness))))
+    let mut regular = RegularCompliance::load_or_compute(compliant, tool.radius, tool.max_stiffness);
+    // A body in motion is displaced by its modes, which are linear.
+    if !moves && !tool.shape.needs_cells() {
+        let of_radius = body.series.iter().find(|(radius, _)| *radius == tool.radius);
+        regular.series = of_radius.map(|(_, series)| series.clone());
+    }
+    Ok(Some(Arc::new(regular)))
 }

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use palpate_core::contact::Moduli;
+use palpate_core::contact::local::SERIES_FIELDS;
 use palpate_core::contact::shape::ToolShape;
+use palpate_core::contact::{Moduli, SeriesFields};
 use palpate_core::dynamics::{Newmark, Rayleigh};
 use palpate_core::fem::{Isotropic, Supports, stiffness};
 use palpate_core::green::{GreensFunction, Interior};
@@ -94,8 +95,22 @@ fn body(folder: &Path, described: BodyDescription) -> Result<Body> {
         moduli,
         motion: described.motion.map(|described| motion(&arrays, &described)).transpose()?,
         strain: Some(Arc::new(strain(&arrays, &green)?)),
+        series: series(&arrays)?,
         green,
     })
+}
+
+/// Series of all radii one after the other.
+fn series(arrays: &Arrays) -> Result<Vec<(f64, Arc<[SeriesFields]>)>> {
+    let radii: Vec<f64> = arrays.optional("series_radii", Dtype::F64, 1)?.unwrap_or_default();
+    let fields: Vec<f64> = arrays.optional("series", Dtype::F64, SERIES_FIELDS)?.unwrap_or_default();
+    let fields: &[SeriesFields] = fields.as_chunks().0;
+    let each = fields.len() / radii.len().max(1);
+    Ok(radii
+        .into_iter()
+        .zip(fields.chunks_exact(each.max(1)))
+        .map(|(radius, fields)| (radius, fields.into()))
+        .collect())
 }
 
 fn motion(arrays: &Arrays, described: &MotionDescription) -> Result<Motion> {

@@ -6,6 +6,7 @@
 pub mod cells;
 mod contact_plane;
 mod finite_strain;
+mod force_series;
 mod friction;
 mod modulus;
 mod sphere;
@@ -15,8 +16,9 @@ mod widening;
 
 pub use contact_plane::{ContactPlane, ToolPose};
 pub use finite_strain::{StrainTerms, correct_sphere, terms_with_pad};
+pub use force_series::{HigherOrders, SERIES_FIELDS, SeriesFields, higher_orders};
 pub use friction::{Friction, FrictionResponse};
 pub use modulus::effective_modulus;
 pub use sphere::{SphereContact, indent_sphere};
-pub use strain_law::{StrainLaw, strain_terms};
+pub use strain_law::{StrainLaw, interpolate, strain_terms};
 pub use widening::{WidenedContact, Widening};

@@ -46,18 +46,18 @@ impl StrainLaw {
 pub fn strain_terms(law: &StrainLaw, poisson: f64) -> StrainTerms {
     match *law {
         StrainLaw::Linear => [0.0; 3],
-        StrainLaw::NeoHookean => along(&RATIOS, poisson, |i| NEO_HOOKEAN[i]),
+        StrainLaw::NeoHookean => interpolate(&RATIOS, poisson, |i| NEO_HOOKEAN[i]),
         StrainLaw::MooneyRivlin { share } => {
-            along(&FEW_RATIOS, poisson, |i| along(&SHARES, share, |j| MOONEY_RIVLIN[i][j]))
+            interpolate(&FEW_RATIOS, poisson, |i| interpolate(&SHARES, share, |j| MOONEY_RIVLIN[i][j]))
         }
-        StrainLaw::Yeoh { quadratic, cubic } => along(&FEW_RATIOS, poisson, |i| {
-            along(&YEOH_QUADRATIC, quadratic, |j| along(&YEOH_CUBIC, cubic, |k| YEOH[i][j][k]))
+        StrainLaw::Yeoh { quadratic, cubic } => interpolate(&FEW_RATIOS, poisson, |i| {
+            interpolate(&YEOH_QUADRATIC, quadratic, |j| interpolate(&YEOH_CUBIC, cubic, |k| YEOH[i][j][k]))
         }),
     }
 }
 
 /// Lagrange's polynomial through the values at the three points closest to `x`, or at two if there are no more.
-fn along(points: &[f64], x: f64, value: impl Fn(usize) -> StrainTerms) -> StrainTerms {
+pub fn interpolate<const N: usize>(points: &[f64], x: f64, value: impl Fn(usize) -> [f64; N]) -> [f64; N] {
     let count = points.len().min(3);
     let next = points.iter().position(|&point| point >= x).unwrap_or(points.len() - 1);
     // Of the two triples around, that with the closer third point.
@@ -69,7 +69,7 @@ fn along(points: &[f64], x: f64, value: impl Fn(usize) -> StrainTerms) -> Strain
     };
     let low = if next <= 1 { 0 } else { low }.min(points.len() - count);
     let chosen = low..low + count;
-    let mut sum = [0.0; 3];
+    let mut sum = [0.0; N];
     for i in chosen.clone() {
         let weight: f64 =
             chosen.clone().filter(|&j| j != i).map(|j| (x - points[j]) / (points[i] - points[j])).product();
@@ -92,10 +92,10 @@ mod tests {
         }
         let square = |x: f64| [x * x, 1.0 - x, 2.0];
         for x in [0.0, 0.07, 0.33, 0.39, 0.44, 0.45] {
-            let found = along(&RATIOS, x, |i| square(RATIOS[i]));
+            let found = interpolate(&RATIOS, x, |i| square(RATIOS[i]));
             assert!(found.iter().zip(square(x)).all(|(a, b)| (a - b).abs() < 1e-12), "{x}");
         }
-        assert_eq!(along(&[0.0, 1.0], 0.25, |i| [i as f64, 0.0, 4.0]), [0.25, 0.0, 4.0]);
+        assert_eq!(interpolate(&[0.0, 1.0], 0.25, |i| [i as f64, 0.0, 4.0]), [0.25, 0.0, 4.0]);
     }
 
     #[test]

@@ -40,6 +40,12 @@ pub struct Blended<const N: usize> {
 }
 
 impl<const N: usize> Blended<N> {
+    /// From values and their gradients.
+    #[cfg(test)]
+    pub fn from_parts(values: [f64; N], slopes: [DVec3; N]) -> Self {
+        Self { values, slopes: std::array::from_fn(|axis| slopes.map(|slope| slope[axis])) }
+    }
+
     /// Gradient of a field by the tool's place.
     pub fn slope(&self, field: usize) -> DVec3 {
         DVec3::from_array(self.slopes.map(|along| along[field]))

@@ -23,6 +23,8 @@ pub struct LocalContact {
     pub entry_depth: f64,
     /// The closest point of the surface at rest; for a tool that is not a sphere, the middle of its footprint.
     pub foot: FootPoint,
+    /// Offset of the tool along the surface from above its contact, m: the surface is inclined where the body bends.
+    pub offset: DVec3,
     /// Depth of the tool in the surface, m.
     pub penetration: f64,
     /// Whether it has begun in this tick beside another contact of the tool; its approach then counts from the present depth.

@@ -57,6 +57,7 @@ fn observed_contacts<'a>(
 ) -> impl Iterator<Item = ObservedContact> + 'a {
     slots.iter().enumerate().map(|(a, &slot)| {
         let (contact, response) = (&contacts.slots[slot], &local.responses[a]);
+        let higher = &response.higher;
         let displacement: DVec3 = (0..slots.len()).map(|b| local.between[a][b] * local.responses[b].force).sum();
         let before = tools[contact.tool].previous_pose.map_or(
             (contact.local.tool_position, contact.local.orientation),
@@ -77,7 +78,11 @@ fn observed_contacts<'a>(
             radius: tool.radius,
             force: response.force,
             torque: response.torque,
-            stored: response.indentation.energy + response.springs().energy() + 0.5 * response.force.dot(displacement),
+            stored: response.indentation.energy
+                + response.springs().energy()
+                + 0.5 * response.force.dot(displacement)
+                + response.force.dot(higher.displacement)
+                - higher.energy,
             dissipated: response.friction.dissipated,
         }
     })

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::contact::footprint::PressedSurface;
-use crate::contact::local::{StrainTerms, effective_modulus, terms_with_pad};
+use crate::contact::local::{SeriesFields, StrainTerms, effective_modulus, terms_with_pad};
 use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, DrawnSurface, SmoothSurface};
@@ -15,6 +15,8 @@ pub struct LocalBody<'a> {
     pub smooth: &'a SmoothSurface,
     /// Curvatures, moduli and regular compliance at the fans.
     pub fields: &'a [FanFields],
+    /// Higher orders of the displacement at the fans, where they are known.
+    pub series: Option<&'a [SeriesFields]>,
     /// The surface in pieces, for a tool that is not a sphere.
     pub pressed_surface: Option<&'a PressedSurface>,
     /// Young's modulus over the Green's function's.

@@ -5,18 +5,23 @@ use glam::{DMat3, DVec3};
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
-use crate::contact::local::{Friction, FrictionResponse, WidenedContact, Widening};
+use crate::contact::local::{
+    Friction, FrictionResponse, HigherOrders, SERIES_FIELDS, WidenedContact, Widening, higher_orders,
+};
 use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
-use crate::contact::smooth::{FanWeights, FootPoint};
+use crate::contact::smooth::{Blended, FanWeights, FootPoint};
 use crate::simulation::contacts::LocalContact;
 use crate::simulation::rotation::rotation_vector;
-use crate::tensor::outer;
+use crate::tensor::{across, outer};
 
 /// Least `(1/R + kappa_1) (1/R + kappa_2)` over `1/R^2`: a concavity that fits the tool more closely counts as flatter.
 const LEAST_CURVATURE_PRODUCT: f64 = 0.1;
 /// Largest inclination of the force by the body's change of compliance, over the pressing force.
 const STEEPEST_INCLINATION: f64 = 0.5;
+/// Least guess of the force from which a turned contact is followed, and its largest change from the guess, over the force.
+const LEAST_GUESS: f64 = 0.5;
+const LARGEST_CHANGE: f64 = 0.5;
 
 /// Effect of the other contacts of the body at a contact.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,6 +36,14 @@ pub struct OtherContacts {
     /// The same by the tool's rotation, N m.
     pub turn: DVec3,
     pub motion_turn: Option<DMat3>,
+}
+
+/// A force, the part of it by friction, N, and an offset of the tool from above its contact, m, that are close to the result.
+#[derive(Clone, Copy, Debug, Default)]
+struct ForceGuess {
+    force: DVec3,
+    friction: DVec3,
+    offset: DVec3,
 }
 
 /// The response at one position.
@@ -52,6 +65,21 @@ pub struct LocalResponse {
     pub slope: DVec3,
     pub turn: DVec3,
     pub friction: FrictionResponse,
+    /// Higher orders of the body's displacement, at the force.
+    pub higher: HigherOrders,
+    series: Option<Blended<SERIES_FIELDS>>,
+    scale: f64,
+    /// Offset of the tool along the surface from above its contact, m, and its distance from the contact, m.
+    pub offset: DVec3,
+    distance: f64,
+    /// Derivative of the offset by the position.
+    pub offset_by_position: DMat3,
+    /// Derivatives of the slope and of the offset by the force, and of the force by what it would be if neither depended on it.
+    slope_by_force: DMat3,
+    offset_by_force: DMat3,
+    turning: DMat3,
+    /// Where the slope is known.
+    guess: ForceGuess,
     /// Torque on the tool about its tip, N m.
     pub torque: DVec3,
 }
@@ -61,10 +89,13 @@ pub struct LocalResponse {
 pub struct Guess<'a> {
     /// Position of the tool over the surface at rest, m.
     pub place: DVec3,
-    /// Force on the body, N.
+    /// Force on the body, and the part of it by friction, N.
     pub force: DVec3,
+    pub friction: DVec3,
     /// The foot of a position near it.
     pub foot: &'a FootPoint,
+    /// Offset of the tool from above it, m.
+    pub offset: DVec3,
 }
 
 /// Evaluates the response to the tool at a position. `None` where the body is not touchable.
@@ -101,7 +132,11 @@ fn evaluate_sphere(
 ) -> Option<LocalResponse> {
     let foot = match contact.is_fading {
         true => contact.foot.frozen(guess.place),
-        false => body.smooth.foot(body.drawn, guess.place, guess.foot, &mut weights.near)?,
+        false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
+    };
+    let distance = match body.series {
+        Some(_) => foot.distance.signum() * foot.distance.hypot(guess.offset.length()),
+        None => foot.distance,
     };
     body.smooth.weigh(&foot, weights);
     if weights.is_outside() {
@@ -109,9 +144,20 @@ fn evaluate_sphere(
     }
     let fields = weights.blend(body.fields);
     // A new contact has no force: its approach counts from the present depth.
-    let indentation = if contact.is_new { Indentation::default() } else { indent(body, tool, contact, &foot, &fields) };
+    let indentation = match contact.is_new {
+        true => Indentation::default(),
+        false => indent(body, tool, contact, (&foot, distance), &fields),
+    };
     let mut response = LocalResponse::at(body, foot, &fields, indentation);
     response.slope = slope(body, guess.force, others, &fields);
+    response.series = body.series.map(|series| weights.blend(series));
+    response.distance = distance;
+    response.guess = ForceGuess { force: guess.force, friction: guess.friction, offset: guess.offset };
+    if response.series.is_some() {
+        let higher = response.higher_orders_at(guess.force);
+        response.slope += higher.slope;
+        response.slope_by_force = compliance_slope(body, guess.force, &fields) + higher.slope_by_force;
+    }
     response.find_force(tool, contact, guess.place, others);
     Some(response)
 }
@@ -136,6 +182,8 @@ fn evaluate_shape(
             foot: contact.foot,
             compliance,
             jacobian: DMat3::ZERO,
+            slope_by_force: DMat3::ZERO,
+            offset_by_position: DMat3::ZERO,
             ..LocalResponse::default()
         });
     };
@@ -180,15 +228,22 @@ fn slope(body: LocalBody<'_>, force: DVec3, others: OtherContacts, fields: &Fiel
     own * (0.5 / body.scale) + motion_slope
 }
 
+/// Derivative of the linear part of [`slope`] by the force, columns by components of the force.
+fn compliance_slope(body: LocalBody<'_>, force: DVec3, fields: &Fields) -> DMat3 {
+    let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|k| fields.slope(COMPLIANCE.start + k));
+    let column = |[x, y, z]: [DVec3; 3]| (x * force.x + y * force.y + z * force.z) * (1.0 / body.scale);
+    DMat3::from_cols(column([xx, xy, xz]), column([xy, yy, yz]), column([xz, yz, zz]))
+}
+
 /// Indentation by a sphere.
 fn indent(
     body: LocalBody<'_>,
     tool: LocalTool<'_>,
     contact: &LocalContact,
-    foot: &FootPoint,
+    (foot, distance): (&FootPoint, f64),
     fields: &Fields,
 ) -> Indentation {
-    let depth = tool.radius - contact.entry_depth - foot.distance;
+    let depth = tool.radius - contact.entry_depth - distance;
     let [mean, gauss] = [MEAN, GAUSS].map(|field| fields.values[field]);
     let [mean_slope, gauss_slope] = [MEAN, GAUSS].map(|field| fields.slope(field));
     let half_space = HalfSpace::new(body, tool, fields, contact.part);
@@ -230,7 +285,27 @@ impl LocalResponse {
         let compliance = compliance_of(&fields.values) * (1.0 / body.scale);
         let (normal, point) = (foot.normal, foot.position);
         // A matrix is the identity by default.
-        Self { foot, compliance, normal, point, indentation, jacobian: DMat3::ZERO, ..Self::default() }
+        let scale = body.scale;
+        let (jacobian, slope_by_force) = (DMat3::ZERO, DMat3::ZERO);
+        Self {
+            foot,
+            compliance,
+            normal,
+            point,
+            indentation,
+            scale,
+            jacobian,
+            slope_by_force,
+            offset_by_position: DMat3::ZERO,
+            offset_by_force: DMat3::ZERO,
+            ..Self::default()
+        }
+    }
+
+    /// Higher orders of the body's displacement at a force, N.
+    fn higher_orders_at(&self, force: DVec3) -> HigherOrders {
+        let at = |series| higher_orders(series, (self.foot.normal, &self.foot.turning), force, self.scale);
+        self.series.as_ref().map_or_else(HigherOrders::default, at)
     }
 
     /// Finds the wrench that follows from the indentation, inclined by the gradients of the compliance and by the other contacts,
@@ -239,12 +314,18 @@ impl LocalResponse {
         let indentation = self.indentation;
         let whole = self.slope + others.slope;
         let slope = whole.clamp_length_max(STEEPEST_INCLINATION * indentation.force);
-        let push = slope - indentation.gradient;
+        let push = match self.series {
+            Some(_) => self.turned_push(whole),
+            None => slope - indentation.gradient,
+        };
         let pressing = push.length();
         if indentation.force == 0.0 || pressing == 0.0 {
             return;
         }
-        let lever = indentation.lever;
+        let lever = match self.series {
+            Some(_) => push * (-tool.radius / pressing),
+            None => indentation.lever,
+        };
         let rotation = rotation_vector(contact.previous_orientation, contact.orientation);
         let displacement = place - contact.relative_position + rotation.cross(lever);
         self.normal = push / pressing;
@@ -252,6 +333,7 @@ impl LocalResponse {
         let bound = tool.coefficient * pressing;
         self.friction = contact.friction.respond(displacement, bound, tool.coefficient, stiffness, self.normal);
         self.force = self.friction.force - push;
+        self.higher = self.higher_orders_at(self.force);
         let n = self.foot.normal;
         let turning = match tool.shape {
             ToolShape::Sphere { .. } => self.foot.turning,
@@ -260,8 +342,58 @@ impl LocalResponse {
         self.jacobian = outer(n, n) * indentation.stiffness - turning * indentation.force
             + self.friction.by_displacement
             - outer(self.friction.by_pressing, n) * indentation.stiffness;
+        if self.series.is_some() {
+            self.jacobian = self.turning * self.jacobian;
+            self.offset_by_position = self.offset_by_force * self.jacobian;
+        }
         let share = if whole == DVec3::ZERO { 1.0 } else { slope.length() / whole.length() };
         self.torque = indentation.torque - lever.cross(self.friction.force) + (self.turn + others.turn) * share;
+    }
+
+    /// Force on the tool along the sphere's radius where the body turns under it.
+    ///
+    /// The contact lies where the whole energy is stationary, not below the tool: with the unit vector `e` from the contact to the
+    /// sphere's centre, at the distance `D`, and the offset `o = D e_t` along the surface,
+    ///
+    /// ```text
+    /// F e_t = S(f)        f = -F e        dE/dp = -F e
+    /// ```
+    ///
+    /// where `S` is the gradient of the energy along the surface. `S`, `o` and with it the approach depend on the force `f` itself.
+    /// They are known at the guess `f_g`, `o_g`, and the change `x` from it follows from their derivatives:
+    ///
+    /// ```text
+    /// S = S_g + G x      o = D S_g/F_g + B x,  B = D/F (I - n n^T) (G + e_t e^T)      F = F_g - k e_t . (o - o_g)
+    /// ```
+    fn turned_push(&mut self, slope: DVec3) -> DVec3 {
+        let (Indentation { force, stiffness, gradient, .. }, n) = (self.indentation, self.foot.normal);
+        let guess = self.guess.force - self.guess.friction;
+        let before = -n.dot(guess);
+        (self.turning, self.offset_by_force) = (DMat3::IDENTITY, DMat3::ZERO);
+        if force == 0.0 || before <= LEAST_GUESS * force {
+            self.offset = DVec3::ZERO;
+            return n * force;
+        }
+        let along = (across(n) * (slope - gradient)).clamp_length_max(STEEPEST_INCLINATION * before);
+        let before = before.hypot(along.length());
+        let inclination = along * (1.0 / before);
+        let direction = n * (1.0 - inclination.length_squared()).sqrt() + inclination;
+        let by_force = across(n) * (self.slope_by_force + outer(inclination, direction)) * (self.distance / before);
+        let whole = DMat3::IDENTITY + self.slope_by_force - outer(n, by_force.transpose() * inclination) * stiffness;
+        self.turning = whole.inverse();
+        let offset = inclination * self.distance;
+        let relieved = stiffness * inclination.dot(offset - self.guess.offset);
+        let pressing = (force * force - along.length_squared()).max(0.0).sqrt();
+        let change = self.turning * (n * (relieved - pressing) - along - guess);
+        let change = change.clamp_length_max(LARGEST_CHANGE * force);
+        self.offset = offset + by_force * change;
+        self.offset_by_force = by_force;
+        -(guess + change)
+    }
+
+    /// Derivative of the body's displacement by the position at constant force: the contact moves along the surface.
+    pub fn displacement_by_position(&self) -> DMat3 {
+        self.slope_by_force.transpose() * (DMat3::IDENTITY - self.offset_by_position)
     }
 
     /// The springs of friction; without a force none is stretched.

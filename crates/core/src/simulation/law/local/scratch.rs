@@ -78,12 +78,13 @@ impl LocalScratch {
         }
     }
 
-    /// Takes the step, and extrapolates the forces linearly.
+    /// Takes the step, and extrapolates forces and offsets linearly.
     pub(super) fn take_step(&mut self, count: usize) {
         for a in 0..count {
             self.positions[a] += self.steps[a];
             let response = &mut self.responses[a];
             response.force += response.jacobian * self.steps[a];
+            response.offset += response.offset_by_position * self.steps[a];
         }
     }
 
@@ -235,6 +236,7 @@ pub fn local_body<'a>(model: &'a Model, state: &State, tool: usize, body: usize)
         drawn: fixed.drawn(),
         smooth: &local.smooth,
         fields: &regular.fields,
+        series: regular.series.as_deref(),
         pressed_surface: model.pressed_surfaces[tool][body].as_deref(),
         scale: state.bodies[body].stiffness_scale,
     })

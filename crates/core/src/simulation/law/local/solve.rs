@@ -17,9 +17,10 @@ use super::foot_jumps::{
     replace_jumped_contacts, update_parts,
 };
 use super::half_space::LocalTool;
-use super::response::{Guess, OtherContacts, evaluate};
+use super::response::{Guess, LocalResponse, OtherContacts, evaluate};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
 use super::wrench::{CellMemory, placed_shape};
+use crate::contact::local::FrictionResponse;
 use crate::contact::local::cells::Resolution;
 use crate::contact::regular::WIDTH;
 use crate::contact::{Refusal, patch_weights};
@@ -169,6 +170,8 @@ fn solve_equations(
         local.free_positions[a] = contact.local.tool_position - free_displacement(model, state, body, slot);
         local.responses[a].force = contact.local.force;
         local.responses[a].foot = contact.local.foot;
+        local.responses[a].offset = contact.local.offset;
+        local.responses[a].friction = FrictionResponse::default();
     }
     let cells = slots.iter().any(|&slot| contact_needs_cells(model, state, slot));
     let (most, [step_factor, force_factor]) =
@@ -325,7 +328,9 @@ fn evaluate_contacts(
             let pressures = state.pressures.get_mut(slot).unwrap_or(no_pressures);
             let cells = CellMemory { state: pressures, scratch: cells, footprint, resolution };
             let tool = local_tool(model, controls, tool);
-            let guess = Guess { place: positions[a], force: responses[a].force, foot: &responses[a].foot };
+            let LocalResponse { force, foot, offset, friction, .. } = &responses[a];
+            let (force, friction) = (*force, friction.force);
+            let guess = Guess { place: positions[a], force, friction, foot, offset: *offset };
             evaluate(surface, tool, contact, guess, others[a], &mut weights[a], cells)
         });
         match response {
@@ -374,7 +379,10 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> f
             residual += between * local.responses[b].force;
             let mut block = between * local.responses[b].jacobian;
             if a == b {
-                block += DMat3::IDENTITY;
+                let response = &local.responses[a];
+                residual += response.higher.displacement;
+                block += DMat3::IDENTITY + response.higher.compliance * response.jacobian;
+                block += response.displacement_by_position();
             }
             for row in 0..3 {
                 for column in 0..3 {
@@ -424,7 +432,7 @@ fn store_results(model: &Model, state: &mut State, local: &LocalScratch, slots: 
         own.last_step = if is_first { DVec3::ZERO } else { local.positions[a] - own.relative_position };
         own.relative_position = local.positions[a];
         own.previous_orientation = own.orientation;
-        (own.foot, own.penetration) = (response.foot, response.indentation.depth);
+        (own.foot, own.offset, own.penetration) = (response.foot, response.offset, response.indentation.depth);
         own.friction = response.springs();
         let indentation = &response.indentation;
         (contact.torque, contact.radius) = (response.torque, indentation.radius);

@@ -151,6 +151,7 @@ mod tests {
                 drawn,
                 smooth: &self.smooth,
                 fields: &self.fields,
+                series: None,
                 pressed_surface: Some(&pressed),
                 scale: 1.0,
             };
@@ -166,7 +167,13 @@ mod tests {
             contact.entry_depth = 0.003;
             let mut response = LocalResponse::default();
             for _ in 0..8 {
-                let guess = Guess { place, force: response.force, foot: &contact.foot };
+                let guess = Guess {
+                    place,
+                    force: response.force,
+                    friction: DVec3::ZERO,
+                    foot: &contact.foot,
+                    offset: DVec3::ZERO,
+                };
                 let resolution = Resolution::Medium;
                 let cells =
                     CellMemory { state: &mut state, scratch: &mut scratch, footprint: &mut footprint, resolution };

@@ -1,0 +1,122 @@
+//! A hyperelastic body, factorised at rest, and the series of its displacement under loads on patches.
+
+use faer::dyn_stack::MemBuffer;
+use faer::{MatMut, Par};
+use glam::DVec3;
+
+use super::internal::Elements;
+use crate::contact::local::StrainLaw;
+use crate::fem::{self, Isotropic, Supports};
+use crate::green::Problem;
+use crate::mesh::TetMesh;
+use crate::solver::Factor;
+use crate::{Error, Result};
+
+/// A body with its factor.
+pub struct HyperelasticBody<'a> {
+    mesh: &'a TetMesh,
+    materials: &'a [Isotropic],
+    laws: &'a [StrainLaw],
+    supports: &'a Supports,
+    factor: Factor,
+}
+
+/// A force of 1 N spread over mesh nodes by weights, along a unit vector.
+#[derive(Clone, Debug)]
+pub struct PatchLoad {
+    /// Mesh nodes and weights, which sum to one.
+    pub weights: Vec<(u32, f64)>,
+    /// Direction.
+    pub direction: DVec3,
+}
+
+/// Weighted displacements under a patch by order.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SeriesAt {
+    /// `q_1` (m/N), `q_2` (m/N^2), `q_3` (m/N^3).
+    pub displacements: [DVec3; 3],
+    /// `U_5` of 1 N, J/N^5.
+    pub fifth: f64,
+}
+
+impl<'a> HyperelasticBody<'a> {
+    /// Factorises the body.
+    ///
+    /// # Errors
+    /// A law for each element is missing, or a body that is not held.
+    pub fn new(problem: &'a Problem, laws: &'a [StrainLaw]) -> Result<Self> {
+        let Problem { mesh, materials, supports, .. } = problem;
+        if laws.len() != materials.len() {
+            return Err(Error::Invalid(format!("{} laws for {} elements", laws.len(), materials.len())));
+        }
+        let factor = Factor::new(&fem::stiffness(mesh, materials), supports, Par::rayon(0))?;
+        Ok(Self { mesh, materials, laws, supports, factor })
+    }
+
+    /// Memory of [`Self::series`] for so many loads.
+    pub fn scratch(&self, loads: usize) -> MemBuffer {
+        self.factor.solve_scratch(loads)
+    }
+
+    /// The series under each load.
+    pub fn series(&self, loads: &[PatchLoad], memory: &mut MemBuffer) -> Vec<SeriesAt> {
+        let nodes = self.mesh.nodes.len();
+        let elements = Elements { mesh: self.mesh, materials: self.materials, laws: self.laws };
+        let mut first: Vec<_> = loads.iter().map(|load| load.forces(nodes)).collect();
+        self.solve(&mut first, memory);
+        let parts = |first: &Vec<DVec3>| {
+            let mut forces = vec![DVec3::ZERO; nodes];
+            elements.second_order(first, &mut forces);
+            forces.iter_mut().for_each(|force| *force = -*force);
+            forces
+        };
+        let mut second: Vec<_> = first.iter().map(parts).collect();
+        self.solve(&mut second, memory);
+        let mut fifth = vec![0.0; loads.len()];
+        let mut third = Vec::with_capacity(loads.len());
+        for ((first, second), fifth) in first.iter().zip(&second).zip(&mut fifth) {
+            let mut forces = vec![DVec3::ZERO; nodes];
+            *fifth = elements.third_order(first, second, &mut forces);
+            forces.iter_mut().for_each(|force| *force = -*force);
+            third.push(forces);
+        }
+        self.solve(&mut third, memory);
+        let at = |(k, load): (usize, &PatchLoad)| SeriesAt {
+            displacements: [&first[k], &second[k], &third[k]].map(|field| load.mean_displacement(field)),
+            fifth: fifth[k],
+        };
+        loads.iter().enumerate().map(at).collect()
+    }
+
+    /// Replaces forces by the displacements under them.
+    fn solve(&self, fields: &mut [Vec<DVec3>], memory: &mut MemBuffer) {
+        let rows = self.factor.dimension();
+        let mut right = Vec::with_capacity(rows * fields.len());
+        for field in &*fields {
+            let dofs: &[f64] = bytemuck::cast_slice(field);
+            right.extend(self.supports.free.iter().map(|&dof| dofs[dof as usize]));
+        }
+        self.factor.solve_in_place(MatMut::from_column_major_slice_mut(&mut right, rows, fields.len()), memory);
+        for (field, solution) in fields.iter_mut().zip(right.chunks_exact(rows)) {
+            let dofs: &mut [f64] = bytemuck::cast_slice_mut(field);
+            dofs.fill(0.0);
+            for (&dof, &value) in self.supports.free.iter().zip(solution) {
+                dofs[dof as usize] = value;
+            }
+        }
+    }
+}
+
+impl PatchLoad {
+    fn forces(&self, nodes: usize) -> Vec<DVec3> {
+        let mut forces = vec![DVec3::ZERO; nodes];
+        for &(node, weight) in &self.weights {
+            forces[node as usize] += self.direction * weight;
+        }
+        forces
+    }
+
+    fn mean_displacement(&self, field: &[DVec3]) -> DVec3 {
+        self.weights.iter().map(|&(node, weight)| field[node as usize] * weight).sum()
+    }
+}

@@ -1,0 +1,204 @@
+//! Series at places spread over a surface, and their coefficients at all of its fans.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::body::{HyperelasticBody, PatchLoad, SeriesAt};
+use super::half_space::half_space_terms;
+use crate::contact::local::StrainLaw;
+use crate::contact::smooth::{Fan, SmoothSurface};
+use crate::contact::{PatchGeometry, PatchScratch, SeriesFields, centre_of, wide_patch_weights};
+use crate::green::{Problem, Progress};
+use crate::mesh::{Surface, node_elements};
+use crate::{Error, Result};
+
+/// Radius of the patch over the tool's, and over the thickness of the body below it.
+const RADII: f64 = 3.0;
+const THICKNESSES: f64 = 1.5;
+/// Least radius of the patch over the tool's. A patch that stays as wide as the contact has a limit load, which a sphere has not.
+const LEAST_RADII: f64 = 0.9;
+/// Distance of places over the radius of their patches: the coefficients are as smooth as the patch is wide.
+const SPACING: f64 = 0.3;
+/// Distance up to which a place counts at a fan, over that of places.
+const REACH: f64 = 2.0;
+/// Cosine between normals of fans on one side of a body.
+const SAME_SIDE: f64 = 0.5;
+/// Places that are solved together.
+const BLOCK: usize = 8;
+/// `|U_5| / U_2` at which the series ends.
+const LARGEST_REST: f64 = 0.01;
+
+/// Where a series is computed.
+struct Place {
+    fan: usize,
+    width: f64,
+    load: PatchLoad,
+}
+
+/// Places chosen on a surface for a tool.
+pub struct SeriesPlan<'a> {
+    problem: &'a Problem,
+    laws: &'a [StrainLaw],
+    smooth: SmoothSurface,
+    places: Vec<Place>,
+    spacing: f64,
+}
+
+impl<'a> SeriesPlan<'a> {
+    /// Chooses the places for tools of `radius`, m.
+    ///
+    /// # Errors
+    /// A surface that is not the mesh's.
+    pub fn new(problem: &'a Problem, laws: &'a [StrainLaw], radius: f64) -> Result<Self> {
+        let surface = problem.surface()?;
+        let smooth = SmoothSurface::new(&surface);
+        let spacing = SPACING * RADII * radius;
+        let chosen = spread(smooth.fans(), spacing);
+        let geometry = PatchGeometry::new(&surface);
+        let place = |scratch: &mut PatchScratch, fan: usize| {
+            let at = &smooth.fans()[fan];
+            let width = (RADII * radius).min(THICKNESSES * thickness(&surface, at));
+            let patch = wide_patch_weights(&surface, &geometry, &centre_of(&surface, at), width, scratch);
+            let weights: Vec<_> = patch.iter().map(|&(node, w)| (problem.surface_nodes[node as usize], w)).collect();
+            let is_known = width >= LEAST_RADII * radius && !weights.is_empty();
+            is_known.then(|| Place { fan, width, load: PatchLoad { weights, direction: -at.normal } })
+        };
+        let memory = || PatchScratch::new(&surface);
+        let places: Vec<Option<Place>> = chosen.into_par_iter().map_init(memory, place).collect();
+        Ok(Self { problem, laws, places: places.into_iter().flatten().collect(), smooth, spacing })
+    }
+
+    /// How many places there are.
+    pub fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Coefficients at the chosen places.
+    fn solve(&self, progress: Progress<'_>) -> Result<Vec<SeriesFields>> {
+        let body = HyperelasticBody::new(self.problem, self.laws)?;
+        let (done, all) = (AtomicUsize::new(0), self.places.len());
+        let blocks: Vec<&[Place]> = self.places.chunks(BLOCK).collect();
+        let elements = node_elements_of(self.problem);
+        let solve = |places: &&[Place]| {
+            let loads: Vec<PatchLoad> = places.iter().map(|place| place.load.clone()).collect();
+            let found = body.series(&loads, &mut body.scratch(loads.len()));
+            let before = done.fetch_add(places.len(), Ordering::Relaxed);
+            if !progress(before + places.len(), all) {
+                return Err(Error::Interrupted);
+            }
+            let fields = places.iter().zip(&found).map(|(place, at)| self.fields_of(place, at, &elements));
+            Ok(fields.collect::<Vec<_>>())
+        };
+        let found: Result<Vec<Vec<SeriesFields>>> = blocks.par_iter().map(solve).collect();
+        Ok(found?.into_iter().flatten().collect())
+    }
+
+    /// Coefficients from a series: less the half-space's, as `U_3 = F^2 b_3 . f` and `U_4 = F^3 b_4 . f`.
+    fn fields_of(&self, place: &Place, at: &SeriesAt, elements: &(Vec<usize>, Vec<(u32, u8)>)) -> SeriesFields {
+        let fan = &self.smooth.fans()[place.fan];
+        let inward = -fan.normal;
+        let node = self.problem.surface_nodes[fan.node as usize] as usize;
+        let around = &elements.1[elements.0[node]..elements.0[node + 1]];
+        let [mut second, mut third] = [0.0; 2];
+        for &(element, _) in around {
+            let (material, law) = (&self.problem.materials[element as usize], &self.laws[element as usize]);
+            let [h2, h3] = half_space_terms(law, material.poissons_ratio);
+            second += h2 / (material.youngs_modulus.powi(2) * around.len() as f64);
+            third += h3 / (material.youngs_modulus.powi(3) * around.len() as f64);
+        }
+        let [first, q2, q3] = at.displacements;
+        let q2 = q2 - inward * (second / place.width.powi(3));
+        let q3 = q3 - inward * (third / place.width.powi(5));
+        // The gradients of both forms at f = F inward are F^2 (b_3 + 2 (b_3 . n) n) and F^3 (b_4 + 3 (b_4 . n) n).
+        let cubic = q2 - inward * (2.0 / 3.0 * q2.dot(inward));
+        let quartic = q3 - inward * (0.75 * q3.dot(inward));
+        let compliance = first.dot(inward);
+        let ending = (at.fifth.abs() / (0.5 * LARGEST_REST * compliance)).cbrt();
+        let fields = [cubic.x, cubic.y, cubic.z, quartic.x, quartic.y, quartic.z, ending];
+        // A place on a support is not displaced.
+        if fields.iter().all(|field| field.is_finite()) { fields } else { SeriesFields::default() }
+    }
+}
+
+/// Coefficients at the fans of the smooth surface of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Nodes of the fans, m.
+    pub positions: Vec<[f64; 3]>,
+    /// Coefficients of each.
+    pub fields: Vec<SeriesFields>,
+}
+
+/// Computes the series of all places, and its coefficients at every fan.
+///
+/// # Errors
+/// A body that is not held, or an interruption by `progress`.
+pub fn compute_series(plan: &SeriesPlan<'_>, progress: Progress<'_>) -> Result<Series> {
+    let found = plan.solve(progress)?;
+    let fans = plan.smooth.fans();
+    let at = |fan: &Fan| {
+        let near = plan.places.iter().zip(&found).map(|(place, fields)| (&fans[place.fan], fields));
+        let near = near.filter(|(other, _)| other.normal.dot(fan.normal) > SAME_SIDE);
+        interpolate(fan, near, REACH * plan.spacing)
+    };
+    let positions = fans.iter().map(|fan| fan.position.to_array()).collect();
+    Ok(Series { positions, fields: fans.par_iter().map(at).collect() })
+}
+
+/// Mean of fields around a fan, weighted by distance; zero where there is none.
+fn interpolate<'a>(fan: &Fan, near: impl Iterator<Item = (&'a Fan, &'a SeriesFields)>, reach: f64) -> SeriesFields {
+    let (mut sum, mut weights) = (SeriesFields::default(), 0.0);
+    for (other, fields) in near {
+        let distance = fan.position.distance(other.position) / reach;
+        if distance < 1.0 {
+            let weight = (1.0 - distance * distance).powi(2) / (distance * distance + 1e-4);
+            weights += weight;
+            sum.iter_mut().zip(fields).for_each(|(sum, field)| *sum += weight * field);
+        }
+    }
+    if weights > 0.0 { sum.map(|value| value / weights) } else { sum }
+}
+
+/// Fans that are no closer to each other than `spacing`, m, on one side of the body.
+fn spread(fans: &[Fan], spacing: f64) -> Vec<usize> {
+    let mut chosen: Vec<usize> = Vec::new();
+    for (rank, fan) in fans.iter().enumerate() {
+        let is_near = |&other: &usize| {
+            let other = &fans[other];
+            other.position.distance(fan.position) < spacing && other.normal.dot(fan.normal) > SAME_SIDE
+        };
+        if !chosen.iter().any(is_near) {
+            chosen.push(rank);
+        }
+    }
+    chosen
+}
+
+/// Distance through the body from a fan along its inward normal, m.
+fn thickness(surface: &Surface, fan: &Fan) -> f64 {
+    let inward = -fan.normal;
+    let through = |t: usize| {
+        let [a, b, c] = surface.corners(t as u32);
+        let (u, v) = (b - a, c - a);
+        let across = inward.cross(v);
+        let determinant = u.dot(across);
+        if surface.normals[t].dot(inward) <= 0.0 || determinant == 0.0 {
+            return f64::INFINITY;
+        }
+        let from = fan.position - a;
+        let x = from.dot(across) / determinant;
+        let turned = from.cross(u);
+        let y = inward.dot(turned) / determinant;
+        let depth = v.dot(turned) / determinant;
+        if x >= 0.0 && y >= 0.0 && x + y <= 1.0 && depth > 0.0 { depth } else { f64::INFINITY }
+    };
+    (0..surface.triangles.len()).map(through).fold(f64::INFINITY, f64::min)
+}
+
+fn node_elements_of(problem: &Problem) -> (Vec<usize>, Vec<(u32, u8)>) {
+    match &problem.mesh.tets {
+        crate::mesh::Tets::Linear(tets) => node_elements(problem.mesh.nodes.len(), tets),
+        crate::mesh::Tets::Quadratic(tets) => node_elements(problem.mesh.nodes.len(), tets),
+    }
+}
