@@ -30,7 +30,7 @@ def main() -> int:
 
 
 def newest(where: Path) -> Path:
-    """The wheel itself, or the newest one of a folder."""
+    """Take the wheel itself, or the newest one of a folder."""
     if where.suffix == ".whl":
         return where
     wheels = sorted(where.glob("*.whl"), key=lambda wheel: wheel.stat().st_mtime)
@@ -40,7 +40,7 @@ def newest(where: Path) -> Path:
 
 
 def problems(wheel: Path) -> list[str]:
-    """What keeps the wheel from being handed out."""
+    """Say what keeps the wheel from being handed out."""
     found = []
     size = wheel.stat().st_size
     if size > LARGEST:
@@ -63,7 +63,7 @@ def problems(wheel: Path) -> list[str]:
 
 
 def workspace_version() -> str:
-    """The version, which stands in Cargo.toml alone."""
+    """Read the version, which stands in Cargo.toml alone."""
     found = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)
     assert found is not None, "Cargo.toml has no version"
     return found[1]
