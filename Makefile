@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test campaigns install other-build sanitize lint viewer check-tools clean
+.PHONY: demo test campaigns install wheel sdist other-build sanitize lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -46,6 +46,20 @@ viewer: $(PAGE)
 PREFIX ?= /usr/local
 install:
 	scripts/install_c.sh $(PREFIX)
+
+# What `pip install palpate` takes: a wheel for all Pythons from 3.10 on, with the page inside (docs/install.md).
+# `make wheel WHEEL_ARGS="--zig --compatibility manylinux_2_28"` builds for older systems than this one.
+WHEEL_ARGS ?=
+MATURIN := $(BIN)/python -m maturin
+PACKAGERS := $(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin[zig]>=1.9,<2" "auditwheel>=6"
+wheel: $(BIN)/python $(PAGE)
+	$(PACKAGERS)
+	$(MATURIN) build --profile wheel --quiet --out dist $(WHEEL_ARGS)
+	$(BIN)/python scripts/check_wheel.py dist
+
+sdist: $(BIN)/python $(PAGE)
+	$(PACKAGERS)
+	$(MATURIN) sdist --quiet --out dist
 
 demo: $(VENV)/.installed $(PAGE)
 	$(BIN)/palpate demo $(ARGS)
