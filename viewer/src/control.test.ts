@@ -223,3 +223,35 @@ describe("an exam", () => {
     expect(store.get().answering).toBe(false);
   });
 });
+
+describe("the scene's own strike", () => {
+  const strike = { point: [0, 0, 0], impulse: [0, 0, 1] };
+  let sent: ClientMessage[];
+  let control: Control;
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    const store = new Store();
+    sent = [];
+    control = new Control(store, (message) => sent.push(message));
+    store.update({ connection: "open", role: "control", coloring: "field" });
+    control.receiveScene({ ...scene(1), name: "beam", motion: { strike } } as unknown as SceneMessage);
+  });
+
+  afterEach(() => {
+    vi.useRealTimers();
+  });
+
+  it("is given once a body that nobody touches has been seen at rest", () => {
+    vi.advanceTimersByTime(500);
+    expect(sent).toEqual([]);
+    vi.advanceTimersByTime(5000);
+    expect(sent).toEqual([{ type: "repeat" }]);
+  });
+
+  it("does not end a mode that was chosen before", () => {
+    control.showMode(3);
+    vi.advanceTimersByTime(5000);
+    expect(sent).toEqual([{ type: "mode", number: 3 }]);
+  });
+});

@@ -22,6 +22,10 @@ import type { Axis, Coloring, Layer, Posture, Store, Theme } from "./store";
 const SEND_INTERVAL_MS = 40;
 /** For so long after the person moved a slider, values from the server do not move it back. */
 const LOCAL_VALUE_MS = 400;
+/** The scene's own strike waits until the body has been seen at rest. */
+const FIRST_STRIKE_MS = 800;
+/** What someone does with a body that moves; the scene's own strike would put an end to it. */
+const TOUCHES = new Set<ClientMessage["type"]>(["press", "strike", "repeat", "mode"]);
 /** More than so many notices hide the picture. */
 const NOTICES_MAX = 3;
 /** How a tool is held at first: a stylus lies on its side, the others stand upright. */
@@ -40,8 +44,14 @@ const TOO_LARGE_TO_CUT = "A body that is drawn by fewer triangles than its surfa
 export class Control {
   private changedMs = -Infinity;
   private readonly limits = new Map<string, { limit: RateLimit; message: ClientMessage }>();
+  private firstStrike: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(private readonly store: Store, private readonly send: (message: ClientMessage) => void) {}
+  constructor(private readonly store: Store, private readonly sendMessage: (message: ClientMessage) => void) {}
+
+  private send(message: ClientMessage): void {
+    if (TOUCHES.has(message.type)) clearTimeout(this.firstStrike);
+    this.sendMessage(message);
+  }
 
   // What the server says.
 
@@ -79,6 +89,10 @@ export class Control {
       shape === before?.tools[tool]?.shape ? postures[tool]! : firstPosture(shape);
     const offered = scene.bodies[0]?.fields.some(({ name }) => name === field) ?? false;
     this.changedMs = -Infinity;
+    clearTimeout(this.firstStrike);
+    // Another tool on the same body is no reason to strike it.
+    if (before?.name !== scene.name && scene.motion?.strike)
+      this.firstStrike = setTimeout(() => this.repeatStrike(), FIRST_STRIKE_MS);
     this.store.update({
       scene,
       settings: {

@@ -41,9 +41,6 @@ import { TimeLine } from "./ui/time_line";
 import { followTheme } from "./ui/theme";
 import { ToolPanel } from "./ui/tool_panel";
 
-/** The scene's own strike waits until the body has been seen at rest. */
-const FIRST_STRIKE_MS = 800;
-
 export class Viewer {
   private readonly store = new Store();
   private readonly connection: Connection;
@@ -59,7 +56,6 @@ export class Viewer {
   private readonly pointer: Pointer;
   private readonly plots: Plots;
   private readonly statistics: Statistics;
-  private firstStrike = 0;
 
   constructor(token: string) {
     const { store, control } = this;
@@ -138,10 +134,6 @@ export class Viewer {
     this.stage.setScene(data);
     if (held) this.pointer.pressAgain(held);
     document.title = `${data.header.title} · Palpate`;
-    window.clearTimeout(this.firstStrike);
-    // Another tool on the same body is no reason to strike it.
-    if (again || !data.header.motion?.strike) return;
-    this.firstStrike = window.setTimeout(() => this.control.repeatStrike(), FIRST_STRIKE_MS);
   }
 
   /** Takes in what has arrived since the last drawing: all of the log, and the newest frame. Tells whether the picture changes. */
