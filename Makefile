@@ -54,7 +54,7 @@ MATURIN := $(BIN)/python -m maturin
 PACKAGERS := $(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin[zig]>=1.9,<2" "auditwheel>=6"
 wheel: $(BIN)/python $(PAGE)
 	$(PACKAGERS)
-	$(MATURIN) build --profile wheel --quiet --out dist $(WHEEL_ARGS)
+	$(MATURIN) build --release --strip --quiet --out dist $(WHEEL_ARGS)
 	$(BIN)/python scripts/check_wheel.py dist
 
 sdist: $(BIN)/python $(PAGE)

@@ -201,5 +201,5 @@ def page(chromium, program, request):
     """A page of the module's ``program``, as sharp as its ``SHARPNESS``."""
     from browser import opened
 
-    with opened(chromium, program, sharpness=getattr(request.module, "SHARPNESS", 0.5)) as page:
+    with opened(chromium, program, sharpness=getattr(request.module, "SHARPNESS", 0.25)) as page:
         yield page

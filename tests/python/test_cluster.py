@@ -11,7 +11,8 @@ from pathlib import Path
 import distributed
 import numpy as np
 import pytest
-from command_line import refused, run
+from command_line import refused
+from command_line import run_process as run
 from conftest import box_mesh
 from dask_cluster import certificates, certificates_in, local_cluster, programs
 

@@ -20,7 +20,7 @@ PAGE = ROOT / "python/palpate/viewer/static/index.html"
 
 pytestmark = [
     pytest.mark.slow,
-    # All crates are compiled once more, without tables of source lines.
+    # Alone, without another test before it, it compiles all crates.
     pytest.mark.timeout(1800),
     pytest.mark.skipif(shutil.which("cargo") is None, reason="cargo is not installed"),
     pytest.mark.skipif(not PAGE.exists(), reason="the page is not built: make viewer"),
@@ -45,9 +45,8 @@ def tools(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def wheel(tools, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("dist")
-    environment = {**os.environ, "CARGO_PROFILE_WHEEL_INCREMENTAL": "false"}
-    build = (tools, "-m", "maturin", "build", "--profile", "wheel", "--quiet", "--out", out)
-    run(*build, cwd=ROOT, env=environment, timeout=1500)
+    # As `make wheel` does: all that is compiled for the tests serves, but for the bindings.
+    run(tools, "-m", "maturin", "build", "--release", "--strip", "--quiet", "--out", out, cwd=ROOT, timeout=1500)
     (built,) = out.glob("*.whl")
     return built
 
@@ -62,7 +61,7 @@ def bare(wheel, tmp_path_factory) -> dict[str, str]:
     cache = run(sys.executable, "-m", "pip", "cache", "dir").strip()
     assert not any(shutil.which(tool, path=variables["PATH"]) for tool in ("cc", "gcc", "cargo", "node", "npm"))
     # Only wheels: what would have to be compiled is refused.
-    install = ("-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--cache-dir", cache, wheel)
+    install = ("-m", "pip", "install", "--quiet", "--no-compile", "--only-binary", ":all:", "--cache-dir", cache, wheel)
     run(where / "venv/bin/python", *install, env=variables, timeout=600)
     return variables
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from command_line import refused, run
+from command_line import refused, run, run_process
 
 import palpate
 
@@ -148,7 +148,7 @@ def test_demo_of_a_model_without_a_browser(tmp_path):
 
 
 def test_models_beside_the_counts_of_the_paper(tmp_path):
-    shown = run("models", cwd=tmp_path, env={**os.environ, "COLUMNS": "100"}).stdout
+    shown = run_process("models", cwd=tmp_path, env={**os.environ, "COLUMNS": "100"}).stdout
     for count in ("1686", "5430", "2803", "572"):  # table 1 of the paper
         assert count in shown
 
