@@ -75,10 +75,6 @@ class BuiltBody:
         """Vectors (..., 3) of the body's own frame in the scene."""
         return rotated(vectors, self.orientation)
 
-    def vectors_to_body(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (..., 3) of the scene in the body's own frame."""
-        return rotated(vectors, conjugate(self.orientation))
-
 
 @dataclass(frozen=True)
 class BuiltScene:

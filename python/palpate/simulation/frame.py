@@ -71,6 +71,9 @@ class Contact(ComparedByValue):
     stiffness: float
     nodes: np.ndarray
     weights: np.ndarray
+    # Point and normal as the tick has them, in the body's own frame.
+    _own_point: np.ndarray = field(compare=False)
+    _own_normal: np.ndarray = field(compare=False)
 
     def __repr__(self) -> str:
         place = f"{len(self.nodes)} nodes around {brief(self.point)} m"
@@ -205,6 +208,6 @@ def frame_of(raw: dict[str, Any], bodies: Sequence[BuiltBody]) -> Frame:
 
 def contact_of(record: tuple[Any, ...], bodies: Sequence[BuiltBody]) -> Contact:
     """Contact as the native module hands it out, with the nodes of the body's mesh."""
-    tool, body, mode, vectors, flags, numbers, nodes, weights = record
-    nodes = bodies[body].green.surface_nodes[nodes]
-    return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights))
+    tool, body, mode, vectors, flags, numbers, nodes, weights, own = record
+    nodes, place = bodies[body].green.surface_nodes[nodes], map(np.array, own)
+    return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights), *place)

@@ -23,9 +23,8 @@ def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies:
     thin = [False] * len(tools)
     for contact in contacts:
         if contact.radius > 0 and not thin[contact.tool]:
-            body = bodies[contact.body]
-            point, normal = body.points_to_body(contact.point), body.vectors_to_body(contact.normal)
-            thin[contact.tool] = is_thin_at(body.green, point, normal, THICK * size(tools[contact.tool]))
+            green, thickness = bodies[contact.body].green, THICK * size(tools[contact.tool])
+            thin[contact.tool] = is_thin_at(green, contact._own_point, contact._own_normal, thickness)
     return thin
 
 

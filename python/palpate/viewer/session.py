@@ -335,15 +335,14 @@ class Session:
 
     def _contact_header(self, contact: Contact) -> dict[str, Any]:
         """Entry of a frame message: the place in the body's frame, the force on the body in that of the scene."""
-        body = self.built.bodies[contact.body]
         # What holds on, by its law or by a grab, does so by its patch: it has no depth of its own.
         local = contact.mode == "press" and self.built.scene.tools[contact.tool].contact == "local"
         return {
             "tool": contact.tool,
             "body": contact.body,
             "mode": contact.mode,
-            "point": body.points_to_body(contact.point).tolist(),
-            "normal": body.vectors_to_body(contact.normal).tolist(),
+            "point": contact._own_point.tolist(),
+            "normal": contact._own_normal.tolist(),
             "force": contact.force.tolist(),
             "radius": float(contact.radius) if local else self.simulation.contact_radius_of(contact.tool),
             "depth": float(contact.depth) if local else None,

@@ -129,7 +129,6 @@ def test_a_body_is_placed(folder):
     assert right.points_to_scene(points) == pytest.approx(placed, abs=1e-15)
     assert right.points_to_body(placed) == pytest.approx(points, abs=1e-15)
     assert right.vectors_to_scene(points) == pytest.approx(points @ turn.T, abs=1e-15)
-    assert right.vectors_to_body(points) == pytest.approx(points @ turn, abs=1e-15)
 
 
 def test_tools_reach_the_body_where_it_is_placed(folder):

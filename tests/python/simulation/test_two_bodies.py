@@ -126,7 +126,7 @@ def test_contacts_of_a_running_loop_are_in_the_world(blocks):
     assert [(contact.tool, contact.body) for contact in frame.contacts] == [(0, 0), (0, 1)]
     total = np.zeros(3)
     for contact, built, (body, green) in zip(frame.contacts, placed.bodies, blocks, strict=True):
-        own = built.vectors_to_body(contact.displacement)
+        own = built.points_to_body(contact.displacement) - built.points_to_body(np.zeros(3))
         displacements, force = solve_with_patches(body, [(contact.nodes, contact.weights)], own)
         assert np.abs(contact.force - built.vectors_to_scene(force[0])).max() <= 1e-9 * np.abs(force).max()
         surface = displacements[green.surface_nodes]
@@ -134,7 +134,11 @@ def test_contacts_of_a_running_loop_are_in_the_world(blocks):
         # The point lies on the body's top, its normal points out of it, and the anchor is a radius above.
         place = built.points_to_body(contact.point)
         assert place[2] == pytest.approx(TOPS[contact.body], abs=1e-12)
-        assert built.vectors_to_body(contact.normal) == pytest.approx(UP, abs=1e-12)
+        assert contact.normal == pytest.approx(built.vectors_to_scene(np.array(UP)), abs=1e-12)
+        # What the page draws is the place in the frame of the body, which the tick has found.
+        assert contact._own_point == pytest.approx(place, abs=1e-12) and contact._own_normal == pytest.approx(
+            UP, abs=1e-12
+        )
         assert contact.anchor == pytest.approx(contact.point + RADIUS * contact.normal, abs=1e-12)
         total += contact.force
     assert frame.forces[0] == pytest.approx(-total, rel=1e-12)
