@@ -2,7 +2,7 @@
 
 Files are written as ``<name>.<process>.new`` (stores), ``<name>.<process>.partial`` (what stands beside them) or
 ``.<process>.<name>`` (everything else) and renamed when they are complete. A process that is killed leaves them, in
-full size; whoever writes there next removes them. Processes are those of this machine: what one in another container
+full size; the next writer there removes them. Processes are those of this machine: what one in another container
 writes into the same folder looks like a leftover.
 """
 

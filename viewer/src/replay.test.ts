@@ -84,7 +84,7 @@ describe("the verdict", () => {
 });
 
 describe("the way to a tick", () => {
-  it("is told once it has taken a while, until it is there", () => {
+  it("is reported once it has taken a while, until it is there", () => {
     const way = new Way();
     expect(way.seekProgress({ tick: 10, goal: 10 }, 0)).toBeNull();
     expect(way.seekProgress({ tick: 20, goal: 100 }, 10)).toBeNull();

@@ -31,7 +31,7 @@ export class Upload {
     this.send({ type: "upload", name: file.name, size: file.size });
   }
 
-  /** Sends what follows the bytes that have come. Tells whether all of them have. */
+  /** Sends what follows the bytes that have come. Returns whether all of them have. */
   next(received: number): boolean {
     if (received >= this.file.size) return true;
     void this.file.slice(received, received + this.part).arrayBuffer().then((bytes) => {

@@ -136,7 +136,7 @@ export class Viewer {
     document.title = `${data.header.title} · Palpate`;
   }
 
-  /** Takes in what has arrived since the last drawing: all of the log, and the newest frame. Tells whether the picture changes. */
+  /** Takes in what has arrived since the last drawing: all of the log, and the newest frame. Returns whether the picture changes. */
   private receiveFrames(): boolean {
     const frames = this.frames.take();
     const newest = frames.at(-1);

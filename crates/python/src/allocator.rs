@@ -60,7 +60,7 @@ pub fn require_scratch_of_products() -> Result<()> {
     )))
 }
 
-/// Bytes of the third level cache, as far as the system tells.
+/// Bytes of the third level cache, as far as the system reports it.
 fn third_level_cache() -> usize {
     let text = std::fs::read_to_string("/sys/devices/system/cpu/cpu0/cache/index3/size").unwrap_or_default();
     let (number, unit) = text.trim().split_at(text.trim().find(char::is_alphabetic).unwrap_or(text.trim().len()));

@@ -37,11 +37,11 @@ pub fn list_devices<'py>(
         device.set_item("facts", facts)?;
         found.append(device)?;
     }
-    let told = PyDict::new(py);
-    told.set_item("found", found)?;
-    told.set_item("missing", listing.missing.map(|why| (why.what, why.advice)))?;
-    told.set_item("facts", listing.facts)?;
-    Ok(told)
+    let entries = PyDict::new(py);
+    entries.set_item("found", found)?;
+    entries.set_item("missing", listing.missing.map(|why| (why.what, why.advice)))?;
+    entries.set_item("facts", listing.facts)?;
+    Ok(entries)
 }
 
 /// A gentle check of one device: its readings, and small forces that pass the safety stage.
@@ -84,21 +84,21 @@ impl DeviceCheck {
     /// What has been seen of it so far; None before its first tick.
     fn seen<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(seen) = self.check.observation() else { return Ok(None) };
-        let told = PyDict::new(py);
-        told.set_item("time", seen.time)?;
-        told.set_item("readings", seen.readings)?;
-        told.set_item("fresh", seen.fresh)?;
-        told.set_item("longest_gap", seen.longest_gap)?;
-        told.set_item("deviation", seen.deviation.to_array())?;
-        told.set_item("lowest", seen.lowest.to_array())?;
-        told.set_item("highest", seen.highest.to_array())?;
-        told.set_item("moved", (seen.last - seen.first).to_array())?;
-        told.set_item("buttons", seen.buttons)?;
-        told.set_item("largest_force", seen.largest_force)?;
-        told.set_item("done", seen.done)?;
-        told.set_item("ran_away", seen.ran_away)?;
-        told.set_item("fault", seen.fault.map(|fault| fault.to_string()))?;
-        Ok(Some(told))
+        let readings = PyDict::new(py);
+        readings.set_item("time", seen.time)?;
+        readings.set_item("readings", seen.readings)?;
+        readings.set_item("fresh", seen.fresh)?;
+        readings.set_item("longest_gap", seen.longest_gap)?;
+        readings.set_item("deviation", seen.deviation.to_array())?;
+        readings.set_item("lowest", seen.lowest.to_array())?;
+        readings.set_item("highest", seen.highest.to_array())?;
+        readings.set_item("moved", (seen.last - seen.first).to_array())?;
+        readings.set_item("buttons", seen.buttons)?;
+        readings.set_item("largest_force", seen.largest_force)?;
+        readings.set_item("done", seen.done)?;
+        readings.set_item("ran_away", seen.ran_away)?;
+        readings.set_item("fault", seen.fault.map(|fault| fault.to_string()))?;
+        Ok(Some(readings))
     }
 
     /// Ends the check; the device is left without a force.

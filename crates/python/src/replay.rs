@@ -112,7 +112,7 @@ impl Columns {
             self.active.push(reading.active);
             self.limited.push(got.limited);
         }
-        self.tell(record, tools);
+        self.note_events(record, tools);
         let (tick, settings) = (record.tick, &record.input.settings);
         let (before, last) = self.settings.last().map_or((None, Strike::default()), |(_, s, k)| (Some(s), *k));
         let strike = record.input.strike.unwrap_or(last);
@@ -135,21 +135,21 @@ impl Columns {
     }
 
     /// What people want to know of a tick.
-    fn tell(&mut self, record: &TickRecord, tools: usize) {
+    fn note_events(&mut self, record: &TickRecord, tools: usize) {
         let of_tools = record.output.tools.iter().take(tools).enumerate();
         let now = of_tools.map(|(tool, said)| said.fault.map(|fault| format!("tool {tool}: {fault}")));
         let now: Vec<_> = now.chain([record.input.fault.map(|fault| fault.to_string())]).collect();
         let input = &record.input;
-        let mut tell = |what: String| self.events.push((record.tick, what));
+        let mut note = |what: String| self.events.push((record.tick, what));
         if input.reset {
-            tell("reset".into());
+            note("reset".into());
         }
         if let Some(strike) = input.strike {
-            tell(format!("strike of {} N s on body {}", strike.impulse.length(), strike.body));
+            note(format!("strike of {} N s on body {}", strike.impulse.length(), strike.body));
         }
         for (rank, fault) in now.iter().enumerate() {
             if let Some(fault) = fault.as_ref().filter(|_| self.faults.get(rank) != Some(fault)) {
-                tell(fault.clone());
+                note(fault.clone());
             }
         }
         self.faults = now;

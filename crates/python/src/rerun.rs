@@ -14,14 +14,14 @@ use crate::replay::{INTERRUPT_TICKS, Source, open};
 use crate::simulation::SimulationCore;
 
 /// Gives the inputs of a recording, up to the first tick that is missing, to a simulation with settings of its own: the
-/// recording that comes of it. `told` is called with the ticks done.
+/// recording that comes of it. `progress` is called with the ticks done.
 #[pyfunction]
 pub fn rerun<'py>(
     py: Python<'py>,
     core: &SimulationCore,
     source: Source,
     about: BTreeMap<String, String>,
-    told: Option<Py<PyAny>>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let ticks = open(source).map_err(|e| to_python(py, e))?;
     let PreparedScene { model, limits, settings, strain, devices, scheduling, .. } = core.prepared(py);
@@ -32,7 +32,11 @@ pub fn rerun<'py>(
     let inputs = ticks.enumerate().map_while(|(rank, record)| match record {
         Ok(record) if record.tick != rank as u64 => None,
         Ok(record) => {
-            stopped = if rank.is_multiple_of(INTERRUPT_TICKS) { tell(told.as_ref(), rank).err() } else { None };
+            stopped = if rank.is_multiple_of(INTERRUPT_TICKS) {
+                report_progress(progress.as_ref(), rank).err()
+            } else {
+                None
+            };
             match &stopped {
                 None => Some(Ok(record.input)),
                 Some(_) => Some(Err(Error::Invalid("interrupted".into()))),
@@ -53,10 +57,10 @@ pub fn rerun<'py>(
 
 type Inputs<'a> = Box<dyn Iterator<Item = Result<RecordedInput>> + Send + 'a>;
 
-/// Looks for an interrupt, and tells how far it is.
-fn tell(told: Option<&Py<PyAny>>, done: usize) -> PyResult<()> {
+/// Checks for an interrupt and reports the ticks done.
+fn report_progress(progress: Option<&Py<PyAny>>, done: usize) -> PyResult<()> {
     Python::attach(|py| {
         py.check_signals()?;
-        told.map_or(Ok(()), |told| told.call1(py, (done,)).map(|_| ()))
+        progress.map_or(Ok(()), |progress| progress.call1(py, (done,)).map(|_| ()))
     })
 }

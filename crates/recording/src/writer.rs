@@ -33,7 +33,7 @@ const ERROR: u8 = 40;
 /// What is known before the first tick.
 #[derive(Clone, Debug)]
 pub struct Header {
-    /// What was recorded, for whoever plays it again.
+    /// What was recorded, for a replay.
     pub about: BTreeMap<String, String>,
     /// Tools and bodies of the scene.
     pub tools: usize,
@@ -79,7 +79,7 @@ impl<W: Write + Seek> TickWriter<W> {
             .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
             .compression(Some(mcap::Compression::Zstd))
             .compression_threads(0)
-            // Chunks are cut by whoever flushes, and written at once: what is in the file is whole.
+            // Chunks are cut by calls of flush, and written at once: what is in the file is whole.
             .chunk_size(None)
             .disable_seeking(true);
         let mut file = options.create(file)?;

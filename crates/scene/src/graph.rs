@@ -11,9 +11,9 @@ use palpate_servo::{SafetyLimits, Scheduling};
 use crate::body::Body;
 use crate::tool::Tool;
 
-/// Ticks a second where nothing is said, Hz.
+/// Ticks a second by default, Hz.
 const DEFAULT_RATE: f64 = 1000.0;
-/// Strain of the finite element field at which a tool is held where nothing is said.
+/// Strain of the finite element field at which a tool is held by default.
 const DEFAULT_STRAIN_LIMIT: f64 = 0.3;
 
 /// Handle of a body: never given to another one of the same scene.

@@ -12,7 +12,7 @@ use crate::store_defaults::{default_tool_radius, largest_contact_radius};
 
 /// Coulomb's coefficient where none is given.
 pub const DEFAULT_FRICTION: f64 = 0.3;
-/// Stiffest contact where nothing is said, N/m.
+/// Stiffest contact by default, N/m.
 pub const DEFAULT_MAX_STIFFNESS: f64 = 5000.0;
 
 /// A tool of a scene. What is `None` follows the bodies.

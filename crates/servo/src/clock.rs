@@ -39,7 +39,7 @@ pub fn request_realtime_priority(priority: u8) -> bool {
     unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) == 0 }
 }
 
-/// Processors that this thread may run on, in order; none where the system does not tell.
+/// Processors that this thread may run on, in order; none where the system does not report.
 pub fn allowed_cpus() -> Vec<usize> {
     // SAFETY: a set of processors is an array of bits, for which all zeros is the empty set.
     let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };

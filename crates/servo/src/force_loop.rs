@@ -196,7 +196,7 @@ impl ForceLoop {
         self.request_strain(&input);
         self.account(now_ns, &output);
         self.publish();
-        // Not before: whoever waits for it reads what was published.
+        // Not before: a thread that waits for it reads what was published.
         changed.into_iter().for_each(|taken| self.changes.give_back(taken));
         let (took_ns, overrun) = self.timing.end(period, &self.limits, &mut self.status);
         if let Some(row) = &mut self.row {

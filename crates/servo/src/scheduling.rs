@@ -25,7 +25,7 @@ pub struct Scheduling {
 }
 
 impl Scheduling {
-    /// What is asked for where nothing else is said. Above the threads of interrupts (50), below the kernel's own
+    /// What is asked for by default. Above the threads of interrupts (50), below the kernel's own
     /// migration and watchdog threads (99): a tick that never ends must leave those a chance.
     pub const DEFAULT_PRIORITY: u8 = 80;
 

@@ -88,7 +88,7 @@ Dask = Annotated[
 
 @contextlib.contextmanager
 def cluster(address: str | None) -> Iterator[Client | None]:
-    """Client of a scheduler, whose workers and page are told; None where none is named."""
+    """Client of a scheduler, whose workers and page are printed; None where none is named."""
     if address is None:
         yield None
         return

@@ -75,7 +75,7 @@ def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | Non
 
     if id is not None:
         if len(found) == 1:
-            return found[0].kind, id  # its driver tells what is wrong with it
+            return found[0].kind, id  # its driver reports what is wrong with it
         kinds = [listing.kind for listing in found if any(device.id == id for device in listing.found)]
         if len(kinds) != 1:
             what = f"{' and '.join(kinds)} have a device '{id}': name the kind too" if kinds else f"there is no '{id}'"
@@ -112,10 +112,10 @@ def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:
         if rest.fault is None and moved.fault is None and _confirm_forces(yes):
             result = Checked(check.name, check.limits, rest, moved, tuple(_pushes(check)))
     if as_json:
-        told = {"schema": SCHEMA, "kind": kind, "id": id, "passed": result.passed, **asdict(result)}
-        told["rest"]["passed"], told["range"]["passed"] = rest.passed, moved.passed
-        told["pushes"] = [{**asdict(push), "verdict": push.verdict} for push in result.pushes]
-        print(json.dumps(_finite(told), indent=2))
+        report = {"schema": SCHEMA, "kind": kind, "id": id, "passed": result.passed, **asdict(result)}
+        report["rest"]["passed"], report["range"]["passed"] = rest.passed, moved.passed
+        report["pushes"] = [{**asdict(push), "verdict": push.verdict} for push in result.pushes]
+        print(json.dumps(_finite(report), indent=2))
     else:
         print("\n".join(_result_lines(result)))
     return result.passed
@@ -168,8 +168,8 @@ def _listing_lines(found: list[Listing]) -> Iterator[str]:
         facts = "; ".join(f"{name} {value}" for name, value in listing.facts.items())
         yield f"{listing.kind}: {_count(len(listing.found))}{f' ({facts})' if facts else ''}"
         for device in listing.found:
-            told = [device.name, _limits_text(device.limits), *(f"{k} {v}" for k, v in device.facts.items())]
-            yield f"  {device.id}  {', '.join(text for text in told if text)}"
+            texts = [device.name, _limits_text(device.limits), *(f"{k} {v}" for k, v in device.facts.items())]
+            yield f"  {device.id}  {', '.join(text for text in texts if text)}"
             if device.obstacle is not None:
                 yield f"      cannot be opened: {device.obstacle.what}"
                 yield f"      {device.obstacle.advice}"
@@ -193,8 +193,8 @@ def _count(number: int) -> str:
 
 def _limits_text(limits: DeviceLimits) -> str:
     parts = ((limits.max_force, "N"), (limits.max_torque, "N m"), (limits.max_stiffness, "N/m"))
-    told = [f"{value:.4g} {unit}" for value, unit in parts if math.isfinite(value) and value > 0]
-    return f"at most {', '.join(told)}" if told else "without limits of its own"
+    texts = [f"{value:.4g} {unit}" for value, unit in parts if math.isfinite(value) and value > 0]
+    return f"at most {', '.join(texts)}" if texts else "without limits of its own"
 
 
 def _result_lines(result: Checked) -> Iterator[str]:

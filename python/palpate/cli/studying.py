@@ -39,8 +39,8 @@ def study(
         try:
             result = read.run(folder, dask=workers)
         except KeyboardInterrupt:
-            told = f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on"
-            print(told, file=sys.stderr)
+            text = f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on"
+            print(text, file=sys.stderr)
             raise typer.Exit(130) from None
     _print_result(result, folder)
 

@@ -18,7 +18,7 @@ class Device(ABC):
 
     All its methods are called on one thread, which polls it at the rate of the force loop: :meth:`read`, then
     :meth:`write`, over and over. However long they take, the loop ticks on: it takes the latest reading, and after
-    50 ms without a new one its force is zero until a reset. What they raise is a fault of the tool, told in one line
+    50 ms without a new one its force is zero until a reset. What they raise is a fault of the tool, in one line
     (:class:`DeviceWarning`, and ``fault`` of a frame); the device is then asked for a reading ten times a second.
 
     Attributes

@@ -139,7 +139,7 @@ class PollingThread:
                     self._warn(message)
 
     def _poll(self, native: _native.ProgrammedDevice) -> None:
-        """Read and write on a grid of deadlines until told to end; what has failed is tried again at leisure."""
+        """Read and write on a grid of deadlines until it is asked to end; what has failed is tried again at leisure."""
         due, failed = time.monotonic(), False
         while not self._ending.is_set():
             message = self._write(native) or self._read(native)

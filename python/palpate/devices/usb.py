@@ -64,7 +64,7 @@ KNOWN = (
 
 
 def usb_devices(root: Path = Path("/")) -> list[UsbDevice]:
-    """Haptic devices that are plugged in; none on systems that do not tell as Linux does."""
+    """Haptic devices that are plugged in; none on systems that do not list them as Linux does."""
     found = []
     for folder in sorted((root / "sys/bus/usb/devices").glob("*")):
         vendor, product = _number(folder / "idVendor"), _number(folder / "idProduct")
@@ -75,7 +75,7 @@ def usb_devices(root: Path = Path("/")) -> list[UsbDevice]:
 
 
 def udev_rule(vendor: str, product: str | None = None) -> str:
-    """Rule that lets whoever sits at the machine open the devices of a maker."""
+    """Rule that lets the local user open the devices of a maker."""
     which = f'ATTR{{idVendor}}=="{vendor}"' + (f', ATTR{{idProduct}}=="{product}"' if product else "")
     return f'SUBSYSTEM=="usb", {which}, MODE="0660", TAG+="uaccess"'
 

@@ -158,8 +158,8 @@ class ExamFile(Scene):
         self._require(shape in KEYS, ["tool", 0, "shape"], known)
         nodule = self.nodule
         count = self.question.alternatives * len(nodule.radii) * len(nodule.depths) * nodule.contrast.count
-        told = f"nodule: {count} nodules by place, radius, depth and contrast; an exam takes at most {MOST_BODIES}"
-        self._require(count <= MOST_BODIES, ["nodule"], told)
+        text = f"nodule: {count} nodules by place, radius, depth and contrast; an exam takes at most {MOST_BODIES}"
+        self._require(count <= MOST_BODIES, ["nodule"], text)
 
     def _require(self, holds: bool, place: list[str | int], message: str) -> None:
         if not holds:

@@ -167,17 +167,17 @@ class Library:
 
     def _check(self, mesh: TetMesh, inside: np.ndarray, nodule: Nodule) -> None:
         """Refuse a nodule that is not what the file says in this mesh."""
-        told = f"nodule: of radius {1e3 * nodule.radius:g} mm, {1e3 * nodule.depth:g} mm deep at place {nodule.place}"
+        text = f"nodule: of radius {1e3 * nodule.radius:g} mm, {1e3 * nodule.depth:g} mm deep at place {nodule.place}"
         ball = 4.0 / 3.0 * np.pi * nodule.radius**3
         part = float(mesh.volumes[inside].sum()) / ball
         if abs(part - 1.0) > VOLUME_TOLERANCE:
             reason = f"its elements fill {100 * part:.0f} % of it: make them smaller with body.refine"
-            raise self.exam.mistake(["nodule"], f"{told}: {reason}")
+            raise self.exam.mistake(["nodule"], f"{text}: {reason}")
         corners = np.sort(mesh.tets[inside][:, FACES[4]], axis=2).reshape(-1, 3)
         outer = {tuple(face) for face in np.sort(mesh.surface_faces[:, :3], axis=1).tolist()}
         if any(tuple(face) in outer for face in corners.tolist()):
             reason = "an element of it reaches the surface: hide it deeper, or make elements smaller with body.refine"
-            raise self.exam.mistake(["nodule"], f"{told}: {reason}")
+            raise self.exam.mistake(["nodule"], f"{text}: {reason}")
 
     def _searched(self) -> np.ndarray:
         """Surface nodes that may be touched."""

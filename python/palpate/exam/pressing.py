@@ -77,8 +77,8 @@ def _drawn(exam: ExamFile, surface: trimesh.Trimesh) -> tuple[np.ndarray, np.nda
             if len(chosen) == table.count:
                 return points[chosen], faces[chosen]
         most = max(most, len(chosen))
-    told = f"only {most} of {table.count} places found in the box, {1e3 * table.apart:g} mm apart"
-    raise exam.mistake(["exam", "random"], f"exam.random: {told}")
+    text = f"only {most} of {table.count} places found in the box, {1e3 * table.apart:g} mm apart"
+    raise exam.mistake(["exam", "random"], f"exam.random: {text}")
 
 
 def forces_at(built: BuiltScene, places: Places, depth: float) -> np.ndarray:

@@ -252,7 +252,7 @@ class GreensFunction:
             A node that is not touchable, or in ``release`` not fixed; a wrong length; a number that is not finite;
             a force and a displacement on the same component; released supports that leave the body free to move.
         PrecisionError
-            An answer that may be wrong by more than 10 %; a :class:`palpate.PrecisionWarning` tells of more than 1 %.
+            An answer that may be wrong by more than 10 %; a :class:`palpate.PrecisionWarning` reports more than 1 %.
 
         """
         forced = self._by_column(forces, "forces", units.force)
@@ -297,7 +297,7 @@ class GreensFunction:
         UnitError
             Text that is no length.
         PrecisionError
-            A force that may be wrong by more than 10 %; a :class:`palpate.PrecisionWarning` tells of more than 1 %.
+            A force that may be wrong by more than 10 %; a :class:`palpate.PrecisionWarning` reports more than 1 %.
 
         """
         reach = units.length(radius)

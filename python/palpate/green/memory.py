@@ -21,7 +21,7 @@ def peak_memory() -> int:
 
 
 def available_memory() -> int | None:
-    """Bytes that this machine can still give, as far as the system tells; None where it does not."""
+    """Bytes that this machine can still give, as far as the system reports it; None where it does not."""
     lines = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
     kilobytes = lines.get("MemAvailable", "").split()
     return 1024 * int(kilobytes[0]) if kilobytes else None

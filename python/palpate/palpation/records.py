@@ -44,7 +44,7 @@ class PressCurve(ComparedByValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MapRecord(ComparedByValue):
-    """What a map holds; :class:`palpate.palpation.StiffnessMap` tells of each field."""
+    """What a map holds; :class:`palpate.palpation.StiffnessMap` describes each field."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -111,7 +111,7 @@ class Nodule(ComparedByValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DetectionRecord(ComparedByValue):
-    """What a comparison holds; :class:`palpate.palpation.Detection` tells of each field."""
+    """What a comparison holds; :class:`palpate.palpation.Detection` describes each field."""
 
     found: MapRecord
     plain: MapRecord

@@ -20,7 +20,7 @@ KEYS: dict[str, tuple[set[str], set[str]]] = {
     "punch": ({"radius", "rounding"}, set()),
 }
 KEYS_OF_FILES: tuple[set[str], set[str]] = ({"unit"}, set())
-# Part of its radius by which the rim of a punch is rounded where nothing is said.
+# Part of its radius by which the rim of a punch is rounded by default.
 ROUNDING = 0.1
 
 # Kind, three lengths (m), and of a surface its vertices (m) and triangles.

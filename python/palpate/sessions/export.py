@@ -56,7 +56,7 @@ def export(
     scene
         In place of that of the recording, with the same bodies; of frames.
     progress
-        Shown, or told of done and expected rows or frames.
+        Shown, or called with done and expected rows or frames.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def rerun(
     scene
         With as many tools.
     progress
-        Shown, or told of done and expected ticks.
+        Shown, or called with done and expected ticks.
 
     Raises
     ------

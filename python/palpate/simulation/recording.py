@@ -52,13 +52,13 @@ def _of_tools(columns: Mapping[str, Any], name: str) -> np.ndarray:
     return values[:, 0] if single else values[:, :given]
 
 
-def _column(name: str, told: str) -> Any:
+def _column(name: str, description: str) -> Any:
     """Make the property that gives a column of tools."""
 
     def read(recording: Recording) -> np.ndarray:
         return _of_tools(recording._columns, name)
 
-    return property(read, doc=told)
+    return property(read, doc=description)
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ def replay(
     scene
         The scene that should give the same; None takes that of the recording.
     progress
-        Shown, or told of done and expected ticks.
+        Shown, or called with done and expected ticks.
 
     Raises
     ------

@@ -23,7 +23,7 @@ LOG_SECONDS = 10.0
 
 
 class ReplayedSimulation(Simulation):
-    """Frames and log of a recording, as those of a running loop; what it is told to do has no effect on them.
+    """Frames and log of a recording, as those of a running loop; commands have no effect on them.
 
     Parameters
     ----------

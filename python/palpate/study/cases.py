@@ -152,12 +152,12 @@ def _entry(tables: Sequence[Any], step: str, key: Key) -> int:
 
 def _error_text(path: Path, text: str, error: ValidationError, given: Mapping[Key, tuple[Any, Place]]) -> str:
     """Say a mistake where it stands: in the grid or in a case, if it is a value from there."""
-    told = explain(path, text, error, StudyTables)
+    explained = explain(path, text, error, StudyTables)
     found = _names(error.errors()[0]["loc"])
     for key, (_, place) in given.items():
         if _names(key) == found[: len(_names(key))]:
-            return f"{located(path, text, place)}: {told.split(': ', 1)[1]}"
-    return told
+            return f"{located(path, text, place)}: {explained.split(': ', 1)[1]}"
+    return explained
 
 
 def _names(place: Sequence[str | int]) -> list[str]:

@@ -77,7 +77,7 @@ class MovingBody:
         self.set_time_scale(self._first_time_scale())
 
     def header(self) -> dict[str, Any]:
-        """Return the part of the scene message that tells of the motion."""
+        """Return the part of the scene message about the motion."""
         basis, strike = self._motion.basis, self._first_strike
         # After the scene's own strike there is nothing before it to be seen.
         shown = (PERIODS if strike is None else 2 * PERIODS) / basis.frequencies[0]
@@ -94,7 +94,7 @@ class MovingBody:
         }
 
     def frame_header(self) -> dict[str, Any]:
-        """Return the part of a frame message that tells of the motion."""
+        """Return the part of a frame message about the motion."""
         rank = int(np.searchsorted(self._green.surface_nodes, self.watched))
         mode = None if self._mode is None else self._mode.header
         return {"watched": rank, "struck_at": self.struck_at, "mode": mode}

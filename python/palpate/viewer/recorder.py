@@ -47,7 +47,7 @@ class SessionRecorder:
             raise ViewerError(f"cannot record in {path}: {error.strerror or error}") from None
 
     def stop(self, reason: str | None = None) -> dict[str, Any] | None:
-        """End the recording, if there is one: the message that tells of it, with the reason if nobody asked for it."""
+        """End the recording, if there is one: the message about it, with the reason if nobody asked for it."""
         status = self._simulation.stop_recording()
         if status is None:
             return None
@@ -55,7 +55,7 @@ class SessionRecorder:
         return {"type": "recorded", **self._status_message(status), "replay": replay, "reason": reason}
 
     def stop_after_failure(self) -> dict[str, Any] | None:
-        """End a recording that cannot go on: the message that tells why."""
+        """End a recording that cannot go on: the message with the reason."""
         status = self._simulation.recording
         return None if status is None or status.error is None else self.stop()
 

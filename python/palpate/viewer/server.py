@@ -176,7 +176,7 @@ class ViewerServer:
         self._watch = asyncio.create_task(self._watchdog())
 
     async def stop(self) -> dict[str, Any] | None:
-        """Close all connections and stop the loop: what is told of the recording that this ends, if it ends one."""
+        """Close all connections and stop the loop: the report on the recording that this ends, if it ends one."""
         if self._server is not None:
             gc.unfreeze()
             sys.setswitchinterval(self._interval)
@@ -355,11 +355,11 @@ class ViewerServer:
     async def _send_computed(self) -> None:
         """Give the loop what has become ready, and tell of it."""
         try:
-            told = await self._worker.call(self._computing.step, self._session)
+            message = await self._worker.call(self._computing.step, self._session)
         except Error as error:
-            told = {"type": "error", "text": str(error)}
-        if told is not None:
-            await self.send_all(told)
+            message = {"type": "error", "text": str(error)}
+        if message is not None:
+            await self.send_all(message)
 
     async def _send_recording_end(self, ended: dict[str, Any] | None) -> None:
         """Tell of a recording that has ended."""

@@ -181,7 +181,7 @@ class Session:
         return handler(message)
 
     def record(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Begin a recording, or end it: the message that tells of its end.
+        """Begin a recording, or end it: the message about its end.
 
         Raises
         ------
@@ -243,7 +243,7 @@ class Session:
         """Geometry and numbers of the scene."""
         scene = self.built.scene
         outlines = [outline(tool, scene.folder) for tool in scene.tools]
-        tools = [{**told, **self._tool_entry(tool)} for tool, (told, _) in enumerate(outlines)]
+        tools = [{**outline, **self._tool_entry(tool)} for tool, (outline, _) in enumerate(outlines)]
         header = {"type": "scene", "tools": tools, **self._scene_header()}
         bodies = numbered([body.arrays() for body in self._bodies])
         return encode(header, {**bodies, **numbered([arrays for _, arrays in outlines], "tools/")})
@@ -286,13 +286,13 @@ class Session:
             **{k: frame.statistics[k] for k in ("compute_us", "wakeup_us", "ticks", "missed_deadlines", "fault")},
             "realtime": all(frame.statistics["realtime"]),
         }
-        told, arrays = self._drawn(frame, log_seen, wants)
-        return encode({**header, **told}, arrays), (self._log.end, self._history.end)
+        bodies, arrays = self._drawn(frame, log_seen, wants)
+        return encode({**header, **bodies}, arrays), (self._log.end, self._history.end)
 
     def _drawn(
         self, frame: Frame, log_seen: tuple[int, int], wants: ClientView
     ) -> tuple[dict[str, Any], dict[str, tuple[str, np.ndarray]]]:
-        """Part of a frame message that tells of the bodies, and its arrays."""
+        """Part of a frame message about the bodies, and its arrays."""
         poses = [self._pose(frame, body) for body in range(len(self._bodies))]
         pairs = list(zip(self._bodies, poses, strict=True))
         pictures = [body.picture(wants.field, pose, wants.cutaway, wants.full_scale) for body, pose in pairs]
@@ -312,19 +312,19 @@ class Session:
         return header, {**numbered([picture.arrays for picture in pictures]), **rows}
 
     def _motion_header(self) -> dict[str, Any] | None:
-        """Part of a frame message that tells of the motion; the watched node as the vertex that is drawn for it."""
+        """Part of a frame message about the motion; the watched node as the vertex that is drawn for it."""
         moving = self._moving
         if moving is None:
             return None
-        told = moving.frame_header()
-        return {**told, "watched": self._bodies[moving.index].drawn_row(told["watched"])}
+        motion = moving.frame_header()
+        return {**motion, "watched": self._bodies[moving.index].drawn_row(motion["watched"])}
 
     def _replay_scene(self) -> dict[str, Any] | None:
-        """Part of the scene message that tells of a replay."""
+        """Part of the scene message about a replay."""
         return None
 
     def _replay_header(self) -> dict[str, Any] | None:
-        """Part of a frame message that tells of a replay."""
+        """Part of a frame message about a replay."""
         return None
 
     def _pose(self, frame: Frame, body: int) -> np.ndarray:

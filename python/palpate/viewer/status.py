@@ -1,4 +1,4 @@
-"""How far a long work is, told to all pages."""
+"""How far a long work is, reported to all pages."""
 
 from __future__ import annotations
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 
 import pytest
+from command_line import run
 from conftest import box_mesh
 
 import palpate
@@ -27,9 +26,7 @@ def test_the_limit_that_held_is_the_one_named(tmp_path, modulus, max_force, stra
         f'[body]\nmesh = "box.vtu"\n[supports]\nfixed = "z < min + 1mm"\n[material]\nyoungs_modulus = "{modulus}"\n'
         f'[device]\nmax_force = "{max_force}"\n[view]\nstrain_limit = {strain_limit}\n'
     )
-    code = "from palpate.cli import main; main()"
-    command = [sys.executable, "-c", code, "run", "press.toml", "--headless", "2"]
-    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=250, check=True).stdout
+    said = run("run", "press.toml", "--headless", "2", cwd=tmp_path).stdout
     force = float(re.search(r"largest force ([\d.]+) N", said)[1])
     strain = float(re.search(r"largest strain ([\d.]+) %", said)[1])
     assert ("max_force" in said) == by_force

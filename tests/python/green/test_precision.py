@@ -93,7 +93,6 @@ def measured_errors(folder) -> dict[str, np.ndarray]:
     return {name: np.array(found) for name, found in errors.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("precision", FORMATS)
 def test_every_answer_of_a_hundred_random_bodies_is_within_its_stated_error(random_errors, precision):
     stated, true = random_errors[precision].T

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
 import trimesh
 from command_line import refused
+from command_line import run as command
 from conftest import box_mesh
 
 import palpate
 
 MAIN = [sys.executable, "-c", "from palpate.cli import main; main()"]
-
-
-def command(*arguments, cwd) -> subprocess.CompletedProcess:
-    options = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "timeout": 280}
-    return subprocess.run([*MAIN, *arguments], cwd=cwd, check=False, **options)
 
 
 @pytest.fixture
@@ -66,9 +64,17 @@ def test_commands_ask_in_one_line_and_print_the_size(millimetres):
     assert "a body of 80 x 50 x 50 mm" in command("info", "box.palpate", cwd=millimetres).stdout
 
 
+def read_all(terminal: int) -> None:
+    with contextlib.suppress(OSError):
+        while os.read(terminal, 4096):
+            pass
+
+
 def test_on_a_terminal_the_unit_is_asked_for(millimetres):
     terminal, end = pty.openpty()
     os.write(terminal, b"mm\n")
+    # On a slow machine progress fills what a terminal holds, and a program waits until it is read.
+    threading.Thread(target=read_all, args=(terminal,), daemon=True).start()
     options = {"stdin": end, "stderr": end, "stdout": subprocess.PIPE, "text": True, "timeout": 280}
     arguments = ("mesh", "box.stl", "out.vtu", "--max-size", "2cm")
     made = subprocess.run([*MAIN, *arguments], cwd=millimetres, check=False, **options)

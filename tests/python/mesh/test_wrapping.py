@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import warnings
 
 import numpy as np
 import pytest
 import trimesh
+from command_line import run
 from conftest import box_mesh
 
 import palpate
@@ -23,7 +22,6 @@ from palpate.mesh.wrapping import _without_crumbs
 
 pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)
 
-MAIN = [sys.executable, "-c", "from palpate.cli import main; main()"]
 RADIUS = 40.0
 BALL = 4 / 3 * np.pi * 0.04**3
 
@@ -56,8 +54,7 @@ def field_of(shape: trimesh.Trimesh) -> SolidField:
 def test_a_broken_surface_is_filled_without_an_option_more(tmp_path):
     surface, volume = with_a_bar()
     surface.export(tmp_path / "scan.stl")
-    command = [*MAIN, "run", "scan.stl", "--unit", "mm", "--headless", "0.5"]
-    made = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=280, check=False)
+    made = run("run", "scan.stl", "--unit", "mm", "--headless", "0.5", cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     assert float(made.stdout.split("largest force ")[1].split(" N")[0]) > 0.01
     said = [line for line in made.stderr.splitlines() if "was wrapped" in line]

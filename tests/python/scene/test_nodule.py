@@ -11,6 +11,8 @@ from conftest import skfem_stiffness
 
 import palpate
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[3] / "examples" / "nodule.toml"
 TOP, RADIUS, PRESS = 0.04, 0.005, 1e-3
 
@@ -48,7 +50,6 @@ def patch_weights(mesh, point, radius, split=24):
     return weights / weights.sum()
 
 
-@pytest.mark.slow
 def test_stiffness_over_the_nodule_equals_a_direct_solve(nodule):
     body = nodule.bodies[0].body
     assert len(np.unique(body.mesh.regions)) == 2

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
+import command_line
 import numpy as np
 import pytest
 from conftest import bent, box_mesh
@@ -134,8 +132,7 @@ def test_viewer_is_sent_flat_triangles_and_tets(built):
 
 def test_command_line_makes_and_solves_them(tmp_path):
     def run(*arguments):
-        command = [sys.executable, "-c", "from palpate.cli import main; main()", *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=280)
+        return command_line.run(*arguments, cwd=tmp_path)
 
     import trimesh
 
@@ -178,8 +175,7 @@ def test_command_line_takes_the_same_elements(tmp_path):
 
     def run(file, *arguments):
         fixed = ("--fix", "z < min + 5mm", "-o", "out.palpate")
-        command = [sys.executable, "-c", "from palpate.cli import main; main()", "precompute", file, *fixed, *arguments]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=280)
+        return command_line.run("precompute", file, *fixed, *arguments, cwd=tmp_path)
 
     for arguments, element in (((), "quadratic"), (("--element", "linear"), "linear")):
         assert run("ball.stl", *arguments).returncode == 0

@@ -48,7 +48,7 @@ export class PictureKeys {
     return this.store.get().pressing !== null;
   }
 
-  /** Does what a key is for, and tells whether there is anything. */
+  /** Does what a key is for, and returns whether there is anything. */
   private take(key: string, repeated: boolean): boolean {
     const arrow = ARROWS[key];
     if (arrow) this.go(...arrow);

@@ -68,7 +68,7 @@ export interface Gesture {
   press(pressure: number): void;
   /** Whether the tool is held, for the body would be strained too far. */
   hold(held: boolean): void;
-  /** Lets time pass and tells whether the tool moves on. */
+  /** Lets time pass and returns whether the tool moves on. */
   advance(seconds: number): boolean;
   /** Of the tool's origin. */
   position(): THREE.Vector3;

@@ -221,7 +221,7 @@ export class BodyView {
     this.shadow.material.opacity = shadow;
   }
 
-  /** Moves to a pose and tells whether the picture changes; one that belongs to another mesh is left out. */
+  /** Moves to a pose and returns whether the picture changes; one that belongs to another mesh is left out. */
   update(pose: Pose): boolean {
     const { displacements, scalar } = pose.arrays;
     const { arrays, drawn } = this;

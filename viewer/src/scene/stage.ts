@@ -93,7 +93,7 @@ export class Stage {
     this.show();
   }
 
-  /** Moves to a frame and tells whether the picture changes: bodies at rest are not drawn again and again. */
+  /** Moves to a frame and returns whether the picture changes: bodies at rest are not drawn again and again. */
   update({ header, bodies }: FrameData): boolean {
     const { motion } = header;
     let changed = false;

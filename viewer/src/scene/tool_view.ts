@@ -62,7 +62,7 @@ export class ToolView {
     this.group.visible = false;
   }
 
-  /** Tells whether the picture changes. The rings of contacts move with the bodies: call it after these moved. */
+  /** Returns whether the picture changes. The rings of contacts move with the bodies: call it after these moved. */
   update(pose: ToolPose): boolean {
     const { tool, pinned } = pose;
     const contacts = pose.contacts.filter(({ body }) => body < this.bodies.length);

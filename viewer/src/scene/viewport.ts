@@ -28,7 +28,7 @@ export class Viewport {
   /** Of the picture that the region is a part of, CSS pixels. */
   private pictureHeight = 1;
 
-  /** Bodies are framed beside the overlays; beforeDraw takes in what has arrived and tells whether that changed the picture; afterDraw runs when it is shown. */
+  /** Bodies are framed beside the overlays; beforeDraw takes in what has arrived and returns whether that changed the picture; afterDraw runs when it is shown. */
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly overlays: HTMLElement[],

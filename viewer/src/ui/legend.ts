@@ -150,7 +150,7 @@ function roundedUp(value: number): number {
   return Number((Math.ceil(value / step - 1e-6) * step).toPrecision(2));
 }
 
-/** A region by its name, a material by its numbers; a stiffness that was changed while running is told as it is. */
+/** A region by its name, a material by its numbers; a stiffness that was changed while running is shown as it is. */
 function titleOf({ body, region }: Group, { scene, coloring, settings }: Readonly<State>): string {
   const modulus = settings?.youngs_modulus[body] ?? region.youngs_modulus;
   if (coloring === "material") return `${pascals(modulus)}, ν ${region.poissons_ratio}, ${region.density} kg/m³`;

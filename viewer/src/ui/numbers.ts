@@ -44,13 +44,13 @@ export function pascals(value: number): string {
   return `${value.toPrecision(3)} Pa`;
 }
 
-/** A stiffness of a contact in N/m, told in N/mm. */
+/** A stiffness of a contact in N/m, shown in N/mm. */
 export function newtonsPerMillimetre(stiffness: number): string {
   const value = stiffness / 1000;
   return value.toFixed(value >= 9.995 ? 1 : value >= 0.9995 ? 2 : 3);
 }
 
-/** A part of one, told in per cent. */
+/** A part of one, shown in per cent. */
 export function percent(part: number): string {
   return `${Number((100 * part).toFixed(1))} %`;
 }
@@ -60,7 +60,7 @@ export function inMillimetres(metres: number): string {
   return (1000 * metres).toFixed(1);
 }
 
-/** A length in m, told in mm. */
+/** A length in m, shown in mm. */
 export function millimetres(metres: number): string {
   return `${inMillimetres(metres)} mm`;
 }

@@ -8,7 +8,7 @@ export interface SliderOptions {
   id: string;
   /** What messages call it. */
   name: string;
-  /** The value with its unit, as it is told. */
+  /** The value with its unit, as it is shown. */
   format(value: number): string;
   /** Factors of the units that may be typed; a number alone is in the usual one, or in that which is told. */
   units?: Readonly<Record<string, number>>;

@@ -12,7 +12,7 @@ const known = new Map<string, string>();
 export function themeColor(property: `--${string}`): string {
   const found = known.get(property);
   if (found !== undefined) return found;
-  // A property by itself is told as it was written; as the colour of an element it is worked out.
+  // A property by itself is shown as it was written; as the colour of an element it is worked out.
   const probe = document.createElement("span");
   probe.style.color = `var(${property})`;
   document.body.append(probe);

@@ -15,7 +15,7 @@ pub struct OpenDevice {
     pub count: i8,
 }
 
-/// All of them; whoever opens or closes a device has the lock.
+/// All of them; a thread that opens or closes a device holds the lock.
 pub fn open_devices() -> MutexGuard<'static, Vec<OpenDevice>> {
     static OPEN_DEVICES: Mutex<Vec<OpenDevice>> = Mutex::new(Vec::new());
     OPEN_DEVICES.lock().unwrap_or_else(PoisonError::into_inner)

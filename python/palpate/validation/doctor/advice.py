@@ -61,7 +61,7 @@ def advice(
     Parameters
     ----------
     machine
-        What the system tells.
+        What the system reports.
     priority, locked_memory
         What it granted a running loop; None where none has run.
     taken
@@ -155,11 +155,11 @@ def _memory(machine: Machine, locked: bool | None) -> Iterator[Advice]:
     enough = machine.ipc_lock or limit is None or limit == UNLIMITED or limit >= ENOUGH_MEMORY
     if locked or (locked is None and enough):
         return
-    told = "" if limit is None or limit == UNLIMITED else f" (limit {limit / 2**20:.0f} MiB)"
+    allowed = "" if limit is None or limit == UNLIMITED else f" (limit {limit / 2**20:.0f} MiB)"
     user = machine.user or "<user>"
     yield Advice(
         "locked-memory",
-        f"memory is not locked{told}: a page that was swapped out stops the loop",
+        f"memory is not locked{allowed}: a page that was swapped out stops the loop",
         (f"echo '{user} - memlock unlimited' | sudo tee -a /etc/security/limits.d/90-palpate.conf", "# log in again"),
     )
 

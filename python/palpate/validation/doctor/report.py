@@ -31,7 +31,7 @@ class Report:
     Attributes
     ----------
     machine
-        What the system tells.
+        What the system reports.
     seconds
         How long the loop ran.
     loop
@@ -44,7 +44,7 @@ class Report:
         What to change, most important first.
     taken
         Shares of the processors' time that programs took while the loop ran, and that the host of a virtual machine
-        took; None where the system does not tell.
+        took; None where the system does not report.
     devices
         Haptic devices, by the drivers that look for them.
 
@@ -76,7 +76,7 @@ class Report:
 
 
 def as_json(report: Report) -> dict[str, Any]:
-    """Report with stable keys; times in us, memory in bytes. What the system does not tell is null."""
+    """Report with stable keys; times in us, memory in bytes. What the system does not report is null."""
     loop = report.loop
     return {
         "schema": SCHEMA,
