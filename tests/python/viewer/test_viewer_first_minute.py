@@ -143,8 +143,9 @@ def test_the_key_of_plots_opens_more(chromium, program):
 @pytest.mark.parametrize("more", [False, True])
 def test_tab_reaches_every_control_and_each_has_a_name(chromium, program, more):
     with opened(chromium, program, more=more) as page:
-        # The controls of the legend go with the strain of the test before.
-        page.get_by_test_id("legend-max").wait_for(state="hidden")
+        if not more:
+            # The legend goes with the strain of the test before.
+            page.get_by_test_id("legend-max").wait_for(state="hidden")
         wanted = page.evaluate(ENABLED)
         assert len(wanted) > (25 if more else 9) and all(wanted)
         page.evaluate("document.activeElement.blur()")
