@@ -267,17 +267,21 @@ BARE = "  Self { ..versioned_struct::zeroed() }"
 
 def grown_library(folder: Path) -> Path:
     """Folder of a library whose structs that may grow have one more member at their ends, as a later version has."""
+    # A workspace of the same members: cargo then takes what it has compiled for this one.
     copy = folder / "grown"
-    shutil.copytree(ROOT / "crates/capi", copy / "capi", ignore=shutil.ignore_patterns("tests", "examples"))
-    workspace = (ROOT / "Cargo.toml").read_text()
-    workspace = re.sub(r"members = .*", 'members = ["capi"]', workspace).replace('"crates/', f'"{ROOT}/crates/')
-    (copy / "Cargo.toml").write_text(workspace)
-    shutil.copy(ROOT / "Cargo.lock", copy)
+    crates = copy / "crates"
+    crates.mkdir(parents=True)
+    for crate in (ROOT / "crates").iterdir():
+        if crate.name != "capi":
+            (crates / crate.name).symlink_to(crate)
+    shutil.copytree(ROOT / "crates/capi", crates / "capi", ignore=shutil.ignore_patterns("tests", "examples"))
+    for name in ("Cargo.toml", "Cargo.lock"):
+        shutil.copy(ROOT / name, copy)
     # By another name, for it is built beside the other one.
-    manifest = (copy / "capi/Cargo.toml").read_text().replace('name = "palpate"', 'name = "palpate_grown"')
-    (copy / "capi/Cargo.toml").write_text(manifest.replace('["cdylib", "staticlib", "lib"]', '["cdylib"]'))
+    manifest = (crates / "capi/Cargo.toml").read_text().replace('name = "palpate"', 'name = "palpate_grown"')
+    (crates / "capi/Cargo.toml").write_text(manifest.replace('["cdylib", "staticlib", "lib"]', '["cdylib"]'))
     grown = []
-    for source in (copy / "capi/src").glob("*.rs"):
+    for source in (crates / "capi/src").glob("*.rs"):
         text = source.read_text()
         for name in re.findall(r"unsafe impl VersionedStruct for (\w+)", text.split("#[cfg(test)]")[0]):
             whole, added = rf"(pub struct {name} {{.*?)\n}}", r"\1\n    pub added: [f64; 3],\n}"
@@ -293,8 +297,8 @@ def grown_library(folder: Path) -> Path:
         source.write_text(text.replace("//!", "#![allow(missing_docs)]\n//!", 1) if source.name == "lib.rs" else text)
     assert len(grown) == 6
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    build = ("cargo", "build", "--release", "--quiet", "--manifest-path", copy / "Cargo.toml", "--target-dir", target)
-    run(*build, timeout=900)
+    build = ("cargo", "build", "--release", "--quiet", "--manifest-path", copy / "Cargo.toml")
+    run(*build, "-p", "palpate-capi", "-p", "palpate-python", "--target-dir", target, timeout=900)
     (folder / "lib").mkdir()
     shutil.copy(target / "release/libpalpate_grown.so", folder / "lib/libpalpate.so.1")
     return folder / "lib"
