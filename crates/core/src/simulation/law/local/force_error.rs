@@ -29,8 +29,10 @@ use crate::simulation::tool::ToolModel;
 const CONSTANT: f64 = 0.01;
 /// Error of the elements, over the displacement of a half-space under the same patch `0.77 F/(E* b)`, over the depth.
 const BY_ELEMENTS: f64 = 0.04;
-/// Factors of the cube of `b` over the breadth: always, and for the part of the depth by which the whole body yields.
-const BY_BREADTH: [f64; 2] = [0.5, 0.6];
+/// Factors of the cube of `b` over the breadth: for a body whose support stiffens the contact, and added to it for one that is free
+/// below. They differ in the part of the depth by which the body yields, which is negative above a support.
+const BY_BREADTH: [f64; 2] = [0.45, 0.65];
+const SUPPORTED: f64 = -0.15;
 /// Change of the force with Poisson's ratio over `s`.
 const BY_POISSON: f64 = 0.8;
 /// Error of the force under other shapes over the correction of a sphere: without a correction, and with that of an ellipsoid.
@@ -82,12 +84,13 @@ pub fn estimate(tool: &ToolModel, contact: &Contact, response: &LocalResponse, a
     }
     let inverse_thickness = around.inverse_thickness;
     let fraction = response.has_series().then_some(response.higher.fraction.max(0.0));
-    let depth = contact.depth.max(indentation.depth);
+    // Above a support the approach of the half-space is larger than the tool's.
+    let depth = if contact.depth > 0.0 { contact.depth } else { indentation.depth };
+    let free = ((1.0 - indentation.depth / depth - SUPPORTED) / -SUPPORTED).clamp(0.0, 1.0);
     let parts = [
         CONSTANT,
         BY_ELEMENTS * indentation.force * material.share / (material.modulus * material.width * depth),
-        (BY_BREADTH[0] + BY_BREADTH[1] * (1.0 - indentation.depth / depth).max(0.0))
-            * (material.width * around.inverse_breadth).powi(3),
+        (BY_BREADTH[0] + BY_BREADTH[1] * free) * (material.width * around.inverse_breadth).powi(3),
         local_error(tool, response),
         match fraction {
             Some(fraction) => BY_SERIES * 0.01 * fraction.powi(3),
