@@ -13,6 +13,7 @@ from benches.precompute import precompute
 from benches.record import record
 from benches.scale import scale
 from benches.strain.patch_table import patch_table
+from benches.strain.references import strain_references
 from benches.strain.table import strain_table
 from benches.surface import surface
 from benches.tick import tick
@@ -33,6 +34,7 @@ for command in (
     *(paper, dynamics, record, viewer, zwidth, touches, fill),
     strain_table,
     patch_table,
+    strain_references,
 ):
     app.command()(command)
 

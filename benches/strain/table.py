@@ -18,8 +18,8 @@ from benches.strain.indentation import coefficients
 from benches.strain.materials import Material, NeoHookean, ReducedPolynomial
 from palpate.progress import status_line
 
-# Poisson's ratios of the neo-Hookean material, and of the two others. Beyond 0.45 the elements lock.
-RATIOS = (0.0, 0.1, 0.2, 0.3, 0.35, 0.4, 0.45)
+# Poisson's ratios of the neo-Hookean material, and of the two others.
+RATIOS = (0.0, 0.1, 0.2, 0.3, 0.35, 0.4, 0.45, 0.49)
 FEW_RATIOS = (0.3, 0.45)
 # `c01 / (c10 + c01)` of Mooney and Rivlin; `c20 / c10` and `c30 / c10` of Yeoh.
 SHARES = (0.0, 0.5, 1.0)

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 
 import type { BodyMessage, ContactMessage, Quaternion, Vec3 } from "./net/protocol";
-import { contactsOf, deepest, feltStiffness, totalForce } from "./tool_contacts";
+import { contactsOf, deepest, feltStiffness, statedError, totalForce } from "./tool_contacts";
 
 const H = Math.SQRT1_2;
 const contact = (over: Partial<ContactMessage>): ContactMessage => ({
@@ -15,6 +15,7 @@ const contact = (over: Partial<ContactMessage>): ContactMessage => ({
   depth: 1e-3,
   stiffness: 100,
   slipping: false,
+  error: null,
   ...over,
 });
 const body = (orientation: Quaternion) => ({ orientation }) as BodyMessage;
@@ -22,6 +23,15 @@ const UPRIGHT = body([1, 0, 0, 0]);
 /** A wall of a groove with a right angle, which stands at 45 degrees to the left or the right, and is pushed by a force. */
 const wall = (side: number, force: number, over: Partial<ContactMessage> = {}) =>
   contact({ normal: [side * H, 0, H], force: [-side * H * force, 0, -H * force], ...over });
+
+describe("the stated error of a tool's force", () => {
+  it("is the mean over its contacts, weighted by their forces, and none if one states none", () => {
+    expect(statedError([])).toBeNull();
+    expect(statedError([contact({ error: 0.02 }), contact({ error: null })])).toBeNull();
+    const [weak, strong] = [contact({ force: [0, 0, 1], error: 0.05 }), contact({ force: [0, 0, 3], error: 0.01 })];
+    expect(statedError([weak, strong])).toBeCloseTo(0.02);
+  });
+});
 
 describe("the contacts of a tool", () => {
   it("are told apart from those of others, and the deepest from the others", () => {

@@ -14,6 +14,18 @@ export function deepest(contacts: readonly ContactMessage[]): ContactMessage | n
   return contacts.reduce<ContactMessage | null>((most, one) => (most && depth(most) >= depth(one) ? most : one), null);
 }
 
+/** Relative error that the contacts state of their forces together; null if one of them states none. */
+export function statedError(contacts: readonly ContactMessage[]): number | null {
+  let [error, whole] = [0, 0];
+  for (const one of contacts) {
+    if (one.error === null) return null;
+    const force = Math.hypot(...one.force);
+    error += one.error * force;
+    whole += force;
+  }
+  return whole > 0 ? error / whole : null;
+}
+
 /** Of all contacts on what they touch, N, in the frame of the scene. */
 export function totalForce(contacts: readonly ContactMessage[]): Vec3 {
   const sum: Vec3 = [0, 0, 0];

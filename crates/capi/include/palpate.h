@@ -581,6 +581,13 @@ palpate_status palpate_loop_get_contacts(struct palpate_loop *force_loop,
                                          size_t capacity,
                                          size_t *count);
 
+// Estimated relative error of the force of each contact, in the order of palpate_loop_get_contacts; 0 for a linear material.
+// `count` gets how many there are, of which `capacity` are written.
+palpate_status palpate_loop_get_contact_errors(struct palpate_loop *force_loop,
+                                               double *errors,
+                                               size_t capacity,
+                                               size_t *count);
+
 // How many surface nodes and triangles a body has; either place may be null. They never change.
 palpate_status palpate_loop_get_surface_size(const struct palpate_loop *force_loop,
                                              uint32_t body,

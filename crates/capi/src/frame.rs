@@ -205,6 +205,28 @@ pub unsafe extern "C" fn palpate_loop_get_contacts(
     })
 }
 
+/// Estimated relative error of the force of each contact, in the order of palpate_loop_get_contacts; 0 for a linear material.
+/// `count` gets how many there are, of which `capacity` are written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_loop_get_contact_errors(
+    force_loop: *mut Loop,
+    errors: *mut f64,
+    capacity: usize,
+    count: *mut usize,
+) -> Status {
+    catching_panics(|| {
+        // SAFETY: the caller's pointers.
+        let (own, places, count) = unsafe {
+            (shared(force_loop, "loop")?, array_mut(errors, capacity, "errors")?, exclusive(count, "count")?)
+        };
+        let side = own.frame();
+        let found = || side.latest.state.contacts.iter();
+        *count = found().count();
+        places.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = contact.error);
+        Ok(Status::PalpateOk)
+    })
+}
+
 fn record(prepared: &PreparedScene, contact: &Contact) -> ContactRecord {
     let placement = &prepared.model.bodies[contact.body].placement;
     let vector = |v: DVec3| placement.vector_to_world(v).to_array();

@@ -125,6 +125,7 @@ impl Columns {
             for vector in [c.point, c.normal, c.force, c.torque, [c.radius, c.depth, c.stiffness]] {
                 self.contact_numbers.extend(vector);
             }
+            self.contact_numbers.push(c.error);
         }
         for (body, said) in record.output.bodies.iter().enumerate() {
             if let Some((time, energy)) = said {

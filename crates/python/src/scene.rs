@@ -44,10 +44,10 @@ pub type ShapeArguments = (String, [f64; 3], Vec<[f64; 3]>, Vec<[u32; 3]>);
 pub type ToolArguments = (ShapeArguments, String, f64, Option<f64>, BTreeMap<String, f64>);
 
 /// Tool, body, mode, (point, normal, force, torque, anchor, displacement) in the world, whether it is limited and slips,
-/// contact radius (m), depth (m) and stiffness (N/m) under the local law, nodes and weights of a contact, and its point
-/// and normal in the body's own frame.
+/// contact radius (m), depth (m) and stiffness (N/m) under the local law and relative error of the force, nodes and weights
+/// of a contact, and its point and normal in the body's own frame.
 pub type ContactRecord =
-    (usize, usize, &'static str, [[f64; 3]; 6], [bool; 2], [f64; 3], Vec<u32>, Vec<f64>, [[f64; 3]; 2]);
+    (usize, usize, &'static str, [[f64; 3]; 6], [bool; 2], [f64; 4], Vec<u32>, Vec<f64>, [[f64; 3]; 2]);
 
 /// Takes arguments out of the interpreter's hands.
 pub fn scene_body(arguments: &BodyArguments<'_>) -> PyResult<Body> {
@@ -182,7 +182,7 @@ pub fn contact_records(model: &Model, state: &Snapshot) -> Vec<ContactRecord> {
         ];
         let mode = if contact.mode == Mode::Grab { "grab" } else { "press" };
         let flags = [contact.limited, contact.slipping];
-        let numbers = [contact.radius, contact.depth, contact.stiffness];
+        let numbers = [contact.radius, contact.depth, contact.stiffness, contact.error];
         let vectors = vectors.map(|v| v.to_array());
         let own = [contact.point, contact.normal].map(|v| v.to_array());
         (contact.tool, contact.body, mode, vectors, flags, numbers, nodes.to_vec(), weights.to_vec(), own)

@@ -220,6 +220,7 @@ pub struct Contact {
     radius: f32,
     depth: f32,
     stiffness: f32,
+    error: f32,
 }
 
 const GRAB: u8 = 2;
@@ -228,16 +229,17 @@ impl From<&RecordedContact> for Contact {
     fn from(c: &RecordedContact) -> Self {
         let mode = if c.mode == Mode::Grab { GRAB } else { 1 };
         let &RecordedContact { tool, body, slipping, limited, point, normal, force, torque, .. } = c;
-        let (radius, depth, stiffness) = (c.radius, c.depth, c.stiffness);
-        Self { tool, body, mode, slipping, limited, point, normal, force, torque, radius, depth, stiffness }
+        let &RecordedContact { radius, depth, stiffness, error, .. } = c;
+        Self { tool, body, mode, slipping, limited, point, normal, force, torque, radius, depth, stiffness, error }
     }
 }
 
 impl From<Contact> for RecordedContact {
     fn from(c: Contact) -> Self {
         let mode = if c.mode == GRAB { Mode::Grab } else { Mode::Press };
-        let Contact { tool, body, slipping, limited, point, normal, force, torque, radius, depth, stiffness, .. } = c;
-        Self { tool, body, mode, slipping, limited, point, normal, force, torque, radius, depth, stiffness }
+        let Contact { tool, body, slipping, limited, point, normal, force, torque, .. } = c;
+        let Contact { radius, depth, stiffness, error, .. } = c;
+        Self { tool, body, mode, slipping, limited, point, normal, force, torque, radius, depth, stiffness, error }
     }
 }
 

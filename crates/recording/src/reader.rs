@@ -18,6 +18,9 @@ use crate::checksummed::verified;
 use crate::messages::{SettingsMessage, Tick};
 use crate::writer::{END, METADATA, SETTINGS, TICKS};
 
+/// Least format of the texts whose ticks are read.
+const OLDEST_FORMAT: u32 = 3;
+
 /// The ticks of a file, one after the other; nothing of the file is kept but a chunk.
 pub struct Ticks<R = BufReader<File>> {
     records: Records<R>,
@@ -64,6 +67,10 @@ impl<R: Read> Ticks<R> {
                 Some(Ok(Record::Metadata(metadata))) if metadata.name == METADATA => {
                     let damaged = |reason| format!("the recording is damaged: {reason}");
                     let about = verified(metadata.metadata).map_err(damaged)?;
+                    let format = about.get("format").and_then(|format| format.parse::<u32>().ok());
+                    if format.is_some_and(|format| format < OLDEST_FORMAT) {
+                        return Err("an older Palpate made this recording: its contacts state no error".into());
+                    }
                     let topics = BTreeMap::new();
                     return Ok(Self { records, about, topics, settings: None, ending: None, count: 0 });
                 }

@@ -52,6 +52,7 @@ float32[3] torque                  # on the body about the tip, N m
 float32 radius                     # of the contact, m
 float32 depth                      # of the tool in the surface at rest, m
 float32 stiffness                  # along the normal, N/m
+float32 error                      # estimated, of the force, relative; 0 for a linear material
 ",
 );
 const BODY: (&str, &str) = (

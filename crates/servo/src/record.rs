@@ -171,6 +171,8 @@ pub struct RecordedContact {
     pub depth: f32,
     /// Felt stiffness along the normal under the local law, N/m.
     pub stiffness: f32,
+    /// Estimated relative error of the force; zero for a linear material.
+    pub error: f32,
 }
 
 /// Torques below this are rounding errors, N m: those of a sphere without friction.
@@ -234,6 +236,7 @@ impl RecordedContact {
             radius: rounded(contact.radius),
             depth: rounded(contact.depth),
             stiffness: rounded(contact.stiffness),
+            error: rounded(contact.error),
         }
     }
 }

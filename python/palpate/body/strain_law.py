@@ -59,9 +59,8 @@ class StrainLaw:
 
 def _range_of(name: str) -> str:
     return {
-        "neo-hookean": "Poisson's ratio must lie between 0 and 0.45",
-        "mooney-rivlin": "Poisson's ratio must lie between 0.3 and 0.45, and c10 and c01 must not be negative",
-        "yeoh": "Poisson's ratio must lie between 0.3 and 0.45, c20/c10 between 0 and 2, c30/c10 between 0 and 1",
+        "mooney-rivlin": "Poisson's ratio must be at least 0.3, and c10 and c01 must not be negative",
+        "yeoh": "Poisson's ratio must be at least 0.3, c20/c10 lie between 0 and 2, c30/c10 between 0 and 1",
     }.get(name, "unknown")
 
 

@@ -40,5 +40,5 @@ def force_series(
     """
     if green.path is None or body.loads is not None or not is_hyperelastic(body):
         return None
-    problem = problem_arrays(body, body.mesh.surface_nodes)
+    problem = problem_arrays(body, green.touchable_nodes)
     return _native.series(problem, element_laws(body.mesh, body.material), radius, green.path, green.key, progress)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from palpate import models
 from palpate.errors import SceneError
+from palpate.scene.regions import DEFAULT_LAW
 from palpate.scene.scene import Scene
 
 # Size of a fingertip against each model, m; and its stiffness, Pa: organs about as published for fresh tissue
@@ -35,7 +36,8 @@ def model_scene(name: str, paper: bool = False, motion: bool = False) -> Scene:
     return Scene(
         body={"model": name, "paper": paper},
         supports={"fixed": SUPPORTS.get(name)},
-        material={"youngs_modulus": YOUNGS_MODULUS[name]},
+        # The paper's bodies are linear.
+        material={"youngs_modulus": YOUNGS_MODULUS[name], "law": "linear" if paper else DEFAULT_LAW},
         tool=[finger, finger],
         dynamics={**MODES[paper], "damping_ratios": DAMPING_RATIOS} if motion else None,
     )

@@ -29,8 +29,9 @@ _REGION = one_of("the number or the name of a region", lambda v: v is None or is
 
 Law = Literal["linear", "neo-hookean", "mooney-rivlin", "yeoh"]
 
-# Young's modulus, Pa, of a scene that gives none.
+# Young's modulus, Pa, and law of a scene that gives none. At small strain the law is linear elasticity.
 DEFAULT_MODULUS = 10e3
+DEFAULT_LAW: Law = "neo-hookean"
 
 
 class MaterialTable(Table):
@@ -39,7 +40,7 @@ class MaterialTable(Table):
     youngs_modulus: Pressure = DEFAULT_MODULUS
     poissons_ratio: PoissonsRatio = 0.45
     density: Density = 1000.0
-    law: Law = "linear"
+    law: Law = DEFAULT_LAW
     c10: Pressure | None = None
     c01: Pressure | None = None
     c20: Pressure | None = None
@@ -170,7 +171,8 @@ def _completed(table: RegionTable | SegmentTable, base: MaterialTable) -> Materi
 
 def _material(given: dict[str, Any]) -> Material:
     """Return the material of what is given; laws without constants of their own have the default modulus."""
-    if given.get("law", "linear") in ("linear", "neo-hookean"):
+    given = {"law": DEFAULT_LAW} | given
+    if given["law"] in ("linear", "neo-hookean"):
         given = {"youngs_modulus": DEFAULT_MODULUS} | given
     try:
         return Material(**given)

@@ -28,7 +28,7 @@ VECTORS = (
     ("port_energy", "energy", "J", ("given", "owed", "unpaid")),
 )
 CONTACT_VECTORS = (("point", "m"), ("normal", ""), ("force", "N"), ("torque", "Nm"))
-CONTACT_NUMBERS = (("radius", "m"), ("depth", "m"), ("stiffness", "N_per_m"))
+CONTACT_NUMBERS = (("radius", "m"), ("depth", "m"), ("stiffness", "N_per_m"), ("error", ""))
 # Rows that are written at a time.
 BLOCK = 5000
 

@@ -14,7 +14,7 @@ from palpate.scene import BuiltBody, BuiltScene, Scene
 from palpate.scene.tables import SceneTables
 
 # Raised when what is recorded, or what follows from it, changes.
-FORMAT = 2
+FORMAT = 3
 
 
 def about(

@@ -50,6 +50,8 @@ class Contact(ComparedByValue):
         Approach of the tool and the untouched surface, m: how far it has come from first touch.
     stiffness
         Felt along the normal, N/m: change of the force with the depth.
+    error
+        Estimated relative error of the force, for a material with a law beyond small strain; None for a linear one.
     nodes, weights
         (k,) nodes of the body's mesh in the patch, and their weights (k,), which sum to one.
 
@@ -69,6 +71,7 @@ class Contact(ComparedByValue):
     radius: float
     depth: float
     stiffness: float
+    error: float | None
     nodes: np.ndarray
     weights: np.ndarray
     # Point and normal as the tick has them, in the body's own frame.
@@ -77,7 +80,8 @@ class Contact(ComparedByValue):
 
     def __repr__(self) -> str:
         place = f"{len(self.nodes)} nodes around {brief(self.point)} m"
-        return f"Contact(tool {self.tool}, {self.mode}, {place}, force {brief(self.force)} N)"
+        stated = "" if self.error is None else f" within {100 * self.error:.2g} %"
+        return f"Contact(tool {self.tool}, {self.mode}, {place}, force {brief(self.force)} N{stated})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -182,6 +186,11 @@ class Frame(ComparedByValue, Exportable):
         return next((body.energy for body in self.bodies if body.energy is not None), None)
 
     @property
+    def largest_error(self) -> float | None:
+        """Largest estimated relative error of the forces of the contacts; None if none states one."""
+        return max((contact.error for contact in self.contacts if contact.error is not None), default=None)
+
+    @property
     def largest_strain(self) -> float:
         """Largest principal strain in magnitude over the surfaces of all bodies; milliseconds, when read."""
         return max(body.largest_strain for body in self.bodies)
@@ -208,6 +217,7 @@ def frame_of(raw: dict[str, Any], bodies: Sequence[BuiltBody]) -> Frame:
 
 def contact_of(record: tuple[Any, ...], bodies: Sequence[BuiltBody]) -> Contact:
     """Contact as the native module hands it out, with the nodes of the body's mesh."""
-    tool, body, mode, vectors, flags, numbers, nodes, weights, own = record
+    tool, body, mode, vectors, flags, (*numbers, error), nodes, weights, own = record
     nodes, place = bodies[body].green.surface_nodes[nodes], map(np.array, own)
+    numbers.append(error or None)
     return Contact(tool, body, mode, *map(np.array, vectors), *flags, *numbers, nodes, np.array(weights), *place)

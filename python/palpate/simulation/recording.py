@@ -28,7 +28,7 @@ LOG_DTYPE = np.dtype(
 CONTACT_DTYPE = np.dtype(
     [("tick", "u8"), ("tool", "u1"), ("body", "u1"), ("grab", "?"), ("slipping", "?"), ("limited", "?")]
     + [(name, "f4", 3) for name in ("point", "normal", "force", "torque")]
-    + [(name, "f4") for name in ("radius", "depth", "stiffness")]
+    + [(name, "f4") for name in ("radius", "depth", "stiffness", "error")]
 )
 # Columns of tools, and how many numbers they have a tool.
 VECTORS = {
@@ -178,16 +178,19 @@ class Recording(ComparedByValue):
 
     @property
     def contacts(self) -> np.ndarray:
-        """Rows of CONTACT_DTYPE in the order of ticks: vectors in the scene, m and N on the body, to five digits."""
+        """Rows of CONTACT_DTYPE in the order of ticks: vectors in the scene, m and N on the body, to five digits.
+
+        ``error`` is the estimated relative error of the force; 0 for a linear material.
+        """
         state = self._columns["contact_state"].reshape(-1, 6)
-        numbers = self._columns["contact_numbers"].reshape(-1, 15)
+        numbers = self._columns["contact_numbers"].reshape(-1, 16)
         rows = np.zeros(len(state), CONTACT_DTYPE)
         for rank, name in enumerate(("tick", "tool", "body")):
             rows[name] = state[:, rank]
         rows["grab"], rows["slipping"], rows["limited"] = state[:, 3] == 2, state[:, 4] > 0, state[:, 5] > 0
         for rank, name in enumerate(("point", "normal", "force", "torque")):
             rows[name] = numbers[:, 3 * rank : 3 * rank + 3]
-        for rank, name in enumerate(("radius", "depth", "stiffness")):
+        for rank, name in enumerate(("radius", "depth", "stiffness", "error")):
             rows[name] = numbers[:, 12 + rank]
         return rows
 

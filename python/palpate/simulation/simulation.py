@@ -22,6 +22,7 @@ from palpate.dynamics import Energy
 from palpate.errors import SceneError, SimulationError, TouchWarning
 from palpate.fields import StrainMeasure, SurfaceStress
 from palpate.green import GreensFunction
+from palpate.green.series import is_hyperelastic
 from palpate.input_file import require_writable
 from palpate.scene import BodyMotion, BuiltBody, BuiltScene, Scene
 from palpate.simulation.about import about
@@ -39,6 +40,8 @@ from palpate.vectors import three_numbers
 # A tool is held at the limit of strain only where the pose has so much of it: one that has just landed is held until
 # its limit is known.
 AT_LIMIT = 0.95
+# Estimated relative error of a force from which a warning is raised.
+LARGE_ERROR = 0.03
 
 # A program that ends without a word leaves no device pushing.
 RUNNING: weakref.WeakSet[Simulation] = weakref.WeakSet()
@@ -104,7 +107,7 @@ class Simulation(Adjustable, SceneEditing):
         for tool in self._given:
             self._tool(tool)
         self._devices: dict[int, str] = {}
-        self._armed, self._running, self._warned = False, False, False
+        self._armed, self._running, self._warned, self._warned_of_error = False, False, False, False
         self._number: int | None = 0
         self._editing = threading.RLock()
         self._to_record: Path | None = None
@@ -299,9 +302,20 @@ class Simulation(Adjustable, SceneEditing):
         if not self._warned and np.any(frame.limited) and frame.largest_strain >= AT_LIMIT * self.strain_limit:
             self._warned = True
             warnings.warn(self._limit_text("a tool"), TouchWarning, stacklevel=2)
+        if not self._warned_of_error and (frame.largest_error or 0.0) >= LARGE_ERROR:
+            self._warned_of_error = True
+            warnings.warn(self._error_text(frame.largest_error or 0.0), TouchWarning, stacklevel=2)
         return frame
 
+    def _error_text(self, error: float) -> str:
+        return (
+            f"the stated error of the force reached {100 * error:.2g} % (`error` of the contacts): press less "
+            "deep, or see docs/accuracy.md"
+        )
+
     def _limit_text(self, what: str) -> str:
+        if any(body.body is not None and is_hyperelastic(body.body) for body in self.bodies):
+            return f"{what} was held where the law of its material ends: its force is that of the last depth within it"
         return (
             f"{what} was held at the strain limit of {100 * self.strain_limit:.0f} % (view.strain_limit): its "
             f"force is that of the limit, not of its position; press less deep"
@@ -440,6 +454,9 @@ class Simulation(Adjustable, SceneEditing):
         if ticks.any():
             what = f"in {ticks.sum()} of {len(ticks)} ticks, first in tick {ticks.argmax()}, a tool"
             warnings.warn(self._limit_text(what), TouchWarning, stacklevel=3)
+        error = float(recording.contacts["error"].max(initial=0.0)) if recording.source else 0.0
+        if error >= LARGE_ERROR:
+            warnings.warn(self._error_text(error), TouchWarning, stacklevel=3)
         return recording
 
     def _play(

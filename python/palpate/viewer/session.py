@@ -348,6 +348,7 @@ class Session:
             "depth": float(contact.depth) if local else None,
             "stiffness": float(contact.stiffness) if local else None,
             "slipping": bool(contact.slipping),
+            "error": contact.error,
         }
 
     def _tool_header(self, frame: Frame, tool: int) -> dict[str, Any]:

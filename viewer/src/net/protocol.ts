@@ -174,6 +174,8 @@ export interface ContactMessage {
   stiffness: number | null;
   /** Whether all of the contact slides. */
   slipping: boolean;
+  /** Estimated relative error of the force; null for a linear material. */
+  error: number | null;
 }
 
 /**

@@ -55,6 +55,11 @@ export function percent(part: number): string {
   return `${Number((100 * part).toFixed(1))} %`;
 }
 
+/** An error of a force, in whole per cent: never less than it is. */
+export function wholePercent(part: number): string {
+  return `${Math.ceil(100 * part - 1e-9)} %`;
+}
+
 /** A length in m, in mm, without the unit. */
 export function inMillimetres(metres: number): string {
   return (1000 * metres).toFixed(1);

@@ -2,17 +2,20 @@
 
 import { shownTool } from "../store";
 import type { State, Store } from "../store";
-import { contactsOf, deepest, feltStiffness } from "../tool_contacts";
+import { contactsOf, deepest, feltStiffness, statedError } from "../tool_contacts";
 import { byId, setText } from "./dom";
-import { MINUS, inMillimetres, newtonsPerMillimetre, percent, signed, threeDigits } from "./numbers";
+import { MINUS, inMillimetres, newtonsPerMillimetre, percent, signed, threeDigits, wholePercent } from "./numbers";
 
 /** Linear elasticity leaves out the square of the gradient; beyond about 10 % that shows. */
 const LINEAR_STRAIN_MAX = 0.1;
+/** Stated error of a force from which a warning is shown. */
+const LARGE_ERROR = 0.03;
 /** Strain is shown to a tenth of a per cent; a value that rounds to the limit is not beyond it. */
 const STRAIN_ROUNDING = 0.0005;
 
 export class Readout {
   private readonly magnitude = byId("force-value");
+  private readonly error = byId("force-error");
   private readonly components = [byId("force-x"), byId("force-y"), byId("force-z")];
   private readonly stiffness = byId("stiffness-felt");
   private readonly contactLabel = byId("contact-label");
@@ -42,6 +45,8 @@ export class Readout {
     const magnitude = threeDigits(Math.hypot(...force));
     setText(this.magnitude, magnitude);
     this.magnitude.classList.toggle("long", magnitude.length > 4);
+    const error = statedError(contactsOf(frame?.contacts ?? [], tool));
+    setText(this.error, error === null ? "" : `±${wholePercent(error)}`);
     force.forEach((component, axis) => setText(this.components[axis]!, signed(component)));
     byId("pinned-line").hidden = pinned.length === 0;
     const others = pinned.map((other) => threeDigits(Math.hypot(...(frame?.tools[other]?.force ?? [0]))));
@@ -75,9 +80,18 @@ export class Readout {
     setText(this.strain, (100 * strain).toFixed(1));
     const limited = frame?.tools.some((tool) => tool.limited) ?? false;
     this.limit.hidden = !limited;
-    if (settings && limited) setText(this.limit, `Held at ${percent(settings.strain_limit)} strain`);
-    this.warning.hidden = strain < LINEAR_STRAIN_MAX + STRAIN_ROUNDING;
-    if (!this.warning.hidden) {
+    const contacts = frame?.contacts ?? [];
+    const isNonlinear = contacts.length > 0 && contacts.every(({ error }) => error !== null);
+    if (settings && limited) {
+      const at = isNonlinear ? "Held: the material's law ends here" : `Held at ${percent(settings.strain_limit)} strain`;
+      setText(this.limit, at);
+    }
+    const error = Math.max(0, ...contacts.map((contact) => contact.error ?? 0));
+    this.warning.hidden = isNonlinear ? error < LARGE_ERROR : strain < LINEAR_STRAIN_MAX + STRAIN_ROUNDING;
+    if (this.warning.hidden) return;
+    if (isNonlinear) {
+      setText(this.warning, `The force is known to ${wholePercent(error)} here`);
+    } else {
       setText(this.warning, `${Math.round(100 * strain)} % strain: linear elasticity is accurate up to about 10 %`);
     }
   }

@@ -2,9 +2,9 @@
 
 import type { State, Store } from "../store";
 import { shownTool } from "../store";
-import { contactsOf, deepest, feltStiffness } from "../tool_contacts";
+import { contactsOf, deepest, feltStiffness, statedError } from "../tool_contacts";
 import { byId, setText } from "./dom";
-import { inMillimetres, newtonsPerMillimetre, threeDigits } from "./numbers";
+import { inMillimetres, newtonsPerMillimetre, threeDigits, wholePercent } from "./numbers";
 
 /** A force that stays within this part of itself for so long is at rest. */
 const STILL = 0.02;
@@ -43,5 +43,7 @@ function sentence({ frame, scene }: Readonly<State>, tool: number, force: number
   const stiffness = feltStiffness(contacts, scene?.bodies ?? []);
   const felt = stiffness === null ? "" : `, felt stiffness ${newtonsPerMillimetre(stiffness)} newtons per millimetre`;
   const depth = contact.depth === null ? "" : `, depth ${inMillimetres(contact.depth)} millimetres`;
-  return `Force ${threeDigits(force)} newtons${depth}${felt}.`;
+  const error = statedError(contacts);
+  const within = error === null ? "" : ` plus or minus ${wholePercent(error)}`;
+  return `Force ${threeDigits(force)} newtons${within}${depth}${felt}.`;
 }

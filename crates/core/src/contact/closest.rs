@@ -61,6 +61,13 @@ impl SurfaceQuery {
         self.mesh.bvh().intersect_aabb(&around).for_each(visit);
     }
 
+    /// Distance from a point inside to where a line along a unit vector leaves the body, m; infinite if it does not.
+    pub fn distance_along(&self, from: DVec3, direction: DVec3) -> f64 {
+        use parry3d_f64::query::{Ray, RayCast};
+        let ray = Ray::new(from, direction);
+        self.mesh.cast_local_ray(&ray, f64::MAX, false).unwrap_or(f64::INFINITY)
+    }
+
     /// The surface point closest to `point`; `None` if `point` is not finite.
     pub fn closest(&self, surface: &Surface, point: DVec3) -> Option<SurfacePoint> {
         if !point.is_finite() {

@@ -26,6 +26,8 @@ const REACH: f64 = 2.0;
 const SAME_SIDE: f64 = 0.5;
 /// Places that are solved together.
 const BLOCK: usize = 8;
+/// Least part of the compliance at rest that is left where the series ends.
+const LEAST_COMPLIANCE: f64 = 0.2;
 /// `|U_5| / U_2` at which the series ends.
 const LARGEST_REST: f64 = 0.01;
 
@@ -54,7 +56,8 @@ impl<'a> SeriesPlan<'a> {
         let surface = problem.surface()?;
         let smooth = SmoothSurface::new(&surface);
         let spacing = SPACING * RADII * radius;
-        let chosen = spread(smooth.fans(), spacing);
+        let touched = |fan: &Fan| problem.touch.binary_search(&fan.node).is_ok();
+        let chosen = spread(smooth.fans(), spacing, touched);
         let geometry = PatchGeometry::new(&surface);
         let place = |scratch: &mut PatchScratch, fan: usize| {
             let at = &smooth.fans()[fan];
@@ -115,10 +118,20 @@ impl<'a> SeriesPlan<'a> {
         let quartic = q3 - inward * (0.75 * q3.dot(inward));
         let compliance = first.dot(inward);
         let ending = (at.fifth.abs() / (0.5 * LARGEST_REST * compliance)).cbrt();
+        let ending = ending.max(softest(compliance, [2.0 * q2.dot(inward), 3.0 * q3.dot(inward)]));
         let fields = [cubic.x, cubic.y, cubic.z, quartic.x, quartic.y, quartic.z, ending];
         // A place on a support is not displaced.
         if fields.iter().all(|field| field.is_finite()) { fields } else { SeriesFields::default() }
     }
+}
+
+/// One over the force from which `c + s_2 F + s_3 F^2`, the compliance along the force, is less than a part of what it was; zero if
+/// there is none. The energy is convex up to there.
+fn softest(compliance: f64, [second, third]: [f64; 2]) -> f64 {
+    // In x = 1/F: (1 - part) c x^2 + s_2 x + s_3 = 0, its largest root.
+    let whole = (1.0 - LEAST_COMPLIANCE) * compliance;
+    let discriminant = second * second - 4.0 * whole * third;
+    if discriminant < 0.0 { 0.0 } else { ((discriminant.sqrt() - second) / (2.0 * whole)).max(0.0) }
 }
 
 /// Coefficients at the fans of the smooth surface of a body.
@@ -160,10 +173,10 @@ fn interpolate<'a>(fan: &Fan, near: impl Iterator<Item = (&'a Fan, &'a SeriesFie
     if weights > 0.0 { sum.map(|value| value / weights) } else { sum }
 }
 
-/// Fans that are no closer to each other than `spacing`, m, on one side of the body.
-fn spread(fans: &[Fan], spacing: f64) -> Vec<usize> {
+/// Fans among those `within` that are no closer to each other than `spacing`, m, on one side of the body.
+fn spread(fans: &[Fan], spacing: f64, within: impl Fn(&Fan) -> bool) -> Vec<usize> {
     let mut chosen: Vec<usize> = Vec::new();
-    for (rank, fan) in fans.iter().enumerate() {
+    for (rank, fan) in fans.iter().enumerate().filter(|(_, fan)| within(fan)) {
         let is_near = |&other: &usize| {
             let other = &fans[other];
             other.position.distance(fan.position) < spacing && other.normal.dot(fan.normal) > SAME_SIDE
@@ -200,5 +213,18 @@ fn node_elements_of(problem: &Problem) -> (Vec<usize>, Vec<(u32, u8)>) {
     match &problem.mesh.tets {
         crate::mesh::Tets::Linear(tets) => node_elements(problem.mesh.nodes.len(), tets),
         crate::mesh::Tets::Quadratic(tets) => node_elements(problem.mesh.nodes.len(), tets),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::softest;
+
+    #[test]
+    fn the_series_ends_where_the_compliance_vanishes() {
+        // 1 - 0.4 F reaches 0.2 at F = 2, and 1 - 0.2 F^2 too.
+        assert!((softest(1.0, [-0.4, 0.0]) - 0.5).abs() < 1e-14);
+        assert!((softest(1.0, [0.0, -0.2]) - 0.5).abs() < 1e-14);
+        assert_eq!(softest(1.0, [0.3, 0.1]), 0.0);
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::input::Placement;
-use crate::contact::smooth::{DrawnSurface, FootPoint, Neighbourhood, SmoothSurface};
+use crate::contact::smooth::{DrawnSurface, Fan, FootPoint, Neighbourhood, SmoothSurface};
 use crate::contact::{Moduli, PatchGeometry, SeriesFields, SurfacePoint, SurfaceQuery, barycentric, known_fans};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
@@ -15,6 +15,11 @@ use crate::{Error, Result};
 
 /// Shortest and longest time step, s. A tick makes at most ten of the shortest; the longest is ten ticks.
 pub(super) const TIME_STEPS: std::ops::RangeInclusive<f64> = 1e-4..=1e-2;
+
+/// Depth from which the thickness of a body is measured, over the mean length of edges.
+const BELOW_SURFACE: f64 = 0.05;
+/// Number of lines along which its breadth is measured.
+const DIRECTIONS: u32 = 8;
 
 /// Dynamics of a body: its modes at the surface dofs, and the coupling to a tool.
 pub struct BodyDynamics {
@@ -50,6 +55,11 @@ pub struct LocalSurface {
     pub largest_modulus: f64,
     /// Corners of the box around the surface, m.
     pub bounds: [DVec3; 2],
+    /// At each fan of the smooth surface one over the thickness of the body below, and over its breadth: the distance through it
+    /// along lines inclined by 60 degrees, 1/m.
+    pub inverse_sizes: Vec<[f64; 2]>,
+    /// Whether a material at the surface has a law beyond small strain.
+    pub is_hyperelastic: bool,
 }
 
 /// A body of a scene. Copies share the prepared data.
@@ -127,7 +137,13 @@ impl BodyModel {
         let corner =
             |of: fn(DVec3, DVec3) -> DVec3| self.loaded.positions.iter().copied().reduce(of).unwrap_or_default();
         let bounds = [corner(DVec3::min), corner(DVec3::max)];
-        self.preparing(|prepared| prepared.local = Some(LocalSurface { smooth, moduli, largest_modulus, bounds }))
+        let is_hyperelastic = moduli.strain_terms.iter().any(|terms| *terms != [0.0; 3]);
+        let inverse_sizes = match is_hyperelastic {
+            true => smooth.fans().iter().map(|fan| inverse_sizes(&self.query, fan, self.mean_edge)).collect(),
+            false => vec![[0.0; 2]; smooth.fans().len()],
+        };
+        let local = LocalSurface { smooth, moduli, largest_modulus, bounds, inverse_sizes, is_hyperelastic };
+        self.preparing(|prepared| prepared.local = Some(local))
     }
 
     /// The same body with higher orders of its displacement for spheres of `radius`, m, at the fans of its smooth surface.
@@ -191,6 +207,7 @@ impl PreparedBody {
         if let Some(local) = &self.local {
             local.smooth.add_memory(ranges);
             local.moduli.add_memory(ranges);
+            ranges.add(&local.inverse_sizes);
         }
         if let Some(dynamics) = &self.dynamics {
             dynamics.modes.add_memory(ranges);
@@ -200,6 +217,11 @@ impl PreparedBody {
     /// The body's Green's function.
     pub fn green(&self) -> &GreensFunction {
         &self.green
+    }
+
+    /// Whether a material at the surface has a law beyond small strain.
+    pub fn is_hyperelastic(&self) -> bool {
+        self.local.as_ref().is_some_and(|local| local.is_hyperelastic)
     }
 
     /// Whether the body moves.
@@ -261,6 +283,21 @@ impl PreparedBody {
         }
         self.geometry.check_radius(&self.green, radius)
     }
+}
+
+/// One over thickness and breadth of a body at a fan, 1/m.
+fn inverse_sizes(query: &SurfaceQuery, fan: &Fan, mean_edge: f64) -> [f64; 2] {
+    // From below the faces around.
+    let inside = BELOW_SURFACE * mean_edge;
+    let inward = -fan.normal;
+    let inverse = |direction: DVec3| 1.0 / (inside + query.distance_along(fan.position + inward * inside, direction));
+    let (first, second) = inward.any_orthonormal_pair();
+    let inclined = (0..DIRECTIONS).map(|k| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS)).sin_cos();
+        inverse(inward * 0.5 + (first * cos + second * sin) * 0.75f64.sqrt()).powi(2)
+    });
+    let mean_square = inclined.sum::<f64>() / f64::from(DIRECTIONS);
+    [inverse(inward), mean_square.sqrt()]
 }
 
 fn mean_edge(surface: &Surface) -> f64 {

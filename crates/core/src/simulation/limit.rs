@@ -75,6 +75,8 @@ pub(super) fn limit_sliding_forces(model: &Model, state: &mut State, body: usize
         let contact = &mut state.contacts.slots[slot];
         let displacement = law_of(contact.law).body_displacement(contact);
         let mut own = share;
+        // Beyond the range of its law.
+        own = own.min(contact.held);
         if limit > 0.0 {
             contact.bound = if covered { bound * BOUND_GROWTH } else { bound };
             own = own.min(contact.bound / displacement.max(f64::MIN_POSITIVE));

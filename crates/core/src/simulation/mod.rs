@@ -13,6 +13,7 @@ mod energy;
 mod input;
 mod law;
 mod limit;
+mod linear_error;
 mod model;
 mod motion;
 mod passivity;

@@ -4,6 +4,7 @@ use super::contact_check::is_sound;
 use super::contacts::Mode;
 use super::input::{Controls, Input, Output};
 use super::law::{Approach, LAWS, law_of};
+use super::linear_error::estimate_linear_errors;
 use super::model::Model;
 use super::scratch::Scratch;
 use super::slip::slip;
@@ -131,7 +132,9 @@ fn find_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: us
     for law in LAWS {
         law.find_forces(model, state, scratch.memory(), body, controls);
     }
-    limit::limit_sliding_forces(model, state, body, controls.strain_limit[body]);
+    // The limit is that of linear elasticity.
+    let limit = if model.bodies[body].is_hyperelastic() { 0.0 } else { controls.strain_limit[body] };
+    limit::limit_sliding_forces(model, state, body, limit);
     for _ in 0..model.tools.len() {
         solve::contact_forces(model, state, &mut scratch.system, body);
         slip(model, state, &mut scratch.system, body);
@@ -155,6 +158,7 @@ fn find_forces(model: &Model, state: &mut State, scratch: &mut Scratch, body: us
             break;
         }
     }
+    estimate_linear_errors(model, state, body, controls);
 }
 
 pub(super) fn output_wrenches(model: &Model, state: &State) -> Output {

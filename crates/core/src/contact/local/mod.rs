@@ -15,10 +15,10 @@ mod strain_table;
 mod widening;
 
 pub use contact_plane::{ContactPlane, ToolPose};
-pub use finite_strain::{StrainTerms, correct_sphere, terms_with_pad};
+pub use finite_strain::{DEEPEST_FIT, StrainTerms, correct_sphere, terms_with_pad};
 pub use force_series::{HigherOrders, SERIES_FIELDS, SeriesFields, higher_orders};
 pub use friction::{Friction, FrictionResponse};
 pub use modulus::effective_modulus;
 pub use sphere::{SphereContact, indent_sphere};
-pub use strain_law::{StrainLaw, interpolate, strain_terms};
+pub use strain_law::{STRAIN_RATIOS, StrainLaw, interpolate, strain_terms};
 pub use widening::{WidenedContact, Widening};

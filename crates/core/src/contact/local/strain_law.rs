@@ -27,23 +27,29 @@ pub enum StrainLaw {
 }
 
 impl StrainLaw {
-    /// Whether the table has the material at a Poisson's ratio.
+    /// Whether the coefficients of the material are known, inside the table or near it.
     pub fn is_known(&self, poisson: f64) -> bool {
         let within = |points: &[f64], x: f64| {
             points.first().is_some_and(|&low| low <= x) && points.last().is_some_and(|&high| x <= high)
         };
-        let few = within(&FEW_RATIOS, poisson);
+        // Beyond the largest ratio of the table little changes.
+        let few = FEW_RATIOS[0] <= poisson;
         match *self {
-            Self::Linear => true,
-            Self::NeoHookean => within(&RATIOS, poisson),
+            Self::Linear | Self::NeoHookean => true,
             Self::MooneyRivlin { share } => few && within(&SHARES, share),
             Self::Yeoh { quadratic, cubic } => few && within(&YEOH_QUADRATIC, quadratic) && within(&YEOH_CUBIC, cubic),
         }
     }
 }
 
+/// Least and largest Poisson's ratio of the table for the neo-Hookean material.
+pub const STRAIN_RATIOS: [f64; 2] = [RATIOS[0], RATIOS[RATIOS.len() - 1]];
+/// How far the table is extrapolated.
+const BEYOND: f64 = 0.1;
+
 /// Coefficients of a material's contact, interpolated in the table by polynomials.
 pub fn strain_terms(law: &StrainLaw, poisson: f64) -> StrainTerms {
+    let poisson = poisson.max(STRAIN_RATIOS[0] - BEYOND);
     match *law {
         StrainLaw::Linear => [0.0; 3],
         StrainLaw::NeoHookean => interpolate(&RATIOS, poisson, |i| NEO_HOOKEAN[i]),

@@ -86,6 +86,10 @@ pub struct Contact {
     pub stiffness: f64,
     /// Whether it slips.
     pub slipping: bool,
+    /// Estimated relative error of the force beyond small strain; zero for a linear material, of which nothing is known there.
+    pub error: f64,
+    /// Share of force and torque that counts: below one beyond the range of the law.
+    pub(super) held: f64,
     /// Energy stored outside the body, J: of the indentation and of the springs of friction.
     pub(super) energy: f64,
     /// Energy that friction dissipated in the last tick, J.
@@ -97,7 +101,7 @@ pub struct Contact {
 impl Contact {
     /// A new pressing contact.
     pub(super) fn new(law: LawKind, (tool, body): (usize, usize)) -> Self {
-        Self { mode: Mode::Press, law, tool, body, share: 1.0, ..Self::default() }
+        Self { mode: Mode::Press, law, tool, body, share: 1.0, held: 1.0, ..Self::default() }
     }
 
     /// Whether it is an additional contact that the tool is near to but does not press.

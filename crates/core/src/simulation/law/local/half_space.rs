@@ -39,8 +39,23 @@ pub struct LocalTool<'a> {
 /// Fields blended at a foot.
 pub type Fields = Blended<{ size_of::<FanFields>() / size_of::<f64>() }>;
 
+/// Constants of the body at a contact.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LocalMaterial {
+    pub poisson: f64,
+    pub strain_terms: StrainTerms,
+    /// `E*` of body and pad over `E/(1 - nu^2)` of the body.
+    pub share: f64,
+    /// `E*`, Pa.
+    pub modulus: f64,
+    /// Radius of the patch from which the compliance of the body was taken, m.
+    pub width: f64,
+}
+
 /// The half-space below a tool.
 pub struct HalfSpace {
+    /// Constants at the contact.
+    pub material: LocalMaterial,
     /// `E*`, Pa, and its gradient by the position of the foot's point.
     pub modulus: f64,
     pub slope: DVec3,
@@ -74,6 +89,7 @@ impl HalfSpace {
             fields.slope(STRAIN_TERMS.start + k) * share.powi(k as i32 + 2) + body_slope * by_own[k]
         });
         Self {
+            material: LocalMaterial { poisson, strain_terms: body_terms, share, modulus, width: fields.values[WIDTH] },
             modulus,
             slope,
             by_body_modulus,
@@ -89,8 +105,12 @@ impl HalfSpace {
 /// Energy of the local contact at a position, and its gradient without friction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Indentation {
+    /// Constants of body and tool.
+    pub material: LocalMaterial,
     /// Depth of the tool in the surface, m.
     pub depth: f64,
+    /// Radius of the sphere that the tool counts as on the plane, m; zero where nothing touches.
+    pub effective_radius: f64,
     /// Normal force, N.
     pub force: f64,
     /// Contact radius, or that of the circle of the same stiffness, m.

@@ -22,9 +22,11 @@ mod contact_check;
 mod coupling;
 mod energy_surplus;
 mod foot_jumps;
+mod force_error;
 mod half_space;
 mod response;
 mod scratch;
+mod shape_strain;
 mod solve;
 mod wrench;
 

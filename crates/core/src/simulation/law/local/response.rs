@@ -267,7 +267,9 @@ fn indent(
         + by_terms
         - foot.normal * sphere.force;
     Indentation {
+        material: half_space.material,
         depth,
+        effective_radius: radius,
         force: sphere.force,
         radius: sphere.radius,
         stiffness: sphere.stiffness,
@@ -300,6 +302,11 @@ impl LocalResponse {
             offset_by_force: DMat3::ZERO,
             ..Self::default()
         }
+    }
+
+    /// Whether higher orders of the body's displacement are known.
+    pub fn has_series(&self) -> bool {
+        self.series.is_some()
     }
 
     /// Higher orders of the body's displacement at a force, N.

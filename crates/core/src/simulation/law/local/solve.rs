@@ -16,6 +16,7 @@ use super::foot_jumps::{
     SolvedContacts, contact_depth, continue_contact, fade_lost_contacts, fade_merged_contacts, foot_has_jumped,
     replace_jumped_contacts, update_parts,
 };
+use super::force_error::{ForceError, Surroundings, estimate};
 use super::half_space::LocalTool;
 use super::response::{Guess, LocalResponse, OtherContacts, evaluate};
 use super::scratch::{LocalScratch, TrustRegion, local_body};
@@ -135,7 +136,7 @@ pub fn local_forces(model: &Model, state: &mut State, mut memory: TickMemory<'_>
             let energy = observe_energy(model, state, memory.local, slots, body);
             if last || !remove_energy_surplus(model, state, memory.local, slots, energy) {
                 commit_energy(state, body);
-                return store_results(model, state, memory.local, slots, body);
+                return store_results(model, state, memory.local, slots, body, controls);
             }
         }
         last = true;
@@ -404,7 +405,14 @@ fn newton_step(local: &mut LocalScratch, system: &mut System, count: usize) -> f
 }
 
 /// Stores the responses in the contacts.
-fn store_results(model: &Model, state: &mut State, local: &LocalScratch, slots: &[usize], body: usize) {
+fn store_results(
+    model: &Model,
+    state: &mut State,
+    local: &LocalScratch,
+    slots: &[usize],
+    body: usize,
+    controls: &Controls,
+) {
     for (a, &slot) in slots.iter().enumerate() {
         let response = &local.responses[a];
         let contact = &state.contacts.slots[slot];
@@ -442,10 +450,44 @@ fn store_results(model: &Model, state: &mut State, local: &LocalScratch, slots: 
         contact.energy = indentation.energy + response.springs().energy();
         contact.dissipated = response.friction.dissipated;
         contact.depth = contact_depth(&model.tools[tool], contact, contact.local.tool_position);
+        let around = surroundings(model, state, local, (slots, a), body, controls);
+        let contact: &mut Contact = &mut state.contacts.slots[slot];
+        let ForceError { relative, held } = estimate(&model.tools[tool], contact, response, &around);
+        (contact.error, contact.held) = (relative, held);
         if !continue_contact(&model.tools[tool], contact) {
             state.contacts.clear(slot);
         }
     }
     update_parts(state, &local.responses, slots);
     fade_merged_contacts(model, state, slots);
+}
+
+/// What else acts at one of the contacts of a body.
+fn surroundings(
+    model: &Model,
+    state: &State,
+    local: &LocalScratch,
+    (slots, a): (&[usize], usize),
+    body: usize,
+    controls: &Controls,
+) -> Surroundings {
+    let slot = slots[a];
+    let [inverse_thickness, inverse_breadth] =
+        local.weights[a].iter().fold([0.0; 2], |[thickness, breadth], (fan, weight)| {
+            let own = model.bodies[body].local.as_ref().map_or([0.0; 2], |own| own.inverse_sizes[fan]);
+            [thickness + weight * own[0], breadth + weight * own[1]]
+        });
+    let others = (0..slots.len()).filter(|&b| b != a);
+    let by_others: DVec3 = others.map(|b| local.between[a][b] * local.responses[b].force).sum();
+    let by_linear = local.free_positions[a].distance(state.contacts.slots[slot].local.tool_position);
+    let by_loads = local.weights[a].iter().map(|(fan, weight)| load_displacement(model, body, fan) * weight).sum();
+    let friction = controls.friction[state.contacts.slots[slot].tool];
+    Surroundings { inverse_thickness, inverse_breadth, by_others: by_others + DVec3::X * by_linear, by_loads, friction }
+}
+
+/// Displacement of the surface at a fan by the loads of a body, m.
+fn load_displacement(model: &Model, body: usize, fan: usize) -> DVec3 {
+    let fixed = &model.bodies[body];
+    let first = fixed.local.as_ref().map_or(0, |own| 3 * own.smooth.fans()[fan].node as usize);
+    DVec3::from_slice(&fixed.free[first..first + 3])
 }

@@ -12,6 +12,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::half_space::{HalfSpace, Indentation, LocalTool};
+use super::shape_strain::correct_shape;
 use crate::contact::Tessellation;
 use crate::contact::footprint::{Footprint, FootprintScratch, NearPieces, NearRelief, PlacedShape};
 use crate::contact::local::cells::{CellProblem, CellScratch, PressureState, Resolution};
@@ -90,9 +91,11 @@ pub fn indent_shape(
     let stiffer = pressed.energy / half_space.modulus;
     let [by_place, by_rotation] =
         [0, 1].map(|k| footprint.origin_by[k].transpose() * by_origin + footprint.normal_by[k].transpose() * by_normal);
-    Indentation {
+    let linear = Indentation {
         force: pressed.normal_force,
+        material: half_space.material,
         depth: pressed.overlap,
+        effective_radius: tool.shape.thickness(),
         radius: pressed.stiffness / (2.0 * half_space.modulus),
         stiffness: pressed.stiffness,
         energy: pressed.energy,
@@ -105,7 +108,9 @@ pub fn indent_shape(
             - width_by_rotation * pressed.energy_by_width,
         lever: if pressed.normal_force > 0.0 { pressed.centre_of_pressure - place } else { DVec3::ZERO },
         tangential: half_space.tangential,
-    }
+    };
+    let rotation = DMat3::from_quat(contact.orientation);
+    correct_shape(linear, (tool.shape, rotation), half_space, footprint, modulus_by_rotation)
 }
 
 #[cfg(test)]
@@ -114,7 +119,7 @@ mod tests {
     use crate::contact::SurfaceQuery;
     use crate::contact::footprint::PressedSurface;
     use crate::contact::local::effective_modulus;
-    use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, WIDTH};
+    use crate::contact::regular::{FanFields, PLANE_STRAIN, POISSON, STRAIN_TERMS, WIDTH};
     use crate::contact::smooth::tests::{ball, cube, near};
     use crate::contact::smooth::{DrawnSurface, FanWeights, SmoothSurface};
     use crate::mesh::Surface;
@@ -138,6 +143,7 @@ mod tests {
                 let mut fields = FanFields::default();
                 (fields[PLANE_STRAIN], fields[POISSON]) = (modulus(fan.position.z), 0.45);
                 fields[WIDTH] = 0.5 + 0.1 * fan.position.x;
+                fields[STRAIN_TERMS].copy_from_slice(&[-0.2, 0.1, -0.15]);
                 fields
             });
             Self { fields: fields.collect(), smooth, query, surface }
