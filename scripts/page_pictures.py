@@ -1,6 +1,7 @@
 """Pictures of the page for the documents, each as a hand would come to it, in a real Chromium.
 
 Usage: python scripts/page_pictures.py [NAME ...] [--out docs/images], each NAME one of those at the end of this file.
+`scripts/shrink_pictures.py` then turns them into WebP, which is what the pages show.
 
 The page must be built (`make viewer`), and the machine be quiet: the timing of the loop is in the pictures.
 """

@@ -38,11 +38,17 @@ class ShapeTable(Table):
     """
 
     shape: str = "sphere"
+    """`sphere`, `ellipsoid`, `capsule`, `punch`, or the path of a closed surface file relative to the scene file."""
     radius: Length | None = None
+    """Radius of a sphere, a capsule or a punch. Default: a sixteenth of the longest side of the body."""
     semi_axes: tuple[Length, Length, Length] | None = None
+    """Semi-axes of an ellipsoid along its x, y and z."""
     length: Length | None = None
+    """Length of a capsule between the centres of its hemispheres."""
     rounding: Length | None = None
+    """Radius of the rim of a punch. Default: a tenth of its radius."""
     unit: str = "m"
+    """Unit of length of a surface file."""
 
     @model_validator(mode="after")
     def _keys_of_the_shape(self) -> ShapeTable:
