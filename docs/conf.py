@@ -23,6 +23,8 @@ highlight_language = "none"
 
 # A tutorial that fails ends the build. Nothing that a cell prints is committed.
 nb_execution_mode = "force"
+# Files of a tutorial go into a folder that is removed.
+nb_execution_in_temp = True
 nb_execution_timeout = 240
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True

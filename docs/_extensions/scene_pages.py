@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import textwrap
 import typing
 from collections.abc import Iterator
+from itertools import pairwise
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
-from sphinx.pycode import ModuleAnalyzer
 from tables import code, table
 
 from palpate.exam import file as exam
@@ -109,9 +112,19 @@ def descriptions(cls: type[types.Table]) -> dict[str, str]:
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         if issubclass(base, types.Table):
-            found = ModuleAnalyzer.for_module(base.__module__).find_attr_docs()
-            texts |= {key: " ".join(lines) for (owner, key), lines in found.items() if owner == base.__name__}
+            (definition,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+            assert isinstance(definition, ast.ClassDef)
+            texts |= dict(described(definition.body))
     return texts
+
+
+def described(statements: list[ast.stmt]) -> Iterator[tuple[str, str]]:
+    """Names of annotated attributes, each with the string that stands under it."""
+    for statement, after in pairwise(statements):
+        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            text = after.value if isinstance(after, ast.Expr) else None
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                yield statement.target.id, text.value
 
 
 def kind(hint: Any, named: dict[type, str]) -> str:
