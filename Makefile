@@ -98,6 +98,7 @@ lint: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python scripts/check_architecture.py
+	$(BIN)/python scripts/check_words.py
 
 # The site, docs/_build/html/index.html: the reference is generated from the program, the tutorials are run, warnings are
 # errors. Nothing is taken from the network once the packages are there. `make docs NOTEBOOKS=cache` runs changed tutorials only.

@@ -90,7 +90,7 @@ def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | Non
     missing = [f"{listing.kind}: {listing.missing}" for listing in found if listing.missing is not None]
     if len(found) == 1 and missing:
         raise DeviceError(missing[0])
-    raise DeviceError("there is no device to check: 'palpate devices' tells what was looked for")
+    raise DeviceError("there is no device to check: 'palpate devices' lists what was searched for")
 
 
 def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:

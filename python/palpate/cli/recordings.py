@@ -25,7 +25,7 @@ def replay(
         Path | None, typer.Option(help="Scene file that should give the same; default: the scene of the recording.")
     ] = None,
     headless: Annotated[
-        bool, typer.Option("--headless", help="No viewer: only tell whether every bit is the same.")
+        bool, typer.Option("--headless", help="No viewer: only print whether every bit is the same.")
     ] = False,
     port: Port = PORT,
     host: Host = "127.0.0.1",

@@ -36,7 +36,7 @@ def export(
     """Write a recording for other programs: tables, ParaView, Blender, slides.
 
     csv and parquet have one row a tick, and one row a contact in a second file. pvd is a time series for ParaView,
-    glb an animation for Blender and other viewers, mp4 a film: for these the recording is made again.
+    glb an animation for Blender and other viewers, mp4 a film. These need the scene, and the recording is replayed.
 
     Example: palpate export press.mcap --to csv
 

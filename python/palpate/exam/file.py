@@ -92,8 +92,8 @@ class QuestionTable(Table):
     Places (m, in the frame of the body) are taken to the closest point of the surface. They are the alternatives of
     the task: a mark counts for the closest of them. ``show_places`` draws them; without it a person searches.
     ``press_depth`` is where the stiffness that is felt is compared. ``target`` is the probability of a right answer
-    that the staircase seeks. ``blanks`` are trials with nothing hidden. ``pass_weber_fraction`` is passed by whoever's
-    Weber fraction is no larger.
+    that the staircase seeks. ``blanks`` are trials with nothing hidden. ``pass_weber_fraction`` is the largest Weber
+    fraction that passes.
     """
 
     search: str

@@ -75,7 +75,7 @@ class BodyTable(Table):
     """A solid, one of: a mesh file (volume, surface or segmentation to be filled), a built-in model, a store.
 
     Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
-    filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
+    filled with 10-node tetrahedra unless ``element = "linear"``. Volume meshes and models are taken as they are, unless
     ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
     fix the middles between them. ``mesher``, ``part`` and ``max_volume_loss`` are those of
     :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which become regions with their names.
@@ -184,9 +184,10 @@ class ToolTable(ShapeTable):
 
     ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
-    ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
+    ``contact_radius`` to what it first touched. ``"node"`` takes the closest node, as the paper does, whose stiffness
     goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
-    names a ``contact_radius`` and no law is a patch, for only patches have one; one that is not given follows the body.
+    names a ``contact_radius`` and no law is a patch, because only patches have one. A radius that is not given follows
+    the body.
     ``device`` is the name of a ``[[device]]`` table, or a kind of device.
     """
 
