@@ -220,7 +220,7 @@ def body_of(
 
 
 def likely_units(path: Path) -> list[str]:
-    """Tell the units that a file may be in: metres, or those of a size that hands can feel, the most common first."""
+    """Return the units that a file may be in: metres, or those of a size that hands can feel, the most common first."""
     import numpy as np
 
     from palpate.errors import UnclearUnitError
