@@ -40,7 +40,8 @@ def devices(
 ) -> None:
     """List the haptic devices of this machine, and why one is not found.
 
-    With --test it checks one; before any force it asks. Exit code 0: there is a device, or the check passed; 1:
+    With --test it checks one device, and asks before it puts out a force.
+    Exit code 0: there is a device, or the check passed; 1:
     there is none, or it did not; 2: it cannot be opened.
 
     Example: palpate devices

@@ -31,7 +31,7 @@ def replay(
     host: Host = "127.0.0.1",
     browser: Browser = True,
 ) -> None:
-    """Make a recording again, tick by tick, and compare every bit: in the browser with a time line, or headless.
+    """Replay a recording tick by tick and compare every bit, in the browser with a time line, or headless.
 
     With --headless the exit code is 0 if all bits are the same, 1 if one is not, and 2 if the recording cannot be made
     again.

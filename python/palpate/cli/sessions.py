@@ -25,7 +25,9 @@ def export(
         str | None,
         typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="File; default: beside the recording.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; default: beside the recording.")
+    ] = None,
     rate: Annotated[float | None, typer.Option(help="Frames a second of pvd, glb and mp4; default: 30.")] = None,
     start: Annotated[str, typer.Option("--from", help="Begin there, such as 2s.")] = "0s",
     end: Annotated[str | None, typer.Option("--until", help="End there, such as 5s; default: at the end.")] = None,
