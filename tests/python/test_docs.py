@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import subprocess
 import sys
@@ -21,6 +22,8 @@ import command_pages  # noqa: E402
 import python_pages  # noqa: E402
 import scene_pages  # noqa: E402
 
+# Names of files and of modules in other languages that look alike.
+FILES = {"palpate.h", "palpate.pc"}
 LONG = re.compile(r"--[a-z-]+")
 
 
@@ -88,3 +91,39 @@ def test_every_public_name_has_a_place():
     page = python_pages.page()
     for name in palpate.__all__:
         assert f"palpate.{name}" in page
+
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs/tutorials").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_python_of_a_page_can_be_read(page):
+    for block in re.findall(r"```(?:python|\{code-cell\} ipython3)\n(.*?)```", page.read_text(), re.DOTALL):
+        compile(re.sub(r"^:tags:.*\n", "", block), page.name, "exec")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_of_a_page_exist_with_their_options(page):
+    known = {
+        name: {o for p in command_pages.parameters(name, command) for o in LONG.findall(p.name)}
+        for name, command in command_pages.commands(command_pages.app)
+    }
+    for line in re.findall(r"^ {4}palpate .*|^palpate .*|`palpate [^`]*`", page.read_text(), re.MULTILINE):
+        words = line.strip(" `").split("#")[0].split()[1:]
+        if not words or words[0].startswith(("-", "<")) or words[0].isupper() or words[0] == "...":
+            continue
+        name = " ".join(words[:2]) if words[0] in ("cache", "exam") else words[0]
+        assert name in known, line
+        for option in LONG.findall(" ".join(words)):
+            assert option in known[name], f"{option}: {line}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_names_of_the_package_on_a_page_exist(page):
+    for name in set(re.findall(r"\bpalpate((?:\.[A-Za-z_]\w*)+)", page.read_text())):
+        thing, path = palpate, "palpate"
+        for part in name.split(".")[1:]:
+            path = f"{path}.{part}"
+            if path in FILES:
+                break
+            thing = getattr(thing, part, None) or importlib.import_module(path)
