@@ -15,9 +15,6 @@ language = "en-GB"
 extensions = ["generated_reference", "myst_nb", "numpydoc", "sphinx.ext.autodoc"]
 exclude_patterns = ["_build", "_extensions"]
 
-# A pattern in how-to.md without a page is no mistake; a page without a place in any list is one.
-suppress_warnings = ["toc.empty_glob"]
-
 # Links to headings of other pages, such as accuracy.md#which-element.
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence", "deflist"]
