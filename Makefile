@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test campaigns install wheel sdist other-build sanitize lint viewer check-tools clean
+.PHONY: demo test campaigns install wheel sdist other-build sanitize lint docs viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -98,6 +98,18 @@ lint: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python scripts/check_architecture.py
+	$(BIN)/python scripts/check_words.py
+
+# The site, docs/_build/html/index.html: the reference is generated from the program, the tutorials are run, warnings are
+# errors. Nothing is taken from the network once the packages are there. `make docs NOTEBOOKS=cache` runs changed tutorials only.
+NOTEBOOKS ?= force
+$(VENV)/.docs: $(VENV)/.installed pyproject.toml
+	$(BIN)/python -c 'from importlib.metadata import requires; print(*[r.split(";")[0] for r in requires("palpate") if "docs" in r], sep="\n")' \
+		| $(BIN)/python -m pip install --quiet --disable-pip-version-check -r /dev/stdin
+	@touch $@
+
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -b html -q -W --keep-going -j auto -D nb_execution_mode=$(NOTEBOOKS) docs docs/_build/html
 
 clean:
-	rm -rf target $(VENV) viewer/node_modules python/palpate/viewer/static
+	rm -rf docs/_build docs/reference target $(VENV) viewer/node_modules python/palpate/viewer/static

@@ -1,6 +1,7 @@
 """Pictures of the page for the documents, each as a hand would come to it, in a real Chromium.
 
 Usage: python scripts/page_pictures.py [NAME ...] [--out docs/images], each NAME one of those at the end of this file.
+They are written as WebP, which is what the pages show.
 
 The page must be built (`make viewer`), and the machine be quiet: the timing of the loop is in the pictures.
 """
@@ -36,6 +37,7 @@ from browser import (  # noqa: E402
 from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
 
 import palpate  # noqa: E402
+from shrink_pictures import shrunk  # noqa: E402
 
 # So long the page has stood before its picture, s: the plots show ten seconds.
 STANDS = 2.5
@@ -207,11 +209,15 @@ def main() -> None:
     parser.add_argument("names", nargs="*", choices=[*PICTURES, []], help="which (default: all)")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
     given = parser.parse_args()
+    before = time.time()
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         for name in given.names or PICTURES:
             PICTURES[name](chromium, given.out)
         chromium.close()
+    for path in given.out.glob("*.png"):
+        if path.stat().st_mtime >= before:
+            shrunk(path)
 
 
 if __name__ == "__main__":

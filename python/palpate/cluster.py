@@ -120,7 +120,8 @@ def spread(client: Client, waiting: list[Item], start: Callable[[Item, str], Fut
     """Have items worked on, from the last of the list on; yield each with its task once that has ended.
 
     ``start`` makes the task of an item for the worker at an address. Every worker is kept in work and one task ahead;
-    the rest waits here, for whoever joins. What a worker that dies has not finished goes to others. Items may be added
+    the rest waits here for workers that join. What a worker that dies has not finished goes to others. Items may be
+    added
     while this goes on. Tasks that are left when the caller stops are cancelled.
 
     Raises

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 
 class Reporter:
-    """Is called with what is done and all there is to do; ``phase`` is told what is being done."""
+    """Is called with what is done and all there is to do; ``phase`` names the current phase."""
 
     def __init__(self, report: Callable[[int, int], None], phase: Callable[[str], None]):
         self._report, self.phase = report, phase

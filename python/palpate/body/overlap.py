@@ -17,7 +17,7 @@ BLOCK = 4096
 
 
 def require_apart(mesh: TetMesh, labels: np.ndarray) -> None:
-    """Refuse parts, given by the label (n,) of each node, of which one reaches into another.
+    """Refuse parts, given by the label (n,) of each node, if one reaches into another.
 
     Looked at are the nodes and the middles of the elements of each part.
 

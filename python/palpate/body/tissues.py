@@ -15,7 +15,7 @@ NOT_CHECKED = "not checked at the source"
 
 @dataclass(frozen=True)
 class Tissue:
-    """A material of which a measurement was published.
+    """A material with a published measurement.
 
     Attributes
     ----------

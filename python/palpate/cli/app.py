@@ -48,7 +48,7 @@ def _show_version(wanted: bool) -> None:
 def options(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Say which version this is.")
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Finite elements you can feel. Without a command: an empty page, in which a body is set up."""
@@ -111,11 +111,13 @@ def mesh(
     part: Part = None,
     max_volume_loss: MaxVolumeLoss = None,
     segment: Segments = None,
-    quadratic: Annotated[bool, typer.Option("--quadratic", help="10-node tetrahedra, better twice as large.")] = False,
+    quadratic: Annotated[
+        bool, typer.Option("--quadratic", help="10-node tetrahedra; make them twice as large.")
+    ] = False,
 ) -> None:
-    """Fill a surface with tetrahedra, of 4 nodes unless --quadratic: other programs and formats expect those.
+    """Fill a surface with tetrahedra. They have 4 nodes, as other programs expect, or 10 with --quadratic.
 
-    A surface that is open, crosses itself or has several parts is wrapped first; what was done is printed.
+    A surface that is open, crosses itself or has several parts is wrapped first. The command prints what it did.
 
     Example: palpate mesh liver.stl liver.vtu --unit mm --max-size 4mm
 
@@ -136,13 +138,15 @@ def mesh(
 
 @app.command()
 def precompute(
-    mesh: Annotated[Path, typer.Argument(help="Volume mesh, or a surface or segmentation to be meshed.")],
+    mesh: Annotated[Path, typer.Argument(help="Volume mesh, or a surface or segmentation to fill.")],
     fix: Annotated[str, typer.Option(help="Supported nodes, such as 'z < 0.01' or 'z < min + 5mm'.")],
     youngs_modulus: Annotated[str, typer.Option("-E", help="Young's modulus, such as 10kPa.")] = "10kPa",
     poissons_ratio: Annotated[float, typer.Option("--nu", help="Poisson's ratio, below 0.5.")] = 0.45,
-    density: Annotated[str, typer.Option(help="Density, for its weight, such as 1000kg/m3.")] = "1000kg/m3",
-    gravity: Annotated[str | None, typer.Option(help="Let it sag under gravity, m/s^2, such as 0,0,-9.81.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Store; default: in the cache.")] = None,
+    density: Annotated[str, typer.Option(help="Density, such as 1000kg/m3; used with --gravity.")] = "1000kg/m3",
+    gravity: Annotated[
+        str | None, typer.Option(help="Acceleration under which the body sags, m/s^2, such as 0,0,-9.81.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="File of the store; default: in the cache.")] = None,
     unit: Unit = None,
     precision: Annotated[
         str | None,
@@ -156,7 +160,7 @@ def precompute(
     ] = None,
     first: Annotated[
         str | None,
-        typer.Option(help="Part of it that is computed first: the store is written as soon as that can be touched."),
+        typer.Option(help="Part to compute first; the store is written as soon as this part is ready."),
     ] = None,
     element: ElementChoice = None,
     max_size: MaxSize = None,
@@ -165,14 +169,14 @@ def precompute(
     max_volume_loss: MaxVolumeLoss = None,
     segment: Segments = None,
     memory: Annotated[
-        str | None, typer.Option(help="Peak memory allowed, such as 8GB; with --dask of each worker.")
+        str | None, typer.Option(help="Largest memory, such as 8GB; with --dask for each worker.")
     ] = None,
     dask: Dask = None,
 ) -> None:
     """Solve the body once, so that any touch is answered in microseconds.
 
-    What it will need is printed first, and refused where it does not fit.
-    Ctrl-C keeps what is finished in STORE.partial; the same command goes on from there, with --dask or without.
+    The command prints the time, memory and disk that it needs, and stops if there is too little.
+    Ctrl-C keeps finished columns in STORE.partial; the same command continues from there, with or without --dask.
 
     Example: palpate precompute liver.vtu --fix "z < min + 5mm" -E 10kPa --nu 0.45 -o liver.palpate
 
@@ -216,7 +220,7 @@ def touch(
         str | None, typer.Option(help="Contact radius, such as 5mm; 0 is a point; default: a sixteenth of the body.")
     ] = None,
 ) -> None:
-    """Press a patch of the surface and print the force; exit code 1 where linear elasticity has no meaning.
+    """Press a patch of the surface and print the force. The exit code is 1 if the strain is beyond linear elasticity.
 
     Example: palpate touch liver.palpate --point 0,4cm,2cm --press=-,-3mm,- --radius 5mm
     """
@@ -250,10 +254,12 @@ def info(
     file: Annotated[Path, typer.Argument(help="A store, modes, a scene, a volume mesh, a surface or a segmentation.")],
     unit: Annotated[
         str | None,
-        typer.Option(help="Unit of length; default: m, of a surface what fits its size.", autocompletion=units),
+        typer.Option(
+            help="Unit of length; default: m, for a surface the unit that fits its size.", autocompletion=units
+        ),
     ] = None,
 ) -> None:
-    """Say what a file holds.
+    """Describe a file.
 
     Example: palpate info liver.palpate
     """

@@ -48,21 +48,22 @@ Unit = Annotated[
 MaxSize = Annotated[str | None, typer.Option(help="Longest edge, such as 4mm; default: by size and shape of the body.")]
 MesherChoice = Annotated[
     Mesher | None,
-    typer.Option(help="netgen: the surface itself; wrap: a new one around what it encloses; default: by the surface."),
+    typer.Option(help="netgen fills the surface itself, wrap a new surface around it; default: chosen by the surface."),
 ]
 Part = Annotated[
-    str | None, typer.Option(metavar="NUMBER|all", help="Of a surface of several parts: 1 is the largest, 2 the next.")
+    str | None,
+    typer.Option(metavar="NUMBER|all", help="Part of a surface with several parts: 1 is the largest, 2 the next."),
 ]
 MaxVolumeLoss = Annotated[
     str | None,
-    typer.Option(metavar="SHARE", help="Most of the volume that the mesh of a wrapped surface may lose; default: 5%."),
+    typer.Option(metavar="SHARE", help="Largest share of the volume that wrapping may lose; default: 5%."),
 ]
 Segments = Annotated[
     list[str] | None,
     typer.Option(
         "--segment",
         metavar="NAME[=E]",
-        help="Of a label map: name or label, and its Young's modulus, such as tumor=40kPa; again for the next.",
+        help="Segment of a label map with its Young's modulus, such as tumor=40kPa; repeat for more.",
     ),
 ]
 ElementChoice = Annotated[
@@ -220,7 +221,7 @@ def body_of(
 
 
 def likely_units(path: Path) -> list[str]:
-    """Tell the units that a file may be in: metres, or those of a size that hands can feel, the most common first."""
+    """Return the units that a file may be in: metres, or those of a size that hands can feel, the most common first."""
     import numpy as np
 
     from palpate.errors import UnclearUnitError

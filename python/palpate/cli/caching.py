@@ -43,7 +43,8 @@ def cache_list() -> None:
 @cache_app.command("limit")
 def cache_limit_command(
     size: Annotated[
-        str | None, typer.Argument(help="Such as 20GB, or 'default'; what it is and how much is used without it.")
+        str | None,
+        typer.Argument(help="Such as 20GB, or 'default'. Without it the command prints the limit and the use."),
     ] = None,
 ) -> None:
     """Show or set how large the cache may become: what was used least recently is deleted first.
@@ -67,7 +68,9 @@ def cache_clear(
         str | None,
         typer.Argument(help="Name of a file, or its beginning; all files without it.", autocompletion=_names),
     ] = None,
-    leftovers: Annotated[bool, typer.Option("--leftovers", help="Only what killed processes left.")] = False,
+    leftovers: Annotated[
+        bool, typer.Option("--leftovers", help="Only files that killed processes left behind.")
+    ] = False,
 ) -> None:
     """Delete the precomputed files in the cache, or one of them.
 

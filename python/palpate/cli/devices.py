@@ -40,7 +40,8 @@ def devices(
 ) -> None:
     """List the haptic devices of this machine, and why one is not found.
 
-    With --test it checks one; before any force it asks. Exit code 0: there is a device, or the check passed; 1:
+    With --test it checks one device, and asks before it puts out a force.
+    Exit code 0: there is a device, or the check passed; 1:
     there is none, or it did not; 2: it cannot be opened.
 
     Example: palpate devices
@@ -90,7 +91,7 @@ def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | Non
     missing = [f"{listing.kind}: {listing.missing}" for listing in found if listing.missing is not None]
     if len(found) == 1 and missing:
         raise DeviceError(missing[0])
-    raise DeviceError("there is no device to check: 'palpate devices' tells what was looked for")
+    raise DeviceError("there is no device to check: 'palpate devices' lists what was searched for")
 
 
 def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:

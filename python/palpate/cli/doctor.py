@@ -18,7 +18,7 @@ def doctor(
     plot: Annotated[Path | None, typer.Option(help="Draw the histogram of wake-ups into this PNG.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with the same keys on every machine.")] = False,
 ) -> None:
-    """Tell what this machine can give a force loop at 1 kHz, and what to change and how.
+    """Measure whether this machine keeps 1 kHz, and print what to change.
 
     It reads limits, kernel and processors, runs the loop, plays every kind of tick, and opens the page.
 

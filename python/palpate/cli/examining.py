@@ -30,13 +30,14 @@ def nodule(
     out: Annotated[Path, typer.Option(help="Folder for exam.csv, exam.json and exam.png, one for each person.")] = Path(
         "exam"
     ),
-    seed: Annotated[int | None, typer.Option(min=0, help="Of places and depths; default: the file's, or any.")] = None,
-    observer: Annotated[
-        float | None, typer.Option(min=0.005, max=1, help="No page: an observer of this Weber fraction answers.")
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of places and depths; default: that of the file, or a random one.")
     ] = None,
-    exams: Annotated[
-        int, typer.Option(min=1, help="With --observer: so many exams, and how far their results spread.")
-    ] = 1,
+    observer: Annotated[
+        float | None,
+        typer.Option(min=0.005, max=1, help="A simulated observer with this Weber fraction answers, without a page."),
+    ] = None,
+    exams: Annotated[int, typer.Option(min=1, help="With --observer: number of exams.")] = 1,
     port: Port = PORT,
     host: Host = "127.0.0.1",
     browser: Browser = True,

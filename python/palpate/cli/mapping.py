@@ -40,16 +40,16 @@ def map_command(
     ],
     grid: Annotated[str, typer.Option(help="Distance of the points, or of the strokes, such as 10mm.")],
     depth: Annotated[str, typer.Option(help="Depth of a press from first touch, such as 3mm.")],
-    speed: Annotated[str, typer.Option(help="Of a press, or along a stroke.")] = "10mm/s",
+    speed: Annotated[str, typer.Option(help="Speed of a press, or along a stroke.")] = "10mm/s",
     on: Annotated[
-        str | None, typer.Option(help="Where, such as 'z > max - 1mm'; default: all that may be touched.")
+        str | None, typer.Option(help="Part of the surface, such as 'z > max - 1mm'; default: all that may be touched.")
     ] = None,
     strokes: Annotated[
         bool, typer.Option("--strokes", help="Slide over lines at the depth instead of pressing.")
     ] = False,
     against: Annotated[
         Path | None,
-        typer.Option(help="Scene to compare with; default, where a body has regions: the same without them."),
+        typer.Option(help="Scene to compare with; default: for a body with regions the same body without them."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; default: <name>-palpation.")] = None,
     radius: ToolRadius = None,

@@ -25,13 +25,13 @@ def replay(
         Path | None, typer.Option(help="Scene file that should give the same; default: the scene of the recording.")
     ] = None,
     headless: Annotated[
-        bool, typer.Option("--headless", help="No viewer: only tell whether every bit is the same.")
+        bool, typer.Option("--headless", help="No viewer: only print whether every bit is the same.")
     ] = False,
     port: Port = PORT,
     host: Host = "127.0.0.1",
     browser: Browser = True,
 ) -> None:
-    """Make a recording again, tick by tick, and compare every bit: in the browser with a time line, or headless.
+    """Replay a recording tick by tick and compare every bit, in the browser with a time line, or headless.
 
     With --headless the exit code is 0 if all bits are the same, 1 if one is not, and 2 if the recording cannot be made
     again.

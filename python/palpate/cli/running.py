@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from palpate.viewer.preparing import Prepared
 
 Headless = Annotated[
-    float | None, typer.Option(min=0.1, help="No viewer: this many seconds of a scripted press at 1 kHz.")
+    float | None, typer.Option(min=0.1, help="Press by a script for this many seconds at 1 kHz, without a page.")
 ]
 Out = Annotated[Path, typer.Option(help="Folder for the log (CSV) and the plot (PNG) of --headless.")]
-Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the viewer; 0 takes a free one.")]
-Host = Annotated[str, typer.Option(help="Address to listen on; others than 127.0.0.1 let other machines in.")]
-Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0 takes a free one.")]
+Host = Annotated[str, typer.Option(help="Address to listen on; any other than 127.0.0.1 admits other machines.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the browser.")]
 Cpus = Annotated[
     str | None, typer.Option(help="Processors that the loop's thread keeps to, such as 1 or 2,3; default: any.")
 ]
@@ -56,11 +56,11 @@ Devices = Annotated[
     list[str] | None,
     typer.Option(
         "--device",
-        help="What moves a tool: haply, touch, forcedimension, or the name of a [[device]]; again for the next tool.",
+        help="Device of a tool: haply, touch, forcedimension, or the name of a [[device]]; repeat for the next tool.",
         autocompletion=devices,
     ),
 ]
-Recordings = Annotated[Path, typer.Option(help="Folder of what the page records and saves; default: this one.")]
+Recordings = Annotated[Path, typer.Option(help="Folder for recordings and scenes of the page; default: this one.")]
 PORT = 8642
 
 
@@ -143,9 +143,9 @@ def run(
 ) -> None:
     """Run the 1 kHz force loop on a scene, a store, or a bare mesh or surface, in the browser.
 
-    Of a mesh, what is not given has a default, which is printed. Of a scene, options of tool,
-    material and supports stand instead of what it says.
-    With --headless it presses on the highest point by a script, and writes the log and a plot.
+    For a mesh, the command prints the defaults that it takes. For a scene, options of tool, material and
+    supports replace those of the file. With --headless it presses on the highest point by a script, and writes
+    the log and a plot.
 
     Example: palpate run scene.toml
 
@@ -159,7 +159,7 @@ def run(
 
     Example: palpate run scene.toml --record press.mcap
 
-    A scene whose [touch] says what comes first opens when that can be touched; the rest follows beside the loop.
+    A scene with [touch] first opens when that part is ready; the rest is computed while you touch.
 
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
 

@@ -25,7 +25,9 @@ def export(
         str | None,
         typer.Option(help="csv, parquet, pvd, glb or mp4; default: as --out.", autocompletion=formats),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="File; default: beside the recording.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; default: beside the recording.")
+    ] = None,
     rate: Annotated[float | None, typer.Option(help="Frames a second of pvd, glb and mp4; default: 30.")] = None,
     start: Annotated[str, typer.Option("--from", help="Begin there, such as 2s.")] = "0s",
     end: Annotated[str | None, typer.Option("--until", help="End there, such as 5s; default: at the end.")] = None,
@@ -36,7 +38,7 @@ def export(
     """Write a recording for other programs: tables, ParaView, Blender, slides.
 
     csv and parquet have one row a tick, and one row a contact in a second file. pvd is a time series for ParaView,
-    glb an animation for Blender and other viewers, mp4 a film: for these the recording is made again.
+    glb an animation for Blender and other viewers, mp4 a film. These need the scene, and the recording is replayed.
 
     Example: palpate export press.mcap --to csv
 

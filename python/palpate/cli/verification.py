@@ -23,7 +23,7 @@ def verify(
     out: Annotated[Path | None, typer.Option(help="Folder for the plots, as PNG.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
-    """Compute what has a known answer, and compare; exit code 1 if a figure misses its tolerance.
+    """Compute benchmarks with known answers, and compare. The exit code is 1 if a figure misses its tolerance.
 
     Example: palpate verify
 

@@ -96,7 +96,7 @@ class Reading:
 
 
 def reading_error(reading: object) -> str | None:
-    """Tell what is wrong with what :meth:`Device.read` returned, in a few words; None if nothing is."""
+    """Say what is wrong with what :meth:`Device.read` returned, in a few words; None if nothing is."""
     if not isinstance(reading, Reading):
         return f"returned {type(reading).__name__}, not a palpate.Reading"
     try:

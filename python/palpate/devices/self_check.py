@@ -236,4 +236,4 @@ class SelfCheck:
                 if over(seen):
                     return seen
             time.sleep(POLL_SECONDS)
-        raise DeviceError(f"{self.name}: its driver does not call the loop any more: unplug it and start again")
+        raise DeviceError(f"{self.name}: its driver has stopped calling the loop: unplug it and start again")

@@ -29,8 +29,11 @@ class ContrastTable(Table):
     """
 
     low: Annotated[float, Field(gt=1, allow_inf_nan=False)] = 1.1
+    """Smallest ratio of Young's moduli, nodule to tissue."""
     high: Annotated[float, Field(gt=1, allow_inf_nan=False)] = 25.0
+    """Largest ratio."""
     count: Annotated[int, Field(ge=2, le=40)] = 8
+    """Number of ratios from `low` to `high`."""
 
     @model_validator(mode="after")
     def _ascending(self) -> ContrastTable:
@@ -47,8 +50,11 @@ class NoduleTable(Table):
     """What is hidden: balls of every radius at every depth, m. A depth is that of the middle below the surface."""
 
     radii: Annotated[list[Length], Field(min_length=1)]
+    """Radii of the hidden balls."""
     depths: Annotated[list[Length], Field(min_length=1)]
+    """Depths of their centres below the surface."""
     contrast: ContrastTable = ContrastTable()
+    """Young's moduli of the balls."""
 
     @model_validator(mode="after")
     def _covered(self) -> NoduleTable:
@@ -63,10 +69,15 @@ class RandomTable(Table):
     """Places drawn once for a file, on the searched surface within a box, no closer to each other than ``apart``."""
 
     count: Annotated[int, Field(ge=2, le=40)]
+    """Number of places."""
     seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of the places. They are the same for every person."""
     low: Point
+    """Lower corner of the box in which places lie."""
     high: Point
+    """Upper corner of the box."""
     apart: Length
+    """Smallest distance between two places."""
 
     @model_validator(mode="after")
     def _box(self) -> RandomTable:
@@ -81,20 +92,30 @@ class QuestionTable(Table):
     Places (m, in the frame of the body) are taken to the closest point of the surface. They are the alternatives of
     the task: a mark counts for the closest of them. ``show_places`` draws them; without it a person searches.
     ``press_depth`` is where the stiffness that is felt is compared. ``target`` is the probability of a right answer
-    that the staircase seeks. ``blanks`` are trials with nothing hidden. ``pass_weber_fraction`` is passed by whoever's
-    Weber fraction is no larger.
+    that the staircase seeks. ``blanks`` are trials with nothing hidden. ``pass_weber_fraction`` is the largest Weber
+    fraction that passes.
     """
 
     search: str
+    """Part of the surface that may be touched: a predicate."""
     press_depth: Length
+    """Depth at which felt stiffness is compared."""
     places: Annotated[list[Point] | None, Field(min_length=2)] = None
+    """Points near the places under which nodules lie, in place of `[exam.random]`."""
     random: RandomTable | None = None
+    """Places at random."""
     show_places: bool = True
+    """Whether the page marks the places."""
     trials: Annotated[int, Field(ge=1, le=1000)] = 80
+    """Trials with a nodule."""
     blanks: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Trials without a nodule."""
     target: Share = 0.75
+    """Share of right answers that the staircase seeks."""
     pass_weber_fraction: Annotated[float | None, Field(gt=0, allow_inf_nan=False)] = None
+    """Largest Weber fraction with which the exam is passed. Default: no criterion."""
     seed: Annotated[int | None, Field(ge=0)] = None
+    """Seed of the exam. Default: another exam each time."""
 
     @model_validator(mode="after")
     def _one_kind_of_place(self) -> QuestionTable:

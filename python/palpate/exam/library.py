@@ -119,7 +119,7 @@ class Library:
 
     @cached_property
     def staircase_contrasts(self) -> np.ndarray:
-        """(nodules,) felt contrasts of which logarithms can be taken: rounding may leave deep soft nodules none."""
+        """(nodules,) felt contrasts, kept above zero for their logarithms: rounding may leave soft nodules none."""
         return np.maximum(self.felt_contrasts, LEAST_CONTRAST)
 
     @cached_property

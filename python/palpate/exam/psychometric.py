@@ -39,7 +39,7 @@ POINTS, HALF_WIDTH = 81, 7.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """What answers tell of a hand.
+    """Estimate of a hand from its answers.
 
     Attributes
     ----------

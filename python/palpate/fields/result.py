@@ -36,9 +36,10 @@ class ResultSource(StrainSource, Protocol):
 class Result(StrainReporting, Exportable):
     """Displacements of a surface, with all that follows from them.
 
-    Of a body whose elements are known, files and meshes hold its tetrahedra with ``displacement`` (m), ``strain`` and
-    ``stress`` (Pa) by the components xx, yy, zz, xy, yz, xz, ``largest_strain`` (principal, in magnitude) and
-    ``von_mises`` (Pa) at all nodes; the inside is in equilibrium with the surface. A bare store knows the surface
+    Of a body whose elements are known, files and meshes hold its tetrahedra with fields at all nodes. These are
+    ``displacement`` (m), ``strain`` and ``stress`` (Pa) by the components xx, yy, zz, xy, yz, xz, ``largest_strain``
+    (principal, in magnitude) and ``von_mises`` (Pa). The inside is in equilibrium with the surface. A bare store knows
+    the surface
     alone: its faces with ``displacement`` and ``largest_strain``.
     """
 

@@ -17,10 +17,13 @@ _SLOPES = {
 class SurfaceStrain:
     """Green strain in the plane of the elements' faces.
 
-    With the tangents of a face as columns, ``R`` at rest (in their plane, 2x2) and ``D`` deformed (3x2), the
-    deformation gradient is ``F = D R^-1`` and ``E = (F^T F - I) / 2``. It is zero for rigid motions, so a large
-    rotation, which the linear solution draws as growth, is reported too. On a flat triangle it is constant; on a 6-node
-    face it is taken at the nodes, where the magnitudes of all faces around a node are averaged: they bound that of the
+    With the tangents of a face as columns, ``R`` at rest (in their plane, 2x2), ``D`` deformed (3x2)::
+
+        F = D R^-1        E = (F^T F - I) / 2
+
+    It is zero for rigid motions, so a large
+    rotation, which the linear solution draws as growth, is reported too. On a flat triangle it is constant. On a 6-node
+    face it is taken at the nodes, where the magnitudes of all faces around a node are averaged. They bound that of the
     mean strain, and faces need not lie in one plane.
 
     Parameters

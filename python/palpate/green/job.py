@@ -78,7 +78,7 @@ class Job:
         region = surface_region(body, touch, "touch")
         nodes = np.empty(0, np.int64) if first is None else np.intersect1d(surface_region(body, first, "first"), region)
         if first is not None and not len(nodes):
-            raise BodyError("first: none of its nodes may be touched, for they lie outside of touch")
+            raise BodyError("first: none of its nodes may be touched, because they lie outside of touch")
         problem = problem_arrays(body, region)
         key = _native.GreenCore.content_key(problem, precision)
         if path is None:

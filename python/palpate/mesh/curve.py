@@ -47,8 +47,8 @@ def curve(mesh: TetMesh, project: Projection, inner: tuple[np.ndarray, Projectio
 def refine(mesh: TetMesh, project: Callable[[np.ndarray], np.ndarray]) -> TetMesh:
     """Eight 4-node tetrahedra for each of a mesh, new surface nodes on a shape, or as near as flattens no element.
 
-    A tetrahedron is cut at the middles of its edges; the octahedron that is left inside is cut along its shortest
-    diagonal (Bey 1995; Zhang 1995): however often that is done, angles do not go to zero.
+    A tetrahedron is cut at the middles of its edges. The octahedron that is left inside is cut along its shortest
+    diagonal (Bey 1995; Zhang 1995). However often that is done, angles do not go to zero.
 
     Parameters
     ----------

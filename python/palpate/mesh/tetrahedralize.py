@@ -89,8 +89,8 @@ def tetrahedralize(
     """Fill a surface, or segments of a label map, with 4-node tetrahedra.
 
     A closed surface of one part is filled by NETGEN. One that is open, crosses itself, has several parts or very many
-    triangles is wrapped: what its triangles enclose, by their winding number, gets a new surface, which fTetWild fills;
-    nodes on the surface are put back on the given triangles. A :class:`palpate.MeshWarning` says what was done.
+    triangles is wrapped. What its triangles enclose, by their winding number, gets a new surface, which fTetWild fills.
+    Nodes on the surface are put back on the given triangles. A :class:`palpate.MeshWarning` says what was done.
 
     Before solving, ``.to_quadratic()`` is advised, at twice the element size: at the same price the result is several
     times more accurate.

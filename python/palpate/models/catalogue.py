@@ -124,8 +124,8 @@ def beam(paper: bool = False) -> TetMesh:
 def fixed(name: str, mesh: TetMesh) -> np.ndarray:
     """Return the nodes where a model is fixed, as a mask for :class:`palpate.Body`.
 
-    The doll stands on its seat and the under-sides of its legs; the kidney lies on its back, the liver hangs on the
-    bare area at its back and top, where its ligaments are; the beam is clamped at x = 0.
+    The doll stands on its seat and the under-sides of its legs. The kidney lies on its back. The liver hangs on the
+    bare area at its back and top, where its ligaments are. The beam is clamped at x = 0.
 
     Parameters
     ----------

@@ -88,9 +88,9 @@ class Detection(DetectionRecord):
 def homogeneous(scene: SceneTables) -> SceneTables | None:
     """Scene whose regions are all of the material around them; None where there are none.
 
-    Regions stay, :data:`UNFELT` stiffer: the law of contact extrapolates the compliance of a body of several materials
-    from two widths, that of one material from one (docs/theory.md), and on coarse elements beside an edge these are up
-    to 7 % apart. Both bodies are so looked at alike.
+    Regions stay, :data:`UNFELT` stiffer. The law of contact extrapolates the compliance of a body of several materials
+    from two widths, that of one material from one (docs/theory.md). On coarse elements beside an edge these are up to 7
+    % apart. Both bodies are so looked at alike.
     """
 
     def imperceptible_regions(regions: list[RegionTable], base: MaterialTable) -> list[RegionTable]:
@@ -115,7 +115,7 @@ def compare(
     partial: str | os.PathLike[str] | None = None,
     progress: bool | Callable[[int, int], None] = False,
 ) -> Detection:
-    """Palpate another scene at the points of a map, and tell what is different.
+    """Palpate another scene at the points of a map, and find what is different.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def compare(
 
 
 def has_several_materials(body: Body | None) -> bool:
-    """Whether stiffness differs within a body; a bare store does not tell."""
+    """Whether stiffness differs within a body; a bare store does not hold that."""
     return body is not None and len(np.unique(body.element_materials[:, :2], axis=0)) > 1
 
 

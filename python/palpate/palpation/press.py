@@ -33,7 +33,7 @@ STRAIN_LIMIT, FORCE_LIMIT, OTHER_PLACE, NO_CONTACT = "strain limit", "force limi
 
 @dataclass(frozen=True)
 class Measured:
-    """What one press tells; a stiffness that it does not tell is NaN.
+    """Result of one press; a stiffness that could not be measured is NaN.
 
     Attributes
     ----------

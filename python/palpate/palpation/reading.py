@@ -31,7 +31,7 @@ def press_paths(simulation: Simulation, sites: Sites, protocol: Protocol) -> lis
 def read_presses(
     simulation: Simulation, protocol: Protocol, sites: Sites, runs: Sequence[Run]
 ) -> tuple[list[Measured], list[PressCurve]]:
-    """Read what each press tells, and its curve."""
+    """Read the result of each press, and its curve."""
     rate = simulation.scene.device.rate
     depths = depths_of(protocol, rate)
     time = np.arange(len(depths)) / rate
@@ -47,7 +47,7 @@ def read_presses(
 def read_strokes(
     simulation: Simulation, protocol: Protocol, tracks: Sequence[Track], runs: Sequence[Run]
 ) -> tuple[list[Measured], list[PressCurve]]:
-    """Read what each place of each stroke tells, and the curve of its deepest pass."""
+    """Read the result at each place of each stroke, and the curve of its deepest pass."""
     rate = simulation.scene.device.rate
     found, curves = [], []
     for rank, track in enumerate(tracks):

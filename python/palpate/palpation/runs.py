@@ -47,7 +47,7 @@ def run_all(
     partial: Path | None,
     progress: bool | Callable[[int, int], None],
 ) -> tuple[list[Run], int]:
-    """Run each path from a body at rest; how many runs were known already is told too.
+    """Run each path from a body at rest; also report how many runs were known already.
 
     A run is the forces on the device (t, 3), N, and whether strain was limited (t,).
 

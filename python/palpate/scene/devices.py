@@ -26,37 +26,57 @@ _CPUS = one_of(
 class DeviceTable(Table):
     """A device, where its workspace lies in the scene, and its limits; of the first table also how the loop runs.
 
-    ``kind`` is what it is: ``simulated`` follows a pointer or a program; ``id`` chooses among several of a kind,
+    ``kind`` is what it is: ``simulated`` follows a pointer or a program. ``id`` chooses among several of a kind,
     ``address`` is that of its service and ``library`` the vendor's library, where the driver's own choice will not do.
 
     ``position`` (m) is where the device's origin lies in the scene, ``orientation`` (unit quaternion w x y z) how its
-    axes stand there; they are x to the right, y away, z up for the person in front of it. ``scale`` is metres of the
+    axes stand there. They are x to the right, y away, z up for the person in front of it. ``scale`` is metres of the
     scene per metre of the device, ``force_scale`` the force on the hand per force in the scene. While button ``clutch``
     is held the tool is out of the scene, and the hand can reach for more.
 
     ``max_force`` and ``max_stiffness`` are kept at the device, by the safety stage and by the contact; a device that
     renders less has lower ones of its own. ``cpus`` are the processors that the loop's thread keeps to, by their
     numbers; none for any. ``priority`` is that under ``SCHED_FIFO``, 1 to 99, where the system grants it, or 0 for
-    ordinary scheduling; one that is given and not granted is warned of, the default is only told in the statistics.
+    ordinary scheduling. A priority that is given and not granted raises a warning; the default appears in the
+    statistics only.
     """
 
     name: Annotated[str, Field(min_length=1)] | None = None
+    """Name by which a tool chooses this device."""
     kind: Kind = "simulated"
+    """Kind of device. `simulated` follows the pointer of the page, or a program."""
     id: str | None = None
+    """Which of several devices of a kind. Default: the first that is free."""
     address: str | None = None
+    """Address of the device's service."""
     library: str | None = None
+    """Path of the vendor's library. Default: the driver searches for it."""
     position: Point = (0.0, 0.0, 0.0)
+    """Origin of the device's frame in the scene."""
     orientation: tuple[Number, Number, Number, Number] = (1.0, 0.0, 0.0, 0.0)
+    """Rotation of the device's frame in the scene: a unit quaternion w x y z."""
     scale: Scale = 1.0
+    """Metres of the scene per metre of the device."""
     force_scale: Scale = 1.0
+    """Newtons on the hand per newton in the scene."""
     clutch: Annotated[int, Field(ge=0, le=31)] | None = None
+    """Number of the button that takes the tool out of the scene while it is held, so that the hand can reach for
+    more."""
     max_force: Force = 8.0
+    """Largest force on the hand."""
     max_slew: Annotated[float, Field(gt=0)] = 500.0
+    """Fastest rise of the force, N/s. It does not limit a release."""
     ramp: Time = 0.25
+    """Time over which forces rise after the start and after a reset."""
     max_stiffness: Stiffness = 5000.0
+    """Largest stiffness of a contact at the hand."""
     rate: Annotated[float, Field(ge=100, le=10_000)] = 1000.0
+    """Ticks a second, 100 to 10 000. Belongs in the first table."""
     cpus: Annotated[tuple[int, ...], _CPUS] = ()
+    """Processors on which the loop's thread runs. Default: any. Belongs in the first table."""
     priority: Annotated[int, Field(ge=0, le=99)] = 80
+    """Priority of the loop's thread under `SCHED_FIFO`, 1 to 99; 0 for ordinary scheduling. Belongs in the first
+    table."""
 
     @field_validator("orientation")
     @classmethod

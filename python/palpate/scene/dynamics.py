@@ -32,8 +32,11 @@ class StrikeTable(Table):
     """A strike on the surface point closest to a point; ``impulse`` is in N s, ``duration`` 0 is a single time step."""
 
     point: Point
+    """Point near the struck place of the surface."""
     impulse: Direction
+    """Impulse, N s."""
     duration: Time = 0.0
+    """Length of the half sine of the force; 0 is a single time step."""
 
 
 class DynamicsTable(Table):
@@ -46,15 +49,25 @@ class DynamicsTable(Table):
     """
 
     scheme: Literal["newmark", "exact"] = "newmark"
+    """`newmark` is Newmark's scheme; `exact` takes the exact step of each mode under a force held within the step."""
     dt: Annotated[Time, Field(ge=1e-4, le=1e-2)] = 1e-3
+    """Time step, 0.1 to 10 ms."""
     delta: Annotated[float, Field(ge=0.5, allow_inf_nan=False)] = 0.6
+    """Newmark's delta, at least 0.5; above 0.5 it damps what is too fast for the time step."""
     alpha: Factor | None = None
+    """Newmark's alpha. Default: `(delta + 1/2)^2 / 4`. Not for `exact`."""
     modes: Annotated[int | Literal["all"] | None, _COUNT] = None
+    """Number of modes, or `"all"`. Default: all up to 3000 free degrees of freedom, else 200."""
     mass: Literal["consistent", "lumped"] = "consistent"
+    """Mass matrix."""
     damping_ratios: tuple[Ratio, Ratio] = (0.05, 0.05)
+    """Damping ratios of the first and the tenth mode."""
     rayleigh: tuple[Factor, Factor] | None = None
+    """Rayleigh factors of mass (1/s) and stiffness (s), in place of `damping_ratios`."""
     coupling: Stiffness | None = None
+    """Spring between the tool and the body. Default: the device's `max_stiffness`, which is also the largest value."""
     strike: StrikeTable | None = None
+    """Strike that the page gives when it opens."""
 
     @model_validator(mode="after")
     def _one_damping(self) -> DynamicsTable:

@@ -19,10 +19,15 @@ class LoadTable(Table):
     """
 
     gravity: Acceleration | None = None
+    """Acceleration of the whole body, m/s^2."""
     pressure: SignedPressure | None = None
+    """Pressure on a part of the surface."""
     force: ForceVector | None = None
+    """Force on a part of the surface, spread evenly, or on each of `nodes`."""
     on: str | None = None
+    """Predicate over `x`, `y`, `z` that selects the part of the surface."""
     nodes: list[int] | None = None
+    """Numbers of the nodes on which the force acts."""
 
     @model_validator(mode="after")
     def _one_load(self) -> LoadTable:

@@ -38,13 +38,20 @@ class MaterialTable(Table):
     """Isotropic material of the whole body, but for its regions."""
 
     youngs_modulus: Pressure = DEFAULT_MODULUS
+    """Young's modulus."""
     poissons_ratio: PoissonsRatio = 0.45
+    """Poisson's ratio, below 0.5."""
     density: Density = 1000.0
     law: Law = DEFAULT_LAW
+    """Constitutive law: linear elasticity, or a hyperelastic one for strains beyond about 10 %."""
     c10: Pressure | None = None
+    """First constant of `mooney-rivlin` and `yeoh`, as Abaqus and CalculiX define it."""
     c01: Pressure | None = None
+    """Second constant of `mooney-rivlin`."""
     c20: Pressure | None = None
+    """Second constant of `yeoh`."""
     c30: Pressure | None = None
+    """Third constant of `yeoh`."""
 
     @model_validator(mode="after")
     def _one_material(self) -> MaterialTable:
@@ -60,15 +67,25 @@ class PlaceTable(Table):
     """A part of the body: a region of the mesh file by number or name, or what lies in a shape."""
 
     mesh_region: Annotated[int | str | None, _REGION] = None
+    """Region of the mesh file, by its number or name."""
     shape: Literal["sphere", "box", "cylinder", "half-space"] | None = None
+    """Shape that contains the centroids of the elements."""
     center: Point | None = None
+    """Centre of a sphere."""
     radius: Length | None = None
+    """Radius of a sphere or a cylinder."""
     low: Point | None = None
+    """Lower corner of a box."""
     high: Point | None = None
+    """Upper corner of a box."""
     start: Point | None = None
+    """Start of the axis of a cylinder."""
     end: Point | None = None
+    """End of the axis of a cylinder."""
     point: Point | None = None
+    """Point on the plane of a half-space."""
     normal: Direction | None = None
+    """Normal of the plane, out of the half-space."""
 
     @model_validator(mode="after")
     def _one_place(self) -> PlaceTable:
@@ -125,13 +142,22 @@ class RegionTable(PlaceTable):
     """
 
     youngs_modulus: Pressure | None = None
+    """Young's modulus of the region. Default: that of `[material]`."""
     poissons_ratio: PoissonsRatio | None = None
+    """Poisson's ratio of the region, below 0.5. Default: that of `[material]`."""
     density: Density | None = None
+    """Density of the region, for weight and motion. Default: that of `[material]`."""
     law: Law | None = None
+    """Constitutive law: linear elasticity, or a hyperelastic one for strains beyond about 10 %. Default: that of
+    `[material]`."""
     c10: Pressure | None = None
+    """First constant of `mooney-rivlin` and `yeoh`, as Abaqus and CalculiX define it. Default: that of `[material]`."""
     c01: Pressure | None = None
+    """Second constant of `mooney-rivlin`. Default: that of `[material]`."""
     c20: Pressure | None = None
+    """Second constant of `yeoh`. Default: that of `[material]`."""
     c30: Pressure | None = None
+    """Third constant of `yeoh`. Default: that of `[material]`."""
 
     def material(self, base: MaterialTable) -> Material:
         """Material, completed from that of the body."""
@@ -142,14 +168,24 @@ class SegmentTable(Table):
     """A segment of a label map, and its material; what it does not give is that of ``[material]``."""
 
     name: Annotated[int | str, _SEGMENT]
+    """Name of the segment in the file, or its label."""
     youngs_modulus: Pressure | None = None
+    """Young's modulus of the segment. Default: that of `[material]`."""
     poissons_ratio: PoissonsRatio | None = None
+    """Poisson's ratio of the segment, below 0.5. Default: that of `[material]`."""
     density: Density | None = None
+    """Density of the segment, for weight and motion. Default: that of `[material]`."""
     law: Law | None = None
+    """Constitutive law: linear elasticity, or a hyperelastic one for strains beyond about 10 %. Default: that of
+    `[material]`."""
     c10: Pressure | None = None
+    """First constant of `mooney-rivlin` and `yeoh`, as Abaqus and CalculiX define it. Default: that of `[material]`."""
     c01: Pressure | None = None
+    """Second constant of `mooney-rivlin`. Default: that of `[material]`."""
     c20: Pressure | None = None
+    """Second constant of `yeoh`. Default: that of `[material]`."""
     c30: Pressure | None = None
+    """Third constant of `yeoh`. Default: that of `[material]`."""
 
     def material(self, base: MaterialTable) -> Material:
         """Material, completed from that of the body."""

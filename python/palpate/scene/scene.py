@@ -115,7 +115,8 @@ class Scene(SceneTables):
     ) -> BuiltScene:
         """Mesh if need be, precompute, and find the modes of bodies that move, or take it all from the cache.
 
-        ``progress`` is shown, or told of done and expected; of modes ``modes_progress`` is, unless it is None.
+        ``progress`` shows a bar, or is called with the finished and the expected count; ``modes_progress`` likewise for
+        modes, unless it is None.
         ``announce`` is called with the expected size of each body before it is computed.
 
         Raises

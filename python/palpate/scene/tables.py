@@ -46,14 +46,19 @@ class RefineTable(Table):
     """A ball of finer elements in a mesh made from a surface."""
 
     center: Point
+    """Centre of the ball."""
     radius: Length
+    """Radius of the ball."""
     size: Length
+    """Longest edge of an element in the ball."""
 
 
 class SupportsTable(Table):
     """Where the body is fixed: a predicate over x, y, z, node indices, or a file of them; a model has its own."""
 
     fixed: Annotated[str | list[int] | None, _NODES] = None
+    """Nodes that do not move: a predicate over `x`, `y`, `z`, `min` and `max`, such as `"z < min + 5mm"`, a list of
+    node numbers, or a file of them. A built-in model has supports of its own."""
 
     @field_validator("fixed")
     @classmethod
@@ -70,7 +75,7 @@ class BodyTable(Table):
     """A solid, one of: a mesh file (volume, surface or segmentation to be filled), a built-in model, a store.
 
     Paths are relative to the scene file. ``paper`` takes the model in the size of the paper. A surface is
-    filled with 10-node tetrahedra unless ``element = "linear"``; volume meshes and models are taken as they are, unless
+    filled with 10-node tetrahedra unless ``element = "linear"``. Volume meshes and models are taken as they are, unless
     ``element = "quadratic"`` gives 4-node tetrahedra the middles of their edges as nodes. Supports listed by node then
     fix the middles between them. ``mesher``, ``part`` and ``max_volume_loss`` are those of
     :func:`palpate.tetrahedralize`. ``segment`` names parts of a label map, which become regions with their names.
@@ -81,27 +86,53 @@ class BodyTable(Table):
     """
 
     name: str | None = None
+    """Name in messages and on the page. Default: the model, or the file."""
     mesh: str | None = None
+    """Volume mesh, or a surface or segmentation to fill. The path is relative to the scene file."""
     model: str | None = None
+    """Built-in model: `doll`, `kidney`, `liver` or `beam`."""
     store: str | None = None
+    """Precomputed `.palpate` file. It contains material, supports and loads."""
     paper: bool = False
+    """Whether the model has the size and mesh of the paper."""
     unit: str | None = None
+    """Unit of length of the file. Default: m; for a segmentation that of the file, or mm. A body below 1 mm or above
+    3 m is then refused."""
     max_element_size: Length | None = None
+    """Longest edge when a surface is filled. Default: 2/15 of the longest side (1/15 for 4-node elements), and down
+    to a quarter of that where the shape needs it."""
     element: Element | None = None
+    """`linear` has 4 nodes an element, `quadratic` 10. Default: quadratic for a surface; a volume mesh stays as it
+    is."""
     refine: list[RefineTable] = Field(default_factory=list)
+    """Balls with finer elements."""
     mesher: Mesher | None = None
+    """`netgen` fills a closed surface itself, `wrap` fills what any surface encloses. Default: chosen by the
+    surface."""
     part: Annotated[int | str, _PART] = 1
+    """Which part of a surface with several parts: its rank in volume, or `"all"`."""
     max_volume_loss: Share = 0.05
+    """Largest share of the volume that the mesh of a wrapped surface may lose."""
     segment: list[SegmentTable] = Field(default_factory=list)
+    """Segments of a label map that form the body."""
     precision: str | None = Field(None, pattern="^f(16|32|64)$")
+    """Numbers of the store: `f16`, `f32` or `f64`. Default: the smallest that answers touches to 0.03 %."""
     position: Point = (0.0, 0.0, 0.0)
+    """Origin of the body's own frame in the scene."""
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    """Rotation of the body's own frame in the scene: a unit quaternion w x y z."""
     supports: SupportsTable | None = None
+    """Supports of this body, in place of those of the scene."""
     touch: TouchTable | None = None
+    """Touch region of this body, in place of that of the scene."""
     material: MaterialTable | None = None
+    """Material of this body, in place of that of the scene."""
     region: list[RegionTable] | None = None
+    """Regions of this body, in place of those of the scene."""
     loads: list[LoadTable] | None = None
+    """Loads of this body, in place of those of the scene."""
     dynamics: DynamicsTable | None = None
+    """Motion of this body, in place of that of the scene."""
 
     @model_validator(mode="after")
     def _one_source(self) -> BodyTable:
@@ -153,17 +184,24 @@ class ToolTable(ShapeTable):
 
     ``contact = "local"`` is contact with a half-space in series with the finite elements: it slides with Coulomb's
     ``friction``, and ``pad_youngs_modulus`` makes a finger's pad of a rigid tool. ``"patch"`` sticks with a disc of
-    ``contact_radius`` to what it first touched; ``"node"`` takes the closest node, as the paper does, whose stiffness
+    ``contact_radius`` to what it first touched. ``"node"`` takes the closest node, as the paper does, whose stiffness
     goes to zero with the size of the elements. A tool that grabs holds on by the disc, whatever its law. A tool that
-    names a ``contact_radius`` and no law is a patch, for only patches have one; one that is not given follows the body.
+    names a ``contact_radius`` and no law is a patch, because only patches have one. A radius that is not given follows
+    the body.
     ``device`` is the name of a ``[[device]]`` table, or a kind of device.
     """
 
     contact: Literal["local", "patch", "node"] = "local"
+    """Contact law. `local` slides with friction; `patch` sticks with a disc of `contact_radius`; `node` takes the
+    closest node, as in the paper."""
     friction: Annotated[float, Field(ge=0, le=MOST_FRICTION, allow_inf_nan=False)] = 0.3
+    """Coulomb's coefficient under `local`, at most 10; 0 slides freely."""
     pad_youngs_modulus: Pressure | None = None
+    """Young's modulus of a soft pad on the tool, under `local`. Default: a rigid tool."""
     contact_radius: Radius | None = None
+    """Radius of the disc of `patch`, and of what a grab holds. A tool with this key and no `contact` is a `patch`."""
     device: str | None = None
+    """Device that moves the tool: the name of a `[[device]]` table, or a kind of device."""
 
     @model_validator(mode="before")
     @classmethod
@@ -187,8 +225,11 @@ class ViewTable(Table):
     """
 
     position: tuple[float, float, float] | None = None
+    """Position of the camera, m. Default: the whole body is in view."""
     target: tuple[float, float, float] | None = None
+    """Point that the camera looks at, m."""
     strain_limit: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = STRAIN_LIMIT
+    """Largest strain to which tools take a body; 0 switches the limit off."""
 
 
 class SceneTables(Table):

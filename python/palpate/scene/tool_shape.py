@@ -31,18 +31,25 @@ class ShapeTable(Table):
     """Keys of a tool's shape.
 
     ``shape`` is ``"sphere"`` (``radius``), ``"ellipsoid"`` (``semi_axes``), ``"capsule"`` (``radius``, and ``length``
-    of the cylinder between its hemispheres), ``"punch"`` (``radius``, ``rounding`` of its rim), or the path of a closed
+    of the cylinder between its hemispheres), or ``"punch"`` (``radius``, ``rounding`` of its rim). It may also be the
+    path of a closed
     surface file relative to the scene file, in ``unit``. Capsule and punch lie along z of the tool, their front towards
     -z; its origin is the middle of the front hemisphere or of the face. A radius that is not given
     follows the body.
     """
 
     shape: str = "sphere"
+    """`sphere`, `ellipsoid`, `capsule`, `punch`, or the path of a closed surface file relative to the scene file."""
     radius: Length | None = None
+    """Radius of a sphere, a capsule or a punch. Default: a sixteenth of the longest side of the body."""
     semi_axes: tuple[Length, Length, Length] | None = None
+    """Semi-axes of an ellipsoid along its x, y and z."""
     length: Length | None = None
+    """Length of a capsule between the centres of its hemispheres."""
     rounding: Length | None = None
+    """Radius of the rim of a punch. Default: a tenth of its radius."""
     unit: str = "m"
+    """Unit of length of a surface file."""
 
     @model_validator(mode="after")
     def _keys_of_the_shape(self) -> ShapeTable:
@@ -63,7 +70,7 @@ class ShapeTable(Table):
 
     @property
     def reach(self) -> float:
-        """From the tool's origin to its front along -z, m; of a surface file 0, for its origin may lie anywhere."""
+        """From the tool's origin to its front along -z, m; of a surface file 0, because its origin may lie anywhere."""
         radius = self.radius or 0.0
         fronts = {"sphere": radius, "capsule": radius, "ellipsoid": (self.semi_axes or (0.0,))[-1]}
         return fronts.get(self.shape, 0.0)

@@ -45,7 +45,10 @@ class TouchTable(Table):
     """
 
     region: _Area | None = None
+    """Part of the surface that may be touched: a predicate, the name of a region of the mesh file, node numbers, or
+    a shape. Default: all of it."""
     first: _Area | None = None
+    """Part of the region that is computed first. `palpate run` opens when it is ready."""
 
     @field_validator("region", "first")
     @classmethod

@@ -22,7 +22,7 @@ def about(
 ) -> dict[str, str]:
     """Tables of the scene, where its paths start, keys of what was computed for its bodies, and limits of its devices.
 
-    ``shown`` is the number of tools of which a recording speaks, and whether it speaks of one without an axis of tools.
+    ``shown`` is the number of tools that a recording shows, and whether it shows one without an axis of tools.
     """
     keys = [[body.green.key, None if body.motion is None else body.motion.basis.key] for body in bodies]
     return {
@@ -126,6 +126,6 @@ def with_recorded_series(about: dict[str, str], built: BuiltScene) -> BuiltScene
 
 
 def shown_of(about: dict[str, str]) -> tuple[int, bool]:
-    """Tell the number of tools of which a recording speaks, and whether it speaks of one without an axis of tools."""
+    """Return the number of tools that a recording shows, and whether it shows one without an axis of tools."""
     given, single = json.loads(about["shown"])
     return given, single

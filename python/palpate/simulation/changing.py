@@ -124,7 +124,7 @@ class SceneEditing:
     def take_store(self, body: int, green: GreensFunction) -> None:
         """Go on with another store of a body, in which more of the same surface may be touched.
 
-        Contacts go on; those whose nodes may not be touched any more are let go.
+        Contacts go on; those on nodes that have left the touch region are released.
 
         Raises
         ------

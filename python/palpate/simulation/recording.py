@@ -231,7 +231,7 @@ class Recording(ComparedByValue):
         """Settings in the order in which they came into force, from the tick ``tick`` on.
 
         ``contact_radius`` (m) and ``friction`` are of each tool, ``stiffness_scale`` of each body, ``strain_limit`` and
-        ``time_scale`` of the scene; ``strike_body``, ``strike_point`` (m), ``strike_impulse`` (N s), ``strike_radius``
+        ``time_scale`` of the scene. ``strike_body``, ``strike_point`` (m), ``strike_impulse`` (N s), ``strike_radius``
         (m) and ``strike_duration`` (s) are those of the latest strike.
         """
         bodies = len(json.loads(self.about["keys"]))

@@ -74,7 +74,7 @@ def start_loop(core: _native.SimulationCore, device: DeviceTable) -> None:
     memory = "" if locked_memory else ", nor locked memory"
     warnings.warn(
         f"device.priority = {device.priority}: the system granted no real-time priority{memory}; the loop runs as "
-        "others do and may wake late: 'palpate doctor' tells what to change",
+        "others do and may wake late: 'palpate doctor' prints what to change",
         SchedulingWarning,
         stacklevel=3,
     )

@@ -193,8 +193,8 @@ class Simulation(Adjustable, SceneEditing):
     def record(self, path: str | os.PathLike[str]) -> None:
         """Record every tick from now on, or from the start of the loop, in a new file (MCAP).
 
-        The loop begins anew: everything is let go of, bodies come to rest, and forces ramp in, for only from a known
-        state can a recording be made again bit for bit. What was written is safe after a tenth of a second.
+        The loop begins anew: everything is let go of, bodies come to rest, and forces ramp in. Only from a known state
+        can a recording be replayed bit for bit. What was written is safe after a tenth of a second.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class Simulation(Adjustable, SceneEditing):
         return None if status is None else RecordingStatus(*status)
 
     def stop_recording(self) -> RecordingStatus | None:
-        """End the recording, if there is one, and tell how it went."""
+        """End the recording, if there is one, and return its status."""
         self._to_record = None
         status = self._core.end_recording()
         return None if status is None else RecordingStatus(*status)
@@ -379,7 +379,7 @@ class Simulation(Adjustable, SceneEditing):
         """Rows of the 1 kHz log since the last call.
 
         ``time``; ``position`` and ``force`` of the first tool, ``compute_us``, ``wakeup_us``; ``watched``, the
-        displacement of the node of :meth:`watch`, m; and of the body of that node, if it moves, ``body_time``, s, and
+        displacement of the node of :meth:`watch`, m. If the body of that node moves, also its ``body_time``, s, and
         its energies, J, as in :class:`palpate.Energy`.
         """
         return np.ascontiguousarray(self._core.drain_log()).view(LOG_DTYPE)

@@ -23,9 +23,13 @@ class PressTable(Table):
     """
 
     name: str | None = None
+    """Name in the table of results."""
     point: Point
+    """Point near the pressed place of the surface."""
     displacement: tuple[Component, Component, Component]
+    """Displacement of the patch; `"-"` leaves a component free."""
     radius: Radius | None = None
+    """Radius of the patch; 0 is a point. Default: a sixteenth of the longest side of the body."""
 
     @model_validator(mode="after")
     def _presses(self) -> PressTable:

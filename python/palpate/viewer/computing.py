@@ -33,7 +33,7 @@ class Computing:
             background.yield_processor()
 
     def step(self, session: Session) -> dict[str, Any] | None:
-        """Give the loop what has become ready; the message for all pages, if there is something new to tell."""
+        """Give the loop what has become ready; the message for all pages, if there is something new."""
         for body, background in self._growing.items():
             if body >= len(session.built.bodies):
                 continue  # another body is set up in its place for now

@@ -53,9 +53,9 @@ class DrawnSurface:
 
 
 def drawn_surface(built: BuiltBody, of_element: np.ndarray, most: int | None = None) -> DrawnSurface:
-    """Surface of a body, or at most about so many triangles of it, as many as a page takes where that is not told.
+    """Surface of a body, or at most about so many triangles of it, by default as many as a page takes.
 
-    ``of_element`` tells the region of each element.
+    ``of_element`` has the region of each element.
     """
     green = built.green
     triangles = np.searchsorted(green.surface_nodes, green.surface_triangles)

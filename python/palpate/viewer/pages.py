@@ -64,8 +64,8 @@ def headers(host: str) -> dict[str, str]:
 def is_own_host(header: str | None, bound: str, port: int) -> bool:
     """Whether a Host header names this server.
 
-    A page elsewhere may point a name of its own at this machine (DNS rebinding): only names known to mean this machine
-    and the bound address pass; a server bound to every address also answers to addresses, which nobody can rebind.
+    A page elsewhere may point a name of its own at this machine (DNS rebinding). Only names known to mean this machine
+    and the bound address pass. A server bound to every address also answers to addresses, which nobody can rebind.
     """
     if header is None:
         return False

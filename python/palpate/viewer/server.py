@@ -490,7 +490,7 @@ class ViewerServer:
         session.press_on(before)
 
     def reporter(self, text: str, work: CancellableTask) -> StatusReporter:
-        """Tell all pages how far a long work is."""
+        """Send all pages how far a long work is."""
         return StatusReporter(text, work, self.send_all)
 
 

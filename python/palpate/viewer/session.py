@@ -198,7 +198,7 @@ class Session:
         return None
 
     def reshaped(self, message: Mapping[str, Any]) -> BuiltScene | None:
-        """Scene with the same bodies, a tool of which has the shape of a message; None if it has that now.
+        """Scene with the same bodies, one tool with the shape of a message; None if it has that now.
 
         Raises
         ------
@@ -235,7 +235,7 @@ class Session:
                 self._press(message)
 
     def take_store(self, body: int, green: GreensFunction) -> None:
-        """Go on with a store of the same body of which more may be touched."""
+        """Go on with a store of the same body in which more may be touched."""
         self.simulation.take_store(body, green)
         self.built = replace(self.built, bodies=self.simulation.bodies)
 

@@ -110,7 +110,7 @@ class SettingUp:
 
     @property
     def is_offered(self) -> bool:
-        """Whether pages are told of it: an exam and a replay have no place for it."""
+        """Whether pages hear of it: an exam and a replay have no place for it."""
         session = self._server.session
         return session.takes_files or isinstance(session, SetupSession)
 

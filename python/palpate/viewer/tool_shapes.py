@@ -57,7 +57,7 @@ def radius_of(tool: ShapeTable, folder: Path) -> float:
 
 
 def outline(tool: ShapeTable, folder: Path) -> tuple[dict[str, Any], dict[str, tuple[str, np.ndarray]]]:
-    """Return the entries of the scene message that tell a tool's shape, and its arrays, empty but for surface files."""
+    """Return the entries of the scene message about a tool's shape, and its arrays, empty but for surface files."""
     kind, lengths, vertices, triangles = tool.shape_arguments(folder)
     header = {"shape": kind, "lengths": list(lengths), "radius": radius_of(tool, folder)}
     places, corners = np.array(vertices, dtype=float), np.array(triangles, dtype=np.uint32)

@@ -80,7 +80,7 @@ export class TimeLine {
     const badge = byId("timeline-verdict");
     badge.hidden = progress !== null;
     badge.dataset["state"] = replay.difference ? "bad" : "good";
-    badge.title = replay.difference?.text ?? "Each tick that is made again is compared with the recorded one, bit by bit.";
+    badge.title = replay.difference?.text ?? "Each replayed tick is compared with the recorded one, bit by bit.";
     setText(badge, verdict(replay, scene));
   }
 

@@ -30,7 +30,7 @@ __all__ = [
 
 
 def examine(seconds: float, report: Callable[[float], None] | None = None) -> Report:
-    """Read what the system reports and measure; ``report`` is told the seconds that the loop has run."""
+    """Read the system's settings and measure; ``report`` is called with the seconds that the loop has run."""
     machine, before = read_machine(), processor_time()
     loop, ticks = loop_times(seconds, report)
     after = processor_time()
