@@ -1,7 +1,7 @@
-"""A robot's finger in MuJoCo presses on soft tissue of Palpate: the wrench goes into MuJoCo, and the taxels see the contact.
+"""A robot's finger in MuJoCo presses on soft tissue of Palpate: its wrench goes into MuJoCo.
 
-MuJoCo steps the finger, a mass on a slide that a motor pushes down; Palpate steps the contact. Once it is at rest, motor, weight and
-contact force balance. Usage: mujoco_finger.py [plot.png]      (pip install mujoco)
+MuJoCo steps the finger, a mass on a slide that a motor pushes down; Palpate steps the contact. Once it is at rest,
+motor, weight and contact force balance. Usage: mujoco_finger.py [plot.png]      (pip install mujoco)
 """
 
 import sys

@@ -20,6 +20,7 @@ RATE, SECONDS = 60.0, 4.0
 client = pyigtl.OpenIGTLinkClient("127.0.0.1", 18944)
 while not client.is_connected():
     time.sleep(0.01)
+client.wait_for_message("Force")
 depths, forces, sent, begun = [], [], 0, time.monotonic()
 while (now := time.monotonic() - begun) < SECONDS:
     if now * RATE >= sent:

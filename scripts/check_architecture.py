@@ -237,7 +237,7 @@ def dead_name_problems() -> list[str]:
 
     Fenced examples are left out.
     """
-    sources = [ROOT / name for name in tracked_files() if name.endswith((".rs", ".py", ".pyi", ".ts", ".toml"))]
+    sources = [ROOT / name for name in tracked_files() if name.endswith((".rs", ".py", ".pyi", ".ts", ".cs", ".toml"))]
     sources = [path for path in sources if path.exists()]
     files = {path.relative_to(ROOT).as_posix() for path in sources}
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))

@@ -63,7 +63,7 @@ static class Press
             }
             Vector f = wrenches[0].Force;
             Console.WriteLine(string.Format(CultureInfo.InvariantCulture,
-                "{0:R},{1:R},{2:R},{3:R},{4:R},{5:R}", tip.X, tip.Y, tip.Z, f.X, f.Y, f.Z));
+                "{0:G17},{1:G17},{2:G17},{3:G17},{4:G17},{5:G17}", tip.X, tip.Y, tip.Z, f.X, f.Y, f.Z));
         }
     }
 }
