@@ -146,7 +146,7 @@ def test_taxels_of_a_ball_read_hertz_and_turn_with_the_tool(block, block_green):
     slope = (np.arctanh(s) + s / (1 - s**2)) / s
     sneddon = slope.mean(axis=2) * np.sqrt(np.clip(1 - squared, 0, None))
     sneddon *= force / (sneddon.sum() * (0.012 / 32) ** 2)
-    assert np.abs(level - sneddon)[inside].max() < 0.01 * sneddon.max()
+    assert np.abs(level - sneddon)[inside].max() < 0.015 * sneddon.max()
     # Inclined about y, the contact is seen towards -x of the tool (its x points down by as much).
     seen = (inclined * x).sum() / inclined.sum()
     assert seen == pytest.approx(0.006 * np.sin(angle), rel=0.05)
