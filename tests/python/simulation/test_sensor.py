@@ -149,7 +149,8 @@ def test_taxels_of_a_ball_read_hertz_and_turn_with_the_tool(block, block_green):
     assert np.abs(level - sneddon)[inside].max() < 0.015 * sneddon.max()
     # Inclined about y, the contact is seen towards -x of the tool (its x points down by as much).
     seen = (inclined * x).sum() / inclined.sum()
-    assert seen == pytest.approx(0.006 * np.sin(angle), rel=0.05)
+    # Its plane lies between the pressed depth of a millimetre and the ball's surface.
+    assert 0.005 * np.sin(angle) < seen < 0.006 * np.sin(angle)
     assert inclined.sum() == pytest.approx(level.sum(), rel=1e-3)
 
 
