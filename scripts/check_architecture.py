@@ -50,7 +50,7 @@ FORBIDDEN = {
 # all of them. The package itself, which exports the public names, comes after them.
 PYTHON_ORDER = (
     *("segmentation", "mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation"),
-    *("palpation", "sessions", "study"),
+    *("openigtlink", "palpation", "sessions", "study"),
     *("viewer", "validation/plots", "exam", "validation/verify", "validation/ticks", "validation/doctor"),
     "cli",
 )
@@ -237,7 +237,7 @@ def dead_name_problems() -> list[str]:
 
     Fenced examples are left out.
     """
-    sources = [ROOT / name for name in tracked_files() if name.endswith((".rs", ".py", ".pyi", ".ts", ".toml"))]
+    sources = [ROOT / name for name in tracked_files() if name.endswith((".rs", ".py", ".pyi", ".ts", ".cs", ".toml"))]
     sources = [path for path in sources if path.exists()]
     files = {path.relative_to(ROOT).as_posix() for path in sources}
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Puts libpalpate, palpate.h, palpate.pc and PalpateConfig.cmake below a prefix: install_c.sh [PREFIX] [FOLDER]
+# Puts libpalpate, palpate.h, Palpate.cs, palpate.pc and PalpateConfig.cmake below a prefix: install_c.sh [PREFIX] [FOLDER]
 # FOLDER is where a build has left the library; without it the library is built here.
 set -euo pipefail
 root="$(cd "$(dirname "$0")/.." && pwd)"
@@ -21,6 +21,7 @@ lib="$prefix/lib"
 place() { install -m "$1" "$2" "$3.new" && mv -f "$3.new" "$3"; }
 place_library() { install -m "$1" "$2" "$3.new" && strip -S "$3.new" && mv -f "$3.new" "$3"; }
 place 644 "$root/crates/capi/include/palpate.h" "$prefix/include/palpate.h"
+place 644 "$root/crates/capi/csharp/Palpate.cs" "$prefix/include/Palpate.cs"
 shared="libpalpate.so.$major"
 place_library 755 "$built/libpalpate.so" "$lib/libpalpate.so.$major.$minor"
 ln -sfn "libpalpate.so.$major.$minor" "$lib/$shared"

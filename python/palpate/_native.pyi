@@ -209,6 +209,17 @@ class SimulationCore:
     def recording(self) -> tuple[Path, int, int, int, str | None] | None: ...
     def end_recording(self) -> tuple[Path, int, int, int, str | None] | None: ...
 
+class SensorCore:
+    def __init__(
+        self,
+        core: SimulationCore,
+        count: int,
+        limited: bool,
+        taxels: tuple[int, int, list[tuple[float, float]]] | None,
+    ) -> None: ...
+    def step(self, poses: np.ndarray, period: float) -> dict[str, Any]: ...
+    def reset(self, copies: list[int]) -> None: ...
+
 Limits = tuple[float, float, float, float, float, float | None, float, float | None, float | None]
 
 class OpenedDevice:

@@ -22,6 +22,7 @@ mod recording;
 mod replay;
 mod rerun;
 mod scene;
+mod sensor;
 mod series;
 mod simulation;
 mod strain;
@@ -69,6 +70,8 @@ mod _native {
     use crate::rerun::rerun;
     #[pymodule_export]
     use crate::scene::{checksum, strain_terms};
+    #[pymodule_export]
+    use crate::sensor::SensorCore;
     #[pymodule_export]
     use crate::series::series;
     #[pymodule_export]

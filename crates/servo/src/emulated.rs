@@ -9,7 +9,8 @@ use palpate_devices::emulated::{EmulatedDevice, Handle, TrueMotion};
 use palpate_devices::{Device, Reading, Wrench};
 
 use crate::force_loop::ForceLoop;
-use crate::offline::Preparation;
+use crate::handoff::LOG_ROWS;
+use crate::preparation::Preparation;
 use crate::preparer::StrainPreparer;
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::Settings;
@@ -56,7 +57,7 @@ impl Emulation<'_> {
         let (mut handles, devices): (Vec<_>, Vec<_>) =
             devices.into_iter().map(|(handle, device)| (handle, Box::new(device) as Box<dyn Device>)).unzip();
         let (mut force_loop, mut handle) =
-            ForceLoop::with_clock(self.model.clone(), devices, self.limits, self.settings, || 0)?;
+            ForceLoop::with_clock(self.model.clone(), devices, self.limits, self.settings, (|| 0, LOG_ROWS))?;
         force_loop.limit_strain_of(self.strain.limitable());
         let mut preparation = Preparation::new(handle.take_strain()?, self.strain);
         for number in 0.. {

@@ -12,7 +12,7 @@ use palpate_devices::{Device, DeviceLimits, Wrench};
 
 use crate::change::{AcceptedOffer, ChangeEnd, ChangeHandle, change_ends};
 use crate::clock;
-use crate::handoff::{LoopEnds, LoopHandle, handoffs};
+use crate::handoff::{LOG_ROWS, LoopEnds, LoopHandle, handoffs};
 use crate::log::{LogRow, RealtimeStatus, Status};
 use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::record::{RecordedInput, RecordedTool, StrainArrivals, recorded_port};
@@ -65,16 +65,16 @@ impl ForceLoop {
         limits: SafetyLimits,
         settings: Settings,
     ) -> Result<(Self, LoopHandle)> {
-        Self::with_clock(model, devices, limits, settings, clock::now_ns)
+        Self::with_clock(model, devices, limits, settings, (clock::now_ns, LOG_ROWS))
     }
 
-    /// With a clock to measure ticks by.
+    /// With a clock to measure ticks by, and room for so many rows of the log.
     pub(crate) fn with_clock(
         model: Arc<Model>,
         devices: Vec<Box<dyn Device>>,
         limits: SafetyLimits,
         settings: Settings,
-        clock: Clock,
+        (clock, log_rows): (Clock, usize),
     ) -> Result<(Self, LoopHandle)> {
         let (tools, given) = (model.tools.len(), devices.len());
         refuse_unless(tools == given, || format!("a scene of {tools} tools takes as many devices, got {given}"))?;
@@ -86,7 +86,7 @@ impl ForceLoop {
             stages.push(SafetyStage::new(limits.with_device(&model, tool, &device.limits())?, moves));
         }
         let (changes, change_handle) = change_ends();
-        let (ends, handle) = handoffs(&model, &settings, &stages);
+        let (ends, handle) = handoffs(&model, &settings, &stages, log_rows);
         let (state, scratch) = (State::new(&model), Scratch::new(&model));
         let force_loop = Self {
             model,
@@ -174,6 +174,16 @@ impl ForceLoop {
             fault.into_iter().for_each(|fault| stage.latch(fault));
         }
         self.skipped = input.strain.unsent;
+    }
+
+    /// Wrench on the device of a tool in the last tick, before the safety stage.
+    pub(crate) fn computed(&mut self, tool: usize) -> ComputedWrench {
+        self.ends.recorder.tool(tool).computed
+    }
+
+    /// Its state after the last tick.
+    pub(crate) fn state(&self) -> &State {
+        &self.state
     }
 
     /// The end through which another scene comes in.

@@ -21,7 +21,7 @@ use crate::settings::Settings;
 use crate::strain::{PreparerEnd, StrainEnd, strain_ends};
 
 /// Rows of the log kept for a reader: 20 seconds at 1 kHz.
-const LOG_ROWS: usize = 20_000;
+pub(crate) const LOG_ROWS: usize = 20_000;
 
 /// The latest tick, for drawing.
 #[derive(Clone)]
@@ -52,13 +52,18 @@ pub struct LoopHandle {
     recorder: RecorderHandle,
 }
 
-/// Both ends, with settings that have been checked and the safety stages of the start.
-pub(crate) fn handoffs(model: &Arc<Model>, settings: &Settings, stages: &[SafetyStage]) -> (LoopEnds, LoopHandle) {
+/// Both ends, with settings that have been checked, the safety stages of the start and room for so many rows of the log.
+pub(crate) fn handoffs(
+    model: &Arc<Model>,
+    settings: &Settings,
+    stages: &[SafetyStage],
+    log_rows: usize,
+) -> (LoopEnds, LoopHandle) {
     let (command_end, commands) = command_ends();
     let status = Status { settings: *settings, ..Status::default() };
     let first = Published { status, state: Snapshot::new(model) };
     let (published_in, published_out) = triple_buffer(&first);
-    let (producer, consumer) = RingBuffer::new(LOG_ROWS);
+    let (producer, consumer) = RingBuffer::new(log_rows);
     let (strain, preparer) = strain_ends();
     let (recorder_end, recorder) = recorder_ends(stages);
     let ends =

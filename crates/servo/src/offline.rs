@@ -1,25 +1,23 @@
 //! Offline runs: the same ticks without a clock, from a script or from recorded inputs.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use glam::DVec3;
 use palpate_core::Result;
 use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Model, Pose, Strike};
-use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
+use palpate_devices::{Device, DeviceLimits};
 
 use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
+use crate::handoff::LOG_ROWS;
+use crate::preparation::Preparation;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedInput, TickRecord};
 use crate::replay::ReplayedDevice;
 use crate::safety::{Fault, SafetyLimits};
 use crate::settings::{Settings, check_node, refuse_unless};
-use crate::strain::{PreparerEnd, StrainAnswer};
-
-/// Ticks after which a strain response comes: about as many as the thread beside a running loop takes.
-const PREPARATION_TICKS: usize = 16;
+use crate::stepper::Stepper;
 
 /// What happens, tick by tick.
 pub struct Script<'a> {
@@ -71,26 +69,23 @@ pub fn run(
 ) -> Result<Recording> {
     check(model, script)?;
     let tools = model.tools.len();
-    let devices =
-        (0..tools).map(|tool| Box::new(ScriptedDevice::new(script, tool, tools)) as Box<dyn Device>).collect();
-    let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
-    force_loop.limit_strain_of(strain.limitable());
-    let mut preparation = Preparation::new(handle.take_strain()?, strain);
-    let mut records = handle.begin_recording()?;
+    let mut stepper = Stepper::new(model, script.devices, limits, settings, strain)?;
+    let mut records = stepper.handle.begin_recording()?;
     let mut strikes = script.strikes.iter().peekable();
     let moving = (0..model.bodies.len()).filter(|&body| model.bodies[body].moves());
     let mut recording = Recording { energies: moving.map(|body| (body, Vec::new())).collect(), ..Recording::default() };
-    for tick in 0..script.poses.len() / tools {
+    for (tick, poses) in script.poses.chunks_exact(tools).enumerate() {
         if let Some(&(_, strike)) = strikes.next_if(|(when, _)| *when == tick) {
-            handle.strike(strike)?;
+            stepper.handle.strike(strike)?;
         }
-        preparation.hand_over(tick);
+        let grabs = script.grabs.get(tick * tools..(tick + 1) * tools).unwrap_or_default();
+        stepper.prepare(poses, grabs, script.period);
         let begun = computed_ns();
-        force_loop.tick((1e9 * script.period * tick as f64).round() as u64, script.period);
+        stepper.tick();
         recording.compute_ns.push(computed_ns() - begun);
-        preparation.prepare(tick);
+        stepper.finish();
         records.pop().iter().for_each(&mut each);
-        let published = handle.latest();
+        let published = stepper.handle.latest();
         let (status, state) = (&published.status, &published.state);
         recording.fault = recording.fault.or(status.fault);
         recording.forces.extend(status.wrenches[..tools].iter().map(|wrench| wrench.force));
@@ -123,7 +118,8 @@ pub fn rerun(
 ) -> Result<()> {
     let (mut readings, devices): (Vec<_>, Vec<_>) = devices.iter().map(|&limits| ReplayedDevice::new(limits)).unzip();
     let devices = devices.into_iter().map(|device| Box::new(device) as Box<dyn Device>).collect();
-    let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), devices, limits, settings, || 0)?;
+    let (mut force_loop, mut handle) =
+        ForceLoop::with_clock(model.clone(), devices, limits, settings, (|| 0, LOG_ROWS))?;
     force_loop.limit_strain_of(strain.limitable());
     let mut preparation = Preparation::new(handle.take_strain()?, strain);
     let mut records = handle.begin_recording()?;
@@ -147,31 +143,6 @@ pub fn rerun(
     Ok(())
 }
 
-/// Strain responses between the ticks, handed over after a fixed number of them.
-pub(crate) struct Preparation<'a> {
-    end: PreparerEnd,
-    strain: &'a StrainPreparer,
-    due: VecDeque<(usize, StrainAnswer)>,
-}
-
-impl<'a> Preparation<'a> {
-    pub(crate) fn new(end: PreparerEnd, strain: &'a StrainPreparer) -> Self {
-        Self { end, strain, due: VecDeque::new() }
-    }
-
-    pub(crate) fn hand_over(&mut self, tick: usize) {
-        while self.due.front().is_some_and(|(when, _)| *when <= tick) {
-            self.due.pop_front().into_iter().for_each(|(_, response)| self.end.send(response));
-        }
-    }
-
-    pub(crate) fn prepare(&mut self, tick: usize) {
-        while let Some(prepared) = self.end.prepare_one(self.strain) {
-            self.due.extend(prepared.map(|response| (tick + PREPARATION_TICKS, response)));
-        }
-    }
-}
-
 fn check(model: &Model, script: &Script<'_>) -> Result<()> {
     let (tools, poses, grabs) = (model.tools.len(), script.poses.len(), script.grabs.len());
     refuse_unless(script.period > 0.0 && script.period.is_finite(), || {
@@ -187,61 +158,4 @@ fn check(model: &Model, script: &Script<'_>) -> Result<()> {
         format!("a strike comes after the last of {} ticks", poses / tools)
     })?;
     script.watch.iter().try_for_each(|&(body, node)| check_node(model, body, node))
-}
-
-/// The device of one tool of a script. Its pose is commanded: it may jump.
-struct ScriptedDevice {
-    poses: std::vec::IntoIter<Pose>,
-    grabs: std::vec::IntoIter<bool>,
-    latest: Reading,
-    limits: DeviceLimits,
-}
-
-impl ScriptedDevice {
-    fn new(script: &Script<'_>, tool: usize, tools: usize) -> Self {
-        fn of_tool<T: Copy>(all: &[T], tool: usize, tools: usize) -> std::vec::IntoIter<T> {
-            all.iter().copied().skip(tool).step_by(tools).collect::<Vec<_>>().into_iter()
-        }
-        Self {
-            poses: of_tool(script.poses, tool, tools),
-            grabs: of_tool(script.grabs, tool, tools),
-            latest: Reading::default(),
-            limits: DeviceLimits {
-                max_speed: None,
-                ..script.devices.get(tool).copied().unwrap_or(DeviceLimits::UNLIMITED)
-            },
-        }
-    }
-}
-
-impl Device for ScriptedDevice {
-    fn name(&self) -> &str {
-        "script"
-    }
-
-    fn read(&mut self, now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
-        let before = self.latest;
-        let pose = self.poses.next().ok_or(DeviceFault::Disconnected)?;
-        self.latest.active = pose.position.is_finite();
-        self.latest.timestamp_ns = now_ns;
-        self.latest.buttons = if self.grabs.next().unwrap_or(false) { Buttons::GRAB } else { Buttons::default() };
-        if self.latest.active {
-            self.latest.pose = pose;
-            self.latest.twist = if before.active { twist(&before.pose, &pose, period) } else { Twist::default() };
-        }
-        Ok(self.latest)
-    }
-
-    fn write(&mut self, _wrench: Wrench) -> Result<(), DeviceFault> {
-        Ok(())
-    }
-
-    fn limits(&self) -> DeviceLimits {
-        self.limits
-    }
-}
-
-/// Mean velocity from one pose to the next.
-fn twist(before: &Pose, now: &Pose, period: f64) -> Twist {
-    Twist { linear: (now.position - before.position) / period, angular: now.rotation_from(before) / period }
 }

@@ -12,6 +12,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
+use crate::handoff::LOG_ROWS;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::LogRow;
 use crate::preparer::StrainPreparer;
@@ -89,7 +90,8 @@ impl Replay {
             readings.push(producer);
             replayed.push(Box::new(device) as Box<dyn Device>);
         }
-        let (mut force_loop, mut handle) = ForceLoop::with_clock(model.clone(), replayed, limits, settings, || 0)?;
+        let (mut force_loop, mut handle) =
+            ForceLoop::with_clock(model.clone(), replayed, limits, settings, (|| 0, LOG_ROWS))?;
         force_loop.limit_strain_of(strain.limitable());
         let (records, end) = (handle.begin_recording()?, handle.take_strain()?);
         let tools = model.tools.len();

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,6 +25,7 @@ from palpate.cli.bodies import (
     YoungsModulus,
 )
 from palpate.cli.completion import devices, models
+from palpate.cli.linking import Igtl, IgtlAxes, IgtlFrom, IgtlHost, LinkOptions, linked
 
 if TYPE_CHECKING:
     import numpy as np
@@ -140,6 +141,10 @@ def run(
     port: Port = PORT,
     host: Host = "127.0.0.1",
     browser: Browser = True,
+    igtl: Igtl = None,
+    igtl_host: IgtlHost = "127.0.0.1",
+    igtl_axes: IgtlAxes = "RAS",
+    igtl_from: IgtlFrom = None,
 ) -> None:
     """Run the 1 kHz force loop on a scene, a store, or a bare mesh or surface, in the browser.
 
@@ -159,6 +164,8 @@ def run(
 
     Example: palpate run scene.toml --record press.mcap
 
+    Example: palpate run scene.toml --igtl 18944 --no-browser
+
     A scene with [touch] first opens when that part is ready; the rest is computed while you touch.
 
     Example: palpate run nodule.toml --map nodule-palpation/detection.vtu
@@ -167,13 +174,15 @@ def run(
     """
     from palpate.cli.run_file import RunOptions, built_from
 
-    page = _Page(host, port, browser, recordings)
+    page = _Page(host, port, browser, recordings, LinkOptions(igtl, igtl_host, igtl_axes, igtl_from))
     lengths = {"unit": unit, "max_size": max_size, "element": element}
     lengths |= {"mesher": mesher, "part": part, "max_volume_loss": max_volume_loss}
     lengths |= {"segment": tuple(segment) if segment else None}
     material = {"youngs_modulus": youngs_modulus, "poissons_ratio": poissons_ratio, "density": density}
     of_loop = {"cpus": cpus, "priority": priority, "device": tuple(device) if device else None}
     options = RunOptions(radius=radius, fix=fix, **material, **lengths, **of_loop)
+    if page.link.is_asked and (file is None or headless is not None):
+        raise typer.BadParameter("--igtl and --igtl-from need a FILE, and no --headless")
     if file is None:
         options.refuse(Path("an empty page"), set(), "what belongs to a body is chosen in the page", of_loop=False)
         if surface_map is not None or headless is not None or record is not None:
@@ -198,12 +207,13 @@ def _build(scene: Scene) -> BuiltScene:
 
 @dataclass(frozen=True)
 class _Page:
-    """Where the page is served, whether it is opened, and where it puts recordings."""
+    """Where the page is served, whether it is opened, where it puts recordings, and who else is linked."""
 
     host: str
     port: int
     browser: bool
     recordings: Path
+    link: LinkOptions = field(default_factory=LinkOptions)
 
 
 def _view(
@@ -251,7 +261,8 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
         maps = None if surface_map is None else read_map(surface_map, built)
         return Prepared(built, growing, maps)
 
-    open_viewer(server, browser=page.browser, preparation=Preparation(file.name, build))
+    with linked(server, page.link, page.recordings):
+        open_viewer(server, browser=page.browser, preparation=Preparation(file.name, build))
 
 
 def _print_kept() -> None:

@@ -6,6 +6,7 @@ from palpate.simulation.packed import pack
 from palpate.simulation.recording import CONTACT_DTYPE, Recording, RecordingStatus
 from palpate.simulation.replay import Difference, Replayed, replay, simulation_of, ticks_before_gap
 from palpate.simulation.replayed import ReplayedSimulation
+from palpate.simulation.sensor import Sensor, SensorContacts
 from palpate.simulation.simulation import Simulation
 
 __all__ = [
@@ -18,6 +19,8 @@ __all__ = [
     "RecordingStatus",
     "Replayed",
     "ReplayedSimulation",
+    "Sensor",
+    "SensorContacts",
     "Simulation",
     "frame_of",
     "pack",

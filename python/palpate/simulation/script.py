@@ -25,7 +25,7 @@ def positions_of(positions: Any, tools: int) -> np.ndarray:
         Another shape, or more tools than the scene has.
 
     """
-    path = _array(positions, "positions")
+    path = number_array(positions, "positions")
     if path.ndim not in (2, 3) or path.shape[-1] != 3:
         raise SceneError(f"positions must have shape (ticks, 3) or (ticks, tools, 3), got {path.shape}")
     path = path[:, None] if path.ndim == 2 else path
@@ -46,7 +46,7 @@ def orientations_of(orientations: Any, positions: np.ndarray) -> np.ndarray:
     shape = (*positions.shape[:2], 4)
     if orientations is None:
         return np.broadcast_to([1.0, 0.0, 0.0, 0.0], shape).copy()
-    turned = _array(orientations, "orientations")
+    turned = number_array(orientations, "orientations")
     turned = turned[:, None] if turned.ndim == 2 else turned
     if turned.shape != shape:
         raise SceneError(f"orientations must have shape {shape}, as the positions, got {turned.shape}")
@@ -109,7 +109,15 @@ def strike_of(
     return where, three_numbers(impulse, "a strike's impulse", SceneError), seconds
 
 
-def _array(values: Any, what: str) -> np.ndarray:
+def number_array(values: Any, what: str) -> np.ndarray:
+    """Take values as an array of numbers.
+
+    Raises
+    ------
+    SceneError
+        Values that are none.
+
+    """
     try:
         return np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

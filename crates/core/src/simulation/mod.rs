@@ -4,7 +4,7 @@
 //! `input` has the inputs of a tick, `model` the constant data, `state` the data that evolve. A `law` begins, follows and ends a
 //! contact and finds its force. `limit` keeps the strain in the range of linear elasticity. `solve` finds the forces of all linear
 //! contacts of a body together. A body in motion has a `motion`, which a `strike` may start, and an `energy` balance. On a body at
-//! rest `passivity` prevents contacts from releasing more energy than tools have put in. `snapshot` has the data to draw.
+//! rest `passivity` prevents contacts from releasing more energy than tools have put in. `snapshot` has the data to draw, `taxels` the pressures on a tool.
 
 mod body;
 mod contact_check;
@@ -29,6 +29,7 @@ mod strain_projection;
 mod strain_watch;
 mod strike;
 mod system;
+mod taxels;
 mod time;
 mod tool;
 mod weight_scratch;
@@ -43,6 +44,7 @@ pub use snapshot::Snapshot;
 pub use state::{BodyState, State, ToolState};
 pub use step::step;
 pub use strain_watch::StrainWatch;
+pub use taxels::TaxelGrid;
 pub use tool::{LawKind, ToolModel, contact_size};
 
 /// Most tools a simulation may have.

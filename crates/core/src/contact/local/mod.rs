@@ -10,6 +10,7 @@ mod force_series;
 mod friction;
 mod modulus;
 mod sphere;
+mod sphere_pressure;
 mod strain_law;
 mod strain_table;
 mod widening;
@@ -20,5 +21,6 @@ pub use force_series::{HigherOrders, SERIES_FIELDS, SeriesFields, higher_orders}
 pub use friction::{Friction, FrictionResponse};
 pub use modulus::effective_modulus;
 pub use sphere::{SphereContact, indent_sphere};
+pub use sphere_pressure::SpherePressure;
 pub use strain_law::{STRAIN_RATIOS, StrainLaw, interpolate, strain_terms};
 pub use widening::{WidenedContact, Widening};

@@ -66,10 +66,26 @@ pub struct CellProblem<'a> {
     pub width: f64,
 }
 
+/// Where the cells lie, relative to the origin of the tool, in the axes of the problem.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CellPlace {
+    /// Corner of the grid, m.
+    pub corner: DVec3,
+    /// Side of a cell along its first axis, m.
+    pub along: DVec3,
+    /// Side of a cell along its second axis, m.
+    pub across: DVec3,
+    /// Cells along each side of the grid.
+    pub count: usize,
+}
+
 /// Pressures that the next solution starts from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureState {
     resolution: Resolution,
+    place: CellPlace,
+    /// Forces up to a common factor, of the last solution.
+    forces: Grid,
     /// Forces over `pi E* sqrt(hx hy)`, m.
     q: Grid,
     /// Forces of a punch on the same cells for a unit approach.
@@ -79,7 +95,19 @@ pub struct PressureState {
 impl Default for PressureState {
     fn default() -> Self {
         let zero = [[0.0; MAX_CELLS]; MAX_CELLS];
-        Self { resolution: Resolution::Fine, q: zero, punch: zero }
+        Self { resolution: Resolution::Fine, place: CellPlace::default(), forces: zero, q: zero, punch: zero }
+    }
+}
+
+impl PressureState {
+    /// Where the cells lay in the last solution.
+    pub fn place(&self) -> &CellPlace {
+        &self.place
+    }
+
+    /// Normal forces of the cells in the last solution, up to a common factor: across the grid, then along it.
+    pub fn forces(&self) -> &[[f64; MAX_CELLS]; MAX_CELLS] {
+        &self.forces
     }
 }
 
@@ -160,6 +188,8 @@ impl CellProblem<'_> {
         scratch.soften(&cells, &edges);
         let convergence = scratch.solver.solve(&scratch.influence, cells.count, &scratch.scaled, largest, &mut state.q);
         let contact = scratch.integrate(&tool, &cells, &edges, &self.plane, &state.q);
+        state.place = cells.place(&self.plane, self.pose.position);
+        scratch.write_forces(cells.count, state);
         let punch = scratch.solver.punch(&scratch.influence, cells.count, &state.q, &mut state.punch);
         CellContact { stiffness: cells.force_scale * punch, overlap: largest, convergence, ..contact }
     }
@@ -259,6 +289,19 @@ impl Cells {
             sides: self.sides,
             count: self.count,
             lowest: -depth,
+        }
+    }
+
+    /// The grid in the axes of the world, relative to a point.
+    fn place(&self, plane: &ContactPlane, origin: DVec3) -> CellPlace {
+        let [along, across] = self.rectangle.axes;
+        let [[left, _], [below, _]] = &self.rectangle.sides;
+        let corner = left.coordinate * along + below.coordinate * across;
+        CellPlace {
+            corner: plane.origin + plane.axes * corner - origin,
+            along: plane.axes * (along * self.sides[0]),
+            across: plane.axes * (across * self.sides[1]),
+            count: self.count,
         }
     }
 

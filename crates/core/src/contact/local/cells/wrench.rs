@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::grid::ToolInSurfaceFrame;
 use super::influence::Grid;
 use super::pressure::dot;
-use super::{CellContact, CellScratch, Cells, EdgeSoftening};
+use super::{CellContact, CellScratch, Cells, EdgeSoftening, PressureState};
 use crate::contact::local::ContactPlane;
 
 /// Least normal component of a tool's normal: its walls do not press along the normal.
@@ -61,6 +61,15 @@ impl CellScratch {
                 let root = (1.0 + edges.share * self.heights.softening[j][i]).sqrt();
                 self.root[j][i] = root;
                 self.scaled[j][i] = self.gap[j][i] / root;
+            }
+        }
+    }
+
+    /// Writes the forces of the solution, up to a common factor.
+    pub(super) fn write_forces(&self, count: usize, state: &mut PressureState) {
+        for j in 0..count {
+            for i in 0..count {
+                state.forces[j][i] = state.q[j][i] / self.root[j][i];
             }
         }
     }

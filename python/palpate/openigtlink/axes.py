@@ -1,0 +1,80 @@
+"""Units and axes of the wire: millimetres, and the patient's axes RAS or LPS.
+
+Palpate has metres, and bodies of segmentations in RAS: x to the patient's right, y to the front (anterior), z to the
+head (superior). Slicer has the same axes in millimetres. LPS, of DICOM and ITK, turns x and y around.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+MILLIMETRES = 1e3
+
+
+class Axes:
+    """Conversion between a scene (m, RAS) and the wire (mm, RAS or LPS), in whose world the scene may stand anywhere.
+
+    Parameters
+    ----------
+    name
+        Axes of the wire.
+
+    """
+
+    def __init__(self, name: Literal["RAS", "LPS"] = "RAS"):
+        self.name = name
+        self._signs = np.array([1.0, 1.0, 1.0] if name == "RAS" else [-1.0, -1.0, 1.0])
+        self._placement = np.eye(4)
+
+    def place(self, matrix: np.ndarray) -> None:
+        """Take the placement of the scene in the world of the wire, (4, 4) in mm."""
+        self._placement = np.array(matrix, dtype=float)
+
+    def pose_from_wire(self, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position, m, and unit quaternion w x y z in the scene."""
+        own = np.linalg.inv(self._placement) @ matrix
+        turned = own[:3, :3] * np.outer(self._signs, self._signs)
+        return self._signs * own[:3, 3] / MILLIMETRES, _quaternion(turned)
+
+    def pose_to_wire(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """Matrix (4, 4), mm, of a position, m, and a unit quaternion in the scene."""
+        own = np.eye(4)
+        own[:3, :3] = _rotation(orientation) * np.outer(self._signs, self._signs)
+        own[:3, 3] = self._signs * np.asarray(position) * MILLIMETRES
+        return self._placement @ own
+
+    def points_to_wire(self, points: np.ndarray) -> np.ndarray:
+        """Points (k, 3), mm, of points in the scene, m."""
+        return (self._signs * points * MILLIMETRES) @ self._placement[:3, :3].T + self._placement[:3, 3]
+
+    def vector_to_wire(self, vector: np.ndarray) -> np.ndarray:
+        """Vector of the scene in the axes of the wire, in its own unit; torques too, for both are right-handed."""
+        return self._placement[:3, :3] @ (self._signs * vector)
+
+
+def _quaternion(rotation: np.ndarray) -> np.ndarray:
+    """Find the unit quaternion w x y z of a rotation as the eigenvector of Bar-Itzhack's matrix: for any angle."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    matrix = np.array(
+        [
+            [a + e + i, h - f, c - g, d - b],
+            [h - f, a - e - i, b + d, c + g],
+            [c - g, b + d, e - a - i, f + h],
+            [d - b, c + g, f + h, i - a - e],
+        ]
+    )
+    found = np.linalg.eigh(matrix)[1][:, -1]
+    return found if found[0] >= 0 else -found
+
+
+def _rotation(quaternion: np.ndarray) -> np.ndarray:
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -1,0 +1,171 @@
+"""What peers may say to a simulation, and what they get of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from palpate.atomic import written_beside
+from palpate.errors import Error
+from palpate.openigtlink.axes import Axes
+from palpate.openigtlink.messages import (
+    Message,
+    MessageError,
+    pack,
+    point_content,
+    read_string,
+    read_transform,
+    string_content,
+    transform_content,
+)
+from palpate.simulation import Frame, Simulation
+
+# A tool that nobody moves for this long leaves the scene, s.
+SILENCE = 0.5
+# Names of the devices of messages.
+TOOL, BODY, COMMAND = "Tool", "Body", "Command"
+TOOL_POSE, CONTACTS, FORCE, ANSWER = "ToolPose", "Contacts", "Force", "Answer"
+
+
+class Link:
+    """A simulation as peers see it.
+
+    In: TRANSFORM ``Tool`` or ``Tool0`` to ``Tool3`` moves a tool, ``Body`` says where the scene stands in the world of
+    the wire, STRING ``Command`` with ``reset`` or ``surface`` begins anew or writes the deformed surface to a file.
+    Out: TRANSFORM ``ToolPose`` (``ToolPose1``...), POINT ``Contacts``, STRING ``Force`` (JSON in N and N m, axes of the
+    wire) and STRING ``Answer``.
+
+    Parameters
+    ----------
+    simulation
+        Gives the simulation that runs now; None where none does.
+    axes
+        Of the wire.
+    folder
+        Where ``surface`` writes.
+
+    """
+
+    def __init__(self, simulation: Callable[[], Simulation | None], axes: Axes | None = None, folder: Path = Path()):
+        self._simulation, self.axes, self._folder = simulation, axes or Axes(), folder
+        # Who moves each tool, and when it was last moved.
+        self._movers: dict[int, tuple[object, float]] = {}
+
+    def take(self, peer: object, message: Message, now: float) -> bytes | None:
+        """Do what a message says; an answer for its peer alone, or None. What Palpate does not know is left alone.
+
+        Raises
+        ------
+        MessageError
+            A message whose content is wrong.
+
+        """
+        simulation = self._simulation()
+        if message.kind == "TRANSFORM" and message.device == BODY:
+            self.axes.place(read_transform(message))
+        elif message.kind == "TRANSFORM" and message.device.startswith(TOOL):
+            matrix = read_transform(message)
+            tool = _rank(message.device)
+            if simulation is not None and tool is not None and tool < len(simulation.scene.tools):
+                self._move(simulation, tool, matrix, peer, now)
+        elif message.kind == "STRING" and message.device == COMMAND:
+            return pack("STRING", ANSWER, string_content(self._command(simulation, read_string(message))), time.time())
+        return None
+
+    def _move(self, simulation: Simulation, tool: int, matrix: np.ndarray, peer: object, now: float) -> None:
+        mover, since = self._movers.get(tool, (peer, now))
+        if mover is not peer and now - since < SILENCE:
+            return
+        position, orientation = self.axes.pose_from_wire(matrix)
+        try:
+            simulation.move(position, tool=tool, orientation=orientation)
+        except Error as error:
+            raise MessageError(str(error)) from None
+        self._movers[tool] = (peer, now)
+
+    def _command(self, simulation: Simulation | None, text: str) -> str:
+        if simulation is None:
+            return "refused: nothing runs"
+        try:
+            if text == "reset":
+                simulation.reset()
+                return "done"
+            if text == "surface":
+                return f"surface {self._write_surface(simulation.frame())}"
+        except (Error, OSError) as error:
+            return f"refused: {error}"
+        return "refused: commands are 'reset' and 'surface'"
+
+    def _write_surface(self, frame: Frame) -> Path:
+        """Write the deformed surface of all bodies, mm in the axes of the wire, as ASCII PLY: Slicer reads it."""
+        surfaces = [body.surface_in_scene() for body in frame.bodies]
+        starts = np.cumsum([0, *(len(surface.positions) for surface in surfaces)])
+        points = self.axes.points_to_wire(np.concatenate([surface.positions for surface in surfaces]))
+        faces = np.concatenate([s.triangles + start for s, start in zip(surfaces, starts, strict=False)])
+        path = (self._folder / "deformed.ply").absolute()
+        header = f"ply\nformat ascii 1.0\ncomment mm {self.axes.name}\nelement vertex {len(points)}\n"
+        header += "property float x\nproperty float y\nproperty float z\n"
+        header += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+        rows = [" ".join(f"{x:.9g}" for x in point) for point in points]
+        rows += ["3 " + " ".join(map(str, face)) for face in faces]
+        with written_beside(path) as beside:
+            beside.write_text(header + "\n".join(rows) + "\n")
+        return path
+
+    def let_go(self, peer: object) -> None:
+        """Take the tools of a peer that has gone out of the scene."""
+        for tool in [tool for tool, (mover, _) in self._movers.items() if mover is peer]:
+            self._remove(tool)
+
+    def let_go_of_silent(self, now: float) -> None:
+        """Take tools that nobody moves any more out of the scene."""
+        for tool in [tool for tool, (_, since) in self._movers.items() if now - since > SILENCE]:
+            self._remove(tool)
+
+    def _remove(self, tool: int) -> None:
+        del self._movers[tool]
+        simulation = self._simulation()
+        if simulation is not None and tool < len(simulation.scene.tools):
+            simulation.remove(tool)
+
+    def state(self) -> bytes | None:
+        """Messages of the latest tick; None where nothing runs."""
+        simulation = self._simulation()
+        if simulation is None:
+            return None
+        try:
+            frame = simulation.frame()
+        except Error:
+            return None
+        now, axes = time.time(), self.axes
+        sent = []
+        for tool in np.flatnonzero(frame.active):
+            matrix = axes.pose_to_wire(frame.positions[tool], frame.orientations[tool])
+            sent.append(pack("TRANSFORM", f"{TOOL_POSE}{tool or ''}", transform_content(matrix), now))
+        contacts = frame.contacts
+        if contacts:
+            points = axes.points_to_wire(np.array([contact.point for contact in contacts]))
+            names = [f"tool {contact.tool} on body {contact.body}" for contact in contacts]
+            diameters = [2e3 * contact.radius for contact in contacts]
+            sent.append(pack("POINT", CONTACTS, point_content(points, names, diameters), now))
+        wrenches = {
+            "time_s": round(frame.time, 6),
+            "axes": axes.name,
+            "force_N": [axes.vector_to_wire(force).tolist() for force in frame.forces],
+            "torque_Nm": [axes.vector_to_wire(torque).tolist() for torque in frame.torques],
+            "fault": frame.statistics["fault"],
+        }
+        sent.append(pack("STRING", FORCE, string_content(json.dumps(wrenches)), now))
+        return b"".join(sent)
+
+
+def _rank(device: str) -> int | None:
+    """Rank of the tool of a device's name: that of 'Tool' is 0."""
+    number = device.removeprefix(TOOL)
+    if number == "":
+        return 0
+    return int(number) if number.isascii() and number.isdigit() and len(number) < 3 else None

@@ -1,0 +1,200 @@
+"""The thread that serves peers: it accepts, reads, sends at a rate, and calls trackers that are servers themselves."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import selectors
+import socket
+import sys
+import threading
+import time
+from types import TracebackType
+
+from palpate.errors import ViewerError
+from palpate.openigtlink.link import Link
+from palpate.openigtlink.messages import MessageError
+from palpate.openigtlink.peer import Peer
+
+PORT = 18944
+MOST_PEERS = 8
+# Time between two calls of a tracker that does not answer, s.
+REDIAL = 1.0
+
+
+class LinkServer:
+    """Serves a link on a port, on this machine alone unless another host is given.
+
+    As a context manager it runs on a thread of its own. That thread never waits for a peer, and the force loop never
+    waits for it.
+
+    Parameters
+    ----------
+    link
+        What peers say goes there, and what they get comes from it.
+    port
+        0 takes a free one; None listens nowhere.
+    host
+        Address to listen on.
+    rate
+        How often the state is sent, Hz.
+    tracker
+        Host and port of a server to be called besides, such as that of PLUS.
+
+    Raises
+    ------
+    ViewerError
+        A port that is in use, or a host that this machine does not have.
+
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        port: int | None = PORT,
+        *,
+        host: str = "127.0.0.1",
+        rate: float = 100.0,
+        tracker: tuple[str, int] | None = None,
+    ):
+        self.link, self._period, self._tracker = link, 1.0 / rate, tracker
+        self._selector = selectors.DefaultSelector()
+        self._peers: dict[socket.socket, Peer] = {}
+        self._listener: socket.socket | None = None
+        self._called: socket.socket | None = None
+        self._redial = 0.0
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="palpate-igtl", daemon=True)
+        if port is not None:
+            self._listener = _listening(host, port)
+            self._selector.register(self._listener, selectors.EVENT_READ)
+
+    @property
+    def port(self) -> int | None:
+        """The port on which it listens."""
+        return None if self._listener is None else int(self._listener.getsockname()[1])
+
+    def __enter__(self) -> LinkServer:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End the thread, and close all connections."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        for peer in list(self._peers.values()):
+            self._drop(peer, None)
+        for open_socket in (self._listener, self._called):
+            if open_socket is not None:
+                open_socket.close()
+        self._selector.close()
+
+    def _serve(self) -> None:
+        due = time.monotonic()
+        while not self._stop.is_set():
+            now = time.monotonic()
+            for key, _ in self._selector.select(max(0.0, min(due - now, 0.1))):
+                self._ready(key.fileobj, time.monotonic())
+            now = time.monotonic()
+            self._call_tracker(now)
+            if now >= due:
+                # A state that could not be sent in time is left out.
+                due = max(due + self._period, now)
+                self._send_state(now)
+
+    def _ready(self, which: object, now: float) -> None:
+        if which is self._listener:
+            self._accept()
+        elif which is self._called:
+            self._connected()
+        elif (peer := self._peers.get(which)) is not None:  # type: ignore[call-overload]
+            try:
+                for message in peer.read(now):
+                    answer = self.link.take(peer, message, now)
+                    if answer is not None:
+                        peer.send(answer, now)
+            except (MessageError, OSError) as error:
+                self._drop(peer, error)
+
+    def _accept(self) -> None:
+        assert self._listener is not None
+        try:
+            connection, address = self._listener.accept()
+        except OSError:
+            return
+        if len(self._peers) >= MOST_PEERS:
+            connection.close()
+            return
+        self._add(connection, f"{address[0]}:{address[1]}")
+
+    def _add(self, connection: socket.socket, name: str) -> None:
+        self._peers[connection] = Peer(connection, name)
+        self._selector.register(connection, selectors.EVENT_READ)
+
+    def _drop(self, peer: Peer, error: Exception | None) -> None:
+        self._selector.unregister(peer.connection)
+        del self._peers[peer.connection]
+        self.link.let_go(peer)
+        peer.close()
+        if isinstance(error, MessageError):
+            print(f"palpate: note: OpenIGTLink: {peer.name} was disconnected: {error}", file=sys.stderr, flush=True)
+
+    def _send_state(self, now: float) -> None:
+        self.link.let_go_of_silent(now)
+        state = self.link.state() if self._peers else None
+        for peer in list(self._peers.values()):
+            try:
+                peer.flush()
+                if state is not None:
+                    peer.send(state, now)
+                peer.require_alive(now)
+            except (MessageError, OSError) as error:
+                self._drop(peer, error)
+
+    def _call_tracker(self, now: float) -> None:
+        if self._tracker is None or self._called is not None or now < self._redial:
+            return
+        name = f"{self._tracker[0]}:{self._tracker[1]}"
+        if any(peer.name == name for peer in self._peers.values()):
+            return
+        self._redial = now + REDIAL
+        self._called = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._called.setblocking(False)
+        try:
+            begun = self._called.connect_ex(self._tracker)
+        except OSError:
+            begun = -1
+        if begun not in (0, errno.EINPROGRESS):
+            self._called.close()
+            self._called = None
+            return
+        self._selector.register(self._called, selectors.EVENT_WRITE)
+
+    def _connected(self) -> None:
+        called, self._called = self._called, None
+        assert called is not None and self._tracker is not None
+        self._selector.unregister(called)
+        if called.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) != 0:
+            called.close()
+            return
+        self._add(called, f"{self._tracker[0]}:{self._tracker[1]}")
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except (OSError, OverflowError) as error:
+        with contextlib.suppress(OSError):
+            listener.close()
+        raise ViewerError(f"OpenIGTLink cannot listen on {host}:{port}: {error}; give another port to --igtl") from None
+    listener.listen(MOST_PEERS)
+    listener.setblocking(False)
+    return listener
