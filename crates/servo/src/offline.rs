@@ -9,8 +9,8 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Model, Pose, Strike};
 use palpate_devices::{Buttons, Device, DeviceFault, DeviceLimits, Reading, Twist, Wrench};
 
-use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
+use crate::platform::computed_ns;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedInput, TickRecord};
 use crate::replay::ReplayedDevice;

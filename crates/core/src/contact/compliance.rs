@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::math::{acos, cos};
 use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, SurfaceQuery, TouchPatch, patch_weights};
 use crate::green::GreensFunction;
 use crate::green::accuracy::{Pressed, PressedError, largest, relative};
@@ -18,7 +19,7 @@ pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
         return mean;
     }
     let r = (deviator.determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
-    mean + 2.0 * p * (r.acos() / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3).cos()
+    mean + 2.0 * p * cos(acos(r) / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3)
 }
 
 /// Response to a pressed patch.

@@ -11,6 +11,7 @@
 //!
 //! so that force, stiffness and the forces along a surface on which anything changes follow from one energy.
 
+use crate::math::cbrt;
 use super::finite_strain::{StrainCorrection, StrainTerms, correct_sphere};
 use super::sphere::{SphereContact, indent_sphere};
 
@@ -99,7 +100,7 @@ impl Widening {
 
 /// Square of the radius of a Hertzian contact, m^2.
 fn hertz_area(force: f64, radius: f64, effective_modulus: f64) -> f64 {
-    (0.75 * radius * force / effective_modulus).cbrt().powi(2)
+    cbrt(0.75 * radius * force / effective_modulus).powi(2)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@
 
 use glam::{DMat4, DVec4};
 use pulp::{Arch, NullaryFnOnce};
+use crate::math::log;
 
 /// Most cells along a side of the grid.
 pub const MAX_CELLS: usize = 16;
@@ -65,8 +66,8 @@ impl Influence {
             for i in 0..self.cells {
                 let x = i as f64 + 0.5;
                 let r = (x * x + y * y).sqrt();
-                by_y[j][i] = ((x + r) / y).ln();
-                value[j][i] = x * ((y + r) / x).ln() + y * by_y[j][i];
+                by_y[j][i] = log((x + r) / y);
+                value[j][i] = x * log((y + r) / x) + y * by_y[j][i];
             }
         }
         self.fill(&value, &by_y);

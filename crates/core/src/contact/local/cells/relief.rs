@@ -12,6 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DMat3, DVec3};
 
+use crate::math::{acos, sin};
 use super::super::contact_plane::ContactPlane;
 use super::influence::{Grid, MAX_CELLS};
 
@@ -130,9 +131,9 @@ impl Wedge {
         if first.cross(second).dot(along) <= 0.0 {
             return None;
         }
-        let angle = PI - first.dot(second).clamp(-1.0, 1.0).acos();
+        let angle = PI - acos(first.dot(second).clamp(-1.0, 1.0));
         let wide = angle.max(FRAC_PI_2);
-        let compliance = [PI / (angle + angle.sin()), PI / (wide - wide.sin())];
+        let compliance = [PI / (angle + sin(angle)), PI / (wide - sin(wide))];
         Some(Self { bisector: (first + second).try_normalize()?, compliance })
     }
 

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::math::hypot;
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
@@ -135,7 +136,7 @@ fn evaluate_sphere(
         false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
     };
     let distance = match body.series {
-        Some(_) => foot.distance.signum() * foot.distance.hypot(guess.offset.length()),
+        Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
         None => foot.distance,
     };
     body.smooth.weigh(&foot, weights);
@@ -375,7 +376,7 @@ impl LocalResponse {
             return n * force;
         }
         let along = (across(n) * (slope - gradient)).clamp_length_max(STEEPEST_INCLINATION * before);
-        let before = before.hypot(along.length());
+        let before = hypot(before, along.length());
         let inclination = along * (1.0 / before);
         let direction = n * (1.0 - inclination.length_squared()).sqrt() + inclination;
         let by_force = across(n) * (self.slope_by_force + outer(inclination, direction)) * (self.distance / before);
