@@ -52,6 +52,12 @@ def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path) -> 
     return sizes
 
 
+def with_precision(scene: Scene, precision: str) -> Scene:
+    """Scene whose stores have numbers of another precision: ``f16`` is half as large to fetch as ``f32``."""
+    bodies = [body.model_copy(update={"precision": precision}) for body in scene.bodies]
+    return scene.model_copy(update={"bodies": bodies})
+
+
 def plain_name(name: str) -> str:
     """Name of a scene in an address."""
     return re.sub(r"[^\w-]+", "-", name) or "scene"
