@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint viewer check-tools clean
+.PHONY: demo test campaigns install web wheel sdist other-build sanitize lint viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -49,11 +49,6 @@ $(WEB): Cargo.lock scripts/build_web.sh $(shell find $(WEB_CRATES:%=crates/%) -n
 	scripts/build_web.sh $@
 
 web: $(WEB)
-
-# The built-in models as one static site with a page of pictures: SITE=folder.
-SITE ?= site
-site: $(VENV)/.installed $(PAGE) $(WEB)
-	$(BIN)/python scripts/make_site.py $(SITE)
 
 # libpalpate for programs in C and C++: library, header, pkg-config, CMake (docs/c-api.md).
 PREFIX ?= /usr/local

@@ -57,7 +57,8 @@ EOF
 }
 
 if ! has_target; then
-    if rustup target add $target >/dev/null 2>&1 && has_target; then :; else
+    # Where rustup reaches nothing it would try for a minute.
+    if timeout 20 rustup target add $target >/dev/null 2>&1 && has_target; then :; else
         from_debian
         export RUSTC=$root/rustc CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$root/wasm-ld
     fi

@@ -97,7 +97,9 @@ impl Session {
 
     fn tool(&mut self, tool: usize) -> Result<&mut (Handle, Target)> {
         let count = self.tools.len();
-        self.tools.get_mut(tool).ok_or_else(|| Error::Invalid(format!("there is no tool {tool}, the scene has {count}")))
+        self.tools
+            .get_mut(tool)
+            .ok_or_else(|| Error::Invalid(format!("there is no tool {tool}, the scene has {count}")))
     }
 
     /// Changes a setting of a tool or body, or of the scene.

@@ -15,7 +15,8 @@ def web(
     scene: Annotated[Path, typer.Argument(help="A scene file (.toml), or a precomputed store.")],
     out: Annotated[Path, typer.Argument(help="Folder to write; an earlier site there is replaced.")],
     precision: Annotated[
-        str | None, typer.Option(help="Numbers in the stores: f16 is half as large to fetch as f32; default: the scene's.")
+        str | None,
+        typer.Option(help="Numbers in the stores: f16 is half as large to fetch as f32; default: the scene's."),
     ] = None,
 ) -> None:
     """Write a scene as a static site: page and WebAssembly, for any web host.
@@ -30,5 +31,6 @@ def web(
     sizes = write_site([(read.name, built)], out)
     program = sizes.pop("program")
     error = max(body.green._core.typical_errors[0] for body in built.bodies)
-    print(f"{out}: program {program / 1e6:.1f} MB, scene {sum(sizes.values()) / 1e6:.1f} MB; forces right to {100 * error:.2g} %")
+    size = sum(sizes.values())
+    print(f"{out}: program {program / 1e6:.1f} MB, scene {size / 1e6:.1f} MB; forces right to {100 * error:.2g} %")
     print(f"python -m http.server -d {out}")

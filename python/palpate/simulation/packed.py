@@ -36,8 +36,8 @@ def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str], inside: bool =
     """Write a scene as a folder that programs without Python load: ``palpate_scene_load`` in C.
 
     Bodies are meshed and precomputed if need be; their stores are linked into the folder, or copied to another file
-    system. An earlier packed scene of that name is replaced, when the new one is complete. Without the ``inside`` of its
-    bodies, a packed scene limits the strain in their surfaces.
+    system. An earlier packed scene of that name is replaced, when the new one is complete. Without the ``inside``
+    of its bodies, a packed scene limits the strain in their surfaces.
 
     Raises
     ------
@@ -115,9 +115,7 @@ def _place_store(green: GreensFunction, target: Path) -> None:
     shutil.copyfile(green.path, target)
 
 
-def _body(
-    body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path, inside: bool
-) -> dict[str, Any]:
+def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path, inside: bool) -> dict[str, Any]:
     _, position, orientation, moving, moduli, series = arguments
     arrays: dict[str, np.ndarray] = {}
     if moduli is not None:

@@ -70,7 +70,7 @@ def _scene(session: Session) -> bytes:
 
 
 def _page(session: Session) -> bytes:
-    """What the worker knows beside the scene message."""
+    """Return what the worker knows beside the scene message."""
     built, tools = session.built, len(session.built.scene.tools)
     about = session.simulation._about((tools, tools == 1), clock=True)
     header = {
@@ -129,8 +129,8 @@ def _arrays(shown: ShownBody) -> dict[str, tuple[str, np.ndarray]]:
 def _inside(shown: ShownBody) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nodes inside of a body (i,), rows of the surface nodes that each follows (i, k), and its weights (i, k).
 
-    A page knows no factor of the inside. Where a body is cut open, its nodes move by the mean of the surface nodes around
-    them, weighed by the inverse square of the distance: for the eye, not for a measurement.
+    A page knows no factor of the inside. Where a body is cut open, its nodes move by the mean of the surface nodes
+    around them, weighed by the inverse square of the distance: for the eye, not for a measurement.
     """
     from scipy.spatial import cKDTree
 

@@ -73,7 +73,9 @@ def _require_replaceable(path: Path) -> None:
 def _program() -> Path:
     program = Path(str(resources.files("palpate.viewer") / "web" / PROGRAM))
     if not program.is_file():
-        raise ViewerError("the program of pages without a server is not built: run 'make web' (needs a WebAssembly target)")
+        raise ViewerError(
+            "the program of pages without a server is not built: run 'make web' (needs a WebAssembly target)"
+        )
     return program
 
 

@@ -117,12 +117,12 @@ export class Program {
   }
 
   private bytes(): Uint8Array {
-    const { memory, palpate_text, palpate_text_length } = this.exports;
-    return new Uint8Array(memory.buffer, palpate_text(), palpate_text_length()).slice();
+    const at = this.exports.palpate_text();
+    return new Uint8Array(this.exports.memory.buffer, at, this.exports.palpate_text_length()).slice();
   }
 
   private numbers(): Float64Array {
-    const { memory, palpate_numbers, palpate_numbers_length } = this.exports;
-    return new Float64Array(memory.buffer, palpate_numbers(), palpate_numbers_length()).slice();
+    const at = this.exports.palpate_numbers();
+    return new Float64Array(this.exports.memory.buffer, at, this.exports.palpate_numbers_length()).slice();
   }
 }

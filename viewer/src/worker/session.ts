@@ -111,7 +111,18 @@ export class WorkerSession {
       case "hello":
       case "cancel":
         return;
-      default:
+      case "answer":
+      case "edit":
+      case "hold":
+      case "mode":
+      case "model":
+      case "paint":
+      case "replay":
+      case "save":
+      case "setup":
+      case "shape":
+      case "touch":
+      case "upload":
         throw new Error(`${NEEDS_SERVER[message.type] ?? "This"} needs Palpate on this computer: pip install palpate`);
     }
   }

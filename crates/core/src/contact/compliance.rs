@@ -2,10 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::math::{acos, cos};
 use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, SurfaceQuery, TouchPatch, patch_weights};
 use crate::green::GreensFunction;
 use crate::green::accuracy::{Pressed, PressedError, largest, relative};
+use crate::math::{acos, cos};
 use crate::{Error, Result};
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).

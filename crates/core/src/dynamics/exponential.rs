@@ -9,8 +9,8 @@
 //! mean of q over the step = [(B + c I1) q + I1 v + I2 p0 + I3 (p1 - p0) / h] / h
 //! ```
 
-use crate::math::{cos, exp, expm1, log2, sin};
 use super::ModeStep;
+use crate::math::{cos, exp, expm1, log2, sin};
 
 /// Below this `k h^2` the closed forms of `I1`, `I2`, `I3` lose digits: their numerators go like `h^2 k` to `h^4 k`.
 const SMALL_SQUARED_ANGLE: f64 = 0.1;

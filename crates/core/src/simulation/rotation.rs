@@ -1,7 +1,7 @@
 //! Rotation vector between two orientations.
 
-use glam::{DQuat, DVec3};
 use crate::math::atan2;
+use glam::{DQuat, DVec3};
 
 /// Shortest rotation in the world that takes one orientation to another, rad along its axis. By the arctangent: the
 /// arccosine of `w` would lose half of the digits of a small angle.

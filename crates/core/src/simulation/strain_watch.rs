@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::math::pow;
 use super::contacts::{Contact, REVISIONS};
+use crate::math::pow;
 use crate::strain::{MAX_CONTACTS_WATCHED, StrainResponse};
 
 /// Factor by which a jump decays in a tick.

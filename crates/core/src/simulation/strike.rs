@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::math::{sin, tan};
 use crate::contact::Patch;
 use crate::dynamics::{Lanes, LoadedPatch, ModalModel, Projection};
+use crate::math::{sin, tan};
 
 /// A strike takes no more steps than this: a second at the usual time step.
 const STEPS_MAX: f64 = 1000.0;

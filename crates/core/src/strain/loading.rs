@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::math::{cos, pow, sin};
 use super::response::MAX_CONTACTS_WATCHED;
+use crate::math::{cos, pow, sin};
 
 /// Directions on half a sphere for a single contact; twice as many combinations for each further one.
 const DIRECTIONS: usize = 200;

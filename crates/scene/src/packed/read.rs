@@ -18,11 +18,11 @@ use palpate_servo::{SafetyLimits, Scheduling};
 use safetensors::tensor::Dtype;
 
 use super::arrays::{Arrays, file_of, refused};
-#[cfg(feature = "offline")]
-use super::elements::strain;
 use super::description::{
     BodyDescription, MotionDescription, SceneDescription, Scheme, ShapeDescription, ToolDescription,
 };
+#[cfg(feature = "offline")]
+use super::elements::strain;
 use crate::body::{Body, Motion, placement};
 use crate::graph::Scene;
 use crate::tool::Tool;

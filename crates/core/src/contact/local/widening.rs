@@ -11,9 +11,9 @@
 //!
 //! so that force, stiffness and the forces along a surface on which anything changes follow from one energy.
 
-use crate::math::cbrt;
 use super::finite_strain::{StrainCorrection, StrainTerms, correct_sphere};
 use super::sphere::{SphereContact, indent_sphere};
+use crate::math::cbrt;
 
 /// Newton's steps for the approach of the sphere alone. Three are usual.
 const MOST_STEPS: usize = 12;

@@ -10,8 +10,8 @@ use glam::{DMat3, DVec3};
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
-use crate::math::sincos;
 use super::LineEntry;
+use crate::math::sincos;
 use crate::{Error, Result};
 
 /// Grid cells along the longest side of the surface.

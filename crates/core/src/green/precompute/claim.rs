@@ -97,10 +97,11 @@ fn identity(metadata: fs::Metadata) -> (u64, u64) {
     (metadata.dev(), metadata.ino())
 }
 
-/// The same where the system has no numbers for it: when it was made.
-#[cfg(not(unix))]
-fn identity(metadata: fs::Metadata) -> Option<std::time::SystemTime> {
-    metadata.created().ok()
+/// The same where the system tells no such numbers: the moment it was made.
+#[cfg(windows)]
+fn identity(metadata: fs::Metadata) -> u64 {
+    use std::os::windows::fs::MetadataExt;
+    metadata.creation_time()
 }
 
 /// Path of the unfinished work on a store.

@@ -11,9 +11,9 @@
 //! `F` is homogeneous: in cells of sides `hx` and `hy = alpha hx`, with forces in place of pressures,
 //! `u_i = sum_j T(i - j) f_j/(pi E* sqrt(hx hy))`, where `T` depends on `alpha` only. `T` is symmetric to the bit.
 
+use crate::math::log;
 use glam::{DMat4, DVec4};
 use pulp::{Arch, NullaryFnOnce};
-use crate::math::log;
 
 /// Most cells along a side of the grid.
 pub const MAX_CELLS: usize = 16;

@@ -12,9 +12,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DMat3, DVec3};
 
-use crate::math::{acos, sin};
 use super::super::contact_plane::ContactPlane;
 use super::influence::{Grid, MAX_CELLS};
+use crate::math::{acos, sin};
 
 /// Largest slope of a height.
 const STEEPEST: f64 = 3.0;

@@ -2,7 +2,6 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::math::hypot;
 use super::half_space::{Fields, HalfSpace, Indentation, LocalBody, LocalTool};
 use super::wrench::{CellMemory, indent_shape, placed_shape};
 use crate::contact::footprint::PressedSurface;
@@ -12,6 +11,7 @@ use crate::contact::local::{
 use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
+use crate::math::hypot;
 use crate::simulation::contacts::LocalContact;
 use crate::simulation::rotation::rotation_vector;
 use crate::tensor::{across, outer};

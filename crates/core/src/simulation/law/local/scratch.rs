@@ -2,12 +2,12 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::math::pow;
 use super::half_space::LocalBody;
 use super::response::{LocalResponse, OtherContacts};
 use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
+use crate::math::pow;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
