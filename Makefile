@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test campaigns install wheel sdist other-build sanitize lint docs viewer check-tools clean
+.PHONY: demo test campaigns install web wheel sdist other-build sanitize lint docs viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -42,6 +42,14 @@ viewer/node_modules/.checks: viewer/node_modules/.package-lock.json | $(PAGE)
 
 viewer: $(PAGE)
 
+# The program of pages without a server (docs/web.md): WebAssembly, for whose target scripts/build_web.sh cares.
+WEB := python/palpate/viewer/web/palpate.wasm
+WEB_CRATES := core devices servo recording scene web
+$(WEB): Cargo.lock scripts/build_web.sh $(shell find $(WEB_CRATES:%=crates/%) -name '*.rs' -o -name Cargo.toml)
+	scripts/build_web.sh $@
+
+web: $(WEB)
+
 # libpalpate for programs in C and C++: library, header, pkg-config, CMake (docs/c-api.md).
 PREFIX ?= /usr/local
 install:
@@ -52,12 +60,12 @@ install:
 WHEEL_ARGS ?=
 MATURIN := $(BIN)/python -m maturin
 PACKAGERS := $(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin[zig]>=1.9,<2" "auditwheel>=6"
-wheel: $(BIN)/python $(PAGE)
+wheel: $(BIN)/python $(PAGE) $(WEB)
 	$(PACKAGERS)
 	$(MATURIN) build --release --strip --quiet --out dist $(WHEEL_ARGS)
 	$(BIN)/python scripts/check_wheel.py dist
 
-sdist: $(BIN)/python $(PAGE)
+sdist: $(BIN)/python $(PAGE) $(WEB)
 	$(PACKAGERS)
 	$(MATURIN) sdist --quiet --out dist
 
@@ -70,14 +78,14 @@ PYTEST := $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadgroup --no
 test: | check-tools
 	@# npm and pip wait for downloads while cargo compiles.
 	cargo test --release --quiet --workspace --no-run & \
-		$(MAKE) --no-print-directory $(PAGE) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
+		$(MAKE) --no-print-directory $(PAGE) $(WEB) viewer/node_modules/.checks $(VENV)/.installed; status=$$?; \
 		wait $$! && exit $$status
 	cargo test --release --quiet --workspace
 	cd viewer && npm run --silent check
 	$(PYTEST) -m "not slow" $(ARGS)
 
 # Long campaigns: hundreds of random touches, presses, writers, answers, and whole builds. CI runs them after `make test`.
-campaigns: $(VENV)/.installed $(PAGE)
+campaigns: $(VENV)/.installed $(PAGE) $(WEB)
 	$(PYTEST) -m slow $(ARGS)
 
 # After `make test`: what the release build has recorded, a build that is not optimised makes again bit for bit.
@@ -112,4 +120,4 @@ docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -b html -q -W --keep-going -j auto -D nb_execution_mode=$(NOTEBOOKS) docs docs/_build/html
 
 clean:
-	rm -rf docs/_build docs/reference target $(VENV) viewer/node_modules python/palpate/viewer/static
+	rm -rf docs/_build docs/reference target $(VENV) viewer/node_modules python/palpate/viewer/static python/palpate/viewer/web

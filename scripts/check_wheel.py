@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # Size that a wheel may have, bytes: as much as a person waits for without noticing.
 LARGEST = 15_000_000
 PAGE = "palpate/viewer/static/index.html"
+PROGRAM = "palpate/viewer/web/palpate.wasm"
 
 
 def main() -> int:
@@ -54,6 +55,8 @@ def problems(wheel: Path) -> list[str]:
         names = contents.namelist()
     if PAGE not in names:
         found.append("has no page: 'make viewer' builds it")
+    if PROGRAM not in names:
+        found.append("has no program for pages without a server: 'make web' builds it")
     if not any("/licenses/" in name and name.endswith("THIRD-PARTY.md") for name in names):
         found.append("does not name the work of others (THIRD-PARTY.md)")
     foreign = sorted(name for name in names if not re.match(r"palpate(-[^/]*\.dist-info)?/", name))

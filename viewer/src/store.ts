@@ -1,7 +1,7 @@
 // The state of the page: the server's last messages, and the user's choices. Parts of the page read it, change it by
 // `update`, and subscribe to keys.
 
-import type { ConnectionState } from "./net/connection";
+import type { ConnectionState } from "./net/carrier";
 import type { ComputedMessage } from "./net/computed_messages";
 import type { SetupMessage } from "./net/setup_messages";
 import type { RecordedMessage } from "./net/session_messages";

@@ -7,8 +7,7 @@ import { Pointer } from "./input/pointer";
 import { listenToKeys } from "./input/keyboard";
 import { PictureKeys } from "./input/picture_keys";
 import { TouchPan } from "./input/touch_pan";
-import { Connection } from "./net/connection";
-import type { ConnectionState } from "./net/connection";
+import type { Carrier, ConnectionHandlers, ConnectionState } from "./net/carrier";
 import { FrameQueue } from "./net/frame_queue";
 import type { SceneData } from "./net/protocol";
 import { Painting } from "./painting";
@@ -17,7 +16,7 @@ import { Stage } from "./scene/stage";
 import { sidesOf } from "./scene/surface";
 import { Viewport } from "./scene/viewport";
 import { Store } from "./store";
-import { installTestHooks } from "./test_hooks";
+import { installPageInterface } from "./page_interface";
 import { byId } from "./ui/dom";
 import { ExamPanel } from "./ui/exam_panel";
 import { fillHelp, toggleHelp } from "./ui/help";
@@ -40,10 +39,11 @@ import { Statistics } from "./ui/statistics";
 import { TimeLine } from "./ui/time_line";
 import { followTheme } from "./ui/theme";
 import { ToolPanel } from "./ui/tool_panel";
+import { ViewLink } from "./view_link";
 
 export class Viewer {
   private readonly store = new Store();
-  private readonly connection: Connection;
+  private readonly connection: Carrier;
   private readonly frames = new FrameQueue((frame) => this.connection.send({ type: "ack", frame }));
   private readonly control = new Control(this.store, (message) => this.connection.send(message));
   private readonly setup = new Setup(
@@ -57,10 +57,9 @@ export class Viewer {
   private readonly plots: Plots;
   private readonly statistics: Statistics;
 
-  constructor(token: string) {
+  constructor(carrier: (handlers: ConnectionHandlers) => Carrier) {
     const { store, control } = this;
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    this.connection = new Connection(`${scheme}://${location.host}/socket`, token, {
+    this.connection = carrier({
       onState: (state) => this.receiveConnection(state),
       onText: (message) => {
         this.setup.receive(message);
@@ -105,7 +104,9 @@ export class Viewer {
     new TimeLine(store, control);
     new ExamPanel(store, control);
     followNotices(store, control);
-    installTestHooks({ store, stage: this.stage, pointer: this.pointer, statistics: this.statistics, history: this.plots.history });
+    if (!this.connection.hasServer) new ViewLink(viewport, store);
+    const { stage, pointer, statistics, connection } = this;
+    installPageInterface({ store, stage, pointer, statistics, history: this.plots.history, carrier: connection });
   }
 
   start(): void {

@@ -1,12 +1,11 @@
 //! Files of texts and arrays of numbers: safetensors under checksums of header and arrays, read whole, replaced only by rename.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
-use crate::files::{unwritten, write_whole};
+use crate::files::{read, unwritten, write_whole};
 use crate::header::{head_of, is_sealed, seal_file, unsealed};
 use crate::{Error, Result};
 
@@ -59,7 +58,7 @@ impl ArraysKind {
     /// [`Error::Store`] that says what is wrong, or the operating system's error.
     pub fn read(&self, path: &Path) -> Result<ArraysFile> {
         let Self { format, name, version } = self;
-        let bytes = fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let bytes = read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
         let broken = |e| refused(path, format!("is not a {name}, or is damaged or cut short ({e})"));
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(broken)?;
         let texts = header.metadata().clone().unwrap_or_default();

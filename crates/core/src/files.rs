@@ -1,11 +1,54 @@
-//! Files appear whole or not at all: written beside, then renamed.
+//! Files appear whole or not at all: written beside, then renamed. A program without a file system provides the bytes of
+//! the files that it reads.
 
+use std::collections::HashMap;
 use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use safetensors::SafeTensorError;
 
+use crate::positioned::Source;
 use crate::{Error, Result};
+
+static PROVIDED: Mutex<Option<HashMap<PathBuf, Arc<[u8]>>>> = Mutex::new(None);
+
+fn provided() -> MutexGuard<'static, Option<HashMap<PathBuf, Arc<[u8]>>>> {
+    PROVIDED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Has `path` read as these bytes from now on, by all of this process: for a browser, which has no file system.
+pub fn provide(path: impl Into<PathBuf>, bytes: Vec<u8>) {
+    provided().get_or_insert_default().insert(path.into(), bytes.into());
+}
+
+/// Forgets what was provided. What has been opened stays.
+pub fn forget_provided() {
+    *provided() = None;
+}
+
+/// Opens a file for reading by position.
+///
+/// # Errors
+/// The operating system's.
+pub(crate) fn open(path: &Path) -> io::Result<Source> {
+    match provided().as_ref().and_then(|files| files.get(path)) {
+        Some(bytes) => Ok(Source::Memory(bytes.clone())),
+        None => File::open(path).map(Source::File),
+    }
+}
+
+/// All bytes of a file.
+///
+/// # Errors
+/// The operating system's.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    match provided().as_ref().and_then(|files| files.get(path)) {
+        Some(bytes) => Ok(bytes.to_vec()),
+        None => fs::read(path),
+    }
+}
 
 /// Gives a path beside `path` to `write`, and renames what it wrote into place.
 ///

@@ -6,8 +6,9 @@
 
 use std::fs::OpenOptions;
 use std::io;
-use std::os::unix::fs::FileExt;
 use std::path::Path;
+
+use crate::positioned::Positioned;
 
 /// Name of the sum among the header's texts.
 const NAME: &str = "header_checksum";

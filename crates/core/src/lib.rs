@@ -19,11 +19,13 @@ pub mod element;
 mod error;
 #[cfg(feature = "offline")]
 pub mod fem;
-mod files;
+pub mod files;
 pub mod green;
 mod header;
+mod math;
 pub mod memory;
 pub mod mesh;
+mod positioned;
 #[cfg(feature = "offline")]
 pub mod series;
 pub mod simulation;

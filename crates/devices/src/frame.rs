@@ -52,9 +52,11 @@ impl Frame {
 }
 
 /// Largest deviation of a matrix from a rotation: vendors compute in double precision.
+#[cfg(feature = "drivers")]
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Rotation of a vendor's matrix; not a number if it is none.
+#[cfg(feature = "drivers")]
 pub(crate) fn rotation(matrix: DMat3) -> DQuat {
     let square = (matrix * matrix.transpose() - DMat3::IDENTITY).to_cols_array();
     let is_rotation = matrix.determinant() > 0.0 && square.iter().all(|entry| entry.abs() < ROTATION_TOLERANCE);

@@ -3,13 +3,18 @@
 
 mod device;
 pub mod emulated;
+#[cfg(feature = "drivers")]
 pub mod forcedimension;
 mod frame;
+#[cfg(feature = "drivers")]
 pub mod haply;
+#[cfg(feature = "drivers")]
 mod kinds;
 pub mod known;
+#[cfg(feature = "drivers")]
 mod library;
 mod mounted;
+#[cfg(feature = "drivers")]
 pub mod openhaptics;
 mod opening;
 pub mod programmed;
@@ -17,6 +22,7 @@ pub mod simulated;
 
 pub use device::{Buttons, Device, DeviceFault, DeviceLimits, Reading};
 pub use frame::Frame;
+#[cfg(feature = "drivers")]
 pub use kinds::{kinds, list, open};
 pub use mounted::{MountedDevice, Workspace};
 pub use opening::{Connection, FoundDevice, Listing, OpenError, ReadyDevice, Scheduler};

@@ -16,7 +16,7 @@ use palpate_core::green::{
 use palpate_core::mesh::TetMesh;
 use palpate_core::{Error, Result, contact};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::allocator::require_scratch_of_products;
 use crate::body::{self, indices, materials, vectors};
@@ -225,6 +225,12 @@ impl GreenCore {
     /// Writes the store, beside and then renamed.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.green.save(&path)).map_err(|e| to_python(py, e))
+    }
+
+    /// A store of what contacts and pictures read, for a page that fetches it: see `GreensFunction::packed`.
+    fn packed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| self.green.packed()).map_err(|e| to_python(py, e))?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// Reads and verifies a store.

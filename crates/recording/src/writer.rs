@@ -77,11 +77,13 @@ impl<W: Write + Seek> TickWriter<W> {
         let options = mcap::WriteOptions::new()
             .profile("ros2")
             .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(mcap::Compression::Zstd))
-            .compression_threads(0)
             // Chunks are cut by calls of flush, and written at once: what is in the file is whole.
             .chunk_size(None)
             .disable_seeking(true);
+        #[cfg(feature = "compression")]
+        let options = options.compression(Some(mcap::Compression::Zstd)).compression_threads(0);
+        #[cfg(not(feature = "compression"))]
+        let options = options.compression(None);
         let mut file = options.create(file)?;
         file.write_metadata(&Metadata { name: METADATA.into(), metadata: with_checksum(header.about.clone()) })?;
         let mut schemas = Vec::new();

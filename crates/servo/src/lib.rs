@@ -11,9 +11,10 @@ mod emulated;
 mod exchange;
 mod force_loop;
 mod handoff;
-mod locking;
 mod log;
 mod offline;
+mod paced;
+mod platform;
 mod preparation;
 mod preparer;
 mod record;
@@ -35,6 +36,7 @@ pub use force_loop::{ForceLoop, check_period};
 pub use handoff::{LoopHandle, Published};
 pub use log::{LogRow, RealtimeStatus, Status};
 pub use offline::{Recording, Script, rerun, run};
+pub use paced::PacedLoop;
 pub use preparer::{StrainPreparer, StrainWorker};
 pub use record::{
     RecordedContact, RecordedContacts, RecordedInput, RecordedOutput, RecordedTool, StrainArrivals, StrainRequestId,

@@ -8,9 +8,9 @@ use palpate_core::dynamics::Energy;
 use palpate_core::simulation::{Model, Pose, Strike};
 use palpate_devices::{Device, DeviceLimits};
 
-use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::handoff::LOG_ROWS;
+use crate::platform::computed_ns;
 use crate::preparation::Preparation;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedInput, TickRecord};

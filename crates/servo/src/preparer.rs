@@ -4,26 +4,26 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 use palpate_core::simulation::StrainWatch;
 use palpate_core::simulation::{MAX_BODIES, Model, PreviousRanks};
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
 
 use crate::strain::{PreparerEnd, StrainAnswer, StrainRequest};
 
-/// What measures the strain of the bodies of a model, as far as it is known. Measuring belongs to the offline part of the
-/// core: built without it, the strain of no body is limited.
+/// What measures the strain of the bodies of a model, as far as it is known. Built without the feature
+/// `strain`, the strain of no body is limited.
 #[derive(Clone)]
 pub struct StrainPreparer {
-    #[cfg(feature = "offline")]
+    #[cfg(feature = "strain")]
     model: Arc<Model>,
-    #[cfg(feature = "offline")]
+    #[cfg(feature = "strain")]
     measures: [Option<Arc<StrainMeasure>>; MAX_BODIES],
 }
 
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 impl StrainPreparer {
     /// Knows none yet: the strain of no body is limited.
     pub fn new(model: &Arc<Model>) -> Self {
@@ -57,7 +57,7 @@ impl StrainPreparer {
     }
 }
 
-#[cfg(not(feature = "offline"))]
+#[cfg(not(feature = "strain"))]
 impl StrainPreparer {
     /// Knows none.
     pub fn new(_model: &Arc<Model>) -> Self {

@@ -10,11 +10,11 @@ use palpate_core::simulation::{Model, Wrench};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading};
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::clock::computed_ns;
 use crate::force_loop::ForceLoop;
 use crate::handoff::LOG_ROWS;
 use crate::handoff::{LoopHandle, Published};
 use crate::log::LogRow;
+use crate::platform::computed_ns;
 use crate::preparer::StrainPreparer;
 use crate::record::{RecordedContact, RecordedInput, RecordedOutput, RecordedTool, StrainRequestId, TickRecord};
 use crate::safety::SafetyLimits;

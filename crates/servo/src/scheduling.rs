@@ -3,9 +3,8 @@
 use palpate_core::Result;
 use palpate_core::memory::Ranges;
 
-use crate::clock::{allowed_cpus, keep_to_cpus, request_realtime_priority};
-use crate::locking::{lock, lock_thread};
 use crate::log::RealtimeStatus;
+use crate::platform::{allowed_cpus, keep_to_cpus, lock, lock_thread, request_realtime_priority};
 use crate::settings::refuse_unless;
 
 /// Rates that the thread can keep, Hz.

@@ -13,7 +13,8 @@ use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceLimits, Reading, ReadyDevice, Scheduler, Wrench};
 use triple_buffer::{Input, Output, triple_buffer};
 
-use crate::clock::{next_deadline, now_ns, sleep_until_ns};
+use crate::clock::{next_deadline, now_ns};
+use crate::platform::sleep_until_ns;
 use crate::safety::{FaultReason, SafetyLimits, SafetyStage};
 use crate::settings::refuse_unless;
 

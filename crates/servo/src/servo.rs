@@ -11,11 +11,11 @@ use palpate_core::{Error, Result};
 use palpate_devices::{Device, DeviceFault, DeviceLimits, Reading, Scheduler, Wrench};
 
 use crate::change::ChangeHandle;
-use crate::clock::{next_deadline, now_ns, sleep_until_ns};
+use crate::clock::{next_deadline, now_ns};
 use crate::force_loop::{ForceLoop, Successor};
 use crate::handoff::LoopHandle;
-use crate::locking::lock;
 use crate::log::RealtimeStatus;
+use crate::platform::{lock, sleep_until_ns};
 use crate::preparer::{StrainPreparer, StrainWorker};
 use crate::safety::SafetyLimits;
 use crate::scheduling::Scheduling;

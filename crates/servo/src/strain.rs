@@ -17,7 +17,7 @@ use crate::record::{IN_FLIGHT, StrainArrivals, StrainRequestId};
 
 /// The contacts of one body, for which strain is to be prepared.
 #[derive(Clone)]
-#[cfg_attr(not(feature = "offline"), allow(dead_code))] // nobody answers it there
+#[cfg_attr(not(feature = "strain"), allow(dead_code))] // nobody answers it there
 pub(crate) struct StrainRequest {
     pub id: StrainRequestId,
     pub limit: f64,

@@ -12,6 +12,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     sessions,
     studying,
     verification,
+    web,
 )
 from palpate.cli.app import main
 

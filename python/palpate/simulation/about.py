@@ -125,6 +125,11 @@ def with_recorded_series(about: dict[str, str], built: BuiltScene) -> BuiltScene
     return replace(built, bodies=tuple(bodies))
 
 
+def measured_by_surface(about: Mapping[str, str]) -> bool:
+    """Whether the strain of all bodies was measured by their surfaces, as in a page without a server."""
+    return about.get("strain") == "surface"
+
+
 def shown_of(about: dict[str, str]) -> tuple[int, bool]:
     """Return the number of tools that a recording shows, and whether it shows one without an axis of tools."""
     given, single = json.loads(about["shown"])

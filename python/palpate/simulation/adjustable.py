@@ -23,6 +23,8 @@ class Adjustable:
     _core: _native.SimulationCore
     # Whether the native part has measures of the strain of all bodies.
     _armed: bool
+    # Whether strain is measured by the surfaces of all bodies, as a page without a server does.
+    _by_surface: bool = False
 
     def _settings(self) -> dict[str, Any]:
         return self._core.settings()
@@ -124,8 +126,13 @@ class Adjustable:
         """Give the loop what measures strain, once it is asked to limit it: it takes a factor of every body."""
         asked = self._core.settings()["strain_limit"] if limit is None else limit
         if asked > 0 and not self._armed:
-            _native.set_strain_measures(self._core, [body.green.native_strain_measure for body in self.bodies])
+            _native.set_strain_measures(self._core, [self._strain_measure_of(body) for body in self.bodies])
             self._armed = True
+
+    def _strain_measure_of(self, body: BuiltBody) -> _native.StrainMeasure:
+        """Return what measures the strain of a body; a page without a server knows the surface alone."""
+        green = body.green
+        return _native.StrainMeasure.of_surface(green._core) if self._by_surface else green.native_strain_measure
 
     def strike(
         self, point: Sequence[float], impulse: Sequence[float], duration: float = 0.0, body: int | None = None

@@ -78,7 +78,7 @@ class SceneEditing:
         place = _placed(table.position if position is None else position, table.orientation, orientation)
         built, table = replace(built, position=place[0], orientation=place[1]), _moved(table, place)
         scene = self.scene.model_copy(update={"bodies": [*self.scene.bodies, table]})
-        measure = built.green.native_strain_measure if self._armed else None
+        measure = self._strain_measure_of(built) if self._armed else None
         arguments = body_arguments(built, _needs_moduli(scene))
         self._take(scene, (*self.bodies, built), lambda: _native.add_body(self._core, arguments, measure))
         return len(self.bodies) - 1

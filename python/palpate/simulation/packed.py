@@ -32,11 +32,12 @@ SCENE_FILE = "scene.json"
 _TYPES = {"f8": "F64", "u4": "U32", "u8": "U64"}
 
 
-def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str]) -> None:
+def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str], inside: bool = True) -> None:
     """Write a scene as a folder that programs without Python load: ``palpate_scene_load`` in C.
 
     Bodies are meshed and precomputed if need be; their stores are linked into the folder, or copied to another file
-    system. An earlier packed scene of that name is replaced, when the new one is complete.
+    system. An earlier packed scene of that name is replaced, when the new one is complete. Without the ``inside``
+    of its bodies, a packed scene limits the strain in their surfaces.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def pack(scene: Scene | BuiltScene, path: str | os.PathLike[str]) -> None:
     _require_replaceable(where)
     built = scene if isinstance(scene, BuiltScene) else scene.build()
     with folder_beside(where) as folder:
-        description = _description(built, folder)
+        description = describe(built, folder, inside)
         text = json.dumps(description, indent=2, allow_nan=False)
         (folder / SCENE_FILE).write_text(text + "\n")
 
@@ -64,7 +65,7 @@ def _require_replaceable(path: Path) -> None:
         raise SceneError(f"{path}: there is no folder {path.parent}; make it first")
 
 
-def _description(built: BuiltScene, folder: Path) -> dict[str, Any]:
+def describe(built: BuiltScene, folder: Path, inside: bool = True) -> dict[str, Any]:
     """Write stores and arrays into the folder; what ``scene.json`` says of them."""
     scene, device = built.scene, built.scene.device
     local = any(tool.contact == "local" for tool in scene.tools)
@@ -73,7 +74,7 @@ def _description(built: BuiltScene, folder: Path) -> dict[str, Any]:
         store = folder / f"body-{rank}.palpate"
         _place_store(body.green, store)
         arguments = body_arguments(body, local)
-        described.append(_body(body, arguments, store, folder / f"body-{rank}.arrays.safetensors"))
+        described.append(_body(body, arguments, store, folder / f"body-{rank}.arrays.safetensors", inside))
         bodies.append((_native.GreenCore.load(store), *arguments[1:]))
     tools = [tool_arguments(scene, rank) for rank in range(len(scene.tools))]
     # Whatever is refused is refused here; and what contact needs beyond the stores is kept beside them.
@@ -114,7 +115,7 @@ def _place_store(green: GreensFunction, target: Path) -> None:
     shutil.copyfile(green.path, target)
 
 
-def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) -> dict[str, Any]:
+def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path, inside: bool) -> dict[str, Any]:
     _, position, orientation, moving, moduli, series = arguments
     arrays: dict[str, np.ndarray] = {}
     if moduli is not None:
@@ -129,7 +130,7 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path) 
         arrays["eigenvalues"], arrays["shapes"], (dt, alpha, delta, mass, stiffness), exact, coupling = moving
         scheme = {"dt": dt, "alpha": alpha, "delta": delta, "rayleigh": [mass, stiffness], "coupling": coupling}
         motion = {"scheme": "exact" if exact else "newmark", **scheme}
-    if body.body is not None:
+    if body.body is not None and inside:
         start, nodes, gradients = body.green.native_strain_measure.gradients()
         arrays["nodes"], arrays["tets"], arrays["materials"] = body.body._element_arrays()
         arrays |= {"gradient_start": start, "gradient_nodes": nodes, "gradients": gradients.reshape(-1, 3)}

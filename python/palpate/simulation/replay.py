@@ -12,7 +12,7 @@ import numpy as np
 from palpate import _native
 from palpate.progress import progress_reporter
 from palpate.scene import BuiltScene, Scene
-from palpate.simulation.about import require_same, scene_of, with_recorded_series
+from palpate.simulation.about import measured_by_surface, require_same, scene_of, with_recorded_series
 from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.recording import Recording
 from palpate.simulation.simulation import Simulation
@@ -105,6 +105,7 @@ def simulation_of(recording: Recording, scene: Scene | BuiltScene | None = None)
 
     """
     simulation = Simulation(built_scene_of(recording, scene))
+    simulation._by_surface = measured_by_surface(recording.about)
     simulation._arm_strain_limit()
     assume_recorded(simulation._core, recording.about)
     return simulation

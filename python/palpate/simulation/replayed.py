@@ -10,6 +10,7 @@ import numpy as np
 from palpate import _native
 from palpate.errors import SceneError
 from palpate.scene import BuiltScene, Scene
+from palpate.simulation.about import measured_by_surface
 from palpate.simulation.connecting import assume_recorded
 from palpate.simulation.frame import PERCENTILES, Frame, frame_of
 from palpate.simulation.recording import LOG_DTYPE, Recording
@@ -59,6 +60,7 @@ class ReplayedSimulation(Simulation):
     def __init__(self, recorded: Recording, scene: Scene | BuiltScene | None = None):
         self.scene_as_built = built_scene_of(recorded, scene)
         super().__init__(self.scene_as_built)
+        self._by_surface = measured_by_surface(recorded.about)
         self._arm_strain_limit()
         assume_recorded(self._core, recorded.about)
         self.recorded, self.ticks = recorded, ticks_before_gap(recorded)

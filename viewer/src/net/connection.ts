@@ -1,24 +1,16 @@
 // The websocket: says hello, hands messages on, and tries again when the connection is lost.
 
-import { PROTOCOL_VERSION, decodeBinary, decodeText, isScene } from "./protocol";
-import type { ClientMessage, FrameData, SceneData, TextMessage } from "./protocol";
+import { receive } from "./carrier";
+import type { Carrier, ConnectionHandlers } from "./carrier";
+import { PROTOCOL_VERSION } from "./protocol";
+import type { ClientMessage } from "./protocol";
 
 const RETRY_MS = 2000;
 /** The server closes with this code when the token is wrong; trying again would not help. */
 const CLOSE_BAD_TOKEN = 4401;
 
-export type ConnectionState = "connecting" | "open" | "lost" | "refused";
-
-export interface ConnectionHandlers {
-  onState(state: ConnectionState): void;
-  onText(message: TextMessage): void;
-  onScene(scene: SceneData): void;
-  onFrame(frame: FrameData): void;
-  /** A message that could not be read. */
-  onUnreadable(reason: string): void;
-}
-
-export class Connection {
+export class Connection implements Carrier {
+  readonly hasServer = true;
   private socket: WebSocket | null = null;
 
   constructor(
@@ -32,7 +24,7 @@ export class Connection {
     const socket = new WebSocket(this.url);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => this.send({ type: "hello", token: this.token, version: PROTOCOL_VERSION });
-    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => receive(event.data, this.handlers);
     socket.onclose = (event) => this.closed(event.code);
     this.socket = socket;
   }
@@ -45,20 +37,8 @@ export class Connection {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(bytes);
   }
 
-  private receive(data: string | ArrayBuffer): void {
-    try {
-      if (typeof data === "string") {
-        const message = decodeText(data);
-        if (message.type === "welcome") this.handlers.onState("open");
-        this.handlers.onText(message);
-        return;
-      }
-      const decoded = decodeBinary(data);
-      if (isScene(decoded)) this.handlers.onScene(decoded);
-      else this.handlers.onFrame(decoded);
-    } catch (error) {
-      this.handlers.onUnreadable(error instanceof Error ? error.message : String(error));
-    }
+  run(): Promise<Float64Array> {
+    return Promise.reject(new Error("a page of a server makes no runs: use palpate.Simulation.run, or a page of 'palpate web'"));
   }
 
   private closed(code: number): void {

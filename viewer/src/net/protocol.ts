@@ -332,7 +332,7 @@ interface ArrayEntry {
   offset: number;
 }
 
-type AnyArray = Float32Array | Uint32Array | Uint8Array;
+export type AnyArray = Float32Array | Uint32Array | Uint8Array;
 type ArrayKind = new (buffer: ArrayBuffer, offset: number, length: number) => AnyArray;
 /** What a table of names and kinds stands for: arrays of these kinds by these names. */
 type ArraysOf<Kinds extends Record<string, ArrayKind>> = { [Name in keyof Kinds]: InstanceType<Kinds[Name]> };
@@ -348,6 +348,40 @@ export function decodeText(text: string): TextMessage {
   const type = isRecord(message) ? message["type"] : undefined;
   if (typeof type !== "string" || !TEXT_TYPES.includes(type)) throw new Error("a text message of an unknown type");
   return message as TextMessage;
+}
+
+/** Header and arrays of any binary message, the arrays viewed in place. */
+export function decodeArrays(buffer: ArrayBuffer): { header: Record<string, unknown>; arrays: Map<string, AnyArray> } {
+  const { header, start } = readHeader(buffer);
+  const entries = header["arrays"];
+  if (!Array.isArray(entries)) throw new Error("a binary message without arrays");
+  return { header, arrays: new Map((entries as ArrayEntry[]).map((entry) => [entry.name, viewArray(buffer, start, entry)])) };
+}
+
+/** A binary message as the server writes them. */
+export function encodeArrays(header: object, arrays: Record<string, AnyArray>): ArrayBuffer {
+  const kinds: [AnyArray, string][] = Object.values(arrays).map((array) => [array, dtypeOf(array)]);
+  let offset = 0;
+  const entries = Object.keys(arrays).map((name, i) => {
+    const [array, dtype] = kinds[i]!;
+    const entry = { name, dtype, shape: [array.length], offset };
+    offset += (array.byteLength + 7) & ~7;
+    return entry;
+  });
+  const text = new TextEncoder().encode(JSON.stringify({ ...header, arrays: entries }));
+  const length = ((4 + text.length + 7) & ~7) - 4;
+  const bytes = new Uint8Array(4 + length + offset).fill(0x20, 4, 4 + length);
+  new DataView(bytes.buffer).setUint32(0, length, true);
+  bytes.set(text, 4);
+  kinds.forEach(([array], i) => {
+    bytes.set(new Uint8Array(array.buffer, array.byteOffset, array.byteLength), 4 + length + entries[i]!.offset);
+  });
+  return bytes.buffer;
+}
+
+function dtypeOf(array: AnyArray): string {
+  if (array instanceof Float32Array) return "f4";
+  return array instanceof Uint32Array ? "u4" : "u1";
 }
 
 /** Reads a scene or a frame; throws on a message that is neither, lacks an array, or is shorter than it says. */

@@ -1,7 +1,7 @@
 // Notices of the page: progress, errors, faults, and the state of the connection.
 
 import type { Control } from "../control";
-import type { ConnectionState } from "../net/connection";
+import type { ConnectionState } from "../net/carrier";
 import type { StatusMessage } from "../net/protocol";
 import { inControl } from "../store";
 import type { Store } from "../store";

@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{MAX_PATCH_NODES, Patch, PatchGeometry, PatchScratch, Refusal, SurfaceQuery, TouchPatch, patch_weights};
 use crate::green::GreensFunction;
 use crate::green::accuracy::{Pressed, PressedError, largest, relative};
+use crate::math::{acos, cos};
 use crate::{Error, Result};
 
 /// Smallest eigenvalue of a symmetric 3x3 matrix (closed form by the angle of the characteristic cubic; Smith, 1961).
@@ -18,7 +19,7 @@ pub fn smallest_eigenvalue(m: &DMat3) -> f64 {
         return mean;
     }
     let r = (deviator.determinant() / (2.0 * p * p * p)).clamp(-1.0, 1.0);
-    mean + 2.0 * p * (r.acos() / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3).cos()
+    mean + 2.0 * p * cos(acos(r) / 3.0 + 2.0 * std::f64::consts::FRAC_PI_3)
 }
 
 /// Response to a pressed patch.

@@ -10,6 +10,7 @@
 //! ```
 
 use super::ModeStep;
+use crate::math::{cos, exp, expm1, log2, sin};
 
 /// Below this `k h^2` the closed forms of `I1`, `I2`, `I3` lose digits: their numerators go like `h^2 k` to `h^4 k`.
 const SMALL_SQUARED_ANGLE: f64 = 0.1;
@@ -89,13 +90,13 @@ fn closed_form(k: f64, c: f64, h: f64) -> Response {
     // e^(-sigma t) times cos(w t) and sin(w t)/w, or their hyperbolic twins written with decaying exponentials only.
     let (even, b) = if squared > 0.0 {
         let w = squared.sqrt();
-        let decay = (-sigma * h).exp();
-        (decay * (w * h).cos(), decay * (w * h).sin() / w)
+        let decay = exp(-sigma * h);
+        (decay * cos(w * h), decay * sin(w * h) / w)
     } else {
         let w = (-squared).sqrt();
-        let slow = (-k / (sigma + w) * h).exp();
-        let fast = (-2.0 * w * h).exp();
-        let odd = if w * h > 1e-8 { -(-2.0 * w * h).exp_m1() / (2.0 * w) } else { h };
+        let slow = exp(-k / (sigma + w) * h);
+        let fast = exp(-2.0 * w * h);
+        let odd = if w * h > 1e-8 { -expm1(-2.0 * w * h) / (2.0 * w) } else { h };
         (0.5 * slow * (1.0 + fast), slow * odd)
     };
     let (a, db) = (even + sigma * b, even - sigma * b);
@@ -107,7 +108,7 @@ fn closed_form(k: f64, c: f64, h: f64) -> Response {
 /// The series over a small part of the step, composed with itself until the step is full.
 fn by_doubling(k: f64, c: f64, h: f64) -> Response {
     let stiffness = (k * h * h).max(c * h);
-    let halvings = (stiffness / SERIES_RADIUS).log2().ceil().max(0.0) as i32;
+    let halvings = log2(stiffness / SERIES_RADIUS).ceil().max(0.0) as i32;
     let mut t = h * 0.5f64.powi(halvings);
     let mut r = series(k, c, t);
     for _ in 0..halvings {

@@ -1,8 +1,8 @@
 //! Checksums of the operator in its file, block by block, taken while the bytes are read.
 
-use std::fs::File;
 use std::io::Result;
-use std::os::unix::fs::FileExt;
+
+use crate::positioned::Positioned;
 
 /// Bytes under one checksum; a multiple of every number's.
 const BLOCK: usize = 1 << 24;
@@ -18,7 +18,7 @@ pub fn block_count(length: usize) -> usize {
 ///
 /// # Errors
 /// The operating system's.
-pub fn sums_while_reading(file: &File, at: u64, bytes: &mut [u8]) -> Result<Vec<[u8; SUM]>> {
+pub fn sums_while_reading(file: &(impl Positioned + Sync), at: u64, bytes: &mut [u8]) -> Result<Vec<[u8; SUM]>> {
     each(bytes.chunks_mut(BLOCK).collect(), |block, piece: &mut [u8]| {
         file.read_exact_at(piece, at + (block * BLOCK) as u64)?;
         Ok(*blake3::hash(piece).as_bytes())
@@ -63,7 +63,7 @@ impl ColumnHeads {
 /// # Errors
 /// The operating system's.
 pub fn sums_keeping_heads(
-    file: &File,
+    file: &(impl Positioned + Sync),
     at: u64,
     length: usize,
     heads: &ColumnHeads,

@@ -1,16 +1,15 @@
 //! Columns of a verified store that stay in its file, read by position.
 
-use std::fs::File;
 use std::io;
-use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
+use crate::positioned::{Positioned, Source};
 use crate::{Error, Result};
 
 /// The operator in a file. The file is held open: one renamed over it changes nothing here.
 pub struct ColumnsFile {
     /// The file as it was when its checksums were verified.
-    pub file: File,
+    pub file: Source,
     /// Its name.
     pub path: PathBuf,
     /// Its length then, bytes.
@@ -36,7 +35,7 @@ impl ColumnsFile {
 
     /// Whether the file is still as long as it was.
     pub fn is_intact(&self) -> bool {
-        self.file.metadata().is_ok_and(|now| now.len() >= self.length)
+        self.file.length().is_ok_and(|now| now >= self.length)
     }
 
     /// Refuses a file that is shorter than it was.

@@ -20,8 +20,11 @@ mod function;
 #[cfg(feature = "offline")]
 mod interior;
 mod key;
+#[cfg(all(feature = "strain", not(feature = "offline")))]
+mod no_interior;
 mod node_order;
 mod numbers;
+mod packed;
 mod precision;
 #[cfg(feature = "offline")]
 mod precompute;
@@ -32,6 +35,8 @@ pub use function::GreensFunction;
 #[cfg(feature = "offline")]
 pub use interior::Interior;
 pub use key::FORMAT_VERSION;
+#[cfg(all(feature = "strain", not(feature = "offline")))]
+pub use no_interior::Interior;
 pub use node_order::TouchNode;
 pub use precision::Precision;
 #[cfg(feature = "offline")]

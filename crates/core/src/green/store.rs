@@ -11,8 +11,6 @@
 //!   somebody overwrites in place, at the same length, are not noticed.
 
 use std::collections::HashMap;
-use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
@@ -25,10 +23,13 @@ use super::function::GreensFunction;
 use super::key::FORMAT_VERSION;
 use super::node_order::NodeOrder;
 use super::numbers::Numbers;
+use super::packed;
 use super::precision::Precision;
 use super::store_writer::small_checksum;
+use crate::files::open;
 use crate::header::{HEADER_BYTES, is_sealed};
 use crate::mesh::{Faces, Surface};
+use crate::positioned::{Positioned, Source};
 use crate::{Error, Result};
 
 /// Largest operator that is held in memory as a whole, bytes. All of the built-in bodies are far below; beyond, a process
@@ -90,7 +91,7 @@ fn check_metadata(reader: &Reader<'_>, metadata: &HashMap<String, String>, expec
 
 struct Reader<'a> {
     path: &'a Path,
-    file: File,
+    file: Source,
     /// Bytes of the file.
     length: u64,
     /// Whether the header is as it was written.
@@ -104,8 +105,8 @@ impl<'a> Reader<'a> {
     /// Opens a file and reads its header.
     fn open(path: &'a Path) -> Result<Self> {
         let io = |source| Error::Io { path: path.to_owned(), source };
-        let file = File::open(path).map_err(io)?;
-        let length = file.metadata().map_err(io)?.len();
+        let file = open(path).map_err(io)?;
+        let length = file.length().map_err(io)?;
         if length == 0 {
             return Err(store_error(path, "is empty"));
         }
@@ -177,7 +178,7 @@ impl<'a> Reader<'a> {
         if row_is_fixed.len() < 3 * surface_nodes.len() {
             return Err(self.damaged("rows are missing"));
         }
-        let precision = self.precision()?;
+        let precision = self.precision(metadata)?;
         let magnitude: Vec<f64> = self.numbers("magnitude")?;
         if magnitude.len() != row_is_fixed.len() {
             return Err(self.damaged("the magnitudes do not match the operator"));
@@ -210,17 +211,43 @@ impl<'a> Reader<'a> {
         if small_checksum(&green.small_tensors()) != field("geometry_checksum") {
             return Err(self.damaged("the checksum of the geometry differs"));
         }
-        green.entries = self.entries(&green, precision, resident_bytes)?;
+        green.entries = match self.is_packed() {
+            true => self.packed_entries(&green, precision, &field(packed::SUM))?,
+            false => self.entries(&green, precision, resident_bytes)?,
+        };
         Ok(green)
     }
 
-    fn precision(&self) -> Result<Precision> {
+    fn precision(&self, metadata: &HashMap<String, String>) -> Result<Precision> {
+        if self.is_packed() {
+            let name = metadata.get("precision").map_or("", String::as_str);
+            let known = [Precision::F16, Precision::F32, Precision::F64].into_iter().find(|known| known.name() == name);
+            return known.ok_or_else(|| self.damaged("the type of its numbers"));
+        }
         match self.tensor("psi")?.dtype {
             Dtype::I16 => Ok(Precision::F16),
             Dtype::F32 => Ok(Precision::F32),
             Dtype::F64 => Ok(Precision::F64),
             other => Err(self.damaged(&format!("numbers of type {other:?}"))),
         }
+    }
+
+    fn is_packed(&self) -> bool {
+        self.tensors.info(packed::BLOCK).is_some()
+    }
+
+    /// What a packed store holds of the operator: rows of the surface.
+    fn packed_entries(&self, green: &GreensFunction, precision: Precision, sum: &str) -> Result<Entries> {
+        let block = self.bytes(packed::BLOCK)?;
+        if blake3::hash(&block).to_hex().as_str() != sum {
+            return Err(packed::damaged(self.path));
+        }
+        let rows = 3 * green.surface_nodes.len();
+        let numbers = Numbers::try_zeros(precision, 3 * green.touch.len() * rows)?;
+        let (node_order, magnitude) = (green.entries.node_order().clone(), green.entries.magnitudes()[..rows].to_vec());
+        let mut entries = Entries::new(node_order, &green.row_is_fixed[..rows], magnitude, numbers, None);
+        entries.unpack(&block).ok_or_else(|| packed::damaged(self.path))?;
+        Ok(entries)
     }
 
     /// Reads what is held of the operator, the checksum of every block verified.

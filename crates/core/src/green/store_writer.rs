@@ -3,7 +3,6 @@
 //! A store is replaced only by renaming a finished file over it: readers keep the file they have opened.
 
 use std::fs::{self, File, OpenOptions};
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::Dtype;
@@ -13,6 +12,7 @@ use super::function::GreensFunction;
 use super::key::FORMAT_VERSION;
 use super::precision::Precision;
 use crate::header::{seal, unsealed};
+use crate::positioned::Positioned;
 use crate::{Error, Result};
 
 /// Name, type, shape and bytes of a tensor that describes the body.
@@ -108,13 +108,13 @@ impl Drop for StoreWriter {
 }
 
 /// The header of a safetensors file: its length in eight bytes, then JSON, padded so that what follows is aligned.
-struct Header {
+pub(super) struct Header {
     fields: serde_json::Map<String, serde_json::Value>,
     end: usize,
 }
 
 impl Header {
-    fn new(green: &GreensFunction, precision: Precision) -> Self {
+    pub fn new(green: &GreensFunction, precision: Precision) -> Self {
         let mut metadata = serde_json::json!({
             "format": "palpate-green",
             "version": FORMAT_VERSION.to_string(),
@@ -129,14 +129,21 @@ impl Header {
         Self { fields: serde_json::Map::from_iter([("__metadata__".to_string(), metadata)]), end: 0 }
     }
 
-    fn tensor(&mut self, name: &str, dtype: Dtype, shape: &[usize], bytes: usize) {
+    /// Adds a text.
+    pub fn text(&mut self, name: &str, text: &str) {
+        self.fields["__metadata__"][name] = text.into();
+    }
+
+    /// Adds a tensor behind the others.
+    pub fn tensor(&mut self, name: &str, dtype: Dtype, shape: &[usize], bytes: usize) {
         let offsets = [self.end, self.end + bytes];
         let tensor = serde_json::json!({"dtype": dtype.to_string(), "shape": shape, "data_offsets": offsets});
         self.fields.insert(name.to_string(), tensor);
         self.end += bytes;
     }
 
-    fn bytes(self) -> Vec<u8> {
+    /// The header, sealed.
+    pub fn bytes(self) -> Vec<u8> {
         let mut json = serde_json::Value::Object(self.fields).to_string().into_bytes();
         json.resize(json.len().next_multiple_of(8), b' ');
         let mut head = [&(json.len() as u64).to_le_bytes()[..], &json].concat();

@@ -1,5 +1,6 @@
 //! Rotation vector between two orientations.
 
+use crate::math::atan2;
 use glam::{DQuat, DVec3};
 
 /// Shortest rotation in the world that takes one orientation to another, rad along its axis. By the arctangent: the
@@ -8,7 +9,7 @@ pub fn rotation_vector(from: DQuat, to: DQuat) -> DVec3 {
     let turn = to * from.conjugate();
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = turn.xyz().length();
-    if sine == 0.0 { DVec3::ZERO } else { turn.xyz() * (2.0 * sine.atan2(turn.w) / sine) }
+    if sine == 0.0 { DVec3::ZERO } else { turn.xyz() * (2.0 * atan2(sine, turn.w) / sine) }
 }
 
 #[cfg(test)]

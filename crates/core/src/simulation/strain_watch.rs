@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::contacts::{Contact, REVISIONS};
+use crate::math::pow;
 use crate::strain::{MAX_CONTACTS_WATCHED, StrainResponse};
 
 /// Factor by which a jump decays in a tick.
@@ -87,7 +88,7 @@ impl LimitShare {
         let squared = self.step.length_squared();
         let extrapolation =
             path.filter(|_| squared > 0.0).map_or(0.0, |(_, now)| (now - self.place).dot(self.step) / squared);
-        let share = allowed * self.ratio.powf(extrapolation.clamp(EXTRAPOLATION[0], EXTRAPOLATION[1]));
+        let share = allowed * pow(self.ratio, extrapolation.clamp(EXTRAPOLATION[0], EXTRAPOLATION[1]));
         if new {
             self.serials = *serials;
             self.easing = if same && share > 0.0 { self.previous_share / share } else { 1.0 };

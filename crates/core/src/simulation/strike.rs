@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::contact::Patch;
 use crate::dynamics::{Lanes, LoadedPatch, ModalModel, Projection};
+use crate::math::{sin, tan};
 
 /// A strike takes no more steps than this: a second at the usual time step.
 const STEPS_MAX: f64 = 1000.0;
@@ -50,7 +51,7 @@ impl StrikeInProgress {
         self.displacement = self.patch.read(modes, q);
         self.steps = (duration / modes.dt).round().clamp(1.0, STEPS_MAX) as u32;
         // The sum of sin(pi k / (n + 1)) over k = 1..n is the cotangent of pi / (2 (n + 1)).
-        let sum = 1.0 / (std::f64::consts::FRAC_PI_2 / f64::from(self.steps + 1)).tan();
+        let sum = 1.0 / tan(std::f64::consts::FRAC_PI_2 / f64::from(self.steps + 1));
         self.amplitude = impulse / (modes.dt * sum);
         self.next = 1;
     }
@@ -64,7 +65,7 @@ impl StrikeInProgress {
         let instant = self.next;
         self.next = if instant == self.steps { 0 } else { instant + 1 };
         let phase = std::f64::consts::PI * f64::from(instant) / f64::from(self.steps + 1);
-        self.force[0] = self.amplitude * phase.sin();
+        self.force[0] = self.amplitude * sin(phase);
     }
 
     /// Force at the end of this step, N.

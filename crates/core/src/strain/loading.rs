@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::response::MAX_CONTACTS_WATCHED;
+use crate::math::{cos, pow, sin};
 
 /// Directions on half a sphere for a single contact; twice as many combinations for each further one.
 const DIRECTIONS: usize = 200;
@@ -28,7 +29,7 @@ pub fn loadings(contacts: usize, both_signs: bool) -> Loadings {
             let z = (k as f64 + 0.5) / DIRECTIONS as f64;
             let (radius, angle) = ((1.0 - z * z).sqrt(), golden * k as f64);
             let mut loading = [DVec3::ZERO; MAX_CONTACTS_WATCHED];
-            loading[contact] = DVec3::new(radius * angle.cos(), radius * angle.sin(), z);
+            loading[contact] = DVec3::new(radius * cos(angle), radius * sin(angle), z);
             loading
         }));
     }
@@ -36,7 +37,7 @@ pub fn loadings(contacts: usize, both_signs: bool) -> Loadings {
         let dimension = 3 * contacts;
         let mut root = 1.5_f64;
         for _ in 0..40 {
-            root = (1.0 + root).powf(1.0 / (dimension as f64 + 1.0));
+            root = pow(1.0 + root, 1.0 / (dimension as f64 + 1.0));
         }
         directions.extend((1..=2 * DIRECTIONS * (contacts - 1)).map(|k| {
             let coordinate = |axis: usize| 2.0 * (k as f64 * root.powi(-(axis as i32 + 1))).fract() - 1.0;

@@ -14,21 +14,21 @@
 //! The tick's side ([`StrainResponse`], [`StrainKind`], [`provisional_displacement`]) needs nothing but vectors; the rest
 //! needs the interior solution and rayon.
 
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 mod gradient;
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 mod loading;
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 mod measure;
 mod provisional;
 mod response;
 mod tensor;
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 mod watched_points;
 
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 pub use gradient::GradientOperator;
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 pub use measure::{StrainMeasure, StrainOperator};
 pub use provisional::provisional_displacement;
 pub use response::{MAX_CONTACTS_WATCHED, MAX_STRAIN_PLACES, StrainResponse};

@@ -53,7 +53,7 @@ pub struct StrainResponse {
 
 impl StrainResponse {
     /// At most [`MAX_STRAIN_PLACES`] of `places`, the first ones, for the first `contacts` contacts.
-    #[cfg(any(test, feature = "offline"))]
+    #[cfg(any(test, feature = "strain"))]
     pub(super) fn new(kind: StrainKind, contacts: usize, places: &[Place]) -> Self {
         let empty = Place { base: [0.0; 6], slope: [[[0.0; 6]; 3]; MAX_CONTACTS_WATCHED] };
         let mut response = Self {

@@ -1,5 +1,6 @@
 //! The largest principal strain in magnitude of one place.
 
+use crate::math::{acos, cos};
 /// Which strain six numbers of a place stand for. Both are affine in the displacements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StrainKind {
@@ -26,7 +27,7 @@ impl StrainKind {
     }
 
     /// Change of the strain (six components) with the sample, to first order about `base`: `sym(F^T X)`.
-    #[cfg(feature = "offline")]
+    #[cfg(feature = "strain")]
     pub(super) fn linearised(self, base: &[f64; 6], change: &[f64; 6]) -> [f64; 6] {
         let dot = |a: &[f64], b: &[f64]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         match self {
@@ -39,7 +40,7 @@ impl StrainKind {
     }
 
     /// Squared norm of what the strain changes by beyond first order: `|X^T X| / 2` is not above half of it.
-    #[cfg(feature = "offline")]
+    #[cfg(feature = "strain")]
     pub(super) fn squared_curvature(self, change: &[f64; 6]) -> f64 {
         match self {
             StrainKind::Infinitesimal => 0.0,
@@ -49,7 +50,7 @@ impl StrainKind {
 }
 
 /// Scalar product of two symmetric tensors; in its norm, that of Frobenius, none of the principal values is larger.
-#[cfg(feature = "offline")]
+#[cfg(feature = "strain")]
 pub(super) fn tensor_product(a: &[f64; 6], b: &[f64; 6]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + 2.0 * (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
 }
@@ -68,9 +69,9 @@ fn infinitesimal(&[xx, yy, zz, xy, yz, zx]: &[f64; 6], floor: f64) -> f64 {
     }
     let determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
     let cosine = determinant / (2.0 * spread * spread * spread).max(f64::MIN_POSITIVE);
-    let angle = cosine.clamp(-1.0, 1.0).acos() / 3.0;
-    let high = mean + 2.0 * spread * angle.cos();
-    let low = mean + 2.0 * spread * (angle + 2.0 * std::f64::consts::FRAC_PI_3).cos();
+    let angle = acos(cosine.clamp(-1.0, 1.0)) / 3.0;
+    let high = mean + 2.0 * spread * cos(angle);
+    let low = mean + 2.0 * spread * cos(angle + 2.0 * std::f64::consts::FRAC_PI_3);
     high.abs().max(low.abs()).max(floor)
 }
 

@@ -1,10 +1,9 @@
 //! A file of arrays: safetensors whose bytes have the checksum that the scene names.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use bytemuck::AnyBitPattern;
-use palpate_core::{Error, Result};
+use palpate_core::{Error, Result, files};
 use safetensors::tensor::{Dtype, SafeTensors};
 
 use super::description::ArrayFile;
@@ -44,7 +43,7 @@ impl Arrays {
     /// The operating system's, or another checksum.
     pub fn read(folder: &Path, file: &ArrayFile) -> Result<Self> {
         let path = file_of(folder, &file.file)?;
-        let bytes = fs::read(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
+        let bytes = files::read(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
         if checksum(&bytes) != file.checksum {
             return Err(refused(&path, "is damaged, or of another scene: its checksum differs; pack the scene again"));
         }

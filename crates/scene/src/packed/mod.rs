@@ -5,6 +5,8 @@
 
 mod arrays;
 mod description;
+#[cfg(feature = "offline")]
+mod elements;
 mod read;
 
 pub use arrays::checksum;

@@ -1,19 +1,17 @@
 //! Reader of packed scenes.
 
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::DVec3;
 use palpate_core::contact::local::SERIES_FIELDS;
 use palpate_core::contact::shape::ToolShape;
 use palpate_core::contact::{Moduli, SeriesFields};
 use palpate_core::dynamics::{Newmark, Rayleigh};
-use palpate_core::fem::{Isotropic, Supports, stiffness};
-use palpate_core::green::{GreensFunction, Interior};
-use palpate_core::mesh::{TetMesh, Tets};
+use palpate_core::files;
+use palpate_core::green::GreensFunction;
 use palpate_core::simulation::LawKind;
-use palpate_core::strain::{GradientOperator, StrainMeasure};
+#[cfg(not(feature = "offline"))]
+use palpate_core::strain::StrainMeasure;
 use palpate_core::{Error, Result};
 use palpate_devices::DeviceLimits;
 use palpate_servo::{SafetyLimits, Scheduling};
@@ -23,6 +21,8 @@ use super::arrays::{Arrays, file_of, refused};
 use super::description::{
     BodyDescription, MotionDescription, SceneDescription, Scheme, ShapeDescription, ToolDescription,
 };
+#[cfg(feature = "offline")]
+use super::elements::strain;
 use crate::body::{Body, Motion, placement};
 use crate::graph::Scene;
 use crate::tool::Tool;
@@ -38,7 +38,7 @@ const VERSION: u32 = 2;
 /// A file that is missing, damaged, of another format or version, or that does not belong to the others.
 pub fn read(folder: &Path) -> Result<Scene> {
     let path = folder.join(SCENE_FILE);
-    let text = fs::read_to_string(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
+    let text = read_text(&path)?;
     let described = describe(&path, &text)?;
     let mut scene = Scene::default();
     scene.strain_limit = described.strain_limit;
@@ -126,35 +126,16 @@ fn motion(arrays: &Arrays, described: &MotionDescription) -> Result<Motion> {
     })
 }
 
-/// By the elements, whose stiffness is assembled and factorised here; of a body of which only the store was there, by its
-/// surface.
-fn strain(arrays: &Arrays, green: &GreensFunction) -> Result<StrainMeasure> {
-    let Some(nodes) = arrays.optional::<[f64; 3]>("nodes", Dtype::F64, 3)? else {
-        return Ok(StrainMeasure::of_surface(&green.surface));
-    };
-    let nodes: Vec<DVec3> = nodes.into_iter().map(DVec3::from).collect();
-    let tets = match arrays.width("tets")? {
-        10 => Tets::Quadratic(arrays.numbers("tets", Dtype::U32, 10)?),
-        _ => Tets::Linear(arrays.numbers("tets", Dtype::U32, 4)?),
-    };
-    let mesh = TetMesh::new(nodes, tets)?;
-    let materials: Vec<[f64; 3]> = arrays.numbers("materials", Dtype::F64, 3)?;
-    if materials.len() != mesh.tets.len() {
-        return Err(Error::Invalid(format!("{} materials for {} elements", materials.len(), mesh.tets.len())));
-    }
-    let isotropic = |[youngs, poissons, density]: [f64; 3]| Isotropic::new(youngs, poissons, density);
-    let materials = materials.into_iter().map(isotropic).collect::<Result<Vec<_>>>()?;
-    let supports = Supports::new(3 * mesh.nodes.len(), green.fixed_dofs.clone())?;
-    let matrix = stiffness(&mesh, &materials);
-    let interior = Arc::new(Interior::new(&matrix, &supports, &green.surface_nodes, &green.loads)?);
-    let start: Vec<u64> = arrays.numbers("gradient_start", Dtype::U64, 1)?;
-    let gradients = GradientOperator::from_parts(
-        start.into_iter().map(|entry| entry as usize).collect(),
-        arrays.numbers("gradient_nodes", Dtype::U32, 1)?,
-        arrays.numbers("gradients", Dtype::F64, 3)?,
-        mesh.nodes.len(),
-    )?;
-    Ok(StrainMeasure::of_gradients(gradients, interior))
+/// By the surface: the inside of the body is not known without the offline part.
+#[cfg(not(feature = "offline"))]
+fn strain(_arrays: &Arrays, green: &GreensFunction) -> Result<StrainMeasure> {
+    Ok(StrainMeasure::of_surface(&green.surface))
+}
+
+/// Text of a file.
+fn read_text(path: &Path) -> Result<String> {
+    let io = |source| Error::Io { path: path.to_owned(), source };
+    String::from_utf8(files::read(path).map_err(io)?).map_err(|_| refused(path, "is no text"))
 }
 
 fn tool(folder: &Path, described: ToolDescription) -> Result<Tool> {

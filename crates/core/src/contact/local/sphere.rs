@@ -21,6 +21,7 @@
 //! Deeper, the parameter solved for is `t`, not `a`: `d = R t tanh t` keeps its relative precision at every depth, while
 //! `1 - a/R` falls below round-off at `d = 18 R`.
 
+use crate::math::{exp, tanh};
 /// Depth over the sphere's radius below which power series are summed.
 const SERIES_BELOW: f64 = 0.5;
 /// Terms of the power series: `(0.5/2.4)^24` is below the precision of a double.
@@ -72,7 +73,7 @@ fn parameter(depth: f64) -> f64 {
     // t^2 = depth + depth^2/3 + .. where shallow, depth^2 where deep.
     let mut t = (depth * (1.0 + depth * (1.0 / 3.0 + depth) / (1.0 + depth))).sqrt();
     for _ in 0..MAX_NEWTON_STEPS {
-        let x = t.tanh();
+        let x = tanh(t);
         let change = (t * x - depth) / (x + t * (1.0 - x * x));
         t -= change;
         if change.abs() <= 1e-16 * t {
@@ -137,7 +138,7 @@ fn series(depth: f64) -> (f64, f64, f64) {
 /// `x`, `f` and `u` of a deep contact.
 fn closed_form(depth: f64) -> (f64, f64, f64) {
     let t = parameter(depth);
-    let x = t.tanh();
+    let x = tanh(t);
     let y = x * x;
     let force = (1.0 + y) * t - x;
     // int_0^x (s artanh s)^2 ds, by parts; the remaining integral is int_0^t s tanh s ds.
@@ -147,7 +148,7 @@ fn closed_form(depth: f64) -> (f64, f64, f64) {
 
 /// `int_0^t s tanh s ds`, from `tanh s = 1 - 2/(exp(2 s) + 1)` and `int_0^inf s/(exp(2 s) + 1) ds = pi^2/48`.
 fn integral_of_t_tanh_t(t: f64) -> f64 {
-    let factor = -(-2.0 * t).exp();
+    let factor = -exp(-2.0 * t);
     let (mut power, mut tail) = (-1.0, 0.0);
     for k in 1..=DILOGARITHM_TERMS {
         power *= factor;

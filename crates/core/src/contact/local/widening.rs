@@ -13,6 +13,7 @@
 
 use super::finite_strain::{StrainCorrection, StrainTerms, correct_sphere};
 use super::sphere::{SphereContact, indent_sphere};
+use crate::math::cbrt;
 
 /// Newton's steps for the approach of the sphere alone. Three are usual.
 const MOST_STEPS: usize = 12;
@@ -99,7 +100,7 @@ impl Widening {
 
 /// Square of the radius of a Hertzian contact, m^2.
 fn hertz_area(force: f64, radius: f64, effective_modulus: f64) -> f64 {
-    (0.75 * radius * force / effective_modulus).cbrt().powi(2)
+    cbrt(0.75 * radius * force / effective_modulus).powi(2)
 }
 
 #[cfg(test)]

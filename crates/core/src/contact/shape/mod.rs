@@ -12,6 +12,7 @@ use glam::DVec3;
 
 pub use surface::SurfaceShape;
 
+use crate::math::hypot;
 use crate::{Error, Result};
 
 /// Shape of a tool.
@@ -185,7 +186,7 @@ impl ToolShape {
             Self::Sphere { radius } => radius,
             Self::Ellipsoid { semi_axes } => semi_axes.max_element(),
             Self::Capsule { radius, half_length } => radius + half_length,
-            Self::Punch { radius, .. } => radius * (0.5 * punch::LENGTH).hypot(1.0),
+            Self::Punch { radius, .. } => radius * hypot(0.5 * punch::LENGTH, 1.0),
             Self::Surface(ref surface) => surface.bounding_radius(),
         }
     }

@@ -11,6 +11,7 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 use super::LineEntry;
+use crate::math::sincos;
 use crate::{Error, Result};
 
 /// Grid cells along the longest side of the surface.
@@ -274,7 +275,7 @@ fn spiral(count: usize) -> impl Iterator<Item = DVec3> {
     let golden_angle = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..count).map(move |k| {
         let z = 1.0 - (2 * k + 1) as f64 / count as f64;
-        let (sin, cos) = (golden_angle * k as f64).sin_cos();
+        let (sin, cos) = sincos(golden_angle * k as f64);
         ((1.0 - z * z).sqrt() * DVec3::new(cos, sin, 0.0)).with_z(z)
     })
 }

@@ -7,6 +7,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::math::acos;
 use crate::mesh::Surface;
 use crate::tensor::outer;
 
@@ -129,7 +130,8 @@ fn outline(surface: &Surface, of_corners: &[[u32; 3]], fans: &mut [Fan]) {
             let (rank, lengths) = (corners[k] as usize, [next.length(), last.length()]);
             let fan = &mut fans[rank];
             (fan.node, fan.triangle, fan.position) = (surface.triangles[t][k], t as u32, here);
-            fan.normal += surface.normals[t] * next.angle_between(last);
+            fan.normal += surface.normals[t]
+                * acos((next.dot(last) / (next.length_squared() * last.length_squared()).sqrt()).clamp(-1.0, 1.0));
             for length in lengths {
                 edges[rank].0 = edges[rank].0.max(length);
                 edges[rank].1 += length;

@@ -5,7 +5,6 @@
 //! different panels in the same places.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -80,9 +79,8 @@ impl Claim {
     }
 
     fn has_its_name(&self) -> bool {
-        let name = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
-        let named = fs::metadata(&self.path).map(name);
-        self.file.metadata().map(name).is_ok_and(|ours| named.is_ok_and(|named| named == ours))
+        let named = fs::metadata(&self.path).map(identity);
+        self.file.metadata().map(identity).is_ok_and(|ours| named.is_ok_and(|named| named == ours))
     }
 }
 
@@ -90,6 +88,20 @@ impl Drop for Claim {
     fn drop(&mut self) {
         self.release();
     }
+}
+
+/// What tells one file from another that has its name now: device and inode.
+#[cfg(unix)]
+fn identity(metadata: fs::Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (metadata.dev(), metadata.ino())
+}
+
+/// The same where the system tells no such numbers: the moment it was made.
+#[cfg(windows)]
+fn identity(metadata: fs::Metadata) -> u64 {
+    use std::os::windows::fs::MetadataExt;
+    metadata.creation_time()
 }
 
 /// Path of the unfinished work on a store.

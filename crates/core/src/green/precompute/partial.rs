@@ -10,7 +10,6 @@
 
 use std::fs::File;
 use std::io;
-use std::os::unix::fs::FileExt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
@@ -18,6 +17,7 @@ use rayon::prelude::*;
 use super::block::Block;
 use super::claim::Claim;
 use super::layout::Layout;
+use crate::positioned::Positioned;
 use crate::{Error, Result};
 
 /// Bytes of the description, padding included.

@@ -11,6 +11,7 @@
 //! `F` is homogeneous: in cells of sides `hx` and `hy = alpha hx`, with forces in place of pressures,
 //! `u_i = sum_j T(i - j) f_j/(pi E* sqrt(hx hy))`, where `T` depends on `alpha` only. `T` is symmetric to the bit.
 
+use crate::math::log;
 use glam::{DMat4, DVec4};
 use pulp::{Arch, NullaryFnOnce};
 
@@ -65,8 +66,8 @@ impl Influence {
             for i in 0..self.cells {
                 let x = i as f64 + 0.5;
                 let r = (x * x + y * y).sqrt();
-                by_y[j][i] = ((x + r) / y).ln();
-                value[j][i] = x * ((y + r) / x).ln() + y * by_y[j][i];
+                by_y[j][i] = log((x + r) / y);
+                value[j][i] = x * log((y + r) / x) + y * by_y[j][i];
             }
         }
         self.fill(&value, &by_y);

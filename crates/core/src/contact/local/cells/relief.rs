@@ -14,6 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::super::contact_plane::ContactPlane;
 use super::influence::{Grid, MAX_CELLS};
+use crate::math::{acos, sin};
 
 /// Largest slope of a height.
 const STEEPEST: f64 = 3.0;
@@ -130,9 +131,9 @@ impl Wedge {
         if first.cross(second).dot(along) <= 0.0 {
             return None;
         }
-        let angle = PI - first.dot(second).clamp(-1.0, 1.0).acos();
+        let angle = PI - acos(first.dot(second).clamp(-1.0, 1.0));
         let wide = angle.max(FRAC_PI_2);
-        let compliance = [PI / (angle + angle.sin()), PI / (wide - wide.sin())];
+        let compliance = [PI / (angle + sin(angle)), PI / (wide - sin(wide))];
         Some(Self { bisector: (first + second).try_normalize()?, compliance })
     }
 

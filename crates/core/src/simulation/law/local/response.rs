@@ -11,6 +11,7 @@ use crate::contact::local::{
 use crate::contact::regular::{COMPLIANCE, GAUSS, MEAN, PLANE_STRAIN, WIDENING, WIDTH, compliance_of, reference_area};
 use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{Blended, FanWeights, FootPoint};
+use crate::math::hypot;
 use crate::simulation::contacts::LocalContact;
 use crate::simulation::rotation::rotation_vector;
 use crate::tensor::{across, outer};
@@ -135,7 +136,7 @@ fn evaluate_sphere(
         false => body.smooth.foot(body.drawn, guess.place - guess.offset, guess.foot, &mut weights.near)?,
     };
     let distance = match body.series {
-        Some(_) => foot.distance.signum() * foot.distance.hypot(guess.offset.length()),
+        Some(_) => foot.distance.signum() * hypot(foot.distance, guess.offset.length()),
         None => foot.distance,
     };
     body.smooth.weigh(&foot, weights);
@@ -382,7 +383,7 @@ impl LocalResponse {
             return n * force;
         }
         let along = (across(n) * (slope - gradient)).clamp_length_max(STEEPEST_INCLINATION * before);
-        let before = before.hypot(along.length());
+        let before = hypot(before, along.length());
         let inclination = along * (1.0 / before);
         let direction = n * (1.0 - inclination.length_squared()).sqrt() + inclination;
         let by_force = across(n) * (self.slope_by_force + outer(inclination, direction)) * (self.distance / before);

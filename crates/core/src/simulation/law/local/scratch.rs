@@ -7,6 +7,7 @@ use super::response::{LocalResponse, OtherContacts};
 use crate::contact::footprint::FootprintScratch;
 use crate::contact::local::cells::{CellScratch, PressureState};
 use crate::contact::smooth::{FanWeights, FootPoint, SmoothSurface};
+use crate::math::pow;
 use crate::simulation::MAX_CONTACTS;
 use crate::simulation::model::Model;
 use crate::simulation::state::State;
@@ -145,7 +146,7 @@ impl LocalScratch {
                 let right = (1.0 + c - outward * (1.0 + power * c) / depth).max(0.0);
                 let mut x = 1.0f64;
                 for _ in 0..6 {
-                    let rise = c * x.powf(power - 1.0);
+                    let rise = c * pow(x, power - 1.0);
                     x = (x - (x + rise * x - right) / (1.0 + power * rise)).max(0.0);
                 }
                 self.steps[a] += normal * ((1.0 - x) * depth - outward);

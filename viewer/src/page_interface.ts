@@ -1,10 +1,11 @@
-// `window.palpate`: state that browser tests read, and points on the screen that they may press.
+// `window.palpate`: what programs may do with the page, and state and points on the screen for browser tests.
 
 import * as THREE from "three";
 
 import type { Pointer } from "./input/pointer";
 import type { RecordingStatus, ReplayFrame } from "./net/session_messages";
-import type { FieldMessage, MotionFrame, ToolFrame, Vec3 } from "./net/protocol";
+import type { Carrier } from "./net/carrier";
+import type { FieldMessage, FrameMessage, MotionFrame, ToolFrame, Vec3 } from "./net/protocol";
 import type { BodyView } from "./scene/body_view";
 import type { Stage } from "./scene/stage";
 import { drivenTool } from "./store";
@@ -54,6 +55,14 @@ export interface ViewerState {
 declare global {
   interface Window {
     palpate: {
+      /** When the first frame is drawn. */
+      ready: Promise<void>;
+      /** Sends a tool to a place, m; null takes it out of the scene. */
+      move(position: Vec3 | null, tool?: number): void;
+      /** The newest tick that is drawn; null before the first. */
+      frame(): FrameMessage | null;
+      /** Forces on the first device, N, at each of its positions (three numbers each, m), from rest and tick by tick. */
+      run(positions: Float64Array): Promise<Float64Array>;
       state(): ViewerState;
       project(point: Vec3): [number, number];
       /** Unit vector towards the viewer, and the distance from what is looked at, m. */
@@ -69,11 +78,24 @@ export interface Parts {
   pointer: Pointer;
   statistics: Statistics;
   history: HistoryLog;
+  carrier: Carrier;
 }
 
-export function installTestHooks(parts: Parts): void {
-  const { stage } = parts;
+export function installPageInterface(parts: Parts): void {
+  const { stage, store, carrier } = parts;
+  let arrived = () => {};
+  const ready = new Promise<void>((resolve) => (arrived = resolve));
+  store.subscribe(["frame"], ({ frame }) => {
+    if (frame) arrived();
+  });
   window.palpate = {
+    ready,
+    move: (position, tool = 0) => {
+      if (position) carrier.send({ type: "press", tool, position, grab: false });
+      else carrier.send({ type: "release", tool });
+    },
+    frame: () => store.get().frame,
+    run: (positions) => carrier.run(positions),
     state: () => viewerState(parts),
     project: (point) => stage.viewport.project(new THREE.Vector3(...point)),
     view: () => {

@@ -1,0 +1,7 @@
+//! Functions beyond IEEE arithmetic and the square root, from one library on every platform.
+//!
+//! The system's `ln`, `exp` or `sin` differ in the last digit from one system to the next, and WebAssembly has none of its
+//! own. A tick, and what it is prepared from, calls these instead: the same input gives the same bits in a program and in a
+//! browser.
+
+pub(crate) use libm::{acos, atan2, cbrt, cos, exp, expm1, hypot, log, log2, pow, sin, sincos, tan, tanh};

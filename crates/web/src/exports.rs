@@ -1,0 +1,191 @@
+//! C functions of the module: memory, files, one session, and what it answers.
+//!
+//! A call that fails returns -1, and its reason is the answer's text. Answers stay in place until the next call.
+#![allow(unsafe_code)] // pointers into this module's memory, and names without mangling
+
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use palpate_core::files;
+
+use crate::command::Command;
+use crate::session::Session;
+use crate::{frame, run};
+
+/// Where the files of the scene are provided.
+const FOLDER: &str = "scene";
+
+#[derive(Default)]
+struct Module {
+    session: Option<Session>,
+    text: Vec<u8>,
+    numbers: Vec<f64>,
+}
+
+static MODULE: Mutex<Option<Module>> = Mutex::new(None);
+
+fn module() -> MutexGuard<'static, Option<Module>> {
+    MODULE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Does something with the session: 0, or -1 with the reason as text.
+fn with_session(work: impl FnOnce(&mut Session, &mut Vec<u8>, &mut Vec<f64>) -> Result<(), String>) -> i32 {
+    let mut module = module();
+    let Module { session, text, numbers } = module.get_or_insert_default();
+    let done = match session {
+        Some(session) => work(session, text, numbers),
+        None => Err("no scene is open".into()),
+    };
+    match done {
+        Ok(()) => 0,
+        Err(reason) => {
+            *text = reason.into_bytes();
+            -1
+        }
+    }
+}
+
+/// Memory of `length` bytes, aligned for numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_alloc(length: usize) -> *mut u8 {
+    let words = vec![0u64; length.div_ceil(8)];
+    Box::leak(words.into_boxed_slice()).as_mut_ptr().cast()
+}
+
+/// Gives memory of [`palpate_alloc`] back.
+///
+/// # Safety
+/// A pointer that [`palpate_alloc`] gave for that length, once.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_free(pointer: *mut u8, length: usize) {
+    let words = std::ptr::slice_from_raw_parts_mut(pointer.cast::<u64>(), length.div_ceil(8));
+    // SAFETY: by the caller.
+    drop(unsafe { Box::from_raw(words) });
+}
+
+/// Provides a file of the scene.
+///
+/// # Safety
+/// Names and bytes within this module's memory.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_provide(name: *const u8, name_length: usize, bytes: *const u8, length: usize) {
+    // SAFETY: by the caller.
+    let (name, bytes) =
+        unsafe { (std::slice::from_raw_parts(name, name_length), std::slice::from_raw_parts(bytes, length)) };
+    files::provide(Path::new(FOLDER).join(&*String::from_utf8_lossy(name)), bytes.to_vec());
+}
+
+/// Opens the scene whose files were provided, and forgets them.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_open() -> i32 {
+    let opened = Session::open(&Path::new(FOLDER).join("scene.json"));
+    files::forget_provided();
+    let mut module = module();
+    let module = module.get_or_insert_default();
+    match opened {
+        Ok(session) => {
+            module.session = Some(session);
+            0
+        }
+        Err(error) => {
+            module.text = error.to_string().into_bytes();
+            -1
+        }
+    }
+}
+
+/// Carries out a command in JSON.
+///
+/// # Safety
+/// A text within this module's memory.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_command(text: *const u8, length: usize) -> i32 {
+    // SAFETY: by the caller.
+    let text = unsafe { std::slice::from_raw_parts(text, length) };
+    with_session(|session, _, _| {
+        let command: Command = serde_json::from_slice(text).map_err(|error| error.to_string())?;
+        command.apply(session).map_err(|error| error.to_string())
+    })
+}
+
+/// Makes the ticks that are due at a time of the page's clock, ms; how many.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_advance(now_ms: f64) -> u32 {
+    let mut module = module();
+    let session = module.as_mut().and_then(|module| module.session.as_mut());
+    session.map_or(0, |session| session.advance((1e6 * now_ms) as u64) as u32)
+}
+
+/// The latest tick, as text.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_frame() -> i32 {
+    with_session(|session, text, _| {
+        *text = frame::frame(session).to_string().into_bytes();
+        Ok(())
+    })
+}
+
+/// Displacements of a body's surface, as numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_displacements(body: usize) -> i32 {
+    with_session(|session, _, numbers| {
+        *numbers = frame::displacements(session, body);
+        Ok(())
+    })
+}
+
+/// Rows of the log since the last call, as numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_log(body: usize) -> i32 {
+    with_session(|session, _, numbers| {
+        *numbers = frame::log(session, body);
+        Ok(())
+    })
+}
+
+/// Forces at given positions (three numbers each), as numbers.
+///
+/// # Safety
+/// Numbers within this module's memory, aligned.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_run(positions: *const f64, count: usize) -> i32 {
+    // SAFETY: by the caller.
+    let positions = unsafe { std::slice::from_raw_parts(positions, count) };
+    with_session(|session, _, numbers| {
+        *numbers = run::forces(session, positions).map_err(|error| error.to_string())?;
+        Ok(())
+    })
+}
+
+/// Ends the recording: the bytes of its file, as text.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_end_recording() -> i32 {
+    with_session(|session, text, _| {
+        *text = session.end_recording().map_err(|error| error.to_string())?;
+        Ok(())
+    })
+}
+
+/// Text of the last answer.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_text() -> *const u8 {
+    module().get_or_insert_default().text.as_ptr()
+}
+
+/// Bytes of the text.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_text_length() -> usize {
+    module().get_or_insert_default().text.len()
+}
+
+/// Numbers of the last answer.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_numbers() -> *const f64 {
+    module().get_or_insert_default().numbers.as_ptr()
+}
+
+/// How many numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn palpate_numbers_length() -> usize {
+    module().get_or_insert_default().numbers.len()
+}

@@ -1,0 +1,200 @@
+//! A running scene: its loop, its simulated devices, and a recording under way.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+use palpate_core::simulation::Pose;
+use palpate_core::{Error, Result};
+use palpate_devices::simulated::{Handle, Target, simulated};
+use palpate_devices::{Device, DeviceLimits, MountedDevice, Workspace};
+use palpate_recording::{Header, TickWriter};
+use palpate_scene::{PreparedScene, Scene};
+use palpate_servo::{LogRow, PacedLoop, Published, TickRecord};
+use rtrb::Consumer;
+
+/// A scene and its loop.
+pub struct Session {
+    pub(crate) scene: PreparedScene,
+    pub(crate) paced: PacedLoop,
+    tools: Vec<(Handle, Target)>,
+    recording: Option<Recording>,
+    pub(crate) rows: Vec<LogRow>,
+}
+
+/// Ticks on their way into bytes.
+struct Recording {
+    records: Consumer<TickRecord>,
+    writer: TickWriter<Cursor<Vec<u8>>>,
+    ticks: u64,
+    failed: Option<String>,
+}
+
+impl Session {
+    /// Of a packed scene.
+    ///
+    /// # Errors
+    /// A file that is missing or damaged; see [`Scene::prepare`].
+    pub fn open(folder: &Path) -> Result<Self> {
+        let scene = Scene::load(folder)?.prepare()?;
+        let (handles, devices): (Vec<_>, Vec<_>) = scene.devices.iter().map(device_of).unzip();
+        let paced = PacedLoop::new(
+            scene.model.clone(),
+            devices,
+            scene.limits,
+            scene.settings,
+            scene.strain.clone(),
+            1.0 / scene.scheduling.rate,
+        )?;
+        let tools = handles.into_iter().map(|handle| (handle, Target::default())).collect();
+        Ok(Self { scene, paced, tools, recording: None, rows: Vec::new() })
+    }
+
+    /// Makes the ticks that are due at a time of the page's clock, ns; how many.
+    pub fn advance(&mut self, now_ns: u64) -> u64 {
+        let recording = &mut self.recording;
+        let made = self.paced.advance(now_ns, |_| {
+            if let Some(recording) = recording {
+                recording.take_up();
+            }
+        });
+        let rows = &mut self.rows;
+        self.paced.handle.drain_log(|row| rows.push(row));
+        made
+    }
+
+    /// The latest tick.
+    pub fn latest(&mut self) -> &Published {
+        self.paced.handle.latest()
+    }
+
+    /// Sends a tool to a place, m; what it holds of an orientation (w x y z) stays where none is given.
+    ///
+    /// # Errors
+    /// No such tool.
+    pub fn press(&mut self, tool: usize, position: [f64; 3], orientation: Option<[f64; 4]>, grab: bool) -> Result<()> {
+        let (handle, target) = self.tool(tool)?;
+        target.pose.position = position.into();
+        if let Some([w, x, y, z]) = orientation {
+            target.pose.orientation = DQuat::from_xyzw(x, y, z, w).normalize();
+        }
+        (target.velocity, target.active, target.grab) = (DVec3::ZERO, true, grab);
+        handle.set(*target);
+        Ok(())
+    }
+
+    /// Takes a tool out of the scene.
+    ///
+    /// # Errors
+    /// No such tool.
+    pub fn release(&mut self, tool: usize) -> Result<()> {
+        let (handle, target) = self.tool(tool)?;
+        (target.active, target.grab) = (false, false);
+        handle.set(*target);
+        Ok(())
+    }
+
+    fn tool(&mut self, tool: usize) -> Result<&mut (Handle, Target)> {
+        let count = self.tools.len();
+        self.tools
+            .get_mut(tool)
+            .ok_or_else(|| Error::Invalid(format!("there is no tool {tool}, the scene has {count}")))
+    }
+
+    /// Changes a setting of a tool or body, or of the scene.
+    ///
+    /// # Errors
+    /// A name that no setting has, or a value that is refused.
+    pub fn set(&mut self, name: &str, rank: usize, value: f64) -> Result<()> {
+        let mut settings = self.scene.settings;
+        settings.set(name, rank, value)?;
+        if name == "contact_radius" {
+            self.scene.model.check_contact_radius(value)?;
+        }
+        self.paced.handle.set(settings)?;
+        self.scene.settings = settings;
+        Ok(())
+    }
+
+    /// Watches a surface node, by its rank.
+    ///
+    /// # Errors
+    /// A body or node that there is not.
+    pub fn watch(&mut self, body: usize, node: u32) -> Result<()> {
+        let mut settings = self.scene.settings;
+        settings.watch = Some((body, node));
+        self.paced.handle.set(settings)?;
+        self.scene.settings = settings;
+        Ok(())
+    }
+
+    /// Begins a recording, whose texts say what is recorded; `begun_ns` is since 1970.
+    ///
+    /// # Errors
+    /// A recording that is under way.
+    pub fn record(&mut self, about: BTreeMap<String, String>, begun_ns: u64) -> Result<()> {
+        if self.recording.is_some() {
+            return Err(Error::Invalid("this session is being recorded already".into()));
+        }
+        let (tools, bodies) = (self.scene.tools.len(), self.scene.bodies.len());
+        let header = Header { about, tools, bodies, rate: self.scene.scheduling.rate, begun_ns };
+        let writer = TickWriter::new(Cursor::new(Vec::new()), header).map_err(invalid)?;
+        let records = self.paced.handle.begin_recording()?;
+        self.recording = Some(Recording { records, writer, ticks: 0, failed: None });
+        Ok(())
+    }
+
+    /// Ticks recorded so far, and why no more are; `None` where nothing is recorded.
+    pub fn recorded(&self) -> Option<(u64, Option<&str>)> {
+        self.recording.as_ref().map(|recording| (recording.ticks, recording.failed.as_deref()))
+    }
+
+    /// Ends the recording: the bytes of its file.
+    ///
+    /// # Errors
+    /// No recording, or one that could not be written.
+    pub fn end_recording(&mut self) -> Result<Vec<u8>> {
+        let none = || Error::Invalid("nothing is being recorded".into());
+        let mut recording = self.recording.take().ok_or_else(none)?;
+        self.paced.handle.end_recording();
+        recording.take_up();
+        let ticks = recording.ticks;
+        match recording.failed {
+            Some(reason) => Err(Error::Invalid(reason)),
+            None => Ok(recording.writer.finish(Some(ticks)).map_err(invalid)?.into_inner()),
+        }
+    }
+
+    /// Pose of a press without a device.
+    pub(crate) fn pose(position: [f64; 3]) -> Pose {
+        Pose { position: position.into(), ..Pose::default() }
+    }
+}
+
+impl Recording {
+    fn take_up(&mut self) {
+        while let Ok(record) = self.records.pop() {
+            if self.failed.is_some() {
+                continue;
+            }
+            match self.writer.push(&record) {
+                Ok(()) => self.ticks += 1,
+                Err(error) => self.failed = Some(format!("the recording ends here: {error}")),
+            }
+        }
+    }
+}
+
+/// A simulated device with the limits that the scene gives it, and what moves it.
+fn device_of(limits: &DeviceLimits) -> (Handle, Box<dyn Device>) {
+    let (handle, device) = simulated();
+    match *limits == DeviceLimits::UNLIMITED {
+        true => (handle, Box::new(device)),
+        false => (handle, Box::new(MountedDevice::new(Box::new(device), Workspace::default(), limits))),
+    }
+}
+
+fn invalid(error: impl std::fmt::Display) -> Error {
+    Error::Invalid(error.to_string())
+}
