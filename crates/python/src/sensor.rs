@@ -20,8 +20,8 @@ const POSE: usize = 7;
 const WRENCH: usize = 6;
 
 /// A contact as a row of numbers: copy, tool, body, whether it slips and is limited, radius (m), depth (m) and stiffness (N/m) under the
-/// local law; point (m), normal, force on the body (N) and torque on it about the tip (N m), in the world.
-type ContactRow = [f64; 20];
+/// local law and relative error of the force; point (m), normal, force on the body (N) and torque on it about the tip (N m), in the world.
+type ContactRow = [f64; 21];
 
 /// Scene copies, each with a state of its own.
 #[pyclass(frozen, module = "palpate._native")]
@@ -170,10 +170,12 @@ impl Copy {
             let [normal, force, torque] =
                 [contact.normal, contact.force, -contact.torque].map(|vector| placement.vector_to_world(vector));
             let flags = [contact.slipping, contact.limited].map(|flag| f64::from(u8::from(flag)));
-            let mut row = [0.0; 20];
+            let mut row = [0.0; 21];
             row[..3].copy_from_slice(&[rank as f64, contact.tool as f64, contact.body as f64]);
-            row[3..8].copy_from_slice(&[flags[0], flags[1], contact.radius, contact.depth, contact.stiffness]);
-            for (to, vector) in row[8..].chunks_exact_mut(3).zip([point, normal, force, torque]) {
+            let numbers = [contact.radius, contact.depth, contact.stiffness, contact.error];
+            row[3..5].copy_from_slice(&flags);
+            row[5..9].copy_from_slice(&numbers);
+            for (to, vector) in row[9..].chunks_exact_mut(3).zip([point, normal, force, torque]) {
                 to.copy_from_slice(&vector.to_array());
             }
             contacts.push(row);

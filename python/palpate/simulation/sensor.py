@@ -17,7 +17,7 @@ from palpate.simulation.simulation import Simulation
 from palpate.simulation.taxels import taxel_sides
 from palpate.units import brief_repr
 
-POSE, WRENCH, CONTACT = 7, 6, 20
+POSE, WRENCH, CONTACT = 7, 6, 21
 MOST_COPIES = 65_536
 MOST_TAXELS = 256
 
@@ -38,6 +38,8 @@ class SensorContacts(ComparedByValue):
         (k,) whether the contact slips, and whether the limit of strain holds the tool back.
     radius, depth, stiffness
         (k,) contact radius, m, approach, m, and stiffness along the normal, N/m; 0 unless the law is ``local``.
+    error
+        (k,) estimated relative error of the force; NaN where none is stated, as for a linear material.
 
     """
 
@@ -53,6 +55,7 @@ class SensorContacts(ComparedByValue):
     radius: np.ndarray
     depth: np.ndarray
     stiffness: np.ndarray
+    error: np.ndarray
 
     def __len__(self) -> int:
         return len(self.copy)
@@ -183,9 +186,10 @@ class Sensor:
         """All contacts after the last step."""
         rows = np.empty((0, CONTACT)) if self._raw is None else self._raw["contacts"].reshape(-1, CONTACT)
         numbers = (rows[:, k].astype(int) for k in range(3))
-        vectors = (rows[:, 8 + 3 * k : 11 + 3 * k] for k in range(4))
+        vectors = (rows[:, 9 + 3 * k : 12 + 3 * k] for k in range(4))
         flags = (rows[:, k] != 0.0 for k in (3, 4))
-        return SensorContacts(*numbers, *vectors, *flags, rows[:, 5], rows[:, 6], rows[:, 7])
+        error = np.where(rows[:, 8] > 0.0, rows[:, 8], np.nan)
+        return SensorContacts(*numbers, *vectors, *flags, rows[:, 5], rows[:, 6], rows[:, 7], error)
 
     @property
     def pressures(self) -> np.ndarray:

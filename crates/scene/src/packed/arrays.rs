@@ -79,6 +79,7 @@ impl Arrays {
     ///
     /// # Errors
     /// No such array.
+    #[cfg(feature = "offline")]
     pub fn width(&self, name: &str) -> Result<usize> {
         let missing = |_| refused(&self.path, format!("has no array '{name}'; pack the scene again"));
         let tensors = SafeTensors::deserialize(&self.bytes).map_err(missing)?;
