@@ -31,7 +31,7 @@ const CONSTANT: f64 = 0.01;
 const BY_ELEMENTS: f64 = 0.04;
 /// Factors of the cube of `b` over the breadth: for a body whose support stiffens the contact, and added to it for one that is free
 /// below. They differ in the part of the depth by which the body yields, which is negative above a support.
-const BY_BREADTH: [f64; 2] = [0.45, 0.65];
+const BY_BREADTH: [f64; 2] = [0.45, 0.95];
 const SUPPORTED: f64 = -0.15;
 /// Change of the force with Poisson's ratio over `s`.
 const BY_POISSON: f64 = 0.8;
