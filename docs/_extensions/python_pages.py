@@ -21,6 +21,7 @@ CHAPTERS = {
     "Strain and stress": ("SurfaceStress", "StressRecovery"),
     "Bodies in motion": ("modes", "ModalBasis", "rayleigh_from_ratios", "Newmark", "Energy"),
     "Scenes and the force loop": ("Scene", "Simulation", "Frame", "Contact", "pack"),
+    "Contact as a sensor": ("Sensor", "SensorContacts"),
     "Devices": ("Device", "DeviceLimits", "Reading"),
     "Recordings": (
         *("Recording", "RecordingStatus", "replay", "Replayed", "Difference", "rerun", "compare", "Comparison"),

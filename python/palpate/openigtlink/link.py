@@ -34,8 +34,8 @@ TOOL_POSE, CONTACTS, FORCE, ANSWER = "ToolPose", "Contacts", "Force", "Answer"
 class Link:
     """A simulation as peers see it.
 
-    In: TRANSFORM ``Tool`` or ``Tool0`` to ``Tool3`` moves a tool, ``Body`` says where the scene stands in the world of
-    the wire, STRING ``Command`` with ``reset`` or ``surface`` begins anew or writes the deformed surface to a file.
+    In: TRANSFORM ``Tool`` or ``Tool0`` to ``Tool3`` moves a tool. TRANSFORM ``Body`` is the pose of the scene in the
+    peer's world. STRING ``Command`` is ``reset``, or ``surface``, which writes the deformed surface to a file.
     Out: TRANSFORM ``ToolPose`` (``ToolPose1``...), POINT ``Contacts``, STRING ``Force`` (JSON in N and N m, axes of the
     wire) and STRING ``Answer``.
 
@@ -117,12 +117,12 @@ class Link:
         return path
 
     def let_go(self, peer: object) -> None:
-        """Take the tools of a peer that has gone out of the scene."""
+        """Take the tools of a disconnected peer out of the scene."""
         for tool in [tool for tool, (mover, _) in self._movers.items() if mover is peer]:
             self._remove(tool)
 
     def let_go_of_silent(self, now: float) -> None:
-        """Take tools that nobody moves any more out of the scene."""
+        """Take tools out of the scene whose peer has been silent for too long."""
         for tool in [tool for tool, (_, since) in self._movers.items() if now - since > SILENCE]:
             self._remove(tool)
 

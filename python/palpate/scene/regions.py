@@ -42,6 +42,7 @@ class MaterialTable(Table):
     poissons_ratio: PoissonsRatio = 0.45
     """Poisson's ratio, below 0.5."""
     density: Density = 1000.0
+    """Density, for weight and motion."""
     law: Law = DEFAULT_LAW
     """Constitutive law: linear elasticity, or a hyperelastic one for strains beyond about 10 %."""
     c10: Pressure | None = None

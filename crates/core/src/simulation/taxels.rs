@@ -81,7 +81,7 @@ fn seen_by_tool(contact: &Contact) -> Option<(f64, DMat3, DVec3)> {
 
 fn add_sphere(contact: &Contact, radius: f64, grid: &TaxelGrid, pressures: &mut [f64]) {
     let Some((force, tool_from_body, normal)) = seen_by_tool(contact) else { return };
-    if !(contact.radius > 0.0) {
+    if contact.radius.is_nan() || contact.radius <= 0.0 {
         return;
     }
     let middle = tool_from_body * (contact.local.foot.position - contact.local.relative_position);
@@ -99,7 +99,7 @@ fn add_cells(contact: &Contact, cells: &PressureState, grid: &TaxelGrid, pressur
     let Some((force, tool_from_body, _)) = seen_by_tool(contact) else { return };
     let place = cells.place();
     let all: f64 = cells.forces().iter().flatten().sum();
-    if !(all > 0.0) {
+    if all.is_nan() || all <= 0.0 {
         return;
     }
     let [corner, along, across] = [place.corner, place.along, place.across].map(|vector| tool_from_body * vector);

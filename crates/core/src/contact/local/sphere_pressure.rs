@@ -65,7 +65,7 @@ impl SpherePressure {
         let left = self.yy - self.xy * self.xy / self.xx;
         let reach = 1.0 / left.sqrt();
         let (low, high) = ((low - self.middle.y).max(-reach), (high - self.middle.y).min(reach));
-        if !(high > low) {
+        if low.is_nan() || high.is_nan() || high <= low {
             return;
         }
         let root = self.xx.sqrt();
