@@ -23,7 +23,7 @@ import python_pages  # noqa: E402
 import scene_pages  # noqa: E402
 
 # Names of files and of modules in other languages that look alike.
-FILES = {"palpate.h", "palpate.pc"}
+FILES = {"palpate.wasm", "palpate.h", "palpate.pc"}
 LONG = re.compile(r"--[a-z-]+")
 
 

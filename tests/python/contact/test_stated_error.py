@@ -20,8 +20,8 @@ def test_forces_are_those_of_a_full_solution_within_the_stated_error(name, tmp_p
     errors = np.abs(forces / body.forces - 1.0)
     assert errors.max() < ALLOWED
     assert (errors < stated).all()
-    # It grows with the depth, but for a body whose narrowness decides from the first touch on; and it says something.
-    assert np.diff(stated).min() > -0.01 * stated[0] and stated[0] < (0.06 if name.startswith("block") else 0.15)
+    # It says something.
+    assert stated.max() < (0.07 if name.startswith("block") else 0.15)
 
 
 def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):

@@ -50,11 +50,13 @@ def site(cache, tmp_path_factory):
 
 
 def drag(built) -> np.ndarray:
-    """Down onto the highest free place, half a tool deep, and 15 mm along the surface: (600, 3) m."""
+    """Down onto the highest free place, of a level top its middle, half a tool deep, and 15 mm along it: (600, 3) m."""
     body = built.bodies[0]
     green = body.green
     free = ~np.isin(green.surface_nodes, green.fixed_nodes)
-    top = green.surface_positions[free][np.argmax(green.surface_positions[free][:, 2])]
+    places = green.surface_positions[free]
+    places = places[places[:, 2] > places[:, 2].max() - 1e-6]
+    top = places[np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))]
     radius = built.scene.tools[0].shape_arguments(built.scene.folder)[1][0]
     height = np.concatenate([np.linspace(1.5, 0.6, 200), np.full(400, 0.6)]) * radius
     along = np.concatenate([np.zeros(200), np.linspace(0.0, 0.015, 400)])
