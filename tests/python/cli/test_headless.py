@@ -23,7 +23,8 @@ import palpate
 def test_the_limit_that_held_is_the_one_named(tmp_path, modulus, max_force, strain_limit, by_force, by_strain):
     box_mesh().write(tmp_path / "box.vtu")
     (tmp_path / "press.toml").write_text(
-        f'[body]\nmesh = "box.vtu"\n[supports]\nfixed = "z < min + 1mm"\n[material]\nyoungs_modulus = "{modulus}"\nlaw = "linear"\n'
+        f'[body]\nmesh = "box.vtu"\n[supports]\nfixed = "z < min + 1mm"\n[material]\nlaw = "linear"\n'
+        f'youngs_modulus = "{modulus}"\n'
         f'[device]\nmax_force = "{max_force}"\n[view]\nstrain_limit = {strain_limit}\n'
     )
     said = run("run", "press.toml", "--headless", "2", cwd=tmp_path).stdout
