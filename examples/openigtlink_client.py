@@ -1,12 +1,15 @@
 """Press on a scene over OpenIGTLink, as a tracker or 3D Slicer does, and plot what comes back.
 
-In one terminal: palpate run examples/block.toml --igtl 18944 --no-browser
-In another:      python examples/openigtlink_client.py [plot.png]      (pip install pyigtl)
+python examples/openigtlink_client.py [plot.png]      (pip install pyigtl)
+
+It starts `palpate run examples/block.toml --igtl 18944 --no-browser` itself.
 """
 
 import json
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pyigtl
@@ -17,8 +20,12 @@ from matplotlib.figure import Figure
 TOP, RADIUS = np.array([40.0, 25.0, 50.0]), 6.0
 RATE, SECONDS = 60.0, 4.0
 
+scene = Path(__file__).with_name("block.toml")
+command = [sys.executable, "-m", "palpate", "run", scene, "--igtl", "18944", "--no-browser", "--port", "0"]
+server = subprocess.Popen(command, stdout=subprocess.DEVNULL)
 client = pyigtl.OpenIGTLinkClient("127.0.0.1", 18944)
 while not client.is_connected():
+    assert server.poll() is None, "palpate run has ended"
     time.sleep(0.01)
 client.wait_for_message("Force")
 depths, forces, sent, begun = [], [], 0, time.monotonic()
@@ -35,6 +42,8 @@ while (now := time.monotonic() - begun) < SECONDS:
             forces.append((now, *json.loads(message.string)["force_N"][0]))
     time.sleep(0.001)
 client.stop()
+server.terminate()
+server.wait()
 depths, forces = np.array(depths), np.array(forces)
 rates = [len(rows) / SECONDS for rows in (depths, forces)]
 print(f"{rates[0]:.0f} poses and {rates[1]:.0f} forces a second; largest force {forces[:, 3].max():.3f} N")
