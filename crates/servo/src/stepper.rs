@@ -17,10 +17,10 @@ use crate::replay::ReplayedDevice;
 use crate::safety::SafetyLimits;
 use crate::settings::Settings;
 
-/// Rows of the log that a stepper keeps: nobody reads them.
+/// Rows of the log that a stepper keeps: its log is never read.
 const LOG_ROWS: usize = 1;
 
-/// A force loop whose tools are where they are told to be. Copies of one model share all that was prepared of it.
+/// A force loop whose tools are at the poses given. Copies of one model share all that was prepared of it.
 pub struct Stepper {
     model: Arc<Model>,
     force_loop: ForceLoop,
@@ -66,7 +66,7 @@ impl Stepper {
     }
 
     /// Makes a tick: tools are at these poses, and `period`, s, has passed since the last one. A position that is not finite takes
-    /// its tool out of the scene; `grabs` says which tools hold on, or is empty.
+    /// its tool out of the scene; `grabs` has whether each tool holds on, or is empty.
     pub fn step(&mut self, poses: &[Pose], grabs: &[bool], period: f64) {
         self.prepare(poses, grabs, period);
         self.tick();

@@ -1,6 +1,6 @@
 // The WebAssembly module: calls, and their texts and numbers in its memory. Its functions are in crates/web/src/exports.rs.
 
-import type { ContactMessage, Percentiles, ToolFrame, Vec3 } from "../net/protocol";
+import type { FrameMessage, Vec3 } from "../net/protocol";
 
 interface Exports {
   memory: WebAssembly.Memory;
@@ -21,20 +21,14 @@ interface Exports {
   palpate_numbers_length(): number;
 }
 
-/** The latest tick, without its arrays. */
-export interface Tick {
-  time: number;
-  tools: ToolFrame[];
-  contacts: ContactMessage[];
-  compute_us: Percentiles;
-  wakeup_us: Percentiles;
-  ticks: number;
-  missed_deadlines: number;
-  fault: string | null;
-  realtime: boolean;
+/** The latest tick, without its arrays: what a frame has of it, and what the worker makes the rest of. */
+export type Tick = Pick<
+  FrameMessage,
+  "time" | "tools" | "contacts" | "compute_us" | "wakeup_us" | "ticks" | "missed_deadlines" | "fault" | "realtime"
+> & {
   recorded: { ticks: number; error: string | null } | null;
   body_time: number[];
-}
+};
 
 export type Command =
   | { do: "press"; tool: number; position: Vec3; orientation?: readonly number[]; grab: boolean }
