@@ -247,9 +247,14 @@ def test_a_reader_hears_the_force_once_it_rests(chromium, program):
     with first_page(chromium, program) as page:
         press(page)
         spoken = page.get_by_test_id("spoken")
-        heard = eventually(page, spoken.text_content, lambda text: "newtons" in text)
-        number = float(re.search(r"Force ([\d.]+) newtons", heard)[1])
-        assert number == pytest.approx(state(page)["forceMagnitude"], rel=0.05)
+
+        def is_of_now(text: str) -> bool:
+            # A page whose frames come late takes a creeping force for one at rest, and speaks again after it.
+            number = re.search(r"Force ([\d.]+) newtons", text)
+            return number is not None and float(number[1]) == pytest.approx(state(page)["forceMagnitude"], rel=0.05)
+
+        heard = eventually(page, spoken.text_content, is_of_now)
+        assert is_of_now(heard)
         assert "felt stiffness" in heard and "depth" in heard
         page.mouse.up()
         eventually(page, spoken.text_content, lambda text: text == "Nothing is touched.")
