@@ -191,6 +191,7 @@ def test_a_worker_of_another_version_that_joins_is_refused(monkeypatch):
         worker.measure((), job)
 
 
+@pytest.mark.slow
 def test_command_line(workers, tmp_path):
     mesh = box_mesh(cells=(8, 5, 5))
     mesh.write(tmp_path / "box.vtu")
@@ -207,6 +208,7 @@ def test_command_line(workers, tmp_path):
     refused(run(*command, "tcp://127.0.0.1:1", cwd=tmp_path), "no scheduler answers at tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow
 def test_certificates_of_dasks_own_configuration_are_taken(tmp_path):
     """A scheduler that asks for certificates: the command has them from the environment, as dask has."""
     box_mesh(cells=(8, 5, 5)).write(tmp_path / "box.vtu")

@@ -49,6 +49,7 @@ def firmness_held(mesh: TetMesh, fixed) -> float:
     return firmness(palpate.precompute(body), 5e-3)
 
 
+@pytest.mark.slow
 def test_a_body_that_hangs_by_a_thread_is_found():
     mesh = necked(0.05).to_quadratic()
     loose = firmness_held(mesh, lambda nodes: nodes[:, 2] < 1e-9)

@@ -97,6 +97,7 @@ def test_a_killed_process_loses_a_tenth_of_a_second(tmp_path, shared_cache):
     assert again.returncode == 0 and "note: the file was cut short" in again.stdout
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path, shared_cache):
     """The size of files is limited in the process, as a full disk would."""
     code = (

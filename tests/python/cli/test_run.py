@@ -23,6 +23,7 @@ from palpate.validation.verify import BENCHMARKS
 BLOCK = Path(__file__).parents[3] / "examples" / "block.obj"
 
 
+@pytest.mark.slow
 def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     shutil.copy(BLOCK, tmp_path)
     result = run("run", "block.obj", "--headless", "1", cwd=tmp_path)
@@ -66,6 +67,7 @@ def test_the_size_of_a_scene_is_printed_before_it_is_computed(capsys, monkeypatc
         assert ("computing" in capsys.readouterr().out) is printed
 
 
+@pytest.mark.slow
 def test_options_of_a_bare_surface_are_those_of_a_scene(capsys, tmp_path):
     options = RunOptions("8mm", "z < min + 1mm", "20kPa", 0.4, "900kg/m3", "mm", "2cm")
     built = built_from(BLOCK, options)

@@ -83,6 +83,7 @@ def test_the_first_recording_of_devices_is_made_again(scene):
     assert again.same and again.ticks > 500, again.differences[:1]
 
 
+@pytest.mark.slow
 def test_a_service_that_dies_ends_the_force_and_is_told(scene):
     with inverse_service() as (address, process):
         command = [sys.executable, "-m", "palpate", "run", scene.name, "--headless", "6", "--device", "haply"]

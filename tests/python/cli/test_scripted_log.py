@@ -40,6 +40,7 @@ def test_the_log_has_the_depth_and_the_strain_of_every_tick(tmp_path):
     assert log["depth_m"][0] == log["strain"][0] == 0
 
 
+@pytest.mark.slow
 def test_the_log_is_kept_on_ctrl_c(tmp_path):
     (tmp_path / "a.toml").write_text(SCENE)
     # What starts tests in the background ignores SIGINT, and what is ignored is inherited.

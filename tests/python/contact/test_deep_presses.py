@@ -113,6 +113,7 @@ def test_places_of_deep_presses_stay_on_the_body_and_forces_finite(loops, name, 
     assert not wrong, "; ".join(wrong)
 
 
+@pytest.mark.slow
 def test_a_stylus_deep_in_a_star_under_the_default_device(loops):
     wrong = presses(loops, "star", "capsule", [135, 339, 617, *range(10)], device={})
     assert not wrong, "; ".join(wrong)

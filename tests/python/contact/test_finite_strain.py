@@ -36,12 +36,14 @@ def test_a_neo_hookean_block_has_the_force_of_a_full_solution(ratio):
     np.testing.assert_allclose(found, FORCES[ratio], rtol=ALLOWED)
 
 
+@pytest.mark.slow
 def test_the_linear_law_fails_the_same_bound():
     errors = np.abs(forces_on(palpate.Material(10e3, 0.45)) / FORCES[0.45] - 1.0)
     assert errors[2] > 1.5 * ALLOWED
     assert errors[3] > 2.5 * ALLOWED
 
 
+@pytest.mark.slow
 def test_a_yeoh_material_stiffens_and_two_ways_of_writing_one_agree():
     yeoh = palpate.Material(law="yeoh", c10=1.7e3, c20=1.7e3, poissons_ratio=0.45)
     plain = palpate.Material(law="yeoh", c10=1.7e3, poissons_ratio=0.45)

@@ -123,6 +123,7 @@ def test_the_series_is_stored_and_linear_bodies_have_none(tmp_path):
     assert force_series(green, cantilever("linear"), RADIUS) is None
 
 
+@pytest.mark.slow
 def test_a_replay_has_the_series_of_its_recording():
     body = cantilever("neo-hookean")
     path = polyline((0.08, 0.01, 0.0305), (0.08, 0.01, 0.018), count=300)

@@ -116,6 +116,7 @@ def test_damaged_files_are_refused(block, tmp_path):
         palpate.ModalBasis.load(tmp_path / "none")
 
 
+@pytest.mark.slow
 def test_no_changed_byte_of_a_header_of_modes_is_accepted(block, tmp_path):
     path = tmp_path / "block.modes.palpate"
     palpate.modes(block, 5, path=path)

@@ -54,6 +54,7 @@ def of_trials(library: Library, **changes) -> Library:
     return other
 
 
+@pytest.mark.slow
 def test_felt_contrasts_are_those_of_bodies_with_the_nodule_in_their_mesh(library):
     """Another way there: a Body with its region, the whole surface touchable, `f64`, and a press that lasts longer."""
     exam, place = library.exam, 1
@@ -199,6 +200,7 @@ def test_an_observer_takes_an_exam_from_the_command_line(library, folder, tmp_pa
 class TestPage:
     pytestmark = MARKS
 
+    @pytest.mark.slow
     def test_a_short_exam_is_taken_by_touch_alone(self, library, folder, chromium, tmp_path):
         """Three trials: marked where the tone is loudest, the same again, and none; an interruption between."""
         path, out = write_exam(folder), tmp_path / "anna"

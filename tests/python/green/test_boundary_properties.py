@@ -146,6 +146,7 @@ def test_any_change_equals_a_direct_solve(data):
     assert np.abs(answer.reactions - f[body.fixed_nodes]).max() <= TOLERANCE * np.abs(f).max()
 
 
+@pytest.mark.slow
 @MANY
 @given(st.data())
 def test_answers_superpose_and_work_is_reciprocal(data):

@@ -120,6 +120,7 @@ def test_a_plan_for_workers_may_need_more_memory_than_there_is_here(block, monke
     assert (of_workers.block, of_workers.store) == (here.block, here.store)
 
 
+@pytest.mark.slow
 def test_peak_memory_is_the_planned_one(tmp_path):
     program = child_program(
         (26, 20, 20),

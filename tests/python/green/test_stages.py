@@ -90,6 +90,7 @@ def _column(green: palpate.GreensFunction, node: int) -> int:
     return int(np.searchsorted(green.touchable_nodes, node))
 
 
+@pytest.mark.slow
 def test_what_is_painted_comes_next(tmp_path):
     body = palpate.Body(
         box_mesh(cells=(20, 16, 16)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 2] < 1e-9

@@ -50,6 +50,7 @@ def test_hard_shapes_fill_at_the_default_size(name, element):
     assert len(mesh.surface_nodes) < 8000
 
 
+@pytest.mark.slow
 def test_the_closed_form_of_a_torus():
     """2 pi^2 R r^2, of which the facets of the surface have 0.7 % less."""
     mesh = tetrahedralize_with("quadratic", surfaces.torus())
@@ -86,6 +87,7 @@ def test_crossings_are_found_where_they_are():
     assert np.abs(place[:2]).max() == pytest.approx(0.25, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_knot_that_runs_through_itself_is_refused_by_its_place():
     shape = surfaces.knot(tube=0.016)
     with pytest.raises(palpate.MeshError, match=r"the surface intersects itself near \(.*\) m") as refusal:
@@ -103,6 +105,7 @@ def test_fit_measures_gaps_and_loss():
     assert not fit.is_good(0.01)
 
 
+@pytest.mark.slow
 def test_middles_of_quadratic_elements_lie_on_the_surface():
     """A sphere of radius 40 mm: what straight elements of the same corners lose, curved ones keep."""
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.04)

@@ -104,6 +104,7 @@ def test_surfaces_are_filled(tmp_path, ending):
     assert mesh.dihedral_angles().min() > 5
 
 
+@pytest.mark.slow
 def test_refinement_balls_are_local():
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.04)
     with pytest.warns(palpate.MeshWarning, match="the mesh loses"):

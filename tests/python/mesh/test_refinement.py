@@ -58,6 +58,7 @@ def test_a_shape_that_would_flatten_elements_is_followed_as_far_as_they_allow(ba
     assert fine.dihedral_angles().min() > 0.4 * ball.dihedral_angles().min()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:surface. with elements of:palpate.MeshWarning")
 @pytest.mark.parametrize(("size", "cut"), [(0.0016, True), (0.0045, False)])
 def test_many_elements_are_made_of_few(monkeypatch, size, cut):

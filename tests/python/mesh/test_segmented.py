@@ -71,6 +71,7 @@ def test_two_segments_of_an_oblique_scan(tmp_path):
     assert mesh.dihedral_angles().min() > 2
 
 
+@pytest.mark.slow
 def test_a_hole_stays_unless_its_segment_is_chosen(tmp_path):
     labels, affine = labels_of([ball((0, 0, 0), 25), ball((0, 0, 4), 10)], (30, 30, 30), (1, 1, 1))
     path = write_nrrd(tmp_path / "a.seg.nrrd", labels, affine, {"organ": 1, "cyst": 2})
@@ -83,6 +84,7 @@ def test_a_hole_stays_unless_its_segment_is_chosen(tmp_path):
     assert volume(full, "cyst") == pytest.approx(4 / 3 * np.pi * 0.01**3, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_tumour_at_the_surface_and_one_beside_it(tmp_path):
     """Boundaries that run into the surface and into each other."""
     shapes = [ball((0, 0, 0), 25), ball((0, 0, 20), 9), ball((0, 11, 14), 8)]
@@ -98,6 +100,7 @@ def test_a_tumour_at_the_surface_and_one_beside_it(tmp_path):
     assert mesh.volume == pytest.approx((labels > 0).sum() * 0.8 * 0.8 * 1.5e-9, rel=0.02)
 
 
+@pytest.mark.slow
 def test_scene_with_a_material_for_each_segment(tmp_path):
     labels, affine = oblique()
     write_nrrd(tmp_path / "ct.seg.nrrd", labels, affine, NAMES)
@@ -150,6 +153,7 @@ def test_from_the_file_to_a_touch_by_one_command(tmp_path):
     assert "'liver' (label 1): 43" in listed.stdout and "2 segments" in listed.stdout
 
 
+@pytest.mark.slow
 def test_mistakes_of_the_command_line_are_one_line(tmp_path):
     labels, affine = labels_of([ball((0, 0, 0), 8)], (10, 10, 10))
     write_nrrd(tmp_path / "a.seg.nrrd", labels, affine, {"liver": 1, "empty": 7})

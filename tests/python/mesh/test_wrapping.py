@@ -69,6 +69,7 @@ def test_a_broken_surface_is_filled_without_an_option_more(tmp_path):
     assert np.median(np.abs(np.linalg.norm(on_ball, axis=1) - 0.04)) < 1.5e-4
 
 
+@pytest.mark.slow
 def test_the_part_that_is_wanted_is_filled_and_the_others_are_named(tmp_path):
     scene = trimesh.Scene()
     scene.add_geometry(trimesh.creation.icosphere(subdivisions=3, radius=40.0), node_name="liver")
@@ -137,6 +138,7 @@ def test_needles_are_thinned_out():
     assert len(cleaned(np.asarray(few.vertices) + 0.5, np.asarray(few.faces), np.zeros(400))[1]) == len(few.faces)
 
 
+@pytest.mark.slow
 def test_a_surface_that_netgen_takes_long_for_is_wrapped(monkeypatch):
     runs = []
     monkeypatch.setattr(Filling, "_run", lambda filling, *_: runs.append(1) or OUT_OF_PROCESSOR_TIME)
@@ -146,6 +148,7 @@ def test_a_surface_that_netgen_takes_long_for_is_wrapped(monkeypatch):
     assert len(runs) == 1
 
 
+@pytest.mark.slow
 def test_a_wavy_sheet_is_refused_and_closed_holes_are_noted():
     x, y = np.meshgrid(np.linspace(0, 0.1, 40), np.linspace(0, 0.1, 40), indexing="ij")
     corner = (np.arange(39)[:, None] * 40 + np.arange(39)).ravel()

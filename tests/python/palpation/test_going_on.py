@@ -67,6 +67,7 @@ def test_presses_of_another_palpation_are_not_used(block, store, tmp_path, chang
     assert stiffness_map(scene, grid, depth, on=TOP, partial=partial).resumed > 0
 
 
+@pytest.mark.slow
 def test_a_command_that_is_interrupted_leaves_the_same_files(store, tmp_path):
     # So many presses that most are still to be made when the signal comes.
     words = ["map", str(store), "--grid", "10mm", "--depth", "0.5mm", "--speed", "1mm/s", "--radius", "4mm"]

@@ -151,6 +151,7 @@ def test_command_line_makes_and_solves_them(tmp_path):
     assert "cannot be written to .node files" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_surface_becomes_ten_node_tetrahedra_unless_told_otherwise(tmp_path):
     import trimesh
 
@@ -167,6 +168,7 @@ def test_a_surface_becomes_ten_node_tetrahedra_unless_told_otherwise(tmp_path):
     assert 0.5 < counts[""][1] / counts['element = "linear"'][1] < 1.5
 
 
+@pytest.mark.slow
 def test_command_line_takes_the_same_elements(tmp_path):
     import trimesh
 

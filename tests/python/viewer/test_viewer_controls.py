@@ -42,6 +42,7 @@ def slide(page, name: str, value: float) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_number_is_typed_and_a_double_click_brings_the_default(page):
     press(page)
     soft = np.linalg.norm(settled_force(page))

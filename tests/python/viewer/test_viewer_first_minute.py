@@ -78,6 +78,7 @@ def nothing_overlaps_or_is_cut(page, size) -> set[str]:
     return set(boxes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def test_the_first_page_has_room_for_all_that_it_shows(chromium, program, size):
     with first_page(chromium, program, size, sharpness=0.25) as page:
@@ -106,6 +107,7 @@ def test_the_first_page_has_room_for_all_that_it_shows(chromium, program, size):
         page.mouse.up()
 
 
+@pytest.mark.slow
 def test_letters_grow_with_a_very_large_screen(chromium, program):
     heights = []
     for size in ((1440, 900), (3840, 2160)):
@@ -170,6 +172,7 @@ def test_tab_reaches_every_control_and_each_has_a_name(chromium, program, more):
         assert repeated == []
 
 
+@pytest.mark.slow
 def test_every_number_has_a_label_and_a_unit(chromium, program):
     with opened(chromium, program) as page:
         press(page, 2)
@@ -206,6 +209,7 @@ def is_tissue(color: np.ndarray) -> bool:
     return color[0] > 1.5 * color[1] and color[0] > 1.5 * color[2]
 
 
+@pytest.mark.slow
 def test_colours_come_over_the_tissue_where_it_is_strained_or_with_a_field(chromium, program):
     with first_page(chromium, program, sharpness=1.0) as page:
         x, y = page.evaluate("window.palpate.pickPoint()")

@@ -36,6 +36,7 @@ def nodes_of(mask: str) -> np.ndarray:
     return np.flatnonzero(np.unpackbits(np.frombuffer(base64.b64decode(mask), np.uint8), bitorder="little"))
 
 
+@pytest.mark.slow
 def test_the_page_is_told_what_is_ready_and_what_it_paints_comes_next(scene):
     built, growing = scene.build_first(progress=False)
     green = built.bodies[0].green

@@ -74,6 +74,7 @@ def hue(color: np.ndarray) -> np.ndarray:
     return color / color.sum(axis=-1, keepdims=True)
 
 
+@pytest.mark.slow
 def test_a_screenshot_carries_force_legend_and_scale(page, tmp_path):
     press(page, 2)
     shot = saved(page, tmp_path)
@@ -121,6 +122,7 @@ def test_the_scale_bar_is_true_and_follows_the_zoom(page):
     page.keyboard.press("v")
 
 
+@pytest.mark.slow
 def test_a_range_is_locked_where_it_is_or_where_it_is_typed(page):
     field = page.get_by_test_id("field-select")
     field.select_option("displacement")
@@ -166,6 +168,7 @@ def body_hues(page, box: tuple[int, int, int, int]) -> np.ndarray:
     return hue(pixels(page.screenshot(clip=clip)))
 
 
+@pytest.mark.slow
 def test_a_body_at_rest_has_the_colour_of_zero_and_not_its_own(page):
     """The liver is red; viridis begins with blue."""
     page.get_by_test_id("field-select").select_option("displacement")
@@ -185,6 +188,7 @@ def test_a_body_at_rest_has_the_colour_of_zero_and_not_its_own(page):
     page.keyboard.press("c")
 
 
+@pytest.mark.slow
 def test_regions_and_materials_have_colours_and_names(chromium, layered):
     with opened(chromium, layered, sharpness=SHARPNESS) as page:
         field, groups = page.get_by_test_id("field-select"), page.get_by_test_id("legend-groups")
@@ -219,6 +223,7 @@ def test_regions_and_materials_have_colours_and_names(chromium, layered):
         assert groups.is_hidden() and page.locator("#legend-field").is_visible()
 
 
+@pytest.mark.slow
 def test_a_cut_is_plane_and_closed(chromium, layered):
     """Cut across y the face is a rectangle, whose edges are straight to a pixel, whatever the elements are."""
     with opened(chromium, layered, sharpness=SHARPNESS) as page:
@@ -264,6 +269,7 @@ def test_a_cut_is_plane_and_closed(chromium, layered):
         page.mouse.up()
 
 
+@pytest.mark.slow
 def test_a_store_says_why_it_is_not_cut_open(chromium, block_green, cache):
     started = Program(cache, str(block_green.path), command="run")
     try:
@@ -280,6 +286,7 @@ def test_a_store_says_why_it_is_not_cut_open(chromium, block_green, cache):
         assert started.stop() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", ["dark", "light"])
 def test_the_theme_is_that_of_the_system_until_it_is_chosen(chromium, program, tmp_path, system):
     other = "light" if system == "dark" else "dark"

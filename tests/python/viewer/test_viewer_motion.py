@@ -180,6 +180,7 @@ def test_a_large_body_swings_and_is_struck_like_a_small_one(moving, monkeypatch)
     assert swings[1] == pytest.approx(swings[0], rel=0.5)
 
 
+@pytest.mark.slow
 def test_the_tool_is_limited_in_motion(moving):
     """By the static response: the body comes to rest within the limit, though the tool is 20 mm deep."""
 

@@ -131,6 +131,7 @@ def test_a_drag_slides_along_the_surface(page):
     page.mouse.up()
 
 
+@pytest.mark.slow
 def test_the_depth_is_told_by_wheel_second_button_and_shift(page):
     x, y = page.evaluate("window.palpate.pickPoint()")
     press(page)
@@ -166,6 +167,7 @@ def choose_field(page, name: str) -> dict:
     return until(page, lambda s: s["field"] and s["field"]["name"] == name)["field"]
 
 
+@pytest.mark.slow
 def test_felt_stiffness_is_the_slope_of_force_against_depth(page):
     forces, stiffness, depths = [], [], []
     press(page)
@@ -187,6 +189,7 @@ def slide_to(page, name: str, value: float) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_press_is_held_at_the_chosen_strain(page):
     notice, strain = page.get_by_test_id("limit-notice"), page.get_by_test_id("strain-value")
     assert page.locator("#strain-limit-value").input_value() == "30 %"
@@ -211,6 +214,7 @@ def test_a_press_is_held_at_the_chosen_strain(page):
     until(page, lambda _: page.locator("#strain-limit-value").input_value() == "30 %")
 
 
+@pytest.mark.slow
 def test_friction_bounds_the_force_along_the_surface(page):
     """Pushed to the same place with and without it: without friction the force is along the normal, and so smaller."""
     x, y = page.evaluate("window.palpate.pickPoint()")
@@ -230,6 +234,7 @@ def test_friction_bounds_the_force_along_the_surface(page):
     until(page, lambda _: page.locator("#friction-value").input_value() == "0.30")
 
 
+@pytest.mark.slow
 def test_deformation_drawn_larger_is_marked(page):
     banner, legend = page.get_by_test_id("scale-banner"), page.get_by_test_id("legend-scale")
     assert banner.is_hidden() and legend.is_hidden()
@@ -249,6 +254,7 @@ def test_deformation_drawn_larger_is_marked(page):
     assert banner.is_hidden() and legend.is_hidden()
 
 
+@pytest.mark.slow
 def test_fields_have_a_legend(page):
     press(page)
     for name, title, unit in (
@@ -277,6 +283,7 @@ def test_a_grab_pulls(page):
     until(page, lambda s: s["force"] == [0, 0, 0])
 
 
+@pytest.mark.slow
 def test_stiffness_scales_the_force_at_once(page):
     slider = page.get_by_test_id("stiffness")
     press(page)
@@ -293,6 +300,7 @@ def test_stiffness_scales_the_force_at_once(page):
     until(page, lambda s: s["force"] == [0, 0, 0])
 
 
+@pytest.mark.slow
 def test_cut_away_and_another_model(page):
     choose_field(page, "von_mises")
     page.locator("#show-cutaway").click()
@@ -324,6 +332,7 @@ def swings(page, condition) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.array(seen).T[1:])
 
 
+@pytest.mark.slow
 def test_the_impulse_is_given_and_repeated(moving_page):
     page = moving_page
     # Slowed down so that an eye follows 30 Hz.
@@ -399,6 +408,7 @@ def test_modes_swing_one_by_one(moving_page):
     assert not banner.is_visible()
 
 
+@pytest.mark.slow
 def test_long_work_has_a_cancel_button(chromium, tmp_path):
     """With an empty cache the next body has to be solved first."""
     started = Program(tmp_path, "beam", "--paper")
@@ -413,6 +423,7 @@ def test_long_work_has_a_cancel_button(chromium, tmp_path):
     assert started.stop() == 0
 
 
+@pytest.mark.slow
 def test_leaving_the_page_lets_go(chromium, program, page):
     watcher = chromium.new_context().new_page()
     watcher.goto(program.address)
@@ -425,6 +436,7 @@ def test_leaving_the_page_lets_go(chromium, program, page):
     watcher.context.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
 def test_nothing_is_cut_off(chromium, program, size):
     context = chromium.new_context(viewport={"width": size[0], "height": size[1]})

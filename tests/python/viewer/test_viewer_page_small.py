@@ -72,6 +72,7 @@ def test_a_stiffness_that_is_not_positive_is_not_taken(chromium, block_program):
             assert number.input_value() == before
 
 
+@pytest.mark.slow
 def test_notices_leave_by_themselves(chromium, block_program):
     with opened(chromium, block_program) as page:
         page.get_by_test_id("stiffness-value").fill("many")

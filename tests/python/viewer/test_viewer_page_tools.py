@@ -70,6 +70,7 @@ def test_a_stylus_lies_on_the_body_and_is_turned_by_hand(page):
     until(page, lambda s: s["contacts"] == 0)
 
 
+@pytest.mark.slow
 def test_a_flat_punch_is_stiffer_than_a_ball_and_softer_on_its_rim(page):
     forces = {}
     for shape, tilt in (("sphere", 0), ("punch", 0), ("punch", 40)):

@@ -103,6 +103,7 @@ def line(page, *places: tuple[float, float]) -> None:
     page.mouse.up()
 
 
+@pytest.mark.slow
 def test_what_is_painted_is_asked_for(chromium, served):
     dome, computing = served.dome, served.computing
     with opened(chromium, served) as page:

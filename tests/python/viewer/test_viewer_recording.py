@@ -77,6 +77,7 @@ def scrub(page, tick: int) -> dict:
     return until(page, lambda s: s["replay"]["tick"] == s["replay"]["goal"] == tick)
 
 
+@pytest.mark.slow
 def test_what_the_button_recorded_is_the_session(recorded):
     path, force = recorded
     assert re.fullmatch(r"liver-\d{8}-\d{6}\.mcap", path.name)

@@ -216,6 +216,7 @@ def test_uploads_are_bounded_and_only_from_the_page_in_control(ball, saves):
     asyncio.run(session())
 
 
+@pytest.mark.slow
 def test_filling_is_cancelled_at_once_and_a_second_file_takes_the_place_of_the_first(ball, saves, tmp_path):
     other = tmp_path / "box.stl"
     trimesh.creation.box((30, 20, 10)).export(other)

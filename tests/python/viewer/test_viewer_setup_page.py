@@ -72,6 +72,7 @@ def pressed(page) -> tuple[np.ndarray, float]:
     return force, depth
 
 
+@pytest.mark.slow
 def test_a_dropped_file_is_set_up_touched_saved_and_run_again_with_the_same_force(
     chromium, empty, block, cache, tmp_path
 ):
@@ -121,6 +122,7 @@ def test_a_dropped_file_is_set_up_touched_saved_and_run_again_with_the_same_forc
     assert again[2] == pytest.approx(force[2], rel=1e-3) and force[2] > 0.02
 
 
+@pytest.mark.slow
 def test_filling_is_cancelled_and_a_nodule_is_dragged(chromium, empty, block):
     with opened(chromium, empty, ready=lambda s: s["connected"] and s["scene"] == "set up empty") as page:
         drop(page, block)
@@ -145,6 +147,7 @@ def test_filling_is_cancelled_and_a_nodule_is_dragged(chromium, empty, block):
         assert abs((after - before) @ towards) < 1e-6 and np.linalg.norm(after - before) > 2e-3
 
 
+@pytest.mark.slow
 def test_a_dropped_label_map_is_touched_with_a_material_for_each_segment(chromium, empty, tmp_path):
     pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)
     labels, affine = labels_of([ellipsoid((40, 30, 22)), ball((8, -4, 0), 14.0)], (46, 36, 28), (1.5, 1.5, 2.0))

@@ -47,6 +47,7 @@ async def empty_page(saves):
         yield server, client
 
 
+@pytest.mark.slow
 def test_segments_of_a_dropped_file_have_materials_of_their_own_in_the_saved_scene(tmp_path):
     pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)
     labels, affine = liver_with_a_tumour()

@@ -54,6 +54,7 @@ def pressed(page, body: int) -> None:
     drawn(page)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
 def test_a_thin_part_is_noticed_while_it_is_pressed(chromium, table, size):
     with opened(chromium, table, size) as page:

@@ -88,6 +88,7 @@ def test_two_tools_on_two_bodies(chromium, pair):
         until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
 
 
+@pytest.mark.slow
 def test_a_second_finger_feels_the_dent_of_the_first(page):
     """By `f2 = delta / (c22 - c21 c12 / c11)`: the first finger holds the body against the second.
 
@@ -116,6 +117,7 @@ def test_a_second_finger_feels_the_dent_of_the_first(page):
     until(page, lambda s: s["contacts"] == 0 and s["pinned"] == [])
 
 
+@pytest.mark.slow
 def test_a_pinned_tool_by_buttons(chromium, pair):
     with opened(chromium, pair) as page:
         pin, release = page.get_by_test_id("pin"), page.locator("#unpin")
@@ -131,6 +133,7 @@ def test_a_pinned_tool_by_buttons(chromium, pair):
             assert pin.get_attribute("aria-pressed") == "false"
 
 
+@pytest.mark.slow
 def test_stiffness_and_legend_are_those_of_the_chosen_body(chromium, pair):
     with opened(chromium, pair) as page:
         press(page, 8)
@@ -149,6 +152,7 @@ def test_stiffness_and_legend_are_those_of_the_chosen_body(chromium, pair):
         until(page, lambda _: [simulation.youngs_modulus_of(body) for body in (0, 1)] == [10e3, 100e3])
 
 
+@pytest.mark.slow
 def test_no_second_tool_is_offered_where_there_is_one(chromium, cache):
     started = Program(cache, "beam", "--paper", "--impulse")
     with opened(chromium, started) as page:

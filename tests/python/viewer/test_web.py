@@ -142,6 +142,7 @@ def page_of(chromium, address: str):
 class TestPage:
     """From a folder below the root of a file server."""
 
+    @pytest.mark.slow
     def test_runs_drags_and_records(self, chromium, site, tmp_path):
         folder, built, _ = site
         with served(folder.parents[1]) as address, page_of(chromium, f"{address}/sub/site/index.html") as page:
