@@ -84,7 +84,8 @@ test: | check-tools
 	cd viewer && npm run --silent check
 	$(PYTEST) -m "not slow" $(ARGS)
 
-# Long campaigns: hundreds of random touches, presses, writers, answers, and whole builds. CI runs them after `make test`.
+# Slow tests and campaigns of random touches, presses, writers and answers. CI runs them after `make test`, with a share of
+# the cases; `make campaigns ARGS=--whole` takes all, about an hour.
 campaigns: $(VENV)/.installed $(PAGE) $(WEB)
 	$(PYTEST) -m slow $(ARGS)
 

@@ -14,6 +14,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--no-skips", action="store_true", help="a skipped test is a failure, as on a machine with all tools"
     )
+    parser.addoption("--whole", action="store_true", help="campaigns with all of their cases, for about an hour")
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -27,12 +28,27 @@ def pytest_runtest_makereport(item, call):
         )
 
 
+def thin_campaigns(config, items) -> None:
+    """Deselect all but one in ``every`` slow cases of a test with the marker ``campaign(every)``, evenly spread."""
+    if config.getoption("--whole"):
+        return
+    seen, deselected, selected = {}, [], []
+    for item in items:
+        marker = item.get_closest_marker("campaign")
+        thinned = marker is not None and item.get_closest_marker("slow")
+        rank = seen[item.function] = seen.get(item.function, -1) + bool(thinned)
+        (deselected if thinned and rank % marker.args[0] else selected).append(item)
+    items[:] = selected
+    config.hook.pytest_deselected(items=deselected)
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """What a worker takes on is a file, but for browsers: all in one, for two that draw in software starve each other.
 
     The browsers come first and then files with slow tests, so that no worker is left with a long one at the end.
     """
+    thin_campaigns(config, items)
     slow = {item.path for item in items if item.get_closest_marker("slow")}
 
     def rank(item) -> int:
@@ -146,6 +162,12 @@ def relative(a, b):
 @pytest.fixture(autouse=True)
 def private_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def rounds(request):
+    """How many rounds a campaign takes: ``rounds(12)`` are 12 with ``--whole``, else a fourth of them."""
+    return lambda count: count if request.config.getoption("--whole") else -(-count // 4)
 
 
 @pytest.fixture(scope="session")

@@ -144,6 +144,7 @@ def test_a_rim_gives_out_no_more_than_was_put_in(loops, part):
 
 
 @pytest.mark.slow
+@pytest.mark.campaign(7)
 @pytest.mark.parametrize("part", DEPTHS)
 @pytest.mark.parametrize("tool", ["sphere", "ellipsoid", "capsule", "punch", "file"])
 def test_a_blocks_edge_gives_out_no_more_than_was_put_in(loops, tool, part):

@@ -106,6 +106,7 @@ def press(
 
 # A file in a star has several contacts of many cells: minutes beside other tests.
 @pytest.mark.timeout(900)
+@pytest.mark.campaign(3)
 @pytest.mark.parametrize("tool", ["sphere", "capsule", "punch", pytest.param("file", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["torus", *(pytest.param(name, marks=pytest.mark.slow) for name in ("star", "cup"))])
 def test_places_of_deep_presses_stay_on_the_body_and_forces_finite(loops, name, tool):
@@ -136,8 +137,8 @@ def test_a_stylus_pressed_and_turned_through_a_point_of_the_star(loops):
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", ["star", "cup", "torus", "kidney", "doll", "valley 60", "ridge 30"])
-def test_many_deep_presses(loops, name):
-    wrong = [text for tool in TOOLS for text in presses(loops, name, tool, range(20, 32))]
+def test_many_deep_presses(loops, name, rounds):
+    wrong = [text for tool in TOOLS for text in presses(loops, name, tool, range(20, 20 + rounds(12)))]
     assert not wrong, f"{len(wrong)}: " + "; ".join(wrong[:6])
 
 
