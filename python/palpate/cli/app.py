@@ -305,9 +305,7 @@ def info(
     tets = TetMesh.read(file, unit or "m")
     print(f"{file}: {_mesh_line(tets)}")
     low, high = 1e3 * tets.bounds
-    print(
-        f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * tets.volume:.4g} cm3"
-    )
+    print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * tets.volume:.4g} cm3")
     print(
         f"  regions: {sorted(set(tets.regions.tolist()))}, dihedral angle >= {tets.dihedral_angles().min():.1f} degrees"
     )

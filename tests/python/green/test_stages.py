@@ -210,17 +210,17 @@ def test_a_partial_of_other_stages_is_used(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("region", "said"),
+    ("region", "message"),
     [
         ("x > 9cm", "no surface node lies in 'x > 9cm'"),
         ([10**6], "node 1000000 is not on the surface"),
         ("y", "not allowed in the predicate"),
     ],
 )
-def test_regions_that_are_none_are_refused(body, region, said):
-    with pytest.raises(palpate.BodyError, match=said):
+def test_regions_that_are_none_are_refused(body, region, message):
+    with pytest.raises(palpate.BodyError, match=message):
         palpate.precompute(body, touch=region)
-    with pytest.raises(palpate.BodyError, match=said):
+    with pytest.raises(palpate.BodyError, match=message):
         palpate.precompute(body, first=region)
 
 
