@@ -206,7 +206,9 @@ pub unsafe extern "C" fn palpate_loop_get_contact_errors(
     count: *mut usize,
 ) -> Status {
     // SAFETY: the caller's pointers.
-    catching_panics(|| unsafe { put_contacts(force_loop, (errors, capacity, "errors"), count, |_, contact| contact.error) })
+    catching_panics(|| unsafe {
+        put_contacts(force_loop, (errors, capacity, "errors"), count, |_, contact| contact.error)
+    })
 }
 
 /// Writes a value of each contact of the last frame, and how many contacts there are.
