@@ -45,15 +45,15 @@ class Row:
 
     def faults(self) -> list[str]:
         """List what does not hold."""
-        found, made = [] if self.is_right else ["not filled"], self.filled
-        if made.get("seconds", 0) > MOST_SECONDS:
-            found.append(f"{made['seconds']:.0f} s")
-        if made.get("memory_mb", 0) > MOST_MEMORY:
-            found.append(f"{made['memory_mb']:.0f} MB")
-        if made.get("angle", 90) < LEAST_ANGLE:
-            found.append(f"{made['angle']:.1f} degrees")
-        if self.thick and abs(made.get("volume_error", 0)) > MOST_LOSS:
-            found.append(f"volume {100 * made['volume_error']:+.1f} %")
+        found, outcome = [] if self.is_right else ["not filled"], self.filled
+        if outcome.get("seconds", 0) > MOST_SECONDS:
+            found.append(f"{outcome['seconds']:.0f} s")
+        if outcome.get("memory_mb", 0) > MOST_MEMORY:
+            found.append(f"{outcome['memory_mb']:.0f} MB")
+        if outcome.get("angle", 90) < LEAST_ANGLE:
+            found.append(f"{outcome['angle']:.1f} degrees")
+        if self.thick and abs(outcome.get("volume_error", 0)) > MOST_LOSS:
+            found.append(f"volume {100 * outcome['volume_error']:+.1f} %")
         if self.touch and self.touch.get("touch_s", np.inf) > TOUCHED[self.name]:
             found.append(f"touched after {self.touch.get('touch_s', np.inf):.0f} s")
         return found
@@ -80,21 +80,27 @@ def as_table(rows: Sequence[Row]) -> Table:
     """Return one line per surface."""
     lines = []
     for row in rows:
-        made, alone = row.filled, row.netgen
+        outcome, alone = row.filled, row.netgen
         by = (
             "failed"
-            if "failed" in made
+            if "failed" in outcome
             else "refused"
-            if "refused" in made
+            if "refused" in outcome
             else "wrap"
-            if made["wrapped"]
+            if outcome["wrapped"]
             else "NETGEN"
         )
-        cells = [row.kind, row.name, by, _figure(made, "seconds", "{:.1f}"), _figure(made, "processor_s", "{:.1f}")]
-        cells += [_figure(made, "angle", "{:.1f}"), _figure(made, "volume_error", "{:+.1f}", 100)]
-        cells += [_figure(made, "hausdorff", "{:.1f}", 100), _figure(made, "memory_mb", "{:.0f}")]
+        cells = [
+            row.kind,
+            row.name,
+            by,
+            _figure(outcome, "seconds", "{:.1f}"),
+            _figure(outcome, "processor_s", "{:.1f}"),
+        ]
+        cells += [_figure(outcome, "angle", "{:.1f}"), _figure(outcome, "volume_error", "{:+.1f}", 100)]
+        cells += [_figure(outcome, "hausdorff", "{:.1f}", 100), _figure(outcome, "memory_mb", "{:.0f}")]
         ran = bool(alone) and "nodes" in alone
-        ratio = f"{made['seconds'] / alone['seconds']:.2f}" if ran and "nodes" in made else "-"
+        ratio = f"{outcome['seconds'] / alone['seconds']:.2f}" if ran and "nodes" in outcome else "-"
         lines.append([*cells, _figure(alone, "seconds", "{:.1f}") if ran else "refused" if alone else "-", ratio])
     headings = ["kind", "surface", "by", "s", "cpu s", "angle", "volume %", "off %", "MB", "NETGEN alone: s", "ratio"]
     right = sum(row.is_right for row in rows)
@@ -127,14 +133,14 @@ def fill(
     kinds = [kind.strip() for kind in only.split(",") if kind.strip()]
     folder = make_folder(out)
     file = RowsFile(None if folder is None else Path(folder) / "fill.json", {"netgen": netgen})
-    kept = file.read()
+    records = file.read()
     for case in corpus():
-        if (kinds and case.kind not in kinds) or any(row["name"] == case.name for row in kept):
+        if (kinds and case.kind not in kinds) or any(row["name"] == case.name for row in records):
             continue
         with status_line(f"filling {case.name}"):
-            kept.append(asdict(measure(case, netgen)))
-        file.write(kept)
-    rows = [Row(**row) for row in kept if not kinds or row["kind"] in kinds]
+            records.append(asdict(measure(case, netgen)))
+        file.write(records)
+    rows = [Row(**row) for row in records if not kinds or row["kind"] in kinds]
     show(as_json, rows, as_table(rows))
     if any(row.faults() for row in rows):
         raise typer.Exit(1)

@@ -71,8 +71,8 @@ def ball(triangles: int, seed: int = 0, bumps: float = 0.12) -> trimesh.Trimesh:
 
 
 def _same(make: Callable[[], trimesh.Trimesh]) -> Given:
-    made = make()
-    return Given(made, made)
+    shape = make()
+    return Given(shape, shape)
 
 
 def _damaged(make: Callable[[], trimesh.Trimesh], damage: Callable[[np.ndarray, trimesh.Trimesh], np.ndarray]) -> Given:
@@ -196,9 +196,9 @@ def _union(*parts: trimesh.Trimesh) -> Given:
 
 
 def _moved(mesh: trimesh.Trimesh, *offset: float) -> trimesh.Trimesh:
-    made = mesh.copy()
-    made.apply_translation(offset)
-    return made
+    moved = mesh.copy()
+    moved.apply_translation(offset)
+    return moved
 
 
 def _crossing() -> list[Case]:
@@ -242,12 +242,12 @@ def _bowl(wall: float) -> trimesh.Trimesh:
     angles = np.linspace(0, 0.55 * np.pi, 40)
     outside = RADIUS * np.column_stack([np.sin(angles), -np.cos(angles)])
     inside = (RADIUS - wall) * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]
-    made = trimesh.creation.revolve(np.vstack([outside, inside]), sections=96)
-    made.merge_vertices()
-    made.update_faces(made.nondegenerate_faces())
-    if made.volume < 0:
-        made.invert()
-    return made
+    solid = trimesh.creation.revolve(np.vstack([outside, inside]), sections=96)
+    solid.merge_vertices()
+    solid.update_faces(solid.nondegenerate_faces())
+    if solid.volume < 0:
+        solid.invert()
+    return solid
 
 
 def _open_bowl() -> Given:
@@ -291,22 +291,22 @@ def _needles() -> list[Case]:
 
 def _band() -> Given:
     """Two rings of vertices a tenth of a micrometre apart."""
-    made = ball(4_000)
-    rings = np.unique(made.vertices[:, 2].round(6))
-    middle = np.abs(made.vertices[:, 2]) < rings[rings > 0].min() * 3
-    made.vertices[middle, 2] *= 1e-4
-    return _same(lambda: made)
+    sphere = ball(4_000)
+    rings = np.unique(sphere.vertices[:, 2].round(6))
+    middle = np.abs(sphere.vertices[:, 2]) < rings[rings > 0].min() * 3
+    sphere.vertices[middle, 2] *= 1e-4
+    return _same(lambda: sphere)
 
 
 def _split_box() -> Given:
     """Each triangle is cut by points very near its edges."""
-    made = trimesh.creation.box(extents=(0.08, 0.05, 0.05))
-    corners = made.vertices[made.faces]
+    box = trimesh.creation.box(extents=(0.08, 0.05, 0.05))
+    corners = box.vertices[box.faces]
     near = 0.4999 * (corners[:, 0] + corners[:, 1]) + 0.0002 * corners[:, 2]
-    index = len(made.vertices) + np.arange(len(made.faces))
-    a, b, c = made.faces.T
+    index = len(box.vertices) + np.arange(len(box.faces))
+    a, b, c = box.faces.T
     faces = np.vstack([np.column_stack(f) for f in ((a, b, index), (b, c, index), (c, a, index))])
-    return _same(lambda: trimesh.Trimesh(np.vstack([made.vertices, near]), faces, process=False))
+    return _same(lambda: trimesh.Trimesh(np.vstack([box.vertices, near]), faces, process=False))
 
 
 def _cad() -> list[Case]:
@@ -343,9 +343,9 @@ def _solid(make: Callable) -> trimesh.Trimesh:
     mesh = geometry.GenerateMesh(maxh=0.02, curvaturesafety=4, perfstepsend=MeshingStep.MESHSURFACE)
     points = np.array([point.p for point in mesh.Points()])
     faces = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in mesh.Elements2D()])
-    made = trimesh.Trimesh(points, faces, process=True)
-    made.fix_normals()
-    return made
+    mesh = trimesh.Trimesh(points, faces, process=True)
+    mesh.fix_normals()
+    return mesh
 
 
 def _no_inside() -> list[Case]:

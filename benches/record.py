@@ -151,7 +151,7 @@ def run_session(
         statistics = simulation.frame().statistics
         done = simulation.stop_recording()
     recording = Recording.load(path)
-    made = replay(recording, built)
+    replayed = replay(recording, built)
     finite = np.isfinite(recording.forces).all(axis=-1) & np.isfinite(recording.torques).all(axis=-1)
     return SessionResult(
         scene=name,
@@ -163,8 +163,8 @@ def run_session(
         not_finite=int((~finite).sum()),
         contacts=len(np.unique(recording.contacts["tick"])),
         mb_per_minute=path.stat().st_size / 1e6 / seconds * 60,
-        longest_us=made.longest_us,
-        same=made.same,
+        longest_us=replayed.longest_us,
+        same=replayed.same,
     )
 
 

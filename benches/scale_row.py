@@ -132,8 +132,8 @@ class Stages:
         """End the stage before, and begin one; an empty name begins none."""
         now = time.perf_counter(), processor_seconds()
         if self._name:
-            for kept, end, start in zip((self.seconds, self.cpu_seconds), now, self._begun, strict=True):
-                kept[self._name] = kept.get(self._name, 0.0) + end - start
+            for totals, end, start in zip((self.seconds, self.cpu_seconds), now, self._begun, strict=True):
+                totals[self._name] = totals.get(self._name, 0.0) + end - start
         self._name, self._begun = name, now
         if name:
             self._report(name)

@@ -49,11 +49,11 @@ class CrtkUdpDevice(palpate.Device):
         except BlockingIOError:
             pass
         if latest is not None:
-            said, self.heard = json.loads(latest), time.monotonic()
-            pose, moves = said["measured_cp"], said.get("measured_cv")
+            message, self.heard = json.loads(latest), time.monotonic()
+            pose, moves = message["measured_cp"], message.get("measured_cv")
             velocities = (numbers(moves["linear"]), numbers(moves["angular"])) if moves else ()
             where = numbers(pose["position"]), numbers(pose["orientation"], "wxyz")
-            self.reading = palpate.Reading(*where, *velocities, buttons=said.get("buttons", 0))
+            self.reading = palpate.Reading(*where, *velocities, buttons=message.get("buttons", 0))
         elif self.reading is not None and time.monotonic() - self.heard > LONGEST_SILENCE:
             raise TimeoutError("no measured_cp for half a second: is the peer still there?")
         return self.reading

@@ -314,14 +314,14 @@ def fill(vertices: np.ndarray, faces: np.ndarray, size: float) -> TetMesh | None
     """Tetrahedra of edge length up to ``size`` m inside a surface kept as it is; None if NETGEN fails."""
     extent, origin = float(np.ptp(vertices, axis=0).max()), vertices.min(axis=0)
     with tempfile.TemporaryDirectory(prefix="palpate-models-") as folder:
-        given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
+        surface_file, mesh_file = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
         scaled = (vertices - origin) / extent
         job = {"balls": np.empty((0, 5)), "points": np.empty((0, 4))}
-        np.savez(given, vertices=scaled, faces=faces, size=size / extent, **job)
-        command = [sys.executable, "-m", "palpate.mesh.netgen_child", "keep", str(given), str(made)]
-        if run_limited(command, MESHER_LIMIT) != 0 or not made.exists():
+        np.savez(surface_file, vertices=scaled, faces=faces, size=size / extent, **job)
+        command = [sys.executable, "-m", "palpate.mesh.netgen_child", "keep", str(surface_file), str(mesh_file)]
+        if run_limited(command, MESHER_LIMIT) != 0 or not mesh_file.exists():
             return None
-        with np.load(made) as result:
+        with np.load(mesh_file) as result:
             return TetMesh(result["nodes"] * extent + origin, result["tets"])
 
 

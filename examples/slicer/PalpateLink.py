@@ -129,14 +129,14 @@ class PalpateLinkLogic(ScriptedLoadableModuleLogic):
     def force_text(self):
         """Force and fault of the latest message."""
         if not self.is_running():
-            said = bytes(self.process.readAllStandardError()).decode(errors="replace") if self.process else ""
-            return said.strip() or "not running"
+            output = bytes(self.process.readAllStandardError()).decode(errors="replace") if self.process else ""
+            return output.strip() or "not running"
         node = slicer.mrmlScene.GetFirstNodeByName("Force")
         if node is None:
             return "preparing"
-        said = json.loads(node.GetText())
-        x, y, z = said["force_N"][0]
-        return said["fault"] or f"{(x * x + y * y + z * z) ** 0.5:.3f} N"
+        state = json.loads(node.GetText())
+        x, y, z = state["force_N"][0]
+        return state["fault"] or f"{(x * x + y * y + z * z) ** 0.5:.3f} N"
 
     def stop(self):
         """End the connection and the process."""

@@ -257,8 +257,10 @@ def require_version(found: str | None, address: str) -> None:
 
     """
     if found != _native.__version__:
-        told = "no Palpate" if found is None else f"Palpate {found}"
-        raise ClusterError(f"the worker at {address} has {told}, not {_native.__version__}: install the same version")
+        version_text = "no Palpate" if found is None else f"Palpate {found}"
+        raise ClusterError(
+            f"the worker at {address} has {version_text}, not {_native.__version__}: install the same version"
+        )
 
 
 def _connection_lost_error() -> ClusterError:

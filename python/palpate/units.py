@@ -65,13 +65,13 @@ def brief_repr(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
-def _reader(units: dict[str, float], kind: str, told: str) -> Callable[[str | float], float]:
+def _reader(units: dict[str, float], kind: str, doc: str) -> Callable[[str | float], float]:
     """Make the reader of one kind of quantity."""
 
     def read(value: str | float) -> float:
         return quantity(value, units, kind)
 
-    read.__doc__ = told
+    read.__doc__ = doc
     return read
 
 

@@ -52,8 +52,8 @@ class Program:
         words = [sys.executable, "-c", PATIENT, command, *arguments, "--port", "0", "--no-browser"]
         environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=environment)
-        told = (re.search(r"http://\S+", line) for line in self.process.stdout)
-        self.address = next(address[0] for address in told if address)
+        addresses = (re.search(r"http://\S+", line) for line in self.process.stdout)
+        self.address = next(address[0] for address in addresses if address)
 
     def stop(self) -> int:
         """Exit status after Ctrl-C."""

@@ -71,8 +71,8 @@ def box_mesh(cells=(4, 3, 3), size=(0.08, 0.05, 0.05), jitter=0.15, seed=1) -> T
     import skfem
 
     axes = [np.linspace(0, s, c + 1) for s, c in zip(size, cells, strict=True)]
-    made = skfem.MeshTet.init_tensor(*axes)
-    nodes, tets = made.p.T.copy(), made.t.T.copy()
+    mesh = skfem.MeshTet.init_tensor(*axes)
+    nodes, tets = mesh.p.T.copy(), mesh.t.T.copy()
     inside = np.ones(len(nodes), dtype=bool)
     for k in range(3):
         inside &= (nodes[:, k] > 1e-9) & (nodes[:, k] < size[k] - 1e-9)

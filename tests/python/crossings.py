@@ -63,9 +63,9 @@ def capsule_file(folder: Path) -> Path:
     """Surface file of the capsule, in mm, its front at the origin."""
     path = folder / "capsule.stl"
     if not path.exists():
-        made = trimesh.creation.capsule(18.0, 3.0, count=[28, 28])
-        made.apply_translation([0.0, 0.0, -3.0 - made.vertices[:, 2].min()])
-        made.export(path)
+        mesh = trimesh.creation.capsule(18.0, 3.0, count=[28, 28])
+        mesh.apply_translation([0.0, 0.0, -3.0 - mesh.vertices[:, 2].min()])
+        mesh.export(path)
     return path
 
 

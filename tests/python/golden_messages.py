@@ -19,12 +19,12 @@ KINDS = ("scene", "frame")
 
 def content(kind: str) -> tuple[dict, dict[str, tuple[str, np.ndarray]]]:
     """Header and arrays of a message, as the JSON file has them; values are such that they survive ``float32``."""
-    told = json.loads((DATA / f"golden_{kind}.json").read_text())
+    data = json.loads((DATA / f"golden_{kind}.json").read_text())
     arrays = {
         name: (entry["dtype"], np.array(entry["values"]).reshape(entry["shape"]))
-        for name, entry in told["arrays"].items()
+        for name, entry in data["arrays"].items()
     }
-    return told["header"], arrays
+    return data["header"], arrays
 
 
 def stored(kind: str) -> bytes:

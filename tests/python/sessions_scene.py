@@ -49,5 +49,5 @@ def called(monkeypatch, capsys, *words) -> SimpleNamespace:
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     with pytest.raises(SystemExit) as ended:
         main()
-    said = capsys.readouterr()
-    return SimpleNamespace(returncode=ended.value.code or 0, stdout=said.out, stderr=said.err)
+    text = capsys.readouterr()
+    return SimpleNamespace(returncode=ended.value.code or 0, stdout=text.out, stderr=text.err)

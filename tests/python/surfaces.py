@@ -41,10 +41,10 @@ def knot(tube: float = 0.006, size: float = 0.015) -> trimesh.Trimesh:
     a, b = index, np.roll(index, -1, axis=1)
     c, d = np.roll(index, -1, axis=0), np.roll(np.roll(index, -1, axis=0), -1, axis=1)
     faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, d), (a, d, c))])
-    made = trimesh.Trimesh(points, faces, process=False)
-    if made.volume < 0:
-        made.invert()
-    return made
+    shape = trimesh.Trimesh(points, faces, process=False)
+    if shape.volume < 0:
+        shape.invert()
+    return shape
 
 
 def bracket() -> trimesh.Trimesh:
@@ -58,6 +58,6 @@ def bracket() -> trimesh.Trimesh:
     mesh = OCCGeometry(solid).GenerateMesh(maxh=5, curvaturesafety=4)
     points = MILLIMETRE * np.array([point.p for point in mesh.Points()])
     faces = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in mesh.Elements2D()])
-    made = trimesh.Trimesh(points, faces, process=True)
-    made.fix_normals()
-    return made
+    shape = trimesh.Trimesh(points, faces, process=True)
+    shape.fix_normals()
+    return shape

@@ -85,9 +85,9 @@ def flags(prefix: Path, *static: str) -> list[str]:
 
 
 def compiled(prefix: Path, source: Path, *options: str) -> Path:
-    made = prefix / f"{source.stem}{len(options)}"
-    if made.exists():
-        return made
+    program = prefix / f"{source.stem}{len(options)}"
+    if program.exists():
+        return program
     standard = ["gcc", "-std=c99"] if source.suffix == ".c" else ["g++", "-std=c++17"]
     run(
         *standard,
@@ -96,13 +96,13 @@ def compiled(prefix: Path, source: Path, *options: str) -> Path:
         *options,
         source,
         "-o",
-        made,
+        program,
         *flags(prefix),
         f"-Wl,-rpath,{prefix}/lib",
         "-lm",
         "-pthread",
     )
-    return made
+    return program
 
 
 def path_of(ticks: int, tools: int) -> np.ndarray:
@@ -198,12 +198,12 @@ def test_touch_is_that_of_python(prefix, block_green, tmp_path):
     store = tmp_path / "block.palpate"
     block_green.save(store)
     program = compiled(prefix, ROOT / "examples/c/touch.c")
-    said = run(program, store, "2")
+    result = run(program, store, "2")
     positions = block_green.surface_positions
     low, high, radius = positions.min(axis=0), positions.max(axis=0), block_green.extents.max() / 16
     top = [*(0.5 * (low + high))[:2], high[2]]
     answer = block_green.touch(top, (None, None, -0.002), radius)
-    force = said.split("body: ")[1].split(" N")[0].split()
+    force = result.split("body: ")[1].split(" N")[0].split()
     assert np.array_equal(np.array(force, dtype=float), answer.force)
     refused = subprocess.run([program, tmp_path / "none.palpate"], capture_output=True, text=True)
     assert refused.returncode == 2 and "none.palpate" in refused.stderr
@@ -311,8 +311,8 @@ def test_programs_of_the_first_header_run_with_a_library_whose_structs_have_grow
     frozen = ["-I", ROOT / "tests/c/abi-1.0", ROOT / "tests/c/sizes.c"]
     link = ["-L", prefix / "lib", "-lpalpate", "-lm"]
     run("gcc", "-std=c99", *WARNINGS, *frozen, "-o", program, *link)
-    said = {
+    result = {
         where: run(program, store, LD_LIBRARY_PATH=str(where)) for where in (prefix / "lib", grown_library(tmp_path))
     }
-    own, grown = said.values()
-    assert own == grown and float(own.split()[2]) > 0.05, said
+    own, grown = result.values()
+    assert own == grown and float(own.split()[2]) > 0.05, result

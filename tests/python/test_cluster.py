@@ -146,9 +146,9 @@ material.poissons_ratio = [0.3, 0.45]
     )
     study = Study.read(tmp_path / "study.toml")
     alone, seen = study.run(tmp_path / "alone", progress=False), []
-    told = run("study", "study.toml", "--dask", workers.scheduler_address, "--out", "by-two", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert "8 bodies" in told.stdout
+    result = run("study", "study.toml", "--dask", workers.scheduler_address, "--out", "by-two", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "8 bodies" in result.stdout
     assert (tmp_path / "by-two" / "study.csv").read_bytes() == written(alone, tmp_path)
     spread = study.run(tmp_path / "spread", dask=workers.scheduler_address, progress=lambda *at: seen.append(at))
     assert spread == alone and seen[-1] == (8, 8)
@@ -196,9 +196,9 @@ def test_command_line(workers, tmp_path):
     mesh = box_mesh(cells=(8, 5, 5))
     mesh.write(tmp_path / "box.vtu")
     command = ["precompute", "box.vtu", "--fix", "x < 1mm", "-E", "10kPa", "--nu", "0.4", "-o", "a.palpate", "--dask"]
-    told = run(*command, workers.scheduler_address, cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert f"{workers.scheduler_address}: 2 workers with 2 threads" in told.stdout
+    result = run(*command, workers.scheduler_address, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert f"{workers.scheduler_address}: 2 workers with 2 threads" in result.stdout
     body = palpate.Body(
         palpate.TetMesh.read(tmp_path / "box.vtu"), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-3
     )
@@ -223,6 +223,6 @@ def test_certificates_of_dasks_own_configuration_are_taken(tmp_path):
         )
         strange = run(*command, address, cwd=tmp_path, env={**os.environ, **certificates(others)})
         refused(strange, f"no scheduler answers at {address} with these certificates")
-        told = run(*command, address, cwd=tmp_path, env={**os.environ, **certificates_in(ours)})
-        assert told.returncode == 0 and f"{address}: 1 worker" in told.stdout, told
+        result = run(*command, address, cwd=tmp_path, env={**os.environ, **certificates_in(ours)})
+        assert result.returncode == 0 and f"{address}: 1 worker" in result.stdout, result
     assert palpate.GreensFunction.load(tmp_path / "a.palpate").touch_error < 0.1

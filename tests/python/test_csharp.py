@@ -18,9 +18,9 @@ pytestmark = [
 
 
 def built(prefix, folder, name, *sources, kind="exe"):  # noqa: F811
-    made = folder / name
-    run("mcs", "-warnaserror", f"-target:{kind}", f"-out:{made}", *sources, prefix / "include/Palpate.cs")
-    return made
+    program = folder / name
+    run("mcs", "-warnaserror", f"-target:{kind}", f"-out:{program}", *sources, prefix / "include/Palpate.cs")
+    return program
 
 
 def test_the_example_has_the_forces_of_c_and_python_to_the_bit(prefix, block, block_green, tmp_path):  # noqa: F811
@@ -28,8 +28,8 @@ def test_the_example_has_the_forces_of_c_and_python_to_the_bit(prefix, block, bl
     whole = palpate.scene.BuiltScene.of(tables, block, block_green)
     palpate.pack(whole, tmp_path / "block.pack")
     program = built(prefix, tmp_path, "press.exe", ROOT / "examples/csharp/Press.cs")
-    said = run("mono", program, tmp_path / "block.pack", 400, LD_LIBRARY_PATH=f"{prefix}/lib")
-    rows = np.loadtxt(said.splitlines()[1:], delimiter=",")
+    result = run("mono", program, tmp_path / "block.pack", 400, LD_LIBRARY_PATH=f"{prefix}/lib")
+    rows = np.loadtxt(result.splitlines()[1:], delimiter=",")
     assert len(rows) == 400 and rows[:, 5].max() > 0.05
     positions = np.ascontiguousarray(rows[:, None, :3])
     assert np.array_equal(palpate.Simulation(whole).run(positions)[:, 0], rows[:, 3:])

@@ -85,7 +85,7 @@ def test_attributes_of_objects_are_named_in_the_docstrings_of_their_classes(bloc
     ]
     for thing in objects:
         kind = type(thing)
-        told = set(re.findall(r"\w+", kind.__doc__ or ""))
+        words = set(re.findall(r"\w+", kind.__doc__ or ""))
         # A public cached property keeps its value among the attributes, and has a docstring of its own.
-        missing = {name for name in vars(thing) if not name.startswith("_") and not hasattr(kind, name)} - told
+        missing = {name for name in vars(thing) if not name.startswith("_") and not hasattr(kind, name)} - words
         assert not missing, f"the docstring of palpate.{kind.__name__} does not tell of {sorted(missing)}"

@@ -71,17 +71,17 @@ def installed(bare: dict[str, str]) -> Path:
 
 
 def test_a_wheel_is_small_complete_and_for_every_python(tools, wheel):
-    said = run(tools, ROOT / "scripts/check_wheel.py", wheel)
-    assert f"{wheel.stat().st_size / 1e6:.1f} MB" in said
+    result = run(tools, ROOT / "scripts/check_wheel.py", wheel)
+    assert f"{wheel.stat().st_size / 1e6:.1f} MB" in result
     if sys.platform == "linux":
-        assert "is consistent with the following platform tag" in re.sub(r"\s+", " ", said)
+        assert "is consistent with the following platform tag" in re.sub(r"\s+", " ", result)
 
 
 def test_an_empty_environment_without_a_compiler_presses_on_the_liver(bare, tmp_path):
     version = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)[1]
     assert run(installed(bare), "--version", env=bare, timeout=60) == f"palpate {version}\n"
-    said = run(installed(bare), "demo", "--headless", "1", env=bare, cwd=tmp_path, timeout=250)
-    assert re.search(r"largest force 0\.[1-9]\d* N", said), said
+    result = run(installed(bare), "demo", "--headless", "1", env=bare, cwd=tmp_path, timeout=250)
+    assert re.search(r"largest force 0\.[1-9]\d* N", result), result
     with open(tmp_path / "liver.csv", newline="") as log:
         assert len(list(csv.reader(log))) > 900
 

@@ -442,8 +442,8 @@ export class Control {
 
 /** What a new scene is coloured by: as the scene before, as far as it offers that. A map that was brought is shown at once. */
 function coloringOf(scene: SceneMessage, before: Coloring): Coloring {
-  const brought = scene.bodies.some(({ fields }) => fields[0]?.name.startsWith("palpated"));
-  if (before === "strained") return brought ? "field" : before;
+  const hasPalpatedField = scene.bodies.some(({ fields }) => fields[0]?.name.startsWith("palpated"));
+  if (before === "strained") return hasPalpatedField ? "field" : before;
   if (before === "field") return before;
   return groupings(scene).includes(before) ? before : "field";
 }

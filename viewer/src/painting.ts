@@ -107,11 +107,11 @@ export class Painting {
       if (stroke.some((nodes) => nodes.length > 0)) this.hold([...state.strokes, stroke]);
       return;
     }
-    const kept = stroke.map((nodes, body) => {
+    const painted = stroke.map((nodes, body) => {
       const states = touchStates(state, body);
       return states ? nodes.filter((node) => states[node] === NOT_READY) : new Uint32Array(0);
     });
-    if (kept.some((nodes) => nodes.length > 0)) this.store.update({ strokes: [...state.strokes, kept] });
+    if (painted.some((nodes) => nodes.length > 0)) this.store.update({ strokes: [...state.strokes, painted] });
   }
 
   undo(): void {

@@ -325,7 +325,7 @@ typedef struct palpate_frame {
     uint32_t struct_size;
     // Tools of the loop.
     uint32_t tools;
-    // Contacts that palpate_loop_get_contacts tells of.
+    // Contacts that palpate_loop_get_contacts writes.
     uint32_t contacts;
     // Whether a fault has latched: 0 or 1.
     uint32_t faulty;
@@ -570,7 +570,7 @@ palpate_status palpate_loop_tick(struct palpate_loop *force_loop,
                                  struct palpate_wrench *wrenches,
                                  size_t tools);
 
-// Takes the latest tick and tells its numbers. Contacts and surfaces that are read next are of the same tick. Never waits for
+// Takes the latest tick and writes its numbers. Contacts and surfaces that are read next are of the same tick. Never waits for
 // the tick; callers of frames and settings wait for each other.
 palpate_status palpate_loop_get_frame(struct palpate_loop *force_loop,
                                       struct palpate_frame *frame);

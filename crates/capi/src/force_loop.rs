@@ -221,9 +221,9 @@ fn unknown(what: &str, handle: u32) -> Refusal {
 pub unsafe extern "C" fn palpate_loop_new(scene: *const SceneGraph, force_loop: *mut *mut Loop) -> Status {
     catching_panics(|| {
         // SAFETY: the caller's pointer.
-        let made = Loop::new(unsafe { shared(scene, "scene") }?)?;
+        let new_loop = Loop::new(unsafe { shared(scene, "scene") }?)?;
         // SAFETY: the caller's pointer.
-        unsafe { store_handle(made, force_loop, "loop") }?;
+        unsafe { store_handle(new_loop, force_loop, "loop") }?;
         Ok(Status::PalpateOk)
     })
 }

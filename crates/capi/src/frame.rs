@@ -51,7 +51,7 @@ pub struct Frame {
     pub struct_size: u32,
     /// Tools of the loop.
     pub tools: u32,
-    /// Contacts that palpate_loop_get_contacts tells of.
+    /// Contacts that palpate_loop_get_contacts writes.
     pub contacts: u32,
     /// Whether a fault has latched: 0 or 1.
     pub faulty: u32,
@@ -168,7 +168,7 @@ pub struct ContactRecord {
     pub stiffness: f64,
 }
 
-/// Takes the latest tick and tells its numbers. Contacts and surfaces that are read next are of the same tick. Never waits for
+/// Takes the latest tick and writes its numbers. Contacts and surfaces that are read next are of the same tick. Never waits for
 /// the tick; callers of frames and settings wait for each other.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_get_frame(force_loop: *mut Loop, frame: *mut Frame) -> Status {
@@ -192,17 +192,8 @@ pub unsafe extern "C" fn palpate_loop_get_contacts(
     capacity: usize,
     count: *mut usize,
 ) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointers.
-        let (own, places, count) = unsafe {
-            (shared(force_loop, "loop")?, array_mut(contacts, capacity, "contacts")?, exclusive(count, "count")?)
-        };
-        let side = own.frame();
-        let found = || side.latest.state.contacts.iter();
-        *count = found().count();
-        places.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = record(&side.prepared, contact));
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointers.
+    catching_panics(|| unsafe { put_contacts(force_loop, (contacts, capacity, "contacts"), count, record) })
 }
 
 /// Estimated relative error of the force of each contact, in the order of palpate_loop_get_contacts; 0 for a linear material.
@@ -214,17 +205,30 @@ pub unsafe extern "C" fn palpate_loop_get_contact_errors(
     capacity: usize,
     count: *mut usize,
 ) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointers.
-        let (own, places, count) = unsafe {
-            (shared(force_loop, "loop")?, array_mut(errors, capacity, "errors")?, exclusive(count, "count")?)
-        };
-        let side = own.frame();
-        let found = || side.latest.state.contacts.iter();
-        *count = found().count();
-        places.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = contact.error);
-        Ok(Status::PalpateOk)
+    // SAFETY: the caller's pointers.
+    catching_panics(|| unsafe {
+        put_contacts(force_loop, (errors, capacity, "errors"), count, |_, contact| contact.error)
     })
+}
+
+/// Writes a value of each contact of the last frame, and how many contacts there are.
+///
+/// # Safety
+/// The pointers are null, or point to a loop, to as many values as stated, and to a count.
+unsafe fn put_contacts<T>(
+    force_loop: *const Loop,
+    (values, capacity, name): (*mut T, usize, &'static str),
+    count: *mut usize,
+    value: impl Fn(&PreparedScene, &Contact) -> T,
+) -> Outcome {
+    // SAFETY: the caller's pointers.
+    let (own, values, count) =
+        unsafe { (shared(force_loop, "loop")?, array_mut(values, capacity, name)?, exclusive(count, "count")?) };
+    let side = own.frame();
+    let found = || side.latest.state.contacts.iter();
+    *count = found().count();
+    values.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = value(&side.prepared, contact));
+    Ok(Status::PalpateOk)
 }
 
 fn record(prepared: &PreparedScene, contact: &Contact) -> ContactRecord {

@@ -80,8 +80,8 @@ pub unsafe extern "C" fn palpate_loop_tick(
         let side = &mut *side;
         require_count("tools", tools, side.ends.len())?;
         let force_loop = side.force_loop.as_mut().ok_or_else(running)?;
-        for (end, said) in side.ends.iter_mut().zip(readings) {
-            end.set_reading(reading(said, now_ns));
+        for (end, input) in side.ends.iter_mut().zip(readings) {
+            end.set_reading(reading(input, now_ns));
         }
         force_loop.tick(now_ns, period);
         for (end, to) in side.ends.iter_mut().zip(wrenches) {
@@ -92,13 +92,13 @@ pub unsafe extern "C" fn palpate_loop_tick(
     })
 }
 
-fn reading(said: &DeviceReading, now_ns: u64) -> Reading {
+fn reading(input: &DeviceReading, now_ns: u64) -> Reading {
     Reading {
-        pose: pose(said.position, said.orientation),
-        twist: Twist { linear: said.velocity.into(), angular: said.angular_velocity.into() },
-        buttons: Buttons(said.buttons),
-        active: said.active != 0,
-        timestamp_ns: if said.timestamp_ns == 0 { now_ns } else { said.timestamp_ns },
+        pose: pose(input.position, input.orientation),
+        twist: Twist { linear: input.velocity.into(), angular: input.angular_velocity.into() },
+        buttons: Buttons(input.buttons),
+        active: input.active != 0,
+        timestamp_ns: if input.timestamp_ns == 0 { now_ns } else { input.timestamp_ns },
     }
 }
 

@@ -36,8 +36,8 @@ fn generated() -> String {
 
 #[test]
 fn the_header_is_current() {
-    let kept = fs::read_to_string(header()).unwrap_or_default();
-    assert!(kept == generated(), "include/palpate.h is not what the sources say; {ADVICE}");
+    let header_text = fs::read_to_string(header()).unwrap_or_default();
+    assert!(header_text == generated(), "include/palpate.h is not what the sources say; {ADVICE}");
 }
 
 /// Every exported function is in the header: a file that is missing in the list above would leave its functions out.

@@ -271,8 +271,8 @@ fn limits_of_a_scene_are_for_loops_that_are_made_later() {
         done(palpate_loop_change(own, scene));
         done(palpate_loop_stop(own));
         done(palpate_loop_new(scene, &mut later));
-        let (kept, new) = (strongest(own), strongest(later));
-        assert!(kept > 0.1 && new <= 0.05 * (1.0 + 1e-12) && new > 0.04, "{kept} N and {new} N");
+        let (held, new) = (strongest(own), strongest(later));
+        assert!(held > 0.1 && new <= 0.05 * (1.0 + 1e-12) && new > 0.04, "{held} N and {new} N");
         palpate_loop_free(later);
     }
 }

@@ -26,9 +26,10 @@ fn two_devices_are_told_apart_and_a_third_is_not_there() {
     falcon.write(Wrench { force: DVec3::Y, torque: DVec3::ZERO }).expect("written");
     assert_eq!(emulated.motors(1).force, DVec3::Y);
     assert_eq!(emulated.motors(0).force, DVec3::ZERO);
-    for (asked, said) in [(Some("1"), "in use"), (Some("2"), "no Force Dimension device"), (Some("omega"), "0 to 1")] {
+    for (asked, message) in [(Some("1"), "in use"), (Some("2"), "no Force Dimension device"), (Some("omega"), "0 to 1")]
+    {
         let error = forcedimension::open(&emulated.connection(asked)).err().expect("refused").to_string();
-        assert!(error.contains(said), "{error}");
+        assert!(error.contains(message), "{error}");
     }
 }
 
@@ -92,31 +93,31 @@ fn motors_that_are_off_are_told_and_come_back() {
     let mut until = |wanted: fn(Result<(), DeviceFault>) -> bool| {
         let began = Instant::now();
         loop {
-            let said = device.read(began.elapsed().as_nanos() as u64, 1e-3).map(|_| ());
-            let force = if said.is_ok() { DVec3::X } else { DVec3::ZERO };
+            let reading = device.read(began.elapsed().as_nanos() as u64, 1e-3).map(|_| ());
+            let force = if reading.is_ok() { DVec3::X } else { DVec3::ZERO };
             let _ = device.write(Wrench { force, torque: DVec3::ZERO });
-            if wanted(said) {
+            if wanted(reading) {
                 return emulated.motors(0).force;
             }
-            assert!(began.elapsed() < Duration::from_secs(10), "{said:?}");
+            assert!(began.elapsed() < Duration::from_secs(10), "{reading:?}");
             std::thread::sleep(Duration::from_millis(1));
         }
     };
-    assert_eq!(until(|said| said.is_ok()), DVec3::X);
+    assert_eq!(until(|reading| reading.is_ok()), DVec3::X);
     emulated.disturb(0, Some(Disturbance::MotorsOff));
-    assert_eq!(until(|said| said == Err(DeviceFault::MotorsOff)), DVec3::ZERO);
+    assert_eq!(until(|reading| reading == Err(DeviceFault::MotorsOff)), DVec3::ZERO);
     emulated.disturb(0, None);
-    assert_eq!(until(|said| said.is_ok()), DVec3::X);
+    assert_eq!(until(|reading| reading.is_ok()), DVec3::X);
 }
 
 /// Ticks without a force until a device says what is wanted; or for a time, and then what it said last.
 fn said_within(device: &mut dyn Device, time: Duration, wanted: Option<DeviceFault>) -> Result<DVec3, DeviceFault> {
     let began = Instant::now();
     loop {
-        let said = device.read(began.elapsed().as_nanos() as u64, 1e-3).map(|reading| reading.pose.position);
+        let reading = device.read(began.elapsed().as_nanos() as u64, 1e-3).map(|reading| reading.pose.position);
         let _ = device.write(Wrench::default());
-        if said.err() == wanted || began.elapsed() > time {
-            return said;
+        if reading.err() == wanted || began.elapsed() > time {
+            return reading;
         }
         std::thread::sleep(Duration::from_millis(1));
     }

@@ -33,10 +33,10 @@ fn tick_until(
 ) {
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(4) {
-        let said = device.read(0, PERIOD);
-        let wrench = if said.is_ok() { Wrench { force, ..Wrench::default() } } else { Wrench::default() };
+        let reading = device.read(0, PERIOD);
+        let wrench = if reading.is_ok() { Wrench { force, ..Wrench::default() } } else { Wrench::default() };
         let _ = device.write(wrench);
-        if holds(said) {
+        if holds(reading) {
             return;
         }
         std::thread::sleep(Duration::from_millis(1));
@@ -56,8 +56,8 @@ fn the_origin_is_the_middle_of_the_workspace_where_it_can_be_chosen() {
         let mut device = opened(&service);
         let held = DVec3::new(0.01, 0.02, -0.03);
         service.set_tip(ARM, Tip::at(held));
-        tick_until(&mut *device, DVec3::ZERO, "the place", |said| {
-            said.is_ok_and(|reading| (reading.pose.position - held - origin).length() < 1e-12)
+        tick_until(&mut *device, DVec3::ZERO, "the place", |reading| {
+            reading.is_ok_and(|reading| (reading.pose.position - held - origin).length() < 1e-12)
         });
         assert_eq!(device.name(), "Haply Inverse3 0A01");
         assert_eq!(service.profiles(), [Some("org.palpate.servo".to_string())]);
@@ -203,8 +203,8 @@ fn bad_replies_are_faults_and_take_the_force_off() {
         until_force(&mut *device, &service, DVec3::new(0.0, 0.0, 2.0));
         service.set_reply_flaw(Some(reply_flaw.clone()));
         let mut fault = None;
-        tick_until(&mut *device, DVec3::Z, "a fault", |said| {
-            fault = said.err();
+        tick_until(&mut *device, DVec3::Z, "a fault", |reading| {
+            fault = reading.err();
             fault.is_some()
         });
         assert_eq!(fault, Some(expected), "{reply_flaw:?}");
@@ -216,7 +216,7 @@ fn bad_replies_are_faults_and_take_the_force_off() {
         }
         assert_eq!(service.motors(ARM).force, DVec3::ZERO, "{reply_flaw:?}");
         service.set_reply_flaw(None);
-        tick_until(&mut *device, DVec3::ZERO, "readings again", |said| said.is_ok());
+        tick_until(&mut *device, DVec3::ZERO, "readings again", |reading| reading.is_ok());
     }
 }
 
@@ -229,9 +229,9 @@ fn a_connection_is_not_given_up_with_a_force_on_the_motors() {
     for _ in 0..3 {
         until_force(&mut *device, &service, DVec3::Y);
         service.set_reply_flaw(Some(ReplyFlaw::Huge(1 << 20)));
-        tick_until(&mut *device, DVec3::Y, "the loss", |said| said == Err(DeviceFault::Disconnected));
+        tick_until(&mut *device, DVec3::Y, "the loss", |reading| reading == Err(DeviceFault::Disconnected));
         service.set_reply_flaw(None);
-        tick_until(&mut *device, DVec3::ZERO, "readings again", |said| said.is_ok());
+        tick_until(&mut *device, DVec3::ZERO, "readings again", |reading| reading.is_ok());
     }
     assert_eq!(service.take_complaints(), Vec::<String>::new());
 }
@@ -271,8 +271,8 @@ fn replies_that_nobody_asked_for_do_not_make_readings_old() {
     tick_until(&mut *device, DVec3::ZERO, "a second", |_| service.messages() > 1000);
     service.set_tip(ARM, Tip::at(DVec3::Y));
     let began = Instant::now();
-    tick_until(&mut *device, DVec3::ZERO, "the new place", |said| {
-        said.is_ok_and(|reading| reading.pose.position == DVec3::Y)
+    tick_until(&mut *device, DVec3::ZERO, "the new place", |reading| {
+        reading.is_ok_and(|reading| reading.pose.position == DVec3::Y)
     });
     assert!(began.elapsed() < Duration::from_millis(100), "{:?}", began.elapsed());
 }
@@ -322,17 +322,17 @@ fn the_arms_own_safety_takes_forces_off_until_the_brake_is_released() {
     std::thread::sleep(Duration::from_millis(30));
     device.read(0, PERIOD).expect("another arm's brake");
     service.trigger_safety(ARM, "ebrake_triggered");
-    tick_until(&mut *device, DVec3::Y, "the brake", |said| said == Err(DeviceFault::MotorsOff));
+    tick_until(&mut *device, DVec3::Y, "the brake", |reading| reading == Err(DeviceFault::MotorsOff));
     for _ in 0..30 {
         assert_eq!(device.read(0, PERIOD), Err(DeviceFault::MotorsOff));
         std::thread::sleep(Duration::from_millis(1));
     }
     assert_eq!(service.motors(ARM).force, DVec3::ZERO);
     service.trigger_safety(ARM, "ebrake_released");
-    tick_until(&mut *device, DVec3::Y, "readings", |said| said.is_ok());
+    tick_until(&mut *device, DVec3::Y, "readings", |reading| reading.is_ok());
     service.trigger_safety(ARM, "stall_detected");
-    tick_until(&mut *device, DVec3::Y, "a stall", |said| said == Err(DeviceFault::MotorsOff));
-    tick_until(&mut *device, DVec3::Y, "readings", |said| said.is_ok());
+    tick_until(&mut *device, DVec3::Y, "a stall", |reading| reading == Err(DeviceFault::MotorsOff));
+    tick_until(&mut *device, DVec3::Y, "readings", |reading| reading.is_ok());
 }
 
 #[test]
@@ -342,7 +342,7 @@ fn a_service_that_starts_anew_is_found_again() {
     let mut device = opened(&service);
     until_force(&mut *device, &service, DVec3::Y);
     service.drop_connections();
-    tick_until(&mut *device, DVec3::Y, "the loss", |said| said == Err(DeviceFault::Disconnected));
+    tick_until(&mut *device, DVec3::Y, "the loss", |reading| reading == Err(DeviceFault::Disconnected));
     assert_eq!(service.motors(ARM).force, DVec3::ZERO);
     until_force(&mut *device, &service, DVec3::X);
     assert_eq!(service.take_complaints(), Vec::<String>::new());
@@ -384,14 +384,16 @@ fn grips_fall_asleep_and_wake() {
     let turned = glam::DQuat::from_rotation_x(0.3);
     service.set_tip(ARM, Tip { orientation: turned, ..Tip::at(DVec3::ZERO) });
     service.press(haply_service::GRIP, Buttons(3));
-    let both = |said: Result<palpate_devices::Reading, DeviceFault>| {
-        said.is_ok_and(|reading| reading.buttons == Buttons(3) && reading.pose.orientation.angle_between(turned) < 1e-6)
+    let both = |reading: Result<palpate_devices::Reading, DeviceFault>| {
+        reading
+            .is_ok_and(|reading| reading.buttons == Buttons(3) && reading.pose.orientation.angle_between(turned) < 1e-6)
     };
     tick_until(&mut *device, DVec3::ZERO, "buttons and orientation", both);
     service.wake(haply_service::GRIP, false);
     // What is held is let go, and the tool stays as it was.
-    tick_until(&mut *device, DVec3::ZERO, "no buttons", |said| {
-        said.is_ok_and(|reading| reading.buttons == Buttons(0) && reading.pose.orientation.angle_between(turned) < 1e-6)
+    tick_until(&mut *device, DVec3::ZERO, "no buttons", |reading| {
+        reading
+            .is_ok_and(|reading| reading.buttons == Buttons(0) && reading.pose.orientation.angle_between(turned) < 1e-6)
     });
     service.wake(haply_service::GRIP, true);
     tick_until(&mut *device, DVec3::ZERO, "buttons and orientation", both);

@@ -18,10 +18,10 @@ use counting_allocator::allocations;
 /// What a tick allocates and frees.
 fn counted(device: &mut dyn Device, tick: u64) -> u64 {
     let before = allocations();
-    let said = device.read(1_000_000 * tick, 1e-3);
+    let reading = device.read(1_000_000 * tick, 1e-3);
     let written = device.write(Wrench { force: 20.0 * DVec3::X, torque: DVec3::Y });
     let count = allocations() - before;
-    assert!(said.is_ok() && written.is_ok(), "{said:?} {written:?}");
+    assert!(reading.is_ok() && written.is_ok(), "{reading:?} {written:?}");
     count
 }
 

@@ -56,12 +56,12 @@ fn two_devices_share_a_tick_and_are_told_apart() {
     let forces = ticks(opened, 20, move |tick, devices| {
         // From the middle on, the second one is unplugged; its errors lie on the stack of both.
         steering.disturb(1, if tick < 10 { None } else { Some(Disturbance::Unplugged) });
-        let said = [devices[0].read(tick as u64, 1e-3), devices[1].read(tick as u64, 1e-3)];
+        let readings = [devices[0].read(tick as u64, 1e-3), devices[1].read(tick as u64, 1e-3)];
         let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
         let _ = devices[1].write(Wrench { force: DVec3::Z, torque: DVec3::ZERO });
-        (said, [steering.motors(0).force, steering.motors(1).force])
+        (readings, [steering.motors(0).force, steering.motors(1).force])
     });
-    let place = |said: Result<Reading, DeviceFault>| said.map(|reading| reading.pose.position);
+    let place = |reading: Result<Reading, DeviceFault>| reading.map(|reading| reading.pose.position);
     let ([first, second], motors) = forces[5];
     assert!((place(first).expect("a reading") - 0.01 * DVec3::X).length() < 1e-12);
     assert!((place(second).expect("a reading") - 0.02 * DVec3::Y).length() < 1e-12);
@@ -134,14 +134,14 @@ fn nonsense_is_survived() {
     let good = ticks(opened, 20_000, move |tick, devices| {
         // Some errors say that the device is gone; then it is well for a while, to come back.
         steering.disturb(0, if tick % 1000 < 900 { Some(Disturbance::Nonsense) } else { None });
-        let said = devices[0].read(1000 * tick as u64, 1e-3);
-        if let Ok(reading) = said {
+        let reading = devices[0].read(1000 * tick as u64, 1e-3);
+        if let Ok(reading) = reading {
             assert!(reading.pose.is_finite() && reading.twist.linear.is_finite() && reading.twist.angular.is_finite());
         }
         let _ = devices[0].write(Wrench { force: 0.5 * DVec3::X, torque: DVec3::ZERO });
         let force = steering.motors(0).force;
         assert!(force == DVec3::ZERO || (force - 0.5 * DVec3::X).length() < 1e-12, "{force}");
-        said.is_ok()
+        reading.is_ok()
     });
     steering.run_fast(false);
     println!("{} good readings of {}", good.iter().filter(|good| **good).count(), good.len());
@@ -157,16 +157,16 @@ fn warm_motors_are_told_and_cool() {
     let emulated = emulated("Touch");
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
     let steering = emulated.steering();
-    let said = ticks(opened, 300, move |tick, devices| {
+    let rows = ticks(opened, 300, move |tick, devices| {
         steering.disturb(0, if (5..10).contains(&tick) { Some(Disturbance::MotorsOff) } else { None });
-        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let reading = devices[0].read(tick as u64, 1e-3).map(|_| ());
         let _ = devices[0].write(Wrench { force: DVec3::X, torque: DVec3::ZERO });
-        (said, steering.motors(0).force.x)
+        (reading, steering.motors(0).force.x)
     });
-    assert_eq!(said[4], (Ok(()), 1.0));
-    assert_eq!(said[7], (Err(DeviceFault::MotorsOff), 0.0));
-    assert!(said[12].0.is_ok() && said[12].1 > 0.0 && said[12].1 < 0.1, "{:?}", said[12]);
-    assert_eq!(said[299], (Ok(()), 1.0));
+    assert_eq!(rows[4], (Ok(()), 1.0));
+    assert_eq!(rows[7], (Err(DeviceFault::MotorsOff), 0.0));
+    assert!(rows[12].0.is_ok() && rows[12].1 > 0.0 && rows[12].1 < 0.1, "{:?}", rows[12]);
+    assert_eq!(rows[299], (Ok(()), 1.0));
 }
 
 const PUSHED: Wrench = Wrench { force: DVec3::X, torque: DVec3::ZERO };
@@ -177,7 +177,7 @@ fn another_thread_than_the_librarys_calls_nothing_of_it() {
     let emulated = emulated("Touch");
     let steering = emulated.steering();
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
-    let said = ticks(opened, 3, move |tick, devices| {
+    let rows = ticks(opened, 3, move |tick, devices| {
         let before = steering.motors(0).force;
         let first = &mut devices[0];
         let elsewhere = (tick == 1).then(|| {
@@ -192,8 +192,8 @@ fn another_thread_than_the_librarys_calls_nothing_of_it() {
         }
         (elsewhere, before)
     });
-    assert_eq!(said[1], (Some((Ok(()), true)), DVec3::X));
-    assert_eq!(said[2], (None, DVec3::ZERO), "the frame without a force is the library's thread's");
+    assert_eq!(rows[1], (Some((Ok(()), true)), DVec3::X));
+    assert_eq!(rows[2], (None, DVec3::ZERO), "the frame without a force is the library's thread's");
 }
 
 /// A device that says it is broken and is not: the tick that says so has no force on the motors any more.
@@ -202,16 +202,16 @@ fn a_device_that_cannot_be_read_is_let_go_at_once() {
     let emulated = emulated("Touch");
     let opened = vec![openhaptics::open(&emulated.connection(None)).expect("opens")];
     let steering = emulated.steering();
-    let said = ticks(opened, 12, move |tick, devices| {
+    let rows = ticks(opened, 12, move |tick, devices| {
         if tick == 10 {
             steering.disturb(0, Some(Disturbance::ReadsFail));
         }
-        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
-        let _ = devices[0].write(if said.is_ok() { PUSHED } else { Wrench::default() });
-        (said, steering.motors(0).force)
+        let reading = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let _ = devices[0].write(if reading.is_ok() { PUSHED } else { Wrench::default() });
+        (reading, steering.motors(0).force)
     });
-    assert_eq!(said[9], (Ok(()), DVec3::X));
-    assert_eq!(said[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
+    assert_eq!(rows[9], (Ok(()), DVec3::X));
+    assert_eq!(rows[10], (Err(DeviceFault::Disconnected), DVec3::ZERO));
 }
 
 /// Before the library is stopped for a device that is lost, the others have no force: they would keep it.
@@ -223,18 +223,19 @@ fn no_force_outlives_the_ticks_of_the_library() {
         openhaptics::open(&emulated.connection(Some("Left"))).expect("the other one"),
     ];
     let steering = emulated.steering();
-    let said = ticks(opened, 300, move |tick, devices| {
+    let rows = ticks(opened, 300, move |tick, devices| {
         if tick == 10 {
             steering.disturb(1, Some(Disturbance::Unplugged));
         }
-        let kept = steering.motors(0).force;
-        let said = devices[0].read(tick as u64, 1e-3).map(|_| ());
+        let force = steering.motors(0).force;
+        let reading = devices[0].read(tick as u64, 1e-3).map(|_| ());
         let _ = devices[0].write(PUSHED);
         let _ = devices[1].read(tick as u64, 1e-3);
         let _ = devices[1].write(Wrench::default());
-        (said, kept)
+        (reading, force)
     });
-    let first = said.iter().find(|(said, _)| *said == Err(DeviceFault::Disconnected)).expect("the library is stopped");
+    let first =
+        rows.iter().find(|(reading, _)| *reading == Err(DeviceFault::Disconnected)).expect("the library is stopped");
     assert_eq!(first.1, DVec3::ZERO);
 }
 
@@ -260,22 +261,22 @@ fn a_scheduler_that_does_not_start_again_is_a_fault() {
     let emulated = emulated("Touch");
     let ReadyDevice { mut device, scheduler } = openhaptics::open(&emulated.connection(None)).expect("opens");
     let scheduler = scheduler.expect("the library has its own loop");
-    let (sender, said) = std::sync::mpsc::channel();
+    let (sender, readings) = std::sync::mpsc::channel();
     let begun = scheduler.start(Box::new(move || {
         let _ = sender.send(device.read(0, 1e-3).map(|_| ()));
         let _ = device.write(Wrench::default());
     }));
     begun.expect("the scheduler starts");
     let until = |wanted: Result<(), DeviceFault>| {
-        while said.recv_timeout(Duration::from_secs(5)).expect("the loop ticks") != wanted {}
+        while readings.recv_timeout(Duration::from_secs(5)).expect("the loop ticks") != wanted {}
     };
     until(Ok(()));
     emulated.disturb(0, Some(Disturbance::Unplugged));
     until(Err(DeviceFault::Disconnected));
     emulated.disturb(0, Some(Disturbance::SchedulerFails));
     std::thread::sleep(Duration::from_millis(1500));
-    while said.try_recv().is_ok() {}
-    assert_eq!(said.recv_timeout(Duration::from_millis(300)), Ok(Err(DeviceFault::Disconnected)));
+    while readings.try_recv().is_ok() {}
+    assert_eq!(readings.recv_timeout(Duration::from_millis(300)), Ok(Err(DeviceFault::Disconnected)));
     emulated.disturb(0, None);
     until(Ok(()));
     scheduler.stop();

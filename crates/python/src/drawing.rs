@@ -15,17 +15,17 @@ pub fn simplified<'py>(
     py: Python<'py>,
     positions: PyReadonlyArray2<'py, f64>,
     triangles: PyReadonlyArray1<'py, u32>,
-    kept: PyReadonlyArray1<'py, bool>,
+    locked: PyReadonlyArray1<'py, bool>,
     target: usize,
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, f32)> {
     let positions = vectors(&positions).map_err(|e| to_python(py, e))?;
-    let (corners, kept): (Vec<u32>, Vec<bool>) = (triangles.as_array().to_vec(), kept.as_array().to_vec());
-    let found = py.detach(|| fewer(&positions, &corners, &kept, target)).map_err(|e| to_python(py, e))?;
+    let (corners, locked): (Vec<u32>, Vec<bool>) = (triangles.as_array().to_vec(), locked.as_array().to_vec());
+    let found = py.detach(|| fewer(&positions, &corners, &locked, target)).map_err(|e| to_python(py, e))?;
     Ok((found.0.into_pyarray(py), found.1))
 }
 
-fn fewer(positions: &[glam::DVec3], corners: &[u32], kept: &[bool], target: usize) -> Result<(Vec<u32>, f32), Error> {
-    if kept.len() != positions.len() || corners.iter().any(|&corner| corner as usize >= positions.len()) {
+fn fewer(positions: &[glam::DVec3], corners: &[u32], locked: &[bool], target: usize) -> Result<(Vec<u32>, f32), Error> {
+    if locked.len() != positions.len() || corners.iter().any(|&corner| corner as usize >= positions.len()) {
         return Err(Error::Invalid("the triangles to be drawn name vertices that are not there".into()));
     }
     let vertices: Vec<f32> = positions.iter().flat_map(|p| p.as_vec3().to_array()).collect();
@@ -34,6 +34,6 @@ fn fewer(positions: &[glam::DVec3], corners: &[u32], kept: &[bool], target: usiz
     let mut error = 0.0;
     // Even where the surface is flat: a tool dents it there as well.
     let options = SimplifyOptions::ErrorAbsolute | SimplifyOptions::Regularize;
-    let found = simplify_with_locks(corners, &adapter, kept, 3 * target, f32::MAX, options, Some(&mut error));
+    let found = simplify_with_locks(corners, &adapter, locked, 3 * target, f32::MAX, options, Some(&mut error));
     Ok((found, error))
 }

@@ -59,8 +59,8 @@ pub fn emulate<'py>(
             let mut runs_away = false;
             for (tool, start) in starts.iter().enumerate() {
                 let true_motion = tick.true_motions[tool];
-                let said = tick.readings[tool].pose.position;
-                let row = [true_motion.position, true_motion.velocity, said, tick.wrenches[tool].force];
+                let read_position = tick.readings[tool].pose.position;
+                let row = [true_motion.position, true_motion.velocity, read_position, tick.wrenches[tool].force];
                 columns.iter_mut().zip(row).for_each(|(column, vector)| column.extend(vector.to_array()));
                 let away = true_motion.position.distance(*start);
                 runs_away |= away > reach || !away.is_finite();

@@ -51,7 +51,7 @@ pub(crate) fn run_interruptible_and<T: Send>(
             }
         }
         match worker.join() {
-            Ok(Ok(made)) => meanwhile().map(|()| made),
+            Ok(Ok(value)) => meanwhile().map(|()| value),
             Ok(Err(error)) => Err(to_python(py, error)),
             Err(_) => Err(to_python(py, Error::Invalid("the precomputation failed unexpectedly".into()))),
         }

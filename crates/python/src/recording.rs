@@ -48,10 +48,10 @@ impl Recording {
     }
 
     /// Ends it, after so many ticks.
-    pub fn end(self, made: u64) -> RecordingStatus {
+    pub fn end(self, ticks: u64) -> RecordingStatus {
         let path = self.recorder.path().to_owned();
-        let status = self.recorder.finish(made);
-        (path, status.ticks, status.bytes, made.saturating_sub(status.ticks), status.error)
+        let status = self.recorder.finish(ticks);
+        (path, status.ticks, status.bytes, ticks.saturating_sub(status.ticks), status.error)
     }
 }
 
@@ -92,8 +92,8 @@ impl Recorded {
         if let Some(reason) = self.failed {
             return Err(Error::Invalid(reason));
         }
-        let made = self.ticks as u64;
-        let file = self.writer.finish(Some(made)).map_err(|error| Error::Invalid(error.to_string()))?;
+        let ticks = self.ticks as u64;
+        let file = self.writer.finish(Some(ticks)).map_err(|error| Error::Invalid(error.to_string()))?;
         Ok(file.into_inner())
     }
 }

@@ -91,8 +91,8 @@ impl Columns {
         self.due_ns.push(record.input.due_ns);
         self.delay_us.push(1e-3 * record.delay_ns as f64);
         self.compute_us.push(1e-3 * record.took_ns as f64);
-        for (said, got) in record.input.readings.iter().zip(&record.output.tools).take(tools) {
-            let reading = said.unwrap_or_default();
+        for (reading, got) in record.input.readings.iter().zip(&record.output.tools).take(tools) {
+            let reading = reading.unwrap_or_default();
             let (pose, twist, computed) = (&reading.pose, &reading.twist, &got.computed);
             let port = got.port.map(f64::from);
             let numbers: [&[f64]; 10] = [
@@ -127,8 +127,8 @@ impl Columns {
             }
             self.contact_numbers.push(c.error);
         }
-        for (body, said) in record.output.bodies.iter().enumerate() {
-            if let Some((time, energy)) = said {
+        for (body, state) in record.output.bodies.iter().enumerate() {
+            if let Some((time, energy)) = state {
                 self.bodies.extend([tick as f64, body as f64, *time]);
                 self.bodies.extend(energy_array(energy));
             }
@@ -138,7 +138,7 @@ impl Columns {
     /// What people want to know of a tick.
     fn note_events(&mut self, record: &TickRecord, tools: usize) {
         let of_tools = record.output.tools.iter().take(tools).enumerate();
-        let now = of_tools.map(|(tool, said)| said.fault.map(|fault| format!("tool {tool}: {fault}")));
+        let now = of_tools.map(|(tool, output)| output.fault.map(|fault| format!("tool {tool}: {fault}")));
         let now: Vec<_> = now.chain([record.input.fault.map(|fault| fault.to_string())]).collect();
         let input = &record.input;
         let mut note = |what: String| self.events.push((record.tick, what));
@@ -245,9 +245,9 @@ impl Replay {
 
     /// Makes up to so many ticks again: how many there were, and what is not as recorded.
     fn step(&self, py: Python<'_>, count: usize) -> PyResult<(usize, Vec<DifferenceRecord>)> {
-        let (mut made, mut differences) = (0, Vec::new());
-        while made < count {
-            let ticks = INTERRUPT_TICKS.min(count - made);
+        let (mut done, mut differences) = (0, Vec::new());
+        while done < count {
+            let ticks = INTERRUPT_TICKS.min(count - done);
             let now = py.detach(|| -> Result<usize> {
                 let mut parts = self.lock();
                 let (recorded, replay) = &mut *parts;
@@ -260,7 +260,7 @@ impl Replay {
             });
             py.check_signals()?;
             let now = now.map_err(|e| to_python(py, e))?;
-            made += now;
+            done += now;
             if now < ticks {
                 break;
             }
@@ -271,7 +271,7 @@ impl Replay {
             Owner::Body(body) => format!("body {body}"),
         };
         let record = |d: palpate_servo::Difference| (d.tick, owner(d.of), d.quantity, d.recorded, d.replayed);
-        Ok((made, differences.into_iter().map(record).collect()))
+        Ok((done, differences.into_iter().map(record).collect()))
     }
 
     /// What the longest tick so far took of the thread's own time, us.

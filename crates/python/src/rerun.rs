@@ -46,11 +46,11 @@ pub fn rerun<'py>(
     });
     let inputs: Inputs<'_> = Box::new(inputs);
     let each = |record: &TickRecord| file.push(record);
-    let made = py.detach(|| palpate_servo::rerun(&model, &devices, limits, settings, &strain, inputs, each));
+    let result = py.detach(|| palpate_servo::rerun(&model, &devices, limits, settings, &strain, inputs, each));
     if let Some(error) = stopped {
         return Err(error);
     }
-    made.map_err(|e| to_python(py, e))?;
+    result.map_err(|e| to_python(py, e))?;
     let bytes = file.finish().map_err(|e| to_python(py, e))?;
     Ok(PyBytes::new(py, &bytes))
 }

@@ -259,9 +259,9 @@ impl SimulationCore {
         let mut parts = self.parts(py);
         let recording = parts.recording.take()?;
         let servo = parts.servo.as_mut()?;
-        let made = py.detach(|| servo.end_recording());
+        let ticks = py.detach(|| servo.end_recording());
         drop(parts);
-        Some(py.detach(|| recording.end(made)))
+        Some(py.detach(|| recording.end(ticks)))
     }
 
     /// Moves the tools through positions (ticks, tools, 3), NaN where one is out of the scene, orientations (ticks, tools,

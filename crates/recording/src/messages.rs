@@ -162,15 +162,15 @@ pub struct Tool {
 
 impl Tool {
     fn of(input: &RecordedInput, tool: usize, output: &RecordedTool) -> Self {
-        let said = input.readings[tool];
-        let reading = said.unwrap_or_default();
+        let result = input.readings[tool];
+        let reading = result.unwrap_or_default();
         Self {
             pose: (&reading.pose).into(),
             twist: (&reading.twist).into(),
             measured_ns: reading.timestamp_ns,
             buttons: reading.buttons.0,
             active: reading.active,
-            reading_fault: said.err().map(FaultReason::Device).into(),
+            reading_fault: result.err().map(FaultReason::Device).into(),
             fault_before: input.tool_faults[tool].into(),
             fault: output.fault.into(),
             limited: output.limited,
@@ -285,8 +285,8 @@ impl Tick {
     /// Of a record, with some tools in the scene.
     pub fn new(record: &TickRecord, tools: usize, stamp: Time) -> Self {
         let TickRecord { input, output, .. } = record;
-        let body = |(body, said): (usize, &Option<(f64, Energy)>)| {
-            said.map(|(time, e)| Body {
+        let body = |(body, energies): (usize, &Option<(f64, Energy)>)| {
+            energies.map(|(time, e)| Body {
                 body: body as u8,
                 time,
                 kinetic: e.kinetic,
@@ -333,10 +333,10 @@ impl Tick {
         };
         let contacts = self.contacts.iter().map(|&contact| contact.into()).collect();
         let mut output = RecordedOutput { contacts, ..RecordedOutput::default() };
-        for (tool, said) in self.tools.iter().enumerate().take(output.tools.len()) {
-            input.readings[tool] = said.reading();
-            input.tool_faults[tool] = said.fault_before.into();
-            output.tools[tool] = said.recorded();
+        for (tool, message) in self.tools.iter().enumerate().take(output.tools.len()) {
+            input.readings[tool] = message.reading();
+            input.tool_faults[tool] = message.fault_before.into();
+            output.tools[tool] = message.recorded();
         }
         for b in &self.bodies {
             if let Some(body) = output.bodies.get_mut(usize::from(b.body)) {

@@ -32,7 +32,7 @@ struct Shared {
     ticks: AtomicU64,
     bytes: AtomicU64,
     /// How many ticks the loop has made, where that is known at the end.
-    made: Mutex<Option<u64>>,
+    total_ticks: Mutex<Option<u64>>,
     error: Mutex<Option<String>>,
 }
 
@@ -85,8 +85,8 @@ impl Recorder {
     }
 
     /// Ends the file, once the loop pushes nothing any more, of so many ticks made.
-    pub fn finish(mut self, made: u64) -> RecorderStatus {
-        *lock(&self.shared.made) = Some(made);
+    pub fn finish(mut self, total_ticks: u64) -> RecorderStatus {
+        *lock(&self.shared.total_ticks) = Some(total_ticks);
         self.stop();
         self.status()
     }
@@ -128,9 +128,9 @@ fn write(file: File, header: Header, mut records: Consumer<TickRecord>, shared: 
                 shared.bytes.store(whole, Ordering::Relaxed);
             }
             if last && records.is_empty() {
-                let made = *lock(&shared.made);
+                let total_ticks = *lock(&shared.total_ticks);
                 // `finish` has flushed all but the buffer.
-                let mut buffer = writer.finish(made)?;
+                let mut buffer = writer.finish(total_ticks)?;
                 std::io::Write::flush(&mut buffer)?;
                 shared.bytes.store(size(), Ordering::Relaxed);
                 return Ok(());

@@ -151,8 +151,8 @@ impl<W: Write + Seek> TickWriter<W> {
     ///
     /// # Errors
     /// The file's.
-    pub fn finish(mut self, made: Option<u64>) -> mcap::McapResult<W> {
-        let dropped = self.dropped + made.map_or(0, |made| made.saturating_sub(self.next));
+    pub fn finish(mut self, total_ticks: Option<u64>) -> mcap::McapResult<W> {
+        let dropped = self.dropped + total_ticks.map_or(0, |total_ticks| total_ticks.saturating_sub(self.next));
         let numbers = [("ticks", self.next - self.dropped), ("dropped", dropped)];
         let metadata = numbers.into_iter().map(|(name, number)| (name.to_owned(), number.to_string())).collect();
         self.file.write_metadata(&Metadata { name: END.into(), metadata: with_checksum(metadata) })?;

@@ -17,7 +17,7 @@ use common::{PERIOD, PERIOD_NS, device, scene, settings};
 
 const TICKS: u64 = 900;
 
-fn said(tool: usize, tick: u64) -> Result<Reading, DeviceFault> {
+fn reading_of(tool: usize, tick: u64) -> Result<Reading, DeviceFault> {
     if tool == 1 && tick > 800 {
         return Err(if tick.is_multiple_of(2) { DeviceFault::Driver(-7) } else { DeviceFault::Program });
     }
@@ -30,7 +30,7 @@ fn said(tool: usize, tick: u64) -> Result<Reading, DeviceFault> {
 }
 
 fn new_loop() -> (ForceLoop, LoopHandle) {
-    let devices = [0, 1].map(|tool| device(move |now_ns| said(tool, now_ns / PERIOD_NS)) as Box<dyn Device>);
+    let devices = [0, 1].map(|tool| device(move |now_ns| reading_of(tool, now_ns / PERIOD_NS)) as Box<dyn Device>);
     let limits = SafetyLimits { max_compute: f64::INFINITY, max_overruns: u32::MAX, ..SafetyLimits::default() };
     ForceLoop::new(scene(true, false), devices.into(), limits, settings()).expect("a valid loop")
 }
@@ -71,7 +71,7 @@ fn header() -> Header {
     Header { about, tools: 2, bodies: 2, rate: 1000.0, begun_ns: 1_700_000_000_000_000_000 }
 }
 
-fn written(records: &[TickRecord], made: u64) -> Vec<u8> {
+fn written(records: &[TickRecord], ticks: u64) -> Vec<u8> {
     let mut writer = TickWriter::new(Cursor::new(Vec::new()), header()).expect("room in memory");
     for (rank, record) in records.iter().enumerate() {
         writer.push(record).expect("room in memory");
@@ -79,7 +79,7 @@ fn written(records: &[TickRecord], made: u64) -> Vec<u8> {
             writer.flush().expect("room in memory");
         }
     }
-    writer.finish(Some(made)).expect("room in memory").into_inner()
+    writer.finish(Some(ticks)).expect("room in memory").into_inner()
 }
 
 fn read<R: Read>(mut ticks: Ticks<R>) -> (Vec<TickRecord>, Option<FileEnd>) {
@@ -175,12 +175,12 @@ fn what_was_dropped_is_counted_and_told() {
     let mut records = records();
     records.drain(400..412);
     let bytes = written(&records, TICKS + 5);
-    let told = mcap::MessageStream::new(&bytes).expect("a file").filter_map(Result::ok);
-    let told: Vec<_> = told.filter(|message| message.channel.topic == "/events").collect();
+    let events = mcap::MessageStream::new(&bytes).expect("a file").filter_map(Result::ok);
+    let events: Vec<_> = events.filter(|message| message.channel.topic == "/events").collect();
     let text = |data: &[u8]| String::from_utf8_lossy(data).into_owned();
-    let told: String = told.iter().map(|message| text(&message.data)).collect();
+    let events: String = events.iter().map(|message| text(&message.data)).collect();
     for expected in ["12 ticks were not recorded", "strike of 0.001 N s on body 0", "tool 1: the device's program"] {
-        assert!(told.contains(expected), "{expected}: {told}");
+        assert!(events.contains(expected), "{expected}: {events}");
     }
     let (again, ending) = read(of_bytes(&bytes).expect("a file of ours"));
     assert_eq!((again.len() as u64, ending), (TICKS - 12, Some(FileEnd { dropped: 17 })));

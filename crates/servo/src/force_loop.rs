@@ -291,13 +291,13 @@ impl ForceLoop {
     /// Reads the devices. A tool with a fault is out of the scene.
     fn read_devices(&mut self, input: &mut Input, now_ns: u64, period: f64) {
         for (tool, (device, stage)) in self.devices.iter_mut().zip(&mut self.stages).enumerate() {
-            let said = device.read(now_ns, period);
-            self.ends.recorder.input().readings[tool] = said;
-            let admitted = stage.accept_reading(said, now_ns, period);
+            let result = device.read(now_ns, period);
+            self.ends.recorder.input().readings[tool] = result;
+            let admitted = stage.accept_reading(result, now_ns, period);
             let reading = &mut self.status.readings[tool];
             // What is published stays a place: a number that is none would end every picture of the scene.
-            match admitted.filter(|said| said.pose.is_finite()) {
-                Some(said) => *reading = said,
+            match admitted.filter(|new| new.pose.is_finite()) {
+                Some(new) => *reading = new,
                 None => reading.active = false,
             }
             let faultless = self.fault.is_none() && stage.fault().is_none();

@@ -132,8 +132,8 @@ pub fn rerun(
             handle.reset()?;
         }
         input.strike.map_or(Ok(()), |strike| handle.strike(strike))?;
-        for (readings, said) in readings.iter_mut().zip(&input.readings) {
-            let _ = readings.push(*said);
+        for (readings, reading) in readings.iter_mut().zip(&input.readings) {
+            let _ = readings.push(*reading);
         }
         preparation.hand_over(tick);
         force_loop.tick(input.due_ns, input.period);

@@ -62,18 +62,18 @@ impl PacedLoop {
             self.missed += behind - most;
             deadline += (behind - most) * period_ns;
         }
-        let mut made = 0;
+        let mut ticks = 0;
         while deadline <= now_ns {
             self.force_loop.tick(deadline, self.period);
             each(&mut self.handle);
             deadline += period_ns;
-            made += 1;
+            ticks += 1;
         }
         self.deadline_ns = Some(deadline);
         if let Some(Some(answer)) = self.end.prepare_one(&self.strain) {
             self.end.send(answer);
         }
-        made
+        ticks
     }
 
     /// Ticks that were left out because the host woke too late.

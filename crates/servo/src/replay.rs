@@ -131,8 +131,8 @@ impl Replay {
             self.handle.reset()?;
         }
         input.strike.map_or(Ok(()), |strike| self.handle.strike(strike))?;
-        for (readings, said) in self.readings.iter_mut().zip(&input.readings) {
-            let _ = readings.push(*said);
+        for (readings, reading) in self.readings.iter_mut().zip(&input.readings) {
+            let _ = readings.push(*reading);
         }
         for &id in input.strain.arrived() {
             self.hand_over(id);

@@ -100,24 +100,24 @@ mod tests {
 
     #[test]
     fn what_cannot_be_had_is_refused() {
-        let said = |scheduling: Scheduling| scheduling.check().map_err(|error| error.to_string());
-        assert_eq!(said(Scheduling::at(1000.0)), Ok(()));
+        let check = |scheduling: Scheduling| scheduling.check().map_err(|error| error.to_string());
+        assert_eq!(check(Scheduling::at(1000.0)), Ok(()));
         let beyond = Scheduling { cpus: vec![100_000], ..Scheduling::at(1000.0) };
-        assert!(said(beyond).is_err_and(|error| error.contains("device.cpus") && error.contains("CPU 100000")));
+        assert!(check(beyond).is_err_and(|error| error.contains("device.cpus") && error.contains("CPU 100000")));
         let steep = Scheduling { priority: 100, ..Scheduling::at(1000.0) };
-        assert!(said(steep).is_err_and(|error| error.contains("device.priority")));
-        assert!(said(Scheduling::at(50.0)).is_err_and(|error| error.contains("100 to 10000 Hz")));
+        assert!(check(steep).is_err_and(|error| error.contains("device.priority")));
+        assert!(check(Scheduling::at(50.0)).is_err_and(|error| error.contains("100 to 10000 Hz")));
     }
 
     #[test]
     fn a_thread_keeps_to_its_processors() {
         let all = allowed_cpus();
         let last = *all.last().expect("a processor");
-        let kept = std::thread::spawn(move || {
+        let thread_end = std::thread::spawn(move || {
             let scheduling = Scheduling { cpus: vec![last], priority: 0, ..Scheduling::at(1000.0) };
             (scheduling.apply(Ranges::default()).map(|granted| granted.priority).ok(), allowed_cpus())
         });
-        assert_eq!(kept.join().expect("a thread that ends"), (Some(false), vec![last]));
+        assert_eq!(thread_end.join().expect("a thread that ends"), (Some(false), vec![last]));
         assert_eq!(allowed_cpus(), all, "other threads stay where they are");
     }
 }

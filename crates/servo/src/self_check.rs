@@ -232,10 +232,10 @@ impl Ticker {
         }
         // By the clock: ticks that were missed count too.
         self.seen.time = 1e-9 * now_ns.saturating_sub(self.begun_ns) as f64 + period;
-        let said = self.device.read(now_ns, period);
+        let result = self.device.read(now_ns, period);
         let reading = self
             .stage
-            .accept_reading(said, now_ns, period)
+            .accept_reading(result, now_ns, period)
             .filter(|reading| reading.active && reading.pose.is_finite());
         // What is told of a push is up to its end.
         if let Some(reading) = reading.as_ref().filter(|_| !self.seen.done) {

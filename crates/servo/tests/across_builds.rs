@@ -67,12 +67,12 @@ fn main() {
         let replay = Replay::new(&model, &devices, SafetyLimits::default(), settings(), strain);
         let mut replay = replay.expect("a valid loop");
         let ticks = Ticks::open(&recording(scene)).expect("a recording that the release build has written");
-        let mut made = 0;
+        let mut ticks = 0;
         for record in ticks {
             let differences = replay.tick(&record.expect("whole messages")).expect("valid settings");
             assert!(differences.is_empty(), "{}: {}", scene.name, differences[0]);
-            made += 1;
+            ticks += 1;
         }
-        assert_eq!(made, 800);
+        assert_eq!(ticks, 800);
     }
 }

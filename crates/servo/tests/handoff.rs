@@ -124,9 +124,9 @@ fn exchange() {
             servo.drain_log(|_| rows += 1);
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
-        let made = servo.end_recording();
+        let ticks = servo.end_recording();
         let recorded = std::iter::from_fn(|| ring.pop().ok()).count() as u64;
-        assert!(recorded == made && rows > 0, "{recorded} of {made} ticks, {rows} rows");
+        assert!(recorded == ticks && rows > 0, "{recorded} of {ticks} ticks, {rows} rows");
     }
     servo.stop();
 }

@@ -44,8 +44,8 @@ def surface_region(body: Body, region: SurfaceRegion | None, what: str) -> np.nd
     inside = surface[mask[surface]]
     if not len(inside):
         low, high = mesh.bounds.round(4).tolist()
-        said = f"'{region}'" if isinstance(region, str) else brief_repr(region)
-        raise BodyError(f"{what}: no surface node lies in {said}: the body reaches from {low} to {high} m")
+        name = f"'{region}'" if isinstance(region, str) else brief_repr(region)
+        raise BodyError(f"{what}: no surface node lies in {name}: the body reaches from {low} to {high} m")
     return inside
 
 

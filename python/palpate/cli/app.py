@@ -131,9 +131,11 @@ def mesh(
     require_writable(out, MeshError)
     size, element = None if max_size is None else length(max_size), "quadratic" if quadratic else "linear"
     fill = fill_options(mesher, part, max_volume_loss, segment)
-    made = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, options=fill))
-    made.write(out)
-    print(f"{out}: {_mesh_line(made)}, smallest dihedral angle {made.dihedral_angles().min():.0f} degrees")
+    volume_mesh = in_unit(unit, lambda unit: tetrahedralize_with(element, surface, size, unit, options=fill))
+    volume_mesh.write(out)
+    print(
+        f"{out}: {_mesh_line(volume_mesh)}, smallest dihedral angle {volume_mesh.dihedral_angles().min():.0f} degrees"
+    )
 
 
 @app.command()
@@ -195,8 +197,8 @@ def precompute(
     loads = None if gravity is None else Loads(gravity=[units.acceleration(g) for g in gravity.split(",")])
     fill = fill_options(mesher, part, max_volume_loss, segment)
     with cluster(dask) as workers:
-        made = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, fill))
-        body = body_of(made, materials_of(made, material, segment), fix, loads)
+        volume_mesh = in_unit(unit, lambda unit: read_any(mesh, unit, element, max_size, fill))
+        body = body_of(volume_mesh, materials_of(volume_mesh, material, segment), fix, loads)
         region = None if touch is None else surface_region(body, touch, "--touch")
         asked = {"precision": precision, "touch": region, "first": first}
         asked |= {"path": out, "memory": memory, "dask": workers}
@@ -300,12 +302,12 @@ def info(
         print_surface(file, unit)
         return
     # A size that needs asking about is what this command tells.
-    made = TetMesh.read(file, unit or "m")
-    print(f"{file}: {_mesh_line(made)}")
-    low, high = 1e3 * made.bounds
-    print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * made.volume:.4g} cm3")
+    tets = TetMesh.read(file, unit or "m")
+    print(f"{file}: {_mesh_line(tets)}")
+    low, high = 1e3 * tets.bounds
+    print(f"  bounds: {low.round(2).tolist()} to {high.round(2).tolist()} mm, volume {1e6 * tets.volume:.4g} cm3")
     print(
-        f"  regions: {sorted(set(made.regions.tolist()))}, dihedral angle >= {made.dihedral_angles().min():.1f} degrees"
+        f"  regions: {sorted(set(tets.regions.tolist()))}, dihedral angle >= {tets.dihedral_angles().min():.1f} degrees"
     )
 
 

@@ -97,8 +97,8 @@ def cluster(address: str | None) -> Iterator[Client | None]:
 
     with connected(address) as client:
         threads, page = threads_of_workers(client), dashboard(client)
-        said = f"{address}: {len(threads)} workers with {sum(threads.values())} threads"
-        print(said + (f", dashboard at {page}" if page else ""))
+        summary = f"{address}: {len(threads)} workers with {sum(threads.values())} threads"
+        print(summary + (f", dashboard at {page}" if page else ""))
         yield client
 
 

@@ -153,9 +153,9 @@ def _palpate(
 
     other = None if against is None else Scene.read(against)
     try:
-        kept = (folder / PARTIAL).exists()
+        partial_exists = (folder / PARTIAL).exists()
         found = stiffness_map(built, **given, on=on, strokes=strokes, partial=folder / PARTIAL, progress=True)
-        if kept:
+        if partial_exists:
             resumed = (
                 f"{found.resumed} of {len(found.curves)} known" if found.resumed else "of another palpation: not used"
             )

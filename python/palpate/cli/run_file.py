@@ -220,8 +220,8 @@ def _changed(table: Any, values: Mapping[str, Any]) -> Any:
         return type(table)(**{**table.model_dump(exclude_unset=True), **values})
     except ValidationError as error:
         first = error.errors()[0]
-        said = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        raise SceneError(f"{FLAGS[str(first['loc'][0])]}: {said}") from None
+        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+        raise SceneError(f"{FLAGS[str(first['loc'][0])]}: {reason}") from None
 
 
 def _radii(tool: Any, radius: str) -> dict[str, float]:

@@ -103,7 +103,7 @@ def demo(
         impulse_history(model, paper, headless or SECONDS, out or Path())
         return
     built = _build(scene_of(model))
-    _print_kept()
+    _print_cache_use()
     if headless is not None:
         _scripted(built, f"{model}-paper" if paper else model, headless, out or Path(), record)
         return
@@ -191,7 +191,7 @@ def run(
         return
     if headless is not None:
         built = built_from(file, options)
-        _print_kept()
+        _print_cache_use()
         _print_loose(built)
         _scripted(built, file.stem, headless, out, record)
         return
@@ -256,7 +256,7 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
         growing: dict[int, BackgroundPrecompute] = {}
         with progress_reporter(file.name, True) as bar:
             built = built_from(file, options, growing, reported_to(reporter, bar), draw)
-        _print_kept()
+        _print_cache_use()
         _print_loose(built)
         maps = None if surface_map is None else read_map(surface_map, built)
         return Prepared(built, growing, maps)
@@ -265,16 +265,16 @@ def _view_early(file: Path, options: RunOptions, page: _Page, record: Path | Non
         open_viewer(server, browser=page.browser, preparation=Preparation(file.name, build))
 
 
-def _print_kept() -> None:
+def _print_cache_use() -> None:
     """Print what stays in the cache of what was prepared."""
     from palpate.cache import cached_files
     from palpate.cache_limit import cache_limit, kept_by_this_process
 
-    kept = kept_by_this_process()
-    if kept:
+    size = kept_by_this_process()
+    if size:
         used, limit = sum(file.size for file in cached_files()) / 1e9, cache_limit().size / 1e9
         of_all = f"{used:.3g} of {limit:.3g} GB are used ('palpate cache list')"
-        print(f"kept in the cache: {kept / 1e6:.1f} MB of this scene; {of_all}", flush=True)
+        print(f"kept in the cache: {size / 1e6:.1f} MB of this scene; {of_all}", flush=True)
 
 
 def _print_loose(built: BuiltScene) -> None:

@@ -182,8 +182,8 @@ class PollingThread:
             returned = call(*arguments)
         except Exception as error:
             lines = str(error).strip().splitlines()
-            said = f": {lines[0]}" if lines else ""
-            return None, f"{self.name}.{what} raised {type(error).__name__}{said}"
+            detail = f": {lines[0]}" if lines else ""
+            return None, f"{self.name}.{what} raised {type(error).__name__}{detail}"
         return (returned if what == "read" else True), None
 
     def _warn(self, message: str) -> None:

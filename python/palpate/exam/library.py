@@ -160,8 +160,10 @@ class Library:
         closest = np.argmin(np.linalg.norm(centres - middle, axis=1))
         modulus, ratio, density = plain.element_materials[closest].tolist()
         hard = Material(modulus * nodule.contrast, ratio, density)
-        kept = np.unique(plain.mesh.regions).tolist()
-        tissue = {label: Material(*plain.element_materials[plain.mesh.regions == label][0].tolist()) for label in kept}
+        labels = np.unique(plain.mesh.regions).tolist()
+        tissue = {
+            label: Material(*plain.element_materials[plain.mesh.regions == label][0].tolist()) for label in labels
+        }
         materials = {label: material for label, material in tissue.items() if (mesh.regions == label).any()}
         return Body(mesh, material={**materials, "hidden nodule": hard}, fixed=plain.fixed_mask)
 
@@ -218,15 +220,15 @@ class _ForceCache:
     """Forces at the places of an exam by the key of the store, kept in a file of the cache."""
 
     def __init__(self, exam: ExamFile, places: Places):
-        said = json.dumps([version("palpate"), exam.force_settings(), places.points.tolist()], sort_keys=True)
-        self._path = cache_directory() / f"{hashlib.sha256(said.encode()).hexdigest()[:32]}.felt.palpate"
+        content = json.dumps([version("palpate"), exam.force_settings(), places.points.tolist()], sort_keys=True)
+        self._path = cache_directory() / f"{hashlib.sha256(content.encode()).hexdigest()[:32]}.felt.palpate"
         self.forces: dict[str, list[float]] = {}
         if self._path.exists():
             try:
-                kept = json.loads(self._path.read_text())
-                if kept["sum"] != _sum(kept["forces"]):
+                cached = json.loads(self._path.read_text())
+                if cached["sum"] != _sum(cached["forces"]):
                     raise ValueError("damaged")
-                self.forces = kept["forces"]
+                self.forces = cached["forces"]
             except (ValueError, KeyError, TypeError):
                 self._path.unlink(missing_ok=True)
 

@@ -67,10 +67,10 @@ def as_html(text: str, surfaces: Sequence[DeformedSurface]) -> str:
     """Text of a result, and its picture where that is drawn within a moment, for notebooks."""
     import html
 
-    said = f"<pre>{html.escape(text)}</pre>"
+    markup = f"<pre>{html.escape(text)}</pre>"
     if sum(len(surface.triangles) for surface in surfaces) > MOST_TRIANGLES:
-        return said
+        return markup
     picture = io.BytesIO()
     draw(surfaces, 1.0, "").savefig(picture, format="png", dpi=80)
     encoded = base64.b64encode(picture.getvalue()).decode()
-    return f'{said}<img alt="deformed surface" src="data:image/png;base64,{encoded}">'
+    return f'{markup}<img alt="deformed surface" src="data:image/png;base64,{encoded}">'

@@ -53,19 +53,19 @@ class Result(StrainReporting, Exportable):
         if source.body is None:
             faces = np.searchsorted(source.surface_nodes, source.surface_faces)
             strain = SurfaceStrain(source.surface_positions, faces).at_nodes(self.displacements)
-            made = surface_mesh(source.surface_positions, faces, self.displacements, strain)
+            written = surface_mesh(source.surface_positions, faces, self.displacements, strain)
         else:
             recovery, mesh = source.stress_everywhere, source.body.mesh
             everywhere = recovery.interior.extend(self.displacements)
             field = recovery.recover_inside(everywhere)
             field = SurfaceStress(self._stiffness_scale * field.stress, field.strain)
-            made = volume_mesh(mesh.nodes, mesh.tets, everywhere, field, mesh.regions)
+            written = volume_mesh(mesh.nodes, mesh.tets, everywhere, field, mesh.regions)
         rows = source.surface_nodes if source.body is not None else slice(None)
         for name, values in self._at_surface_nodes().items():
-            data = np.zeros((len(made.points), *values.shape[1:]))
+            data = np.zeros((len(written.points), *values.shape[1:]))
             data[rows] = values
-            made.point_data[name] = data
-        return made
+            written.point_data[name] = data
+        return written
 
     def _at_surface_nodes(self) -> dict[str, np.ndarray]:
         """Further data at the surface nodes, (s, ...), by name."""

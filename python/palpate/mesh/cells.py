@@ -74,9 +74,9 @@ def split(nodes: np.ndarray, blocks: Sequence[Block]) -> tuple[np.ndarray, np.nd
         tets.append(of_block)
         cells.append(first + of_cell)
         first += len(corners)
-    made = np.concatenate(tets)
-    _check_diagonals(made, np.concatenate(quads))
-    return made, np.concatenate(cells)
+    all_tets = np.concatenate(tets)
+    _check_diagonals(all_tets, np.concatenate(quads))
+    return all_tets, np.concatenate(cells)
 
 
 def _joined(corners: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

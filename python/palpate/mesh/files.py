@@ -101,8 +101,8 @@ def _read_meshio(path: Path) -> meshio.Mesh:
     except MeshError:
         raise
     except (Exception, SystemExit) as error:
-        said = noise.getvalue().strip()
-        reason = said if isinstance(error, SystemExit) and said else str(error).strip() or type(error).__name__
+        output = noise.getvalue().strip()
+        reason = output if isinstance(error, SystemExit) and output else str(error).strip() or type(error).__name__
         # meshio looks types of cells up by their name.
         reason = f"unknown {reason}" if isinstance(error, KeyError) else reason
         reason = " ".join(reason.split())[:200]

@@ -100,10 +100,10 @@ class FillProcess:
 
         status = run_limited(command, TIME_LIMIT, watch)
         watch()
-        made = self.folder / MESH
-        if not made.exists():
+        mesh_file = self.folder / MESH
+        if not mesh_file.exists():
             raise MeshError(f"{self.file}: its process {failure_of(status, TIME_LIMIT) or 'made no tetrahedra'}")
-        with np.load(made) as arrays:
+        with np.load(mesh_file) as arrays:
             return TetMesh(arrays["nodes"], arrays["tets"], arrays["regions"], self._names)
 
     _names: dict[str, int] = field(default_factory=dict)

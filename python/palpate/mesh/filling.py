@@ -113,12 +113,12 @@ class Filling:
         for _ in range(ATTEMPTS if self.size is None else ATTEMPTS_GIVEN):
             # Where a size is given, parts that NETGEN's larger elements miss are got back by smaller ones there.
             least = size / 2**halvings if self.size is not None else self.extent / PARTS[self.element] / FINEST
-            made = self._tetrahedra((size, halvings), points, local, deadline)
-            fit = Fit.of(made, self.shape) if isinstance(made, TetMesh) else None
+            attempt = self._tetrahedra((size, halvings), points, local, deadline)
+            fit = Fit.of(attempt, self.shape) if isinstance(attempt, TetMesh) else None
             if fit is not None and (found is None or abs(fit.loss) < abs(found[1].loss)):
-                found = made, fit
+                found = attempt, fit
             # What one run cannot do at a size, another is not given the time for: the surface is wrapped instead.
-            late = time.monotonic() > deadline or (isinstance(made, str) and OUT_OF_PROCESSOR_TIME in made)
+            late = time.monotonic() > deadline or (isinstance(attempt, str) and OUT_OF_PROCESSOR_TIME in attempt)
             if late or size <= least or (fit is not None and fit.is_good(size)):
                 break
             if fit is None or abs(fit.loss) > (GOOD_LOSS if halvings else LOST):
@@ -131,7 +131,7 @@ class Filling:
             if np.array_equal(before, local):
                 break
         if found is None:
-            raise MesherFailedError(f"{self.name}: {self._reason(size, made)}")
+            raise MesherFailedError(f"{self.name}: {self._reason(size, attempt)}")
         self._warn_of_losses(*found, size)
         return found[0]
 
@@ -186,10 +186,10 @@ class Filling:
             ),
             "points": np.column_stack([(points[smaller] - origin) / extent, local[smaller] / unit]),
         }
-        made = self._run(job, deadline)
-        if isinstance(made, str):
-            return made
-        mesh = TetMesh(made[0] * extent + origin, made[1])
+        result = self._run(job, deadline)
+        if isinstance(result, str):
+            return result
+        mesh = TetMesh(result[0] * extent + origin, result[1])
         for _ in range(halvings):
             mesh = refine(mesh, self._projected)
         return curve(mesh, self._projected) if self.element == "quadratic" else mesh
@@ -197,16 +197,16 @@ class Filling:
     def _run(self, job: dict[str, np.ndarray | float], deadline: float) -> tuple[np.ndarray, np.ndarray] | str:
         """Nodes and tetrahedra, or how the mesher failed."""
         with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-            given, made = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
-            np.savez(given, **job)
+            surface_file, mesh_file = Path(folder) / "surface.npz", Path(folder) / "mesh.npz"
+            np.savez(surface_file, **job)
             # Even triangles are best; where NETGEN cannot make them, the surface as given may still be filled.
             failures = []
             for route in ("remesh", "keep"):
-                command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(given), str(made)]
+                command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(surface_file), str(mesh_file)]
                 status = run_limited(command, max(deadline - time.monotonic(), 0.0))
                 failure = failure_of(status, self.time_limit)
-                if failure is None and made.exists():
-                    with np.load(made) as result:
+                if failure is None and mesh_file.exists():
+                    with np.load(mesh_file) as result:
                         return result["nodes"], result["tets"]
                 failures.append(failure or "returned no tetrahedra")
                 if failure == OUT_OF_PROCESSOR_TIME:

@@ -24,23 +24,23 @@ def inner_triangles(
     """Triangles (n, 3), (k, 3) of inner boundaries, each with the size of its elements; None where none is left."""
     import igl
 
-    kept: list[Triangles] = []
+    shells: list[Triangles] = []
     for own_vertices, own_faces, size in reversed(inner):
         points, triangles = _simplified(own_vertices, own_faces, SIMPLIFIED * size)
         clear = within_surface(points, vertices, faces)
-        for other in ((vertices, faces), *kept):
+        for other in ((vertices, faces), *shells):
             squared = igl.point_mesh_squared_distance(points, np.ascontiguousarray(other[0]), other[1])[0]
             clear &= np.asarray(squared).ravel() > (CLEAR * size) ** 2
         # Those that reach into the band by a corner stay: a gap no wider than a triangle is closed by the elements.
         triangles = triangles[clear[triangles].sum(axis=1) >= 2]
         if len(triangles):
             used = np.unique(triangles)
-            kept.append((points[used], np.searchsorted(used, triangles)))
-    if not kept:
+            shells.append((points[used], np.searchsorted(used, triangles)))
+    if not shells:
         return None
-    starts = np.cumsum([0, *(len(points) for points, _ in kept)])
-    moved = [triangles + start for (_, triangles), start in zip(kept, starts, strict=False)]
-    return np.vstack([points for points, _ in kept]), np.vstack(moved)
+    starts = np.cumsum([0, *(len(points) for points, _ in shells)])
+    moved = [triangles + start for (_, triangles), start in zip(shells, starts, strict=False)]
+    return np.vstack([points for points, _ in shells]), np.vstack(moved)
 
 
 def within_surface(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -52,12 +52,12 @@ def label_summary(
     """
     require_file(Path(path), MeshError)
     with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        job, made = Path(folder) / "job.json", Path(folder) / "summary.json"
+        job, summary_file = Path(folder) / "job.json", Path(folder) / "summary.json"
         wanted = None if segments is None else list(segments)
         job.write_text(json.dumps({"path": os.fspath(path), "unit": unit, "segments": wanted}))
-        command = [sys.executable, "-m", "palpate.segmentation.summary_child", str(job), str(made)]
+        command = [sys.executable, "-m", "palpate.segmentation.summary_child", str(job), str(summary_file)]
         status = run_limited(command, time_limit)
-        found = json.loads(made.read_text()) if made.exists() else {}
+        found = json.loads(summary_file.read_text()) if summary_file.exists() else {}
     if "reason" in found:
         raise MeshError(found["reason"])
     if status != 0 or "shape" not in found:

@@ -22,24 +22,24 @@ if TYPE_CHECKING:
 FEATURE_ANGLE = 80.0
 
 
-def main(route: str, given: str, made: str) -> int:
+def main(route: str, surface_file: str, mesh_file: str) -> int:
     """Mesh the triangles of ``given`` into ``made``."""
     from netgen.meshing import MeshingParameters
 
-    with np.load(given) as job:
+    with np.load(surface_file) as job:
         vertices, faces, size = job["vertices"], job["faces"], float(job["size"])
         _limit_processor_time(float(job["processor_limit"]))
         small = np.vstack([job["points"], *(_ball_points(b[:3], b[3], b[4]) for b in job["balls"])])
     parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE)
     if len(small):
         # A file of sizes, for NETGEN forgets sizes given by RestrictH when it remeshes a surface.
-        sizes = Path(given).with_suffix(".msz")
+        sizes = Path(surface_file).with_suffix(".msz")
         _write_sizes(sizes, small)
         parameters = MeshingParameters(maxh=size, yangle=FEATURE_ANGLE, meshsizefilename=str(sizes))
     if route == "keep":
         mesh = _fill(vertices, faces, parameters)
     else:
-        mesh = _remesh(vertices[faces], Path(given).with_suffix(".stl"), parameters)
+        mesh = _remesh(vertices[faces], Path(surface_file).with_suffix(".stl"), parameters)
     elements = mesh.Elements3D().NumPy()
     nodes = np.array([point.p for point in mesh.Points()])
     if len(elements) == 0:
@@ -47,7 +47,7 @@ def main(route: str, given: str, made: str) -> int:
     # 1-based and negatively oriented.
     tets = elements["nodes"][:, [0, 2, 1, 3]].astype(np.int64) - 1
     used = np.unique(tets)
-    np.savez(made, nodes=nodes[used], tets=np.searchsorted(used, tets))
+    np.savez(mesh_file, nodes=nodes[used], tets=np.searchsorted(used, tets))
     return 0
 
 

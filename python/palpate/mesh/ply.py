@@ -140,14 +140,14 @@ def _fan(polygon: np.ndarray) -> np.ndarray:
 def _strips(indices: np.ndarray) -> np.ndarray:
     """Triangles of strips: each index after the second makes one with the two before, every other one turned round."""
     ends = np.flatnonzero(indices == RESTART)
-    made = []
+    polygons = []
     for piece in np.split(indices, ends):
         strip = piece[piece != RESTART]
         if len(strip) < 3:
             continue
         triangles = np.column_stack([strip[:-2], strip[1:-1], strip[2:]])
         triangles[1::2] = triangles[1::2][:, [1, 0, 2]]
-        made.append(triangles)
-    found = np.concatenate(made) if made else np.empty((0, 3), dtype=np.int64)
+        polygons.append(triangles)
+    found = np.concatenate(polygons) if polygons else np.empty((0, 3), dtype=np.int64)
     # Strips turn corners by repeating a vertex.
     return found[(found != np.roll(found, 1, axis=1)).all(axis=1)]

@@ -93,13 +93,13 @@ def _boundaries(
     path: str | os.PathLike[str], segments: Sequence[str | int], unit: str | None, time_limit: float
 ) -> dict[str, np.ndarray]:
     with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        job, made = Path(folder) / "job.json", Path(folder) / "boundaries.npz"
+        job, boundaries_file = Path(folder) / "job.json", Path(folder) / "boundaries.npz"
         job.write_text(json.dumps({"path": os.fspath(path), "segments": list(segments), "unit": unit}))
-        command = [sys.executable, "-m", "palpate.segmentation.boundary_child", str(job), str(made)]
+        command = [sys.executable, "-m", "palpate.segmentation.boundary_child", str(job), str(boundaries_file)]
         status = run_limited(command, time_limit)
         found: dict[str, np.ndarray] = {}
-        if made.exists():
-            with np.load(made) as result:
+        if boundaries_file.exists():
+            with np.load(boundaries_file) as result:
                 found = dict(result)
     if "reason" in found:
         raise MeshError(str(found["reason"]))

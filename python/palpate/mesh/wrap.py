@@ -93,9 +93,9 @@ def wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int) ->
     """
     moved = SIMPLIFIED / cells
     while True:
-        made = _wrap(field, labels, part, cells, moved)
-        if made.lost_share <= LOST_SHARE or cells >= MOST_CELLS:
-            return made
+        candidate = _wrap(field, labels, part, cells, moved)
+        if candidate.lost_share <= LOST_SHARE or cells >= MOST_CELLS:
+            return candidate
         cells = min(2 * cells, MOST_CELLS)
 
 
@@ -203,20 +203,20 @@ def _around(
     extent = float((high - low).max()) * grid.cell
     if extent > SMALL_PART:
         return None
-    made, _ = field.on_grid(grid.origin + (low - 1) * grid.cell, grid.origin + high * grid.cell, extent / cells)
-    points = np.stack(np.meshgrid(*map(np.arange, made.values.shape), indexing="ij"), axis=-1).reshape(-1, 3)
-    coarse = grid.indices(made.origin + made.cell * points)
+    fine, _ = field.on_grid(grid.origin + (low - 1) * grid.cell, grid.origin + high * grid.cell, extent / cells)
+    points = np.stack(np.meshgrid(*map(np.arange, fine.values.shape), indexing="ij"), axis=-1).reshape(-1, 3)
+    coarse = grid.indices(fine.origin + fine.cell * points)
     from scipy import ndimage
 
     # What thin walls the coarse grid lost beside the part is its own, unless another part is as near.
     nearest = ndimage.distance_transform_edt(label == 0, return_distances=False, return_indices=True)
-    own = kept[tuple(nearest)][coarse].reshape(made.values.shape)
-    found, _ = ndimage.label((made.values < 0) & own)
+    own = kept[tuple(nearest)][coarse].reshape(fine.values.shape)
+    found, _ = ndimage.label((fine.values < 0) & own)
     numbers = np.bincount(found.ravel())[1:]
     return (
-        (made, found > 0)
+        (fine, found > 0)
         if numbers.size == 0
-        else (made, np.isin(found, np.flatnonzero(numbers > CRUMB * numbers.max()) + 1))
+        else (fine, np.isin(found, np.flatnonzero(numbers > CRUMB * numbers.max()) + 1))
     )
 
 
@@ -250,8 +250,8 @@ def _zero(grid: Grid, moved: float) -> tuple[np.ndarray, np.ndarray]:
     if solid.status() != Error.NoError:
         raise WrapError(f"its wrap is no manifold ({solid.status()})")
     simple = solid.simplify(moved).to_mesh()
-    made = np.asarray(simple.vert_properties, dtype=np.float64)[:, :3] + grid.origin
-    return made, np.asarray(simple.tri_verts, dtype=np.int64)
+    vertices = np.asarray(simple.vert_properties, dtype=np.float64)[:, :3] + grid.origin
+    return vertices, np.asarray(simple.tri_verts, dtype=np.int64)
 
 
 def _beside_and_lost(

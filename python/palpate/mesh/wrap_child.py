@@ -28,9 +28,9 @@ ENVELOPE, ENVELOPE_OF_EDGE = 4.5e-3, 0.06
 STOP_ENERGY = 15.0
 
 
-def main(given: str, made: str, stages: str) -> int:
+def main(surface_file: str, mesh_file: str, stages: str) -> int:
     """Mesh what the triangles of ``given`` enclose into ``made``."""
-    with np.load(given) as job:
+    with np.load(surface_file) as job:
         vertices, faces, labels = job["vertices"], job["faces"].astype(np.int64), job["labels"]
         size, part, cells, balls = float(job["size"]), int(job["part"]), int(job["cells"]), job["balls"]
         inner = [
@@ -40,14 +40,14 @@ def main(given: str, made: str, stages: str) -> int:
     _note(stages, "looking for the inside")
     vertices, faces, labels = cleaned(vertices, faces, labels)
     if len(faces) == 0:
-        np.savez(made, reason="its triangles have no area")
+        np.savez(mesh_file, reason="its triangles have no area")
         return 1
     field = SolidField(vertices, oriented(vertices, faces))
     _note(stages, "wrapping")
     try:
         wrapped = wrap(field, labels, part or None, cells)
     except WrapError as error:
-        np.savez(made, reason=str(error))
+        np.savez(mesh_file, reason=str(error))
         return 1
     target = _beside(field, wrapped)
     found = {
@@ -68,17 +68,17 @@ def main(given: str, made: str, stages: str) -> int:
     }
     # Another mesher may fill the wrap where this one fails.
     nodes, tets = np.empty((0, 3)), np.empty((0, 4), dtype=np.int64)
-    np.savez(made, nodes=nodes, tets=tets, **found)
+    np.savez(mesh_file, nodes=nodes, tets=tets, **found)
     tetrahedralize = _tetrahedralizer()
     if tetrahedralize is not None:
         _note(stages, "filling with tetrahedra")
         within = inner_triangles(wrapped.vertices, wrapped.faces, inner)
         # The envelope is one for all surfaces, so it follows the finest.
         finest = min([size, *(2 * own for *_, own in inner)])
-        nodes, tets = _fill(tetrahedralize, wrapped, within, (size, finest), balls, Path(made).parent)
-        partial = Path(made).with_suffix(".partial.npz")
+        nodes, tets = _fill(tetrahedralize, wrapped, within, (size, finest), balls, Path(mesh_file).parent)
+        partial = Path(mesh_file).with_suffix(".partial.npz")
         np.savez(partial, nodes=nodes, tets=tets, **found)
-        partial.replace(made)
+        partial.replace(mesh_file)
     return 0
 
 

@@ -97,12 +97,12 @@ class Wrapping:
         if not extent > 0:
             raise MeshError(f"{self.name}: all of its points are one")
         size = extent / PARTS[self.element] if self.size is None else self.size
-        made = self._run(origin, extent, size)
-        wrap = _Wrapped(made, origin, extent)
+        arrays = self._run(origin, extent, size)
+        wrap = _Wrapped(arrays, origin, extent)
         halvings = int(wrap.volume * IN_CUBE / size**3 > MOST_BY_NETGEN)
         if halvings:
-            made = self._run(origin, extent, 2 * size)
-        mesh = self._tetrahedra(made, wrap, size)
+            arrays = self._run(origin, extent, 2 * size)
+        mesh = self._tetrahedra(arrays, wrap, size)
         self.stage("fitting to the surface")
         reach = min(REACH_CELLS * wrap.cell, REACH_ELEMENT * size)
         project = wrap.projection(reach)
@@ -125,9 +125,9 @@ class Wrapping:
         balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.refine]
         cells = np.clip(CELLS_IN_ELEMENT * extent / size, CELLS, MOST_CELLS)
         with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-            given, made, stages = (Path(folder) / name for name in ("surface.npz", "mesh.npz", "stages"))
+            surface_file, mesh_file, stages = (Path(folder) / name for name in ("surface.npz", "mesh.npz", "stages"))
             np.savez(
-                given,
+                surface_file,
                 vertices=(np.asarray(self.surface.shape.vertices) - origin) / extent,
                 faces=faces,
                 labels=labels if len(labels) == len(faces) else np.full(len(faces), -1),
@@ -137,11 +137,11 @@ class Wrapping:
                 balls=np.reshape(balls, (-1, 5)),
                 **({} if self.inner is None else self.inner.job(origin, extent)),
             )
-            command = [sys.executable, "-m", "palpate.mesh.wrap_child", *map(str, (given, made, stages))]
+            command = [sys.executable, "-m", "palpate.mesh.wrap_child", *map(str, (surface_file, mesh_file, stages))]
             status = run_limited(command, self.time_limit, lambda: self._watch(stages))
             found: dict[str, np.ndarray] = {}
-            if made.exists():
-                with np.load(made) as result:
+            if mesh_file.exists():
+                with np.load(mesh_file) as result:
                     found = dict(result)
         if "reason" in found:
             raise MeshError(f"{self.name}: the surface cannot be filled: {found['reason']}")
@@ -168,13 +168,13 @@ class Wrapping:
             if lines:
                 self.stage(lines[-1])
 
-    def _tetrahedra(self, made: dict[str, np.ndarray], wrap: _Wrapped, size: float) -> TetMesh:
-        if len(made["nodes"]):
-            mesh = TetMesh(made["nodes"] * wrap.extent + wrap.origin, made["tets"])
+    def _tetrahedra(self, arrays: dict[str, np.ndarray], wrap: _Wrapped, size: float) -> TetMesh:
+        if len(arrays["nodes"]):
+            mesh = TetMesh(arrays["nodes"] * wrap.extent + wrap.origin, arrays["tets"])
             return mesh if self.part == "all" else _without_crumbs(self.name, mesh)
         import trimesh
 
-        shape = trimesh.Trimesh(wrap.to_metres(made["vertices"]), made["faces"], process=False)
+        shape = trimesh.Trimesh(wrap.to_metres(arrays["vertices"]), arrays["faces"], process=False)
         filling = Filling(self.name, SurfaceState.of(shape), "linear", size, self.refine, self.time_limit)
         with warnings.catch_warnings():
             # What is lost is measured when its nodes are on the given surface.
@@ -182,7 +182,7 @@ class Wrapping:
             try:
                 return filling.mesh()
             except MesherFailedError:
-                advice = INSTALL if "missing" in made else "Try another --max-size"
+                advice = INSTALL if "missing" in arrays else "Try another --max-size"
                 raise MeshError(
                     f"{self.name}: the surface {self.reason}; it was wrapped, and NETGEN cannot fill the wrap. {advice}"
                 ) from None
@@ -231,20 +231,20 @@ class Wrapping:
 class _Wrapped:
     """What the child found, m."""
 
-    def __init__(self, made: dict[str, np.ndarray], origin: np.ndarray, extent: float):
+    def __init__(self, arrays: dict[str, np.ndarray], origin: np.ndarray, extent: float):
         self.origin, self.extent = origin, extent
-        self.volume, self.cell = float(made["volume"]) * extent**3, float(made["cell"]) * extent
-        self.points, self.lost_points = self.to_metres(made["points"]), self.to_metres(made["lost_points"])
-        self.lost_share, self.closed_share = float(made["lost_share"]), float(made["closed_share"])
+        self.volume, self.cell = float(arrays["volume"]) * extent**3, float(arrays["cell"]) * extent
+        self.points, self.lost_points = self.to_metres(arrays["points"]), self.to_metres(arrays["lost_points"])
+        self.lost_share, self.closed_share = float(arrays["lost_share"]), float(arrays["closed_share"])
         self.parts = [
             (float(volume) * extent**3, self.to_metres(middle), sides * extent, int(label))
             for volume, middle, sides, label in zip(
-                *(made[f"part_{name}"] for name in ("volumes", "middles", "sides", "labels")), strict=True
+                *(arrays[f"part_{name}"] for name in ("volumes", "middles", "sides", "labels")), strict=True
             )
         ]
-        used = np.unique(made["target"])
-        self._target = np.ascontiguousarray(self.to_metres(made["target_vertices"][used]))
-        self._faces = np.searchsorted(used, made["target"]).astype(np.uint32)
+        used = np.unique(arrays["target"])
+        self._target = np.ascontiguousarray(self.to_metres(arrays["target_vertices"][used]))
+        self._faces = np.searchsorted(used, arrays["target"]).astype(np.uint32)
 
     def to_metres(self, points: np.ndarray) -> np.ndarray:
         """Points of the unit box, m."""

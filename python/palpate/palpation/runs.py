@@ -57,18 +57,21 @@ def run_all(
         A fault that latched, with the run that it latched in.
 
     """
-    with PartialFile(partial, key_of(simulation, paths)) as kept, progress_reporter("palpating", progress) as report:
+    with (
+        PartialFile(partial, key_of(simulation, paths)) as partial_runs,
+        progress_reporter("palpating", progress) as report,
+    ):
         for rank, path in enumerate(paths):
-            if rank not in kept.runs:
+            if rank not in partial_runs.runs:
                 try:
                     recording = simulation._play(path.positions, path.orientations)
                 except SimulationError as error:
                     raise SimulationError(f"run {rank} of the palpation: {error}") from None
-                kept.keep(rank, (recording.forces, recording.limited))
+                partial_runs.keep(rank, (recording.forces, recording.limited))
             if report is not None:
                 report(rank + 1, len(paths))
-        runs = [kept.runs[rank] for rank in range(len(paths))]
-    return runs, kept.found
+        runs = [partial_runs.runs[rank] for rank in range(len(paths))]
+    return runs, partial_runs.found
 
 
 def key_of(simulation: Simulation, paths: Sequence[Path3D]) -> str:

@@ -193,7 +193,7 @@ def tables_of_tools(scene: _Scene, without: int | None = None) -> list[DeviceTab
 def device_change(scene: _Scene, tool: int, kind: str) -> dict[str, Any]:
     """Give the changes of a scene in which a tool has a device of another kind, at the place of the one it had."""
     tables = tables_of_tools(scene)
-    kept = tables[tool].model_dump(exclude_unset=True, exclude={"id", "address", "library"})
-    tables[tool] = DeviceTable(**{**kept, "kind": kind})
+    settings = tables[tool].model_dump(exclude_unset=True, exclude={"id", "address", "library"})
+    tables[tool] = DeviceTable(**{**settings, "kind": kind})
     tools = [named.model_copy(update={"device": None}) for named in scene.tools]
     return {"tools": tools, "device": tables[0], "additional_devices": tables[1:]}

@@ -75,8 +75,8 @@ def _expected(mistake: Mapping[str, Any], key: str) -> str:
         return f"needs at least {context['min_length']} {_entries(context['min_length'])}"
     if kind == "too_long":
         return f"takes at most {context['max_length']} {_entries(context['max_length'])}"
-    told = mistake["msg"].removeprefix("Input should be ").removeprefix("a valid ").split(", unable")[0]
-    return f"must be {WORDS.get(told, told)}"
+    expectation = mistake["msg"].removeprefix("Input should be ").removeprefix("a valid ").split(", unable")[0]
+    return f"must be {WORDS.get(expectation, expectation)}"
 
 
 def _entries(count: int) -> str:
@@ -99,8 +99,8 @@ def located(path: Path, text: str, place: Place) -> str:
 
 def _first_line(text: str) -> int:
     """First line that says something."""
-    said = (number for number, line in enumerate(text.splitlines(), 1) if line.split("#")[0].strip())
-    return next(said, 1)
+    numbers = (number for number, line in enumerate(text.splitlines(), 1) if line.split("#")[0].strip())
+    return next(numbers, 1)
 
 
 def line_of(text: str, place: Place) -> int | None:

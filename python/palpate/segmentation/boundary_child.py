@@ -18,19 +18,19 @@ from palpate.segmentation.boundaries import Boundaries, boundaries, covering_bal
 from palpate.segmentation.reading import load_label_map
 
 
-def main(job: str, made: str) -> int:
+def main(job: str, boundaries_file: str) -> int:
     """Write the boundaries of the segments that a job names."""
     given = json.loads(Path(job).read_text())
     try:
         labels = load_label_map(given["path"], given["unit"])
         found = boundaries(labels, given["segments"])
     except Error as error:
-        np.savez(made, reason=str(error))
+        np.savez(boundaries_file, reason=str(error))
         return 1
     except MemoryError:
-        np.savez(made, reason=f"{given['path']}: there is not enough memory for its voxels")
+        np.savez(boundaries_file, reason=f"{given['path']}: there is not enough memory for its voxels")
         return 1
-    np.savez(made, spacing=labels.spacing, **_arrays(found))
+    np.savez(boundaries_file, spacing=labels.spacing, **_arrays(found))
     return 0
 
 

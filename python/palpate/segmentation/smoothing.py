@@ -84,15 +84,15 @@ def smooth_boundary(mask: np.ndarray, affine: np.ndarray) -> Boundary:
     wanted = float(share.sum()) * abs(np.linalg.det(affine[:3, :3]))
     width = WIDTH * float(np.linalg.norm(affine[:3, :3], axis=0).max())
     least = LEAST_WIDTH * width
-    made = None
-    while made is None and width > least:
-        made = _at_width(share, affine, wanted, width)
-        width = width if made else width / 2
-    vertices, faces, field, placed, volume = made or _any_value(share, affine, wanted)
-    return Boundary(vertices, faces, field, placed, wanted, volume, width if made else 0.0, at_edge)
+    level_set = None
+    while level_set is None and width > least:
+        level_set = _at_width(share, affine, wanted, width)
+        width = width if level_set else width / 2
+    vertices, faces, field, placed, volume = level_set or _any_value(share, affine, wanted)
+    return Boundary(vertices, faces, field, placed, wanted, volume, width if level_set else 0.0, at_edge)
 
 
-_Made = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]
+_LevelSet = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]
 
 
 def _box(mask: np.ndarray) -> tuple[slice, ...]:
@@ -176,23 +176,23 @@ def _smoothed(mask: np.ndarray, affine: np.ndarray, width: float) -> tuple[np.nd
     return values, affine
 
 
-def _at_width(share: np.ndarray, affine: np.ndarray, wanted: float, width: float) -> _Made | None:
+def _at_width(share: np.ndarray, affine: np.ndarray, wanted: float, width: float) -> _LevelSet | None:
     """Boundary that keeps the volume, by the secant method in the value; None where there is none near 0."""
     values, placed = _smoothed(share >= 0.5, affine, width)
     farthest = FARTHEST * float(np.linalg.norm(affine[:3, :3], axis=0).max())
     value = 0.0
     tried: list[tuple[float, float]] = []
     for _ in range(ATTEMPTS):
-        made = _zero(values - np.float32(value), placed)
-        if made is None:
+        level_set = _zero(values - np.float32(value), placed)
+        if level_set is None:
             return None
-        change = made[-1] / wanted - 1.0
+        change = level_set[-1] / wanted - 1.0
         tried.append((value, change))
         if abs(change) < EXACT:
-            return made
+            return level_set
         if len(tried) == 1:
             # A boundary that moves by `d` along its normal adds `d` times its area.
-            value += float(np.clip(change * wanted / _area(made), -0.5 * farthest, 0.5 * farthest))
+            value += float(np.clip(change * wanted / _area(level_set), -0.5 * farthest, 0.5 * farthest))
         else:
             (a, at_a), (b, at_b) = tried[-2:]
             if at_a == at_b:
@@ -203,23 +203,23 @@ def _at_width(share: np.ndarray, affine: np.ndarray, wanted: float, width: float
     return None
 
 
-def _area(made: _Made) -> float:
-    corners = made[0][made[1]]
+def _area(level_set: _LevelSet) -> float:
+    corners = level_set[0][level_set[1]]
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return 0.5 * float(np.linalg.norm(sides, axis=1).sum())
 
 
-def _any_value(share: np.ndarray, affine: np.ndarray, wanted: float) -> _Made:
+def _any_value(share: np.ndarray, affine: np.ndarray, wanted: float) -> _LevelSet:
     """Boundary of what is thinner than a few voxels: halfway between voxels, of whatever volume."""
     values, placed = np.pad(share, 2), _shifted(affine, np.full(3, -2))
     # Pooled voxels may all be less than half full.
     value = 0.5 * min(1.0, float(values.max()))
-    made = _zero(values - np.float32(value), placed)
-    assert made is not None, "the largest value is above its half"
-    return made
+    level_set = _zero(values - np.float32(value), placed)
+    assert level_set is not None, "the largest value is above its half"
+    return level_set
 
 
-def _zero(field: np.ndarray, affine: np.ndarray) -> _Made | None:
+def _zero(field: np.ndarray, affine: np.ndarray) -> _LevelSet | None:
     """Triangles where a field is zero, outward, and their volume; None where it has one sign."""
     from skimage.measure import marching_cubes
 

@@ -17,7 +17,7 @@ from palpate.errors import Error
 from palpate.segmentation.reading import load_label_map
 
 
-def main(job: str, made: str) -> int:
+def main(job: str, summary_file: str) -> int:
     """Write what a label map holds; segments that the job names must be there."""
     given = json.loads(Path(job).read_text())
     try:
@@ -25,17 +25,17 @@ def main(job: str, made: str) -> int:
         if given["segments"] is not None:
             labels.choose(given["segments"])
     except Error as error:
-        return _write(made, {"reason": str(error)}, 1)
+        return _write(summary_file, {"reason": str(error)}, 1)
     except MemoryError:
-        return _write(made, {"reason": f"{given['path']}: there is not enough memory for its voxels"}, 1)
+        return _write(summary_file, {"reason": f"{given['path']}: there is not enough memory for its voxels"}, 1)
     segments = [[s.name, s.value, int(np.count_nonzero(labels.mask(s)))] for s in labels.segments]
     shape, spacing = list(labels.layers.shape[1:]), labels.spacing.tolist()
     found = {"shape": shape, "spacing": spacing, "voxel_volume": labels.voxel_volume, "segments": segments}
-    return _write(made, found, 0)
+    return _write(summary_file, found, 0)
 
 
-def _write(made: str, found: dict[str, Any], status: int) -> int:
-    Path(made).write_text(json.dumps(found))
+def _write(summary_file: str, found: dict[str, Any], status: int) -> int:
+    Path(summary_file).write_text(json.dumps(found))
     return status
 
 

@@ -136,10 +136,10 @@ class RecordedFrames:
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         again = _native.Replay(self.simulation._core, self.recording.source)
-        made = 0
+        done = 0
         for row in self.rows.tolist():
-            _, differences = again.step(row + 1 - made)
-            made = row + 1
+            _, differences = again.step(row + 1 - done)
+            done = row + 1
             if differences and not self._warned:
                 tick, of, quantity = differences[0][:3]
                 _warn(f"frames are not as recorded from tick {tick} on ({of} {quantity}): made by another version?")

@@ -134,11 +134,11 @@ class _Document:
 
         self._kinds: Any = pygltflib
         root = pygltflib.Node(name="scene", rotation=UPRIGHT, children=[])
-        self._made = pygltflib.GLTF2(
+        self._document = pygltflib.GLTF2(
             asset=pygltflib.Asset(version="2.0", generator="palpate"), scene=0, scenes=[pygltflib.Scene(nodes=[0])]
         )
-        self._made.nodes, self._root = [root], root
-        self._made.animations = [pygltflib.Animation(name="session", samplers=[], channels=[])]
+        self._document.nodes, self._root = [root], root
+        self._document.animations = [pygltflib.Animation(name="session", samplers=[], channels=[])]
         self._bytes = bytearray()
         self._times = self._accessor(times, "SCALAR", bounds=True)
 
@@ -147,12 +147,12 @@ class _Document:
         node = self._node(name, surface, BODY)
         if len(targets) == 0:
             return
-        primitive = self._made.meshes[node.mesh].primitives[0]
+        primitive = self._document.meshes[node.mesh].primitives[0]
         normals = fitted_normals(surface, targets, weights)
         for target, turned in zip(targets.reshape(len(targets), -1, 3), normals, strict=True):
             places, turns = self._accessor(target, "VEC3", VERTICES, True), self._accessor(turned, "VEC3", VERTICES)
             primitive.targets.append({"POSITION": places, "NORMAL": turns})
-        self._made.meshes[node.mesh].weights = [0.0] * len(targets)
+        self._document.meshes[node.mesh].weights = [0.0] * len(targets)
         self._animate(node, "weights", weights.ravel(), "SCALAR")
 
     def add_moving(self, name: str, surface: trimesh.Trimesh, look: tuple, tracks: dict[str, np.ndarray]) -> None:
@@ -165,51 +165,53 @@ class _Document:
                 self._animate(node, path, values, "VEC3")
 
     def write(self, path: Path) -> None:
-        self._made.buffers = [self._kinds.Buffer(byteLength=len(self._bytes))]
-        self._made.set_binary_blob(bytes(self._bytes))
-        self._made.save_binary(path)
+        self._document.buffers = [self._kinds.Buffer(byteLength=len(self._bytes))]
+        self._document.set_binary_blob(bytes(self._bytes))
+        self._document.save_binary(path)
 
     def _node(self, name: str, surface: trimesh.Trimesh, look: tuple) -> Any:
-        gl, made = self._kinds, self._made
+        gl, document = self._kinds, self._document
         color, roughness = look
         attributes = gl.Attributes(
             POSITION=self._accessor(surface.vertices, "VEC3", VERTICES, True),
             NORMAL=self._accessor(surface.vertex_normals, "VEC3", VERTICES),
         )
         indices = self._accessor(surface.faces.ravel(), "SCALAR", INDICES)
-        primitive = gl.Primitive(attributes=attributes, indices=indices, material=len(made.materials), targets=[])
+        primitive = gl.Primitive(attributes=attributes, indices=indices, material=len(document.materials), targets=[])
         surface_look = gl.PbrMetallicRoughness(
             baseColorFactor=[*color, 1.0], metallicFactor=0.0, roughnessFactor=roughness
         )
-        made.materials.append(gl.Material(name=name, pbrMetallicRoughness=surface_look, alphaCutoff=None))
-        made.meshes.append(gl.Mesh(name=name, primitives=[primitive], weights=[]))
-        node = gl.Node(name=name, mesh=len(made.meshes) - 1)
-        self._root.children.append(len(made.nodes))
-        made.nodes.append(node)
+        document.materials.append(gl.Material(name=name, pbrMetallicRoughness=surface_look, alphaCutoff=None))
+        document.meshes.append(gl.Mesh(name=name, primitives=[primitive], weights=[]))
+        node = gl.Node(name=name, mesh=len(document.meshes) - 1)
+        self._root.children.append(len(document.nodes))
+        document.nodes.append(node)
         return node
 
     def _animate(self, node: Any, path: str, values: np.ndarray, kind: str) -> None:
-        gl, animation = self._kinds, self._made.animations[0]
+        gl, animation = self._kinds, self._document.animations[0]
         output = self._accessor(values, kind)
         animation.samplers.append(gl.AnimationSampler(input=self._times, output=output, interpolation="LINEAR"))
-        target = gl.AnimationChannelTarget(node=self._made.nodes.index(node), path=path)
+        target = gl.AnimationChannelTarget(node=self._document.nodes.index(node), path=path)
         animation.channels.append(gl.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
 
     def _accessor(self, values: np.ndarray, kind: str, target: int | None = None, bounds: bool = False) -> int:
         """Put values into the buffer, as floats or as indices, and give their number."""
-        gl, made = self._kinds, self._made
+        gl, document = self._kinds, self._document
         dtype, component = (np.uint32, UINT) if target == INDICES else (np.float32, FLOAT)
         data = np.ascontiguousarray(values, dtype=dtype)
-        made.bufferViews.append(
+        document.bufferViews.append(
             gl.BufferView(buffer=0, byteOffset=len(self._bytes), byteLength=data.nbytes, target=target)
         )
         self._bytes += data.tobytes()
-        entry = gl.Accessor(bufferView=len(made.bufferViews) - 1, componentType=component, count=len(data), type=kind)
+        entry = gl.Accessor(
+            bufferView=len(document.bufferViews) - 1, componentType=component, count=len(data), type=kind
+        )
         if bounds:
             rows = data.reshape(len(data), -1)
             entry.min, entry.max = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
-        made.accessors.append(entry)
-        return len(made.accessors) - 1
+        document.accessors.append(entry)
+        return len(document.accessors) - 1
 
 
 def _continuous(quaternions: np.ndarray) -> np.ndarray:

@@ -53,5 +53,5 @@ def rerun(
     now = simulation._about(shown_of(about), clock=False)
     with progress_reporter("running again", progress) as report:
         on_tick = None if report is None else lambda done: report(done, expected)
-        made = _native.rerun(simulation._core, recorded.source, now, on_tick)
-    return Recording._of(made)
+        columns = _native.rerun(simulation._core, recorded.source, now, on_tick)
+    return Recording._of(columns)

@@ -27,9 +27,11 @@ def tool_surface(tool: ShapeTable, folder: Path) -> trimesh.Trimesh:
         return trimesh.Trimesh(vertices, triangles)
     if kind == "capsule":
         radius, length = lengths[:2]
-        made = trimesh.creation.capsule(length, radius, count=[SECTIONS, SECTIONS])
-        made.apply_translation([0, 0, -radius - made.bounds[0, 2]])  # the front hemisphere's middle is the origin
-        return made
+        capsule_shape = trimesh.creation.capsule(length, radius, count=[SECTIONS, SECTIONS])
+        capsule_shape.apply_translation(
+            [0, 0, -radius - capsule_shape.bounds[0, 2]]
+        )  # the front hemisphere's middle is the origin
+        return capsule_shape
     if kind == "punch":
         radius, rounding = lengths[:2]
         angle = np.linspace(0, np.pi / 2, 6)

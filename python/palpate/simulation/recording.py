@@ -149,9 +149,11 @@ class Recording(ComparedByValue):
         energies = _energies(columns, len(number))
         forces, torques = _of_tools(columns, "forces"), _of_tools(columns, "torques")
         watched = np.zeros((len(number), 0, 3))
-        made = cls(time, forces, torques, watched, _of_tools(columns, "limited"), energies, columns["dropped"], source)
-        made.__dict__["_columns"] = columns
-        return made
+        recording = cls(
+            time, forces, torques, watched, _of_tools(columns, "limited"), energies, columns["dropped"], source
+        )
+        recording.__dict__["_columns"] = columns
+        return recording
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file (MCAP) that Foxglove, the tools of ROS 2 and :meth:`load` read.

@@ -140,11 +140,11 @@ def replay(
     done = 0
     with progress_reporter("replaying", progress) as report:
         while done < expected:
-            made, found = again.step(min(STEP, expected - done))
+            ticks, found = again.step(min(STEP, expected - done))
             room = MOST_DIFFERENCES - len(differences)
             differences += [Difference(*of[:3], *map(tuple, of[3:])) for of in found[:room]]
-            done += made
-            if made == 0:
+            done += ticks
+            if ticks == 0:
                 break
             if report is not None:
                 report(done, expected)

@@ -75,23 +75,23 @@ class ReplayedSimulation(Simulation):
 
     def _begin(self) -> None:
         self._again = _native.Replay(self._core, self.recorded.source)
-        self.made = 0
+        self.ticks_done = 0
         self._rows: list[np.ndarray] = []
         self._frame: Frame | None = None
 
     def advance(self, tick: int, seconds: float) -> None:
         """Make ticks up to and with the ``tick``-th, counted from 1, for about so many seconds at most."""
-        if tick < self.made:
+        if tick < self.ticks_done:
             self._begin()
             self.restarts += 1
         end = time.monotonic() + seconds
-        while self.made < tick:
-            made, found = self._again.step(min(SLICE, tick - self.made))
-            if made == 0:
+        while self.ticks_done < tick:
+            ticks, found = self._again.step(min(SLICE, tick - self.ticks_done))
+            if ticks == 0:
                 # The file ends here.
-                self.ticks = self.made
+                self.ticks = self.ticks_done
                 break
-            self.made += made
+            self.ticks_done += ticks
             self._compare(found)
             self._take_log(tick)
             if time.monotonic() > end:
@@ -101,12 +101,12 @@ class ReplayedSimulation(Simulation):
         if found and self.difference is None:
             tick, of, quantity, recorded, replayed = found[0]
             self.difference = Difference(tick, of, quantity, tuple(recorded), tuple(replayed))
-        self.checked = max(self.checked, self.made)
+        self.checked = max(self.checked, self.ticks_done)
         self._frame = None
 
     def _take_log(self, goal: int) -> None:
         rows = np.ascontiguousarray(self._again.drain_log()).view(LOG_DTYPE)
-        if goal - self.made < LOG_SECONDS * self.scene.device.rate:
+        if goal - self.ticks_done < LOG_SECONDS * self.scene.device.rate:
             self._rows.append(rows)
 
     def _settings(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class ReplayedSimulation(Simulation):
     def frame(self) -> Frame:
         """Read the latest tick that was made; its timing is that of the recording."""
         if self._frame is None:
-            raw = {**self._again.frame(), "ticks": self.made, **self._timing}
+            raw = {**self._again.frame(), "ticks": self.ticks_done, **self._timing}
             self._frame = self._flagged(frame_of(raw, self.bodies), self.bodies)
         return self._frame
 

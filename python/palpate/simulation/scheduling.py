@@ -48,14 +48,14 @@ def with_scheduling(device: DeviceTable, cpus: Sequence[int] | None, priority: i
     given = {"cpus": cpus if cpus is None else tuple(cpus), "priority": priority}
     changes = {name: value for name, value in given.items() if value is not None}
     try:
-        made = DeviceTable(**{**device.model_dump(exclude_unset=True), **changes}) if changes else device
+        table = DeviceTable(**{**device.model_dump(exclude_unset=True), **changes}) if changes else device
     except ValidationError as error:
         first = error.errors()[0]
-        said = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-        raise SceneError(f"device.{first['loc'][0]}: {said}, got {first['input']}") from None
+        reason = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+        raise SceneError(f"device.{first['loc'][0]}: {reason}, got {first['input']}") from None
     if cpus is not None:
-        require_cpus(made.cpus)
-    return made
+        require_cpus(table.cpus)
+    return table
 
 
 def start_loop(core: _native.SimulationCore, device: DeviceTable) -> None:

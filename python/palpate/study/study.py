@@ -150,10 +150,10 @@ class _AnswerFile:
                 break
             whole += len(line)
             with contextlib.suppress(ValueError, KeyError, TypeError):
-                kept = json.loads(line)
-                if kept.pop("sum") == _sum(kept):
-                    key = kept.pop("key")
-                    self.known[key] = Answers(**kept)
+                record = json.loads(line)
+                if record.pop("sum") == _sum(record):
+                    key = record.pop("key")
+                    self.known[key] = Answers(**record)
         self._stream = path.open("r+b" if path.is_file() else "wb")
         self._stream.truncate(whole)
         self._stream.seek(whole)

@@ -31,7 +31,7 @@ class Client:
     sent: int = 0
     log_seen: tuple[int, int] = (0, 0)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
-    heard: float = field(default_factory=time.monotonic)
+    last_message: float = field(default_factory=time.monotonic)
     allowance: float = MAX_RATE
 
     async def send(self, message: dict[str, Any]) -> None:
@@ -42,6 +42,6 @@ class Client:
     def is_within_rate(self) -> bool:
         """Count a message that has come; False for one too many."""
         now = time.monotonic()
-        self.allowance = min(self.allowance + (now - self.heard) * MAX_RATE, MAX_RATE) - 1.0
-        self.heard = now
+        self.allowance = min(self.allowance + (now - self.last_message) * MAX_RATE, MAX_RATE) - 1.0
+        self.last_message = now
         return self.allowance >= 0.0

@@ -128,8 +128,8 @@ class Fields:
         part = 0.5 + 0.5 * values / end if field.signed else (values - low) / (end - low)
         part = np.clip(part, 0.0, 1.0)
         scaled = np.where(np.isnan(part), 0.0, 1.0 + 254.0 * part) if field.gaps else 255.0 * part
-        told = {name: getattr(field, name) for name in ("name", "title", "unit", "signed", "gaps")}
-        header = {**told, "min": low, "max": end, "largest": largest}
+        properties = {name: getattr(field, name) for name in ("name", "title", "unit", "signed", "gaps")}
+        header = {**properties, "min": low, "max": end, "largest": largest}
         return Picture(header, shown, np.rint(scaled), inside)
 
     def _mapped(self, field: Field, inside: bool) -> np.ndarray:

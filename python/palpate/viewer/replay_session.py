@@ -109,20 +109,20 @@ class ReplaySession(Session):
         """Go on to where the time line is to be; where ticks take long, as far as there is time for."""
         passed, self._looked = min(now - self._looked, LONGEST_PAUSE), now
         replayed = self._replayed
-        arrived = replayed.made == self._goal
+        arrived = replayed.ticks_done == self._goal
         if arrived and self._playing:
             self._place = min(self._place + passed * self._speed * self.built.scene.device.rate, float(replayed.ticks))
             self._goal = int(self._place)
         replayed.advance(self._goal, PLAYING if arrived else SEEKING)
-        if arrived and self._playing and replayed.made < self._goal:
+        if arrived and self._playing and replayed.ticks_done < self._goal:
             # It is played as fast as ticks can be made.
-            self._go_to(replayed.made)
+            self._go_to(replayed.ticks_done)
         self._goal = min(self._goal, replayed.ticks)
         self._playing &= self._goal < replayed.ticks
 
     def _follow(self) -> None:
         """Take over from the recording what a running session is told."""
-        recorded, tick = self._replayed.recorded, self._replayed.made - 1
+        recorded, tick = self._replayed.recorded, self._replayed.ticks_done - 1
         active = np.atleast_1d(recorded.active[tick]).tolist()
         self._active = active + [False] * (len(self._active) - len(active))
         moving, watched = self._moving, self._replayed.watched
@@ -161,17 +161,17 @@ class ReplaySession(Session):
 
     def _replay_header(self) -> dict[str, Any]:
         replayed, difference = self._replayed, self._replayed.difference
-        told = None
+        divergence = None
         if difference is not None:
-            told = {"tick": difference.tick + 1, "of": difference.of, "quantity": difference.quantity}
+            divergence = {"tick": difference.tick + 1, "of": difference.of, "quantity": difference.quantity}
         return {
-            "tick": replayed.made,
+            "tick": replayed.ticks_done,
             "goal": self._goal,
             "playing": self._playing,
             "speed": self._speed,
             "checked": replayed.checked,
             "restarts": replayed.restarts,
-            "difference": told and {**told, "text": str(difference)},
+            "difference": divergence and {**divergence, "text": str(difference)},
             "settings": self.settings(),
         }
 

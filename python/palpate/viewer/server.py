@@ -347,7 +347,7 @@ class ViewerServer:
         while True:
             await asyncio.sleep(0.25)
             controller = self._controller
-            if controller is None or time.monotonic() - controller.heard > LOST_AFTER:
+            if controller is None or time.monotonic() - controller.last_message > LOST_AFTER:
                 await self._worker.call(self._session.release)
             await self._send_recording_end(await self._worker.call(self._session.recorder.stop_after_failure))
             await self._send_computed()

@@ -40,9 +40,9 @@ def test_plot_json_and_table(tmp_path, capsys):
     bench.plot(results(), tmp_path / "curves.png")
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
     show(True, results())
-    made = json.loads(capsys.readouterr().out)
-    assert made["rows"][0]["method"] == "Palpate"
-    assert made["machine"]["cpus"] >= 1
+    data = json.loads(capsys.readouterr().out)
+    assert data["rows"][0]["method"] == "Palpate"
+    assert data["machine"]["cpus"] >= 1
     first = bench.as_tables([result for result in results() if result.surface_dofs == 2181])[0]
     assert first.title.endswith("1 thread")
     # Palpate takes a hundredth of the other's time.

@@ -20,17 +20,17 @@ SETTINGS = scale.Settings(sizes=(600,), touched=100)
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory):
+def measured(tmp_path_factory):
     path = tmp_path_factory.mktemp("scale") / "scale.json"
-    told: list[str] = []
-    return path, scale.run(SETTINGS, path, told.append), told
+    reports: list[str] = []
+    return path, scale.run(SETTINGS, path, reports.append), reports
 
 
-def test_a_row_tells_of_every_stage(kept):
-    _, results, told = kept
+def test_a_row_tells_of_every_stage(measured):
+    _, results, reports = measured
     row = results.rows[600]
     assert list(row.seconds) == STAGES
-    assert told == [f"600 tetrahedra: {stage}" for stage in STAGES]
+    assert reports == [f"600 tetrahedra: {stage}" for stage in STAGES]
     assert all(value > 0 for value in row.seconds.values())
     assert row.touched == 100
     # Halves: 2 bytes an entry.
@@ -40,14 +40,14 @@ def test_a_row_tells_of_every_stage(kept):
     assert row.frame > 0
 
 
-def test_rows_are_not_measured_again(kept):
-    path, _, _ = kept
+def test_rows_are_not_measured_again(measured):
+    path, _, _ = measured
     held = json.loads(path.read_text())
     held["rows"][0]["store"] = 12345
     path.write_text(json.dumps(held))
-    told: list[str] = []
-    assert scale.run(SETTINGS, path, told.append).rows[600].store == 12345
-    assert told == []
+    reports: list[str] = []
+    assert scale.run(SETTINGS, path, reports.append).rows[600].store == 12345
+    assert reports == []
     with pytest.raises(palpate.Error, match="holds rows of other settings"):
         scale.run(scale.Settings(sizes=(600,), touched=101), path)
 

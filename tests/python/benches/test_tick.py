@@ -127,7 +127,7 @@ def test_motions_under_the_local_law_are_in_contact(monkeypatch, plates):
 
 
 def test_an_interrupted_run_goes_on(tmp_path, monkeypatch, plates):
-    kept = tmp_path / "tick.json"
+    rows_file = tmp_path / "tick.json"
     monkeypatch.setattr(tick, "_plate", lambda cells: plates[cells])
     prepared = tick._envelope_play
 
@@ -138,29 +138,29 @@ def test_an_interrupted_run_goes_on(tmp_path, monkeypatch, plates):
 
     monkeypatch.setattr(tick, "_envelope_play", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        tick.run(["envelope"], SHORT, kept)
-    first = json.loads(kept.read_text())["rows"]
+        tick.run(["envelope"], SHORT, rows_file)
+    first = json.loads(rows_file.read_text())["rows"]
     assert [row["labels"]["tick"] for row in first] == list(KINDS)
     monkeypatch.setattr(
         tick, "_envelope_play", lambda *given: prepared(*given) if given[1] == 4 else pytest.fail("again")
     )
     reported: list[tuple[int, int]] = []
-    rows = tick.run(["envelope"], SHORT, kept, lambda *counts: reported.append(counts))
+    rows = tick.run(["envelope"], SHORT, rows_file, lambda *counts: reported.append(counts))
     assert reported == [(1, 2), (2, 2)]
     assert [asdict(row) for row in rows[: len(KINDS)]] == first
     assert [row.labels["contacts"] for row in rows] == [1] * len(KINDS) + [4] * len(KINDS)
     monkeypatch.setattr(tick, "_plate", lambda cells: pytest.fail("a plate that nobody needs"))
-    assert tick.run(["envelope"], SHORT, kept) == rows
+    assert tick.run(["envelope"], SHORT, rows_file) == rows
     plot_envelope(rows, tmp_path / "envelope.png")
     assert (tmp_path / "envelope.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_file_of_something_else_is_refused(tmp_path):
-    kept = tmp_path / "tick.json"
-    kept.write_text("[]")
+    rows_file = tmp_path / "tick.json"
+    rows_file.write_text("[]")
     with pytest.raises(palpate.Error, match=r"tick\.json: is not a file of this benchmark"):
-        tick.run(["envelope"], SHORT, kept)
+        tick.run(["envelope"], SHORT, rows_file)
     other = {"machine": output.machine(), "settings": {"places": 1}, "rows": []}
-    kept.write_text(json.dumps(other))
+    rows_file.write_text(json.dumps(other))
     with pytest.raises(palpate.Error, match="other settings or of another machine"):
-        tick.run(["envelope"], SHORT, kept)
+        tick.run(["envelope"], SHORT, rows_file)

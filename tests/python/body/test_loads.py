@@ -113,10 +113,10 @@ def test_touch_starts_from_the_loaded_state(loaded, loaded_green):
     idle = loaded_green.touch(point=loaded.mesh.nodes[node], displacement=sag)
     assert np.abs(idle.force).max() <= 1e-12
     assert idle.displacements == pytest.approx(loaded_green.free_displacements, abs=1e-15)
-    kept = loaded_green.touch(point=loaded.mesh.nodes[node], displacement=(0, 0, 0))
+    press = loaded_green.touch(point=loaded.mesh.nodes[node], displacement=(0, 0, 0))
     answer = loaded_green.solve(displacements={node: (0, 0, 0)})
-    assert kept.force == pytest.approx(answer.forces[row] - loaded.load_vector()[node], rel=1e-9)
-    assert kept.displacements == pytest.approx(answer.displacements, abs=1e-12)
+    assert press.force == pytest.approx(answer.forces[row] - loaded.load_vector()[node], rel=1e-9)
+    assert press.displacements == pytest.approx(answer.displacements, abs=1e-12)
 
 
 def test_simulation_presses_the_sagged_body(loaded, loaded_green):

@@ -20,9 +20,9 @@ def voxels(filled: np.ndarray) -> palpate.TetMesh:
     grid = skfem.MeshTet.init_tensor(*axes)
     nodes, tets = grid.p.T, grid.t.T
     cube = np.floor(nodes[tets].mean(axis=1) / STEP).astype(int)
-    kept = tets[filled[tuple(cube.T)]]
-    used = np.unique(kept)
-    return palpate.TetMesh(nodes[used], np.searchsorted(used, kept))
+    filled_tets = tets[filled[tuple(cube.T)]]
+    used = np.unique(filled_tets)
+    return palpate.TetMesh(nodes[used], np.searchsorted(used, filled_tets))
 
 
 def strainless_motions(body: palpate.Body) -> int:

@@ -92,9 +92,9 @@ def _default() -> str:
 
 
 def test_run_prints_what_it_keeps(cache, tmp_path):
-    told = run("demo", "beam", "--paper", "--headless", "0.1", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
+    result = run("demo", "beam", "--paper", "--headless", "0.1", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
     # What the tool needs to know of the body is written when the loop is prepared.
     (store,) = (file for file in cache_directory().iterdir() if "contact" not in file.name)
     size = store.stat().st_size / 1e6
-    assert f"kept in the cache: {size:.1f} MB of this scene; " in told.stdout
+    assert f"kept in the cache: {size:.1f} MB of this scene; " in result.stdout

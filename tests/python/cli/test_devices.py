@@ -73,11 +73,11 @@ def test_what_is_found_and_why_something_is_not(pads):
 
 
 def test_the_list_as_json(pads):
-    told = json.loads(invoke("--json").stdout)
-    assert [kind["kind"] for kind in told["kinds"]] == ["lever", "pad"]
-    pad = told["kinds"][1]["found"][0]
+    data = json.loads(invoke("--json").stdout)
+    assert [kind["kind"] for kind in data["kinds"]] == ["lever", "pad"]
+    pad = data["kinds"][1]["found"][0]
     assert (pad["id"], pad["limits"]["max_force"], pad["limits"]["max_torque"]) == ("7", 2.5, None)
-    assert told["kinds"][0]["missing"] == {"what": "no service listens at ws://localhost:1", "advice": "start it"}
+    assert data["kinds"][0]["missing"] == {"what": "no service listens at ws://localhost:1", "advice": "start it"}
 
 
 def test_a_check_asks_before_any_force(pads):
@@ -103,21 +103,21 @@ def test_a_check_pushes_along_every_axis_and_passes(pads):
 def test_a_wrong_sign_fails_the_check(pads):
     pads.sign = -1.0
     result = invoke("--test", "--yes", "--json")
-    told = json.loads(result.stdout)
-    assert result.exit_code == 1 and not told["passed"]
-    assert {push["verdict"] for push in told["pushes"]} == {"against"}
-    assert told["limits"]["max_force"] == 0.4 and told["rest"]["passed"]
+    data = json.loads(result.stdout)
+    assert result.exit_code == 1 and not data["passed"]
+    assert {push["verdict"] for push in data["pushes"]} == {"against"}
+    assert data["limits"]["max_force"] == 0.4 and data["rest"]["passed"]
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("lever", "--test", "--yes"), "lever: no service listens at ws://localhost:1: start it"),
         (("--test", "--yes", "--id", "9"), "there is no '9'; 'palpate devices' lists what there is"),
     ],
 )
-def test_what_cannot_be_checked_is_one_line(pads, words, told):
-    assert str(invoke(*words).exception) == told
+def test_what_cannot_be_checked_is_one_line(pads, words, message):
+    assert str(invoke(*words).exception) == message
 
 
 def test_without_a_terminal_nothing_is_pushed(pads, monkeypatch):

@@ -27,10 +27,10 @@ def test_the_limit_that_held_is_the_one_named(tmp_path, modulus, max_force, stra
         f'youngs_modulus = "{modulus}"\n'
         f'[device]\nmax_force = "{max_force}"\n[view]\nstrain_limit = {strain_limit}\n'
     )
-    said = run("run", "press.toml", "--headless", "2", cwd=tmp_path).stdout
-    force = float(re.search(r"largest force ([\d.]+) N", said)[1])
-    strain = float(re.search(r"largest strain ([\d.]+) %", said)[1])
-    assert ("max_force" in said) == by_force
-    assert ("strain_limit" in said) == by_strain
+    text = run("run", "press.toml", "--headless", "2", cwd=tmp_path).stdout
+    force = float(re.search(r"largest force ([\d.]+) N", text)[1])
+    strain = float(re.search(r"largest strain ([\d.]+) %", text)[1])
+    assert ("max_force" in text) == by_force
+    assert ("strain_limit" in text) == by_strain
     assert (force == pytest.approx(palpate.units.force(max_force))) == by_force
     assert (strain == pytest.approx(100 * strain_limit, rel=0.1)) == by_strain

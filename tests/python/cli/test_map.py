@@ -31,7 +31,7 @@ def test_a_grid_is_pressed_and_written(folder):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("--grid", "10parsec", "--depth", "1mm"), ("--grid", "unknown unit 'parsec'", "mm")),
         (("--grid", "10mm", "--depth", "3N"), ("--depth", "unknown unit 'N'")),
@@ -45,31 +45,31 @@ def test_a_grid_is_pressed_and_written(folder):
         (("--grid", "10mm", "--depth", "1mm", "--against", "no.toml"), ("no.toml: no such file",)),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_one_line(folder, words, told, monkeypatch, capsys):
-    complaint(["map", "block.palpate", *words, "--out", "refused"], told, folder, monkeypatch, capsys)
+def test_what_makes_no_sense_is_refused_in_one_line(folder, words, message, monkeypatch, capsys):
+    complaint(["map", "block.palpate", *words, "--out", "refused"], message, folder, monkeypatch, capsys)
     assert not (folder / "refused").exists()
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("map", "no.stl"), ("no.stl: no such file",)),
         (("map", "lung"), ("lung: no such file", "models are doll, kidney, liver, beam")),
         (("map", "liver", "--unit", "mm"), ("--unit is not for this file",)),
     ],
 )
-def test_what_is_not_there_is_refused(folder, words, told, monkeypatch, capsys):
-    complaint([*words, "--grid", "10mm", "--depth", "1mm"], told, folder, monkeypatch, capsys)
+def test_what_is_not_there_is_refused(folder, words, message, monkeypatch, capsys):
+    complaint([*words, "--grid", "10mm", "--depth", "1mm"], message, folder, monkeypatch, capsys)
 
 
 def test_a_map_that_is_none_is_refused(folder, monkeypatch, capsys):
     complaint(["run", "block.palpate", "--map", "no.vtu"], ("no.vtu: no such file",), folder, monkeypatch, capsys)
     (folder / "text.vtu").write_text("no mesh")
-    told = ("text.vtu: not a map that can be read",)
-    complaint(["run", "block.palpate", "--map", "text.vtu"], told, folder, monkeypatch, capsys)
+    message = ("text.vtu: not a map that can be read",)
+    complaint(["run", "block.palpate", "--map", "text.vtu"], message, folder, monkeypatch, capsys)
 
 
-def complaint(words, told, folder, monkeypatch, capsys) -> None:
+def complaint(words, message, folder, monkeypatch, capsys) -> None:
     """The command ends with code 2 and one line; in this process, for it is quick to refuse."""
     monkeypatch.chdir(folder)
     monkeypatch.setattr("sys.argv", ["palpate", *words])
@@ -77,5 +77,5 @@ def complaint(words, told, folder, monkeypatch, capsys) -> None:
         main()
     lines = capsys.readouterr().err.strip().splitlines()
     assert stop.value.code == 2 and len(lines) == 1, lines
-    for word in told:
+    for word in message:
         assert word in lines[0], lines[0]

@@ -37,8 +37,8 @@ def recorded(cache, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("recorded")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
-        made = run("run", ROOT / "examples" / "block.toml", "--headless", 1.0, "--record", "press.mcap", cwd=folder)
-    assert made.returncode == 0 and "recorded press.mcap: 'palpate replay press.mcap' makes it again" in made.stdout
+        result = run("run", ROOT / "examples" / "block.toml", "--headless", 1.0, "--record", "press.mcap", cwd=folder)
+    assert result.returncode == 0 and "recorded press.mcap: 'palpate replay press.mcap' makes it again" in result.stdout
     return folder / "press.mcap"
 
 
@@ -117,9 +117,9 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path, shared_cache)
         "    print(simulation.recording.error)\n"
         "    print(simulation.stop_recording().error)\n"
     )
-    made = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=280)
-    assert made.returncode == 0, made.stderr
-    assert all("full.mcap: " in line and "the recording ends here" in line for line in made.stdout.splitlines())
+    result = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=280)
+    assert result.returncode == 0, result.stderr
+    assert all("full.mcap: " in line and "the recording ends here" in line for line in result.stdout.splitlines())
     cut = palpate.Recording.load(tmp_path / "full.mcap")
     assert cut.dropped is None and len(cut.ticks) > 100
     assert run("replay", "full.mcap", "--headless", cwd=tmp_path).returncode == 0

@@ -28,7 +28,7 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
     shutil.copy(BLOCK, tmp_path)
     result = run("run", "block.obj", "--headless", "1", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    computed, said, *_ = result.stdout.splitlines()
+    computed, text, *_ = result.stdout.splitlines()
     # The size is printed before it is written.
     assert computed.startswith("computing 2526 columns: at most 51 MB in the cache")
     assert computed.endswith(", 842 on the surface)")
@@ -39,8 +39,8 @@ def test_a_bare_surface_runs_with_defaults_that_are_told(tmp_path):
         "E = 10kPa (-E)",
         "0.45 (--nu)",
     ):
-        assert word in said
-    assert "tool of radius 5 mm (--radius)" in said
+        assert word in text
+    assert "tool of radius 5 mm (--radius)" in text
     log = np.genfromtxt(tmp_path / "block.csv", delimiter=",", names=True)
     assert log["fz_N"].max() > 0.05
 
@@ -167,8 +167,8 @@ def test_a_fine_surface_takes_what_it_can():
     import skfem
 
     along = np.concatenate([[0, 0.01, 0.02, 0.03], np.linspace(0.035, 0.045, 21), [0.05, 0.06, 0.07, 0.08]])
-    made = skfem.MeshTet.init_tensor(along, np.linspace(0, 0.01, 21), np.array([0, 0.002]))
-    mesh = palpate.TetMesh(made.p.T, made.t.T)
+    result = skfem.MeshTet.init_tensor(along, np.linspace(0, 0.01, 21), np.array([0, 0.002]))
+    mesh = palpate.TetMesh(result.p.T, result.t.T)
     body = palpate.Body(mesh, material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 2] < 1e-9)
     green = palpate.precompute(body, precision="f16")
     built = palpate.scene.BuiltScene.of(palpate.Scene(body={"store": "x.palpate"}), body, green)
@@ -188,16 +188,16 @@ def test_the_unit_of_a_bare_file_is_the_most_common_that_fits_a_body(longest, un
 def test_info_reads_surfaces(tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3, radius=40.0)
     ball.export(tmp_path / "ball.ply")
-    told = run("info", "ball.ply", cwd=tmp_path).stdout
-    assert f"{len(ball.vertices)} vertices, {len(ball.faces)} triangles" in told
-    assert "80 x 80 x 80 mm if its unit is mm" in told and f"closed, volume {1e-3 * ball.volume:.4g} cm3" in told
-    assert "palpate mesh ball.ply ball.vtu --unit mm" in told
+    text = run("info", "ball.ply", cwd=tmp_path).stdout
+    assert f"{len(ball.vertices)} vertices, {len(ball.faces)} triangles" in text
+    assert "80 x 80 x 80 mm if its unit is mm" in text and f"closed, volume {1e-3 * ball.volume:.4g} cm3" in text
+    assert "palpate mesh ball.ply ball.vtu --unit mm" in text
     ball.update_faces(np.arange(len(ball.faces)) > 0)
     ball.export(tmp_path / "open.glb")
-    told = run("info", "open.glb", "--unit", "cm", cwd=tmp_path).stdout
-    assert "800 x 800 x 800 mm if its unit is cm" in told
-    assert "not closed: 3 open edges; what it encloses is filled all the same" in told
-    assert "palpate mesh open.glb open.vtu --unit cm" in told
+    text = run("info", "open.glb", "--unit", "cm", cwd=tmp_path).stdout
+    assert "800 x 800 x 800 mm if its unit is cm" in text
+    assert "not closed: 3 open edges; what it encloses is filled all the same" in text
+    assert "palpate mesh open.glb open.vtu --unit cm" in text
 
 
 def test_version():

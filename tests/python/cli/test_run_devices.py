@@ -95,8 +95,8 @@ def test_a_service_that_dies_ends_the_force_and_is_told(scene):
             while not (log.exists() and log.stat().st_size > 100_000):
                 assert running.poll() is None
             process.kill()
-            told = running.communicate(timeout=60)[1]
-    assert running.returncode == 1 and "the device is disconnected" in told, told
+            output = running.communicate(timeout=60)[1]
+    assert running.returncode == 1 and "the device is disconnected" in output, output
     import palpate
 
     recording = palpate.Recording.load(log)
@@ -105,24 +105,24 @@ def test_a_service_that_dies_ends_the_force_and_is_told(scene):
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
+    ("kind", "message"),
     [
         ("haply", "no Haply Inverse Service listens at ws://127.0.0.1:9"),
         ("touch", "the library of OpenHaptics (HD) is not found, looked for as"),
         ("forcedimension", "the library of Force Dimension's SDK is not found, looked for as"),
     ],
 )
-def test_without_a_device_the_message_says_what_to_do(scene, kind, said):
+def test_without_a_device_the_message_says_what_to_do(scene, kind, message):
     variables = {"PALPATE_HAPLY_ADDRESS": "ws://127.0.0.1:9"} if kind == "haply" else {}
     done = run(scene, kind, **variables)
-    assert done.returncode == 2 and said in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == 2 and message in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert len(done.stderr.strip().splitlines()) == 1 and not (scene.parent / "run.mcap").exists()
 
 
 def test_options_that_cannot_be_are_refused(scene):
-    for devices, said in [
+    for devices, message in [
         (["haptic"], "--device: there is no device 'haptic'"),
         (["haply"] * 3, "--device was given 3 times, but the scene has 2 of [[tool]]"),
     ]:
         done = run(scene, *devices)
-        assert done.returncode == 2 and said in done.stderr, done.stderr
+        assert done.returncode == 2 and message in done.stderr, done.stderr

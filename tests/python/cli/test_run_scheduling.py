@@ -37,9 +37,9 @@ def test_what_is_typed_stands_in_place_of_the_scene(scene):
     ],
 )
 def test_mistakes_are_told_by_the_option(scene, options, words):
-    with pytest.raises(palpate.SceneError) as said:
+    with pytest.raises(palpate.SceneError) as error:
         built_from(scene, RunOptions(**options))
-    assert str(said.value).startswith(words)
+    assert str(error.value).startswith(words)
 
 
 def test_a_press_runs_with_what_was_typed(scene):

@@ -60,10 +60,10 @@ def test_the_log_is_kept_on_ctrl_c(tmp_path):
     assert "running\n" in [child.stdout.readline() for _ in range(3)]
     time.sleep(1.5)
     child.send_signal(signal.SIGINT)
-    said, complained = child.communicate(timeout=280)
+    output, complained = child.communicate(timeout=280)
     assert child.returncode == 130, complained
     assert complained.strip().splitlines()[-1] == "palpate: interrupted" and "Traceback" not in complained
-    assert "wrote a.csv and .png" in said
+    assert "wrote a.csv and .png" in output
     assert sorted(os.listdir(tmp_path)) == ["a.csv", "a.png", "a.toml", "cache"]
     log = read_log(tmp_path / "a.csv")
     assert 1.0 < log["time_s"][-1] < 20 and len(log) > 500

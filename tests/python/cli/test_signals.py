@@ -31,8 +31,8 @@ def test_an_interrupt_while_modules_are_imported_is_one_line(tmp_path):
     process = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
     awaited(tmp_path / "importing", process)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=20)
-    assert (process.returncode, said) == (130, "palpate: interrupted\n")
+    _, output = process.communicate(timeout=20)
+    assert (process.returncode, output) == (130, "palpate: interrupted\n")
 
 
 @pytest.mark.parametrize(("end", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
@@ -58,6 +58,6 @@ def test_unfinished_work_is_removed_when_the_command_line_is_ended(tmp_path, end
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(end)
-    _, said = process.communicate(timeout=20)
-    assert process.returncode == code and "Traceback" not in said
+    _, output = process.communicate(timeout=20)
+    assert process.returncode == code and "Traceback" not in output
     assert not list(tmp_path.iterdir())

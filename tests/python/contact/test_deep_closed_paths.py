@@ -117,7 +117,7 @@ def shares(loops: Loops, body: str, tool: str, paths, rotation: Rotation = LYING
     return {name: share(played(simulation, path, rotation)) for name, path in paths}
 
 
-def told(found: dict[str, float]) -> str:
+def ratios(found: dict[str, float]) -> str:
     return ", ".join(f"{name}: {100 * part:+.2f} %" for name, part in found.items())
 
 
@@ -126,21 +126,21 @@ def told(found: dict[str, float]) -> str:
 def test_a_torus_gives_out_no_more_than_was_put_in(loops, tool, part):
     """Deep presses end in a fading contact, which takes energy away: what is given back is not tested."""
     found = shares(loops, "torus", tool, torus_paths(RADII[tool], part * RADII[tool]))
-    assert max(found.values()) <= TOLERANCE, told(found)
+    assert max(found.values()) <= TOLERANCE, ratios(found)
 
 
 @pytest.mark.parametrize("tool", ["sphere", "small sphere"])
 @pytest.mark.parametrize("part", DEPTHS)
 def test_a_cups_wall_gives_back_what_was_put_in(loops, tool, part):
     found = shares(loops, "cup", tool, cup_paths(RADII[tool], part * RADII[tool]))
-    assert all(abs(given) <= TOLERANCE for given in found.values()), told(found)
+    assert all(abs(given) <= TOLERANCE for given in found.values()), ratios(found)
 
 
 @pytest.mark.parametrize("part", [0.5, 1.0, 2.0, 4.0])
 def test_a_rim_gives_out_no_more_than_was_put_in(loops, part):
     for tool in ("sphere", "small sphere"):
         found = shares(loops, "cup", tool, rim_paths(RADII[tool], part * RADII[tool]))
-        assert max(found.values()) <= TOLERANCE, f"{tool}: {told(found)}"
+        assert max(found.values()) <= TOLERANCE, f"{tool}: {ratios(found)}"
 
 
 @pytest.mark.slow
@@ -150,7 +150,7 @@ def test_a_rim_gives_out_no_more_than_was_put_in(loops, part):
 def test_a_blocks_edge_gives_out_no_more_than_was_put_in(loops, tool, part):
     rotation = LYING if tool in ("capsule", "file") else Rotation.identity()
     found = shares(loops, "block", tool, edge_paths(tool, rotation, part * RADII[tool]), rotation)
-    assert max(found.values()) <= TOLERANCE, told(found)
+    assert max(found.values()) <= TOLERANCE, ratios(found)
 
 
 def test_the_check_sees_forces_of_no_energy(loops):

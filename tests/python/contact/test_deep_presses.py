@@ -78,11 +78,11 @@ def presses(loops: Loops, name: str, tool: str, ranks: Iterable[int], device: di
         deep = min(DEEPEST, random.uniform(1.0, 4.0) * RADII[tool])
         path, turns = press(tool, foot, normal, deep, random)
         try:
-            told = wrong_with(played(simulation, path, turns), surface, tool)
+            problem = wrong_with(played(simulation, path, turns), surface, tool)
         except palpate.SimulationError as error:
-            told = f"fault: {error}"
-        if told:
-            wrong.append(f"{tool} in {name}, press {rank} at {foot.round(4)}, {1e3 * deep:.1f} mm deep: {told}")
+            problem = f"fault: {error}"
+        if problem:
+            wrong.append(f"{tool} in {name}, press {rank} at {foot.round(4)}, {1e3 * deep:.1f} mm deep: {problem}")
     return wrong
 
 

@@ -30,9 +30,9 @@ def scene(youngs_modulus: float, radius: float) -> palpate.Scene:
     tool = found.tools[0].model_copy(update={"contact": "local", "friction": 0.0})
     device = found.device.model_copy(update=UNLIMITED)
     view = found.view.model_copy(update={"strain_limit": 0.0})
-    made = found.model_copy(update={"region": [region], "tools": [tool], "device": device, "view": view})
-    made._source = found._source
-    return made
+    result = found.model_copy(update={"region": [region], "tools": [tool], "device": device, "view": view})
+    result._source = found._source
+    return result
 
 
 def felt(built: BuiltScene, line: np.ndarray) -> np.ndarray:

@@ -75,7 +75,7 @@ def test_contrast_over_a_tumour_of_12_mm(tmp_path):
     path = write_nrrd(tmp_path / "ct.seg.nrrd", labels, affine, {"liver": 1, "tumor": 2})
     with pytest.warns(palpate.MeshWarning):
         mesh = tetrahedralize_with("quadratic", path, options=FillOptions(segments=("liver", "tumor")))
-    made, true = contrast(mesh), contrast(analytic())
+    segmented, true = contrast(mesh), contrast(analytic())
     # That of the liver itself, and one that is felt.
     assert (true > 0.08).all()
-    np.testing.assert_allclose(made, true, atol=POINTS)
+    np.testing.assert_allclose(segmented, true, atol=POINTS)

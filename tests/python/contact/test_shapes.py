@@ -229,16 +229,16 @@ def test_mistakes_in_shapes_are_told_with_their_line(tmp_path):
         'shape = "punch"\ncontact = "patch"': "contact = 'patch' is for spheres",
         'shape = "punch"\nradius = "2mm"\nrounding = "3mm"': "more than the radius",
     }
-    for tool, told in mistakes.items():
+    for tool, message in mistakes.items():
         path = tmp_path / "scene.toml"
         path.write_text(f'[body]\nmodel = "beam"\n[tool]\n{tool}\n')
         with pytest.raises(palpate.SceneError, match=r"scene\.toml:[34]: .*tool") as caught:
             palpate.Scene.read(path)
-        assert told in str(caught.value) and "\n" not in str(caught.value)
+        assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("file", "told"), [("open.stl", "not closed"), ("missing.stl", "no such file")])
-def test_mistakes_in_surface_files_are_told_with_their_line(tmp_path, file, told):
+@pytest.mark.parametrize(("file", "message"), [("open.stl", "not closed"), ("missing.stl", "no such file")])
+def test_mistakes_in_surface_files_are_told_with_their_line(tmp_path, file, message):
     surface = trimesh.creation.box((1.0, 1.0, 1.0))
     surface.faces = surface.faces[:-1]
     surface.export(tmp_path / "open.stl")
@@ -246,4 +246,4 @@ def test_mistakes_in_surface_files_are_told_with_their_line(tmp_path, file, told
     path.write_text(f'[body]\nmodel = "beam"\n[tool]\nshape = "{file}"\n')
     with pytest.raises(palpate.SceneError, match=r"scene\.toml:4: tool\.shape") as caught:
         tool_arguments(palpate.Scene.read(path), 0)
-    assert told in str(caught.value) and "\n" not in str(caught.value)
+    assert message in str(caught.value) and "\n" not in str(caught.value)

@@ -16,23 +16,23 @@ import json
 from dataclasses import asdict
 from palpate.devices import SelfCheck, listings
 
-told = {}
+checks = {}
 for listing in listings():
     (device,) = listing.found
     with SelfCheck(listing.kind, device.id) as check:
         rest, pushes = check.watch(0.4), [check.push(direction, 0.5, 0.5) for direction in ("+x", "-y", "+z")]
-        told[listing.kind] = {
+        checks[listing.kind] = {
             "name": device.name, "obstacle": device.obstacle, "force": device.limits.max_force, "rest": asdict(rest),
             "passed": rest.passed, "verdicts": [push.verdict for push in pushes],
             "moved": [push.moved for push in pushes], "faults": [push.fault for push in pushes],
             "pushed": [push.force for push in pushes],
         }
-print(json.dumps(told))
+print(json.dumps(checks))
 """
 
 
 @pytest.fixture(scope="module")
-def told():
+def checks():
     with inverse_service(REST) as (address, _):
         environment = {
             **os.environ,
@@ -52,8 +52,8 @@ def told():
     ("kind", "name", "force"),
     [("haply", "Inverse3", 10.0), ("touch", "Touch", 3.3), ("forcedimension", "omega.3", 12.0)],
 )
-def test_a_device_is_found_and_pushes_where_it_should(told, kind, name, force):
-    found = told[kind]
+def test_a_device_is_found_and_pushes_where_it_should(checks, kind, name, force):
+    found = checks[kind]
     assert name in found["name"] and found["obstacle"] is None and found["force"] == force
     assert found["faults"] == [None] * 3
     assert found["pushed"] == pytest.approx([0.5] * 3, rel=0.05)

@@ -27,8 +27,8 @@ def check(sign):
 
     def attempt():
         device = Held(sign)
-        with SelfCheck(device) as made:
-            rest, push = made.watch(0.3), made.push("+x", 0.4, RISE)
+        with SelfCheck(device) as result:
+            rest, push = result.watch(0.3), result.push("+x", 0.4, RISE)
         return (device, rest, push), push.fault
 
     return unstarved(attempt)
@@ -39,8 +39,8 @@ def fault_of(device):
 
     def attempt():
         made_device = device()
-        with SelfCheck(made_device) as made:
-            push = made.push("+x", 0.4, 10.0)
+        with SelfCheck(made_device) as result:
+            push = result.push("+x", 0.4, 10.0)
         return (made_device, push), push.fault
 
     return unstarved(attempt)
@@ -64,9 +64,9 @@ def test_it_is_polled_at_the_rate_of_the_loop_or_its_own():
     for rate, most in ((None, 1000.0), (200.0, 200.0)):
         device = Held()
         device.rate = rate
-        with SelfCheck(device) as made:
+        with SelfCheck(device) as result:
             # Other programs may have the processors meanwhile: never faster, and the loop sees what was measured.
-            assert 0.1 * most < made.watch(0.5).rate < 1.05 * most
+            assert 0.1 * most < result.watch(0.5).rate < 1.05 * most
 
 
 def test_what_is_put_out_is_the_latest():
@@ -123,10 +123,10 @@ def reading(**given):
     ],
 )
 def test_a_reading_that_is_none_takes_the_force_away_and_is_told_in_one_line(go_wrong, words):
-    with pytest.warns(palpate.DeviceWarning) as told:
+    with pytest.warns(palpate.DeviceWarning) as record:
         device, push = fault_of(lambda: Failing(go_wrong))
     assert push.verdict == "fault" and "the device's program has failed" in push.fault
-    (warning,) = {str(one.message) for one in told}
+    (warning,) = {str(one.message) for one in record}
     assert words in warning and "\n" not in warning and "Traceback" not in warning
     late = [when for when, force in device.written if force.any() and when > device.wrong_since + 0.1]
     assert not late and device.calls == ["open", "close"]
@@ -135,8 +135,8 @@ def test_a_reading_that_is_none_takes_the_force_away_and_is_told_in_one_line(go_
 def test_a_read_that_hangs_takes_the_force_away_and_holds_nobody_up():
     released = threading.Event()
     device = Failing(lambda: (released.wait(20.0), palpate.Reading((0, 0, 0)))[1])
-    with SelfCheck(device) as made:
-        push = made.push("+x", 0.4, 10.0)
+    with SelfCheck(device) as result:
+        push = result.push("+x", 0.4, 10.0)
         silent = time.monotonic() - device.wrong_since
         assert push.verdict == "fault" and "stopped sending measurements" in push.fault
         assert 0.05 <= silent < 0.5
@@ -154,9 +154,9 @@ def test_a_write_that_raises_is_a_fault_and_goes_on_being_tried():
     device = Broken()
     with (
         pytest.warns(palpate.DeviceWarning, match=r"Broken\.write raised OSError: amplifier off"),
-        SelfCheck(device) as made,
+        SelfCheck(device) as result,
     ):
-        assert "program has failed" in made.watch(5.0).fault
+        assert "program has failed" in result.watch(5.0).fault
         tried = len(device.written)
         time.sleep(0.35)
         # Twice each time, ten times a second: what was to be put out, and zero.
@@ -168,8 +168,8 @@ def test_warnings_as_errors_do_not_end_the_thread():
     device = Failing(raises)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with SelfCheck(device) as made:
-            assert made.push("+x", 0.4, 10.0).fault
+        with SelfCheck(device) as result:
+            assert result.push("+x", 0.4, 10.0).fault
     assert not device.written[-1][1].any() and device.calls[-1] == "close"
 
 
@@ -205,8 +205,8 @@ def test_a_program_that_ends_without_a_word_leaves_no_force_behind():
 def test_a_tool_may_leave_the_scene():
     device = Held()
     device.read = lambda: None
-    with SelfCheck(device) as made:
-        rest, push = made.watch(0.2), made.push("+x", 0.4, 5.0)
+    with SelfCheck(device) as result:
+        rest, push = result.watch(0.2), result.push("+x", 0.4, 5.0)
     assert rest.readings == 0 and not rest.passed and rest.fault is None
     assert (push.force, push.fault) == (0.0, None)
 

@@ -78,7 +78,7 @@ def test_exact_modes_keep_their_energy(body, modes, rayleigh):
     motion.step(count=1)  # the force falls to zero
     before = motion.energy.total
     motion.step(count=5000)
-    kept = motion.energy
+    energy = motion.energy
     if rayleigh == (0.0, 0.0):
-        assert kept.total == pytest.approx(before, rel=1e-9)
-    assert kept.work == pytest.approx(kept.total + kept.dissipated, rel=1e-9)
+        assert energy.total == pytest.approx(before, rel=1e-9)
+    assert energy.work == pytest.approx(energy.total + energy.dissipated, rel=1e-9)

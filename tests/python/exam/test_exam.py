@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def made(folder):
+def cached_library(folder):
     """The exam's library, its bodies in a cache of this module's."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
@@ -38,11 +38,11 @@ def made(folder):
 
 
 @pytest.fixture
-def library(made, folder, monkeypatch):
+def library(cached_library, folder, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
     # Matplotlib looks at every font of the machine, for seconds, unless it finds what it wrote the last time.
     monkeypatch.setenv("MPLCONFIGDIR", str(Path.home() / ".cache" / "matplotlib"))
-    return made
+    return cached_library
 
 
 def of_trials(library: Library, **changes) -> Library:
@@ -188,8 +188,8 @@ def test_an_observer_takes_an_exam_from_the_command_line(library, folder, tmp_pa
     path = write_exam(folder, ("trials = 3", "trials = 30"))
     result = run("exam", "nodule", path, "--observer", 0.06, "--out", "kim", cwd=tmp_path)
     assert result.returncode == 0 and "Weber fraction" in result.stdout, result.stderr
-    told = json.loads((tmp_path / "kim/exam.json").read_text())
-    assert told["trials"] == 30 and 0.01 < told["estimate"]["weber_fraction"] < 0.3
+    data = json.loads((tmp_path / "kim/exam.json").read_text())
+    assert data["trials"] == 30 and 0.01 < data["estimate"]["weber_fraction"] < 0.3
     assert len((tmp_path / "kim/exam.csv").read_text().splitlines()) == 31
     assert (tmp_path / "kim/exam.png").read_bytes().startswith(b"\x89PNG")
     refused(run("exam", "nodule", path, "--observer", 0.06, "--out", "kim", cwd=tmp_path), "exam.csv is there already")
@@ -234,8 +234,8 @@ class TestPage:
 
 def interrupted(program: Program) -> None:
     os.kill(program.process.pid, signal.SIGINT)
-    told = program.process.communicate(timeout=20)[0]
-    assert program.process.returncode == 0, told
+    output = program.process.communicate(timeout=20)[0]
+    assert program.process.returncode == 0, output
 
 
 def mark_the_loudest(page, trial: int) -> None:

@@ -65,8 +65,8 @@ def test_the_inside_is_that_of_a_direct_solution(block, block_green):
     answer = block_green.solve(displacements={node: (0, 0, -1e-3)})
     known = {int(dof): 0.0 for dof in block.fixed_dofs} | {3 * node: 0.0, 3 * node + 1: 0.0, 3 * node + 2: -1e-3}
     direct, _ = direct_solve(block, known, np.zeros(block.fixed_mask.size))
-    made = answer.to_meshio().point_data["displacement"]
-    assert np.abs(made - direct).max() < 1e-8 * np.abs(direct).max()
+    values = answer.to_meshio().point_data["displacement"]
+    assert np.abs(values - direct).max() < 1e-8 * np.abs(direct).max()
     inner = np.setdiff1d(np.arange(len(direct)), block.mesh.surface_nodes)
     assert np.abs(direct[inner]).max() > 1e-5
 
@@ -98,13 +98,13 @@ def test_a_bare_store_gives_its_surface(block_green, tmp_path):
 
 
 def frame_of(bodies, displacements, scales=None) -> Frame:
-    made = tuple(
+    values = tuple(
         BodyFrame(u, None, body.green, body, scale)
         for body, u, scale in zip(bodies, displacements, scales or [1.0] * len(bodies), strict=True)
     )
     zeros = np.zeros((1, 3))
     return Frame(
-        0.0, zeros, zeros, zeros, np.array([[1.0, 0, 0, 0]]), np.array([True]), np.array([False]), [], made, {}
+        0.0, zeros, zeros, zeros, np.array([[1.0, 0, 0, 0]]), np.array([True]), np.array([False]), [], values, {}
     )
 
 

@@ -68,10 +68,10 @@ def test_materials_in_series_carry_the_same_stress():
 
 def thick_cylinder(cells, inner=0.02, outer=0.04, pressure=1e3, nu=0.3):
     """Quarter of a long cylinder under internal pressure: recovered and exact stress at its surface nodes."""
-    made = box_mesh(cells, (outer - inner, np.pi / 2, 0.01), jitter=0.1)
-    r, angle = made.nodes[:, 0] + inner, made.nodes[:, 1]
-    nodes = np.column_stack([r * np.cos(angle), r * np.sin(angle), made.nodes[:, 2]])
-    mesh = palpate.TetMesh(nodes, made.tets)
+    quarter = box_mesh(cells, (outer - inner, np.pi / 2, 0.01), jitter=0.1)
+    r, angle = quarter.nodes[:, 0] + inner, quarter.nodes[:, 1]
+    nodes = np.column_stack([r * np.cos(angle), r * np.sin(angle), quarter.nodes[:, 2]])
+    mesh = palpate.TetMesh(nodes, quarter.tets)
     rollers = np.abs(nodes) < 1e-9
     rollers[:, 2] |= nodes[:, 2] > 0.01 - 1e-9  # plane strain
     loads = palpate.Loads(pressure=[(lambda p: np.hypot(p[:, 0], p[:, 1]) < inner + 1e-6, pressure)])

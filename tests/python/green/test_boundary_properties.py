@@ -33,9 +33,9 @@ def meshes(draw) -> palpate.TetMesh:
     if draw(st.booleans()):
         centres = mesh.nodes[mesh.tets].mean(axis=1) / np.array(size)
         corner = (centres[:, 0] > 0.5) & (centres[:, 2] > 0.5)
-        kept = mesh.tets[~corner]
-        used = np.unique(kept)
-        mesh = palpate.TetMesh(mesh.nodes[used], np.searchsorted(used, kept))
+        remaining = mesh.tets[~corner]
+        used = np.unique(remaining)
+        mesh = palpate.TetMesh(mesh.nodes[used], np.searchsorted(used, remaining))
     return mesh
 
 

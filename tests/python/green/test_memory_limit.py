@@ -30,20 +30,20 @@ def test_scratch_that_the_system_does_not_give_is_a_line(what, tmp_path):
     """Twice the third level cache a thread: a machine with a small cache gives it."""
     path = str(tmp_path / "a.palpate")
     program = PROGRAM.format(path=path, stored=False, room=300_000_000, work=WORK[what].format(path=path))
-    told = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", child_program((6, 5, 5), program)], capture_output=True, text=True, timeout=100
     )
-    assert told.returncode == 0, told.stderr
-    assert told.stdout == "" or told.stdout.startswith("products of matrices reserve "), told.stdout
-    assert told.stdout.count("\n") <= 1
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == "" or result.stdout.startswith("products of matrices reserve "), result.stdout
+    assert result.stdout.count("\n") <= 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of addresses are Linux's")
 def test_a_store_that_the_memory_cannot_hold_is_a_line(tmp_path):
     path = str(tmp_path / "a.palpate")
     program = PROGRAM.format(path=path, stored=True, room=10_000_000, work=f"palpate.GreensFunction.load({path!r})")
-    told = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", child_program((20, 15, 15), program)], capture_output=True, text=True, timeout=100
     )
-    assert told.returncode == 0, told.stderr
-    assert told.stdout.startswith("the system does not give the 0.1 GB of memory"), told.stdout
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("the system does not give the 0.1 GB of memory"), result.stdout

@@ -229,9 +229,9 @@ def test_the_body_chooses_its_precision_and_says_so(tmp_path, capfd):
     for green in (contrast, palpate.precompute(half_stiff(1e4), precision="f64", path=tmp_path / "same.palpate")):
         assert palpate.GreensFunction.load(green.path, body=half_stiff(1e4)).precision == "f64"
     half_stiff(1e4).mesh.write(tmp_path / "body.vtu")
-    made = run("precompute", "body.vtu", "--fix", "x < 1mm", "-o", "body.palpate", cwd=tmp_path)
-    assert "the precision is chosen by the body" in made.stdout
-    line = next(line for line in made.stdout.splitlines() if line.startswith("precision f32: touches right to "))
+    result = run("precompute", "body.vtu", "--fix", "x < 1mm", "-o", "body.palpate", cwd=tmp_path)
+    assert "the precision is chosen by the body" in result.stdout
+    line = next(line for line in result.stdout.splitlines() if line.startswith("precision f32: touches right to "))
     assert line in run("info", "body.palpate", cwd=tmp_path).stdout
     touched = run("touch", "body.palpate", "--point=8cm,2cm,2cm", "--press=-1mm,-,-", "--radius=1cm", cwd=tmp_path)
     assert "estimated error: " in touched.stdout
@@ -251,8 +251,8 @@ def test_a_named_precision_that_is_too_low_is_told_when_it_is_computed_and_when_
         palpate.precompute(slender(length), precision="f16", path=tmp_path / "rod.palpate", progress=False)
     (tmp_path / "scene.toml").write_text('[body]\nstore = "rod.palpate"\n[tool]\nradius = "3mm"\n')
     scene = palpate.Scene.read(tmp_path / "scene.toml")
-    told = pytest.warns(palpate.PrecisionWarning) if length == 30 else pytest.raises(palpate.PrecisionError)
-    with told as caught:
+    expected = pytest.warns(palpate.PrecisionWarning) if length == 30 else pytest.raises(palpate.PrecisionError)
+    with expected as caught:
         scene.build()
     message = str(caught[0].message if length == 30 else caught.value)
     assert message.startswith("forces on rod") and "--precision f" in message

@@ -232,9 +232,9 @@ except palpate.StoreError as error:
     print(error)
 """,
     )
-    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=280)
-    assert told.returncode == 0, told.stderr
-    assert f"finished columns are kept in {path}.partial: once there is room, the same command goes on" in told.stdout
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=280)
+    assert result.returncode == 0, result.stderr
+    assert f"finished columns are kept in {path}.partial: once there is room, the same command goes on" in result.stdout
     assert os.listdir(tmp_path) == ["a.palpate.partial"]
     body = palpate.Body(
         box_mesh(cells=(20, 15, 15)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 0] < 1e-9

@@ -171,15 +171,15 @@ def test_a_partial_with_all_columns_only_has_to_be_written(tmp_path):
         box_mesh(cells=(16, 12, 12)), material=palpate.Material(1e4, 0.4), fixed=lambda p: p[:, 2] < 1e-9
     )
     path, other = tmp_path / "a.palpate", tmp_path / "b.palpate"
-    kept = other.with_name("b.palpate.partial")
+    partial = other.with_name("b.palpate.partial")
 
     def keep(_done, _columns):
         # A second name of the file: it has all the columns in the end.
-        if not kept.exists() and path.with_name("a.palpate.partial").exists():
-            os.link(path.with_name("a.palpate.partial"), kept)
+        if not partial.exists() and path.with_name("a.palpate.partial").exists():
+            os.link(path.with_name("a.palpate.partial"), partial)
 
     palpate.precompute(body, precision="f32", first=FIRST, path=path, progress=keep)
-    assert kept.exists()
+    assert partial.exists()
     begun = []
     palpate.precompute(body, precision="f32", first=FIRST, path=other, progress=lambda done, _all: begun.append(done))
     assert set(begun) <= {0, 3 * len(body.mesh.surface_nodes)}, "finished columns were computed again"
@@ -211,17 +211,17 @@ def test_a_partial_of_other_stages_is_used(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("region", "said"),
+    ("region", "message"),
     [
         ("x > 9cm", "no surface node lies in 'x > 9cm'"),
         ([10**6], "node 1000000 is not on the surface"),
         ("y", "not allowed in the predicate"),
     ],
 )
-def test_regions_that_are_none_are_refused(body, region, said):
-    with pytest.raises(palpate.BodyError, match=said):
+def test_regions_that_are_none_are_refused(body, region, message):
+    with pytest.raises(palpate.BodyError, match=message):
         palpate.precompute(body, touch=region)
-    with pytest.raises(palpate.BodyError, match=said):
+    with pytest.raises(palpate.BodyError, match=message):
         palpate.precompute(body, first=region)
 
 

@@ -98,9 +98,9 @@ def test_second_order_hexahedra_are_taken_by_their_corners(tmp_path):
     meshio.write(
         tmp_path / "box.vtu", meshio.Mesh(np.vstack([nodes, nodes[ends].mean(axis=1)]), [("hexahedron20", cells)])
     )
-    with pytest.warns(palpate.MeshWarning) as said:
+    with pytest.warns(palpate.MeshWarning) as record:
         mesh = palpate.TetMesh.read(tmp_path / "box.vtu")
-    assert "edges are straight, their mid-side nodes dropped" in str(said[0].message)
+    assert "edges are straight, their mid-side nodes dropped" in str(record[0].message)
     assert mesh.volume == pytest.approx(SIZE.prod(), rel=1e-12)
     assert np.array_equal(mesh.nodes, nodes)
 

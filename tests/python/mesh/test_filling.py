@@ -24,9 +24,9 @@ from palpate.mesh.fit import Fit, distances
 from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
 
 
-def told_loss(said) -> float:
+def told_loss(warned) -> float:
     """Share of the volume that a warning says is lost; 0 if nothing is said."""
-    texts = [str(warning.message) for warning in said if issubclass(warning.category, palpate.MeshWarning)]
+    texts = [str(warning.message) for warning in warned if issubclass(warning.category, palpate.MeshWarning)]
     found = [float(text.split("the mesh loses ")[1].split(" %")[0]) for text in texts if "the mesh loses" in text]
     return 0.01 * found[0] if found else 0.0
 
@@ -38,11 +38,11 @@ def told_loss(said) -> float:
 )
 def test_hard_shapes_fill_at_the_default_size(name, element):
     shape = getattr(surfaces, name)()
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as record:
         warnings.simplefilter("always")
         mesh = tetrahedralize_with(element, shape)
-    loss, told = 1 - mesh.volume / shape.volume, told_loss(said)
-    assert abs(loss) <= 0.01 or told == pytest.approx(loss, abs=0.001)
+    loss, stated = 1 - mesh.volume / shape.volume, told_loss(record)
+    assert abs(loss) <= 0.01 or stated == pytest.approx(loss, abs=0.001)
     assert abs(loss) <= 0.02
     # No part of the surface is missing. Chords of 4-node elements across a hole of the bracket, of 7 mm in radius, lie
     # 0.5 mm off its rim, which is 0.9 % of the size.
@@ -60,11 +60,11 @@ def test_the_closed_form_of_a_torus():
 def test_what_a_given_size_loses_is_told():
     """The size that was the default took 7 % off a torus without a word."""
     shape = surfaces.torus()
-    with pytest.warns(palpate.MeshWarning, match=r"with elements of 6.67 mm the mesh loses .* elements of") as said:
+    with pytest.warns(palpate.MeshWarning, match=r"with elements of 6.67 mm the mesh loses .* elements of") as record:
         mesh = palpate.tetrahedralize(shape, 0.1 / 15)
     loss = 1 - mesh.volume / shape.volume
     assert 0.04 < loss < 0.1
-    assert told_loss(said) == pytest.approx(loss, abs=0.0006)
+    assert told_loss(record) == pytest.approx(loss, abs=0.0006)
 
 
 def test_elements_too_large_are_called_so():

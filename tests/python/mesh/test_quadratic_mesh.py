@@ -184,6 +184,6 @@ def test_netgen_reads_and_makes_second_order(linear, curved, tmp_path):
     # In a process of its own: it would curve edges after a geometry that another test has left in this one.
     raise_order = "m = Mesh(3); m.Load('linear.vol'); m.SecondOrder(); m.Save('raised.vol')"
     subprocess.run([sys.executable, "-c", f"from netgen.meshing import Mesh; {raise_order}"], cwd=tmp_path, check=True)
-    made, ours = palpate.TetMesh.read(tmp_path / "raised.vol"), linear.to_quadratic()
-    assert made.tets.shape == ours.tets.shape
-    assert made.nodes[made.tets] == pytest.approx(ours.nodes[ours.tets], abs=1e-12)
+    mesh, ours = palpate.TetMesh.read(tmp_path / "raised.vol"), linear.to_quadratic()
+    assert mesh.tets.shape == ours.tets.shape
+    assert mesh.nodes[mesh.tets] == pytest.approx(ours.nodes[ours.tets], abs=1e-12)

@@ -63,16 +63,16 @@ def test_a_shape_that_would_flatten_elements_is_followed_as_far_as_they_allow(ba
 @pytest.mark.parametrize(("size", "cut"), [(0.0016, True), (0.0045, False)])
 def test_many_elements_are_made_of_few(monkeypatch, size, cut):
     """By NETGEN an eighth of them, unless these would be too large for the shape: a ring 20 mm thick."""
-    shape, made, run = surfaces.torus(), [], filling.Filling._run
+    shape, surface, run = surfaces.torus(), [], filling.Filling._run
 
     def counted(self, *arguments):
-        made.append(run(self, *arguments))
-        return made[-1]
+        surface.append(run(self, *arguments))
+        return surface[-1]
 
     monkeypatch.setattr(filling.Filling, "_run", counted)
     monkeypatch.setattr(filling, "MOST_BY_NETGEN", 300)
     mesh = palpate.tetrahedralize(shape, size)
-    counts = [len(tets) for _, tets in made]
+    counts = [len(tets) for _, tets in surface]
     assert (len(mesh.tets) == 8 * counts[0]) == cut
     assert (len(mesh.tets) == counts[-1]) != cut
     assert abs(Fit.of(mesh, shape).loss) < 0.04

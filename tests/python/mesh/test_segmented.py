@@ -145,10 +145,10 @@ def test_from_the_file_to_a_touch_by_one_command(tmp_path):
     labels, affine = labels_of([ball((0, 0, 0), 22), ball((0, 0, 12), 6)], (26, 26, 26), (1, 1, 2))
     write_nrrd(tmp_path / "ct.seg.nrrd", labels, affine, NAMES)
     command = ("run", "ct.seg.nrrd", "--segment", "liver", "--segment", "tumor=40kPa")
-    made = run(*command, "--headless", "0.5", cwd=tmp_path)
-    assert made.returncode == 0, made.stderr
-    assert float(made.stdout.split("largest force ")[1].split(" N")[0]) > 0.01
-    assert "'liver'" in made.stderr and "cm3 in elements" in made.stderr and "--unit" not in made.stdout
+    result = run(*command, "--headless", "0.5", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert float(result.stdout.split("largest force ")[1].split(" N")[0]) > 0.01
+    assert "'liver'" in result.stderr and "cm3 in elements" in result.stderr and "--unit" not in result.stdout
     listed = run("info", "ct.seg.nrrd", cwd=tmp_path)
     assert "'liver' (label 1): 43" in listed.stdout and "2 segments" in listed.stdout
 

@@ -52,8 +52,8 @@ def test_commands_ask_in_one_line_and_print_the_size(millimetres):
     assert asked.returncode == 2
     assert asked.stderr.count("\n") == 1 and "--unit mm" in asked.stderr
     assert not (millimetres / "out.vtu").exists()
-    made = command("mesh", "box.stl", "out.vtu", "--unit", "mm", "--max-size", "2cm", cwd=millimetres)
-    assert "80 x 50 x 50 mm" in made.stdout, made.stderr
+    result = command("mesh", "box.stl", "out.vtu", "--unit", "mm", "--max-size", "2cm", cwd=millimetres)
+    assert "80 x 50 x 50 mm" in result.stdout, result.stderr
     assert "80 x 50 x 50 mm" in command("info", "out.vtu", cwd=millimetres).stdout
     unlikely = command("info", "box.vtu", cwd=millimetres)
     assert "80 x 50 x 50 m" in unlikely.stdout and "really m?" in unlikely.stderr
@@ -77,9 +77,9 @@ def test_on_a_terminal_the_unit_is_asked_for(millimetres):
     threading.Thread(target=read_all, args=(terminal,), daemon=True).start()
     options = {"stdin": end, "stderr": end, "stdout": subprocess.PIPE, "text": True, "timeout": 280}
     arguments = ("mesh", "box.stl", "out.vtu", "--max-size", "2cm")
-    made = subprocess.run([*MAIN, *arguments], cwd=millimetres, check=False, **options)
-    assert made.returncode == 0
-    assert "80 x 50 x 50 mm" in made.stdout
+    result = subprocess.run([*MAIN, *arguments], cwd=millimetres, check=False, **options)
+    assert result.returncode == 0
+    assert "80 x 50 x 50 mm" in result.stdout
     assert palpate.TetMesh.read(millimetres / "out.vtu").volume == pytest.approx(2e-4, rel=1e-9)
 
 

@@ -54,11 +54,11 @@ def field_of(shape: trimesh.Trimesh) -> SolidField:
 def test_a_broken_surface_is_filled_without_an_option_more(tmp_path):
     surface, volume = with_a_bar()
     surface.export(tmp_path / "scan.stl")
-    made = run("run", "scan.stl", "--unit", "mm", "--headless", "0.5", cwd=tmp_path)
-    assert made.returncode == 0, made.stderr
-    assert float(made.stdout.split("largest force ")[1].split(" N")[0]) > 0.01
-    said = [line for line in made.stderr.splitlines() if "was wrapped" in line]
-    assert len(said) == 1 and "open edges" in said[0] and "% of the volume" in said[0] and "mm off" in said[0]
+    result = run("run", "scan.stl", "--unit", "mm", "--headless", "0.5", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert float(result.stdout.split("largest force ")[1].split(" N")[0]) > 0.01
+    text = [line for line in result.stderr.splitlines() if "was wrapped" in line]
+    assert len(text) == 1 and "open edges" in text[0] and "% of the volume" in text[0] and "mm off" in text[0]
     with pytest.warns(palpate.MeshWarning, match="was wrapped"):
         mesh = tetrahedralize_with("quadratic", tmp_path / "scan.stl", None, "mm")
     assert mesh.volume == pytest.approx(volume, rel=0.02)
@@ -76,9 +76,9 @@ def test_the_part_that_is_wanted_is_filled_and_the_others_are_named(tmp_path):
     away = trimesh.transformations.translation_matrix([70, 0, 0])
     scene.add_geometry(trimesh.creation.box(extents=(40, 30, 30)), node_name="kidney", transform=away)
     scene.export(tmp_path / "organs.glb")
-    with pytest.warns(palpate.MeshWarning) as said:
+    with pytest.warns(palpate.MeshWarning) as record:
         largest = palpate.tetrahedralize(tmp_path / "organs.glb", 0.01, "mm")
-    texts = [str(warning.message) for warning in said]
+    texts = [str(warning.message) for warning in record]
     assert any(np.all([word in text for word in ("part 2 of 2", "'kidney'", "--part all")]) for text in texts), texts
     assert largest.volume == pytest.approx(BALL, rel=0.03)
     with pytest.warns(palpate.MeshWarning):
@@ -159,9 +159,9 @@ def test_a_wavy_sheet_is_refused_and_closed_holes_are_noted():
         palpate.tetrahedralize(trimesh.Trimesh(points, faces, process=False), unit="m")
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     ball.update_faces(ball.triangles_center[:, 2] < 0.8 * RADIUS)
-    with pytest.warns(palpate.MeshWarning) as said:
+    with pytest.warns(palpate.MeshWarning) as record:
         palpate.tetrahedralize(ball, 0.012, "mm")
-    (note,) = [str(w.message) for w in said if "closes holes" in str(w.message)]
+    (note,) = [str(w.message) for w in record if "closes holes" in str(w.message)]
     # A tenth of the sphere is missing; the flatter wrap across it has less.
     assert 5 <= int(note.split(" %")[0].split()[-1]) <= 11
 
@@ -237,9 +237,9 @@ def test_crumbs_are_dropped_by_count_and_volume():
     text = (
         f"3 tetrahedra that share no face with the rest, {whole.volume - body.volume:.2g} m3 of 0.0002 m3, were dropped"
     )
-    with pytest.warns(palpate.MeshWarning) as said:
+    with pytest.warns(palpate.MeshWarning) as record:
         mesh = _without_crumbs("surface", whole)
-    assert text in str(said[0].message)
+    assert text in str(record[0].message)
     assert mesh.volume == pytest.approx(body.volume, rel=1e-12)
     assert len(mesh.tets) == len(body.tets)
 

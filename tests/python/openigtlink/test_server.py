@@ -67,16 +67,16 @@ def press(client, depth=0.003, seconds=20.0):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         client.send_message(pyigtl.TransformMessage(pose(depth), device_name="Tool"))
-        said = force_of(client)
-        if said["force_N"][0][2] > 0.05:
-            return said
+        result = force_of(client)
+        if result["force_N"][0][2] > 0.05:
+            return result
     raise AssertionError("no force")
 
 
 def test_a_client_moves_the_tool_and_gets_force_pose_and_contact(server, simulation):
     with client_of(server) as client:
-        said = press(client)
-        assert said["axes"] == "RAS" and said["fault"] is None and len(said["torque_Nm"]) == 1
+        force = press(client)
+        assert force["axes"] == "RAS" and force["fault"] is None and len(force["torque_Nm"]) == 1
         tip = client.wait_for_message("ToolPose", timeout=10).matrix[:3, 3]
         assert np.abs(tip - 1e3 * simulation.frame().positions[0]).max() < 0.5
         point = client.wait_for_message("Contacts", timeout=10)

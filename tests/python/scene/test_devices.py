@@ -65,7 +65,7 @@ def test_tools_that_name_none_take_the_tables_in_order(tmp_path, device, tools, 
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         (
             'device = "left"',
@@ -85,10 +85,10 @@ def test_tools_that_name_none_take_the_tables_in_order(tmp_path, device, tools, 
         ('max_force = "5N"', "orientation = [1, 1, 0, 0]", ":13: device.orientation: must be a unit quaternion"),
     ],
 )
-def test_mistakes_are_named_with_their_line(tmp_path, old, new, said):
+def test_mistakes_are_named_with_their_line(tmp_path, old, new, message):
     with pytest.raises(palpate.SceneError) as error:
         read(tmp_path, SCENE.replace(old, new))
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def test_tables_of_tools_keep_the_loop_in_the_first(tmp_path):

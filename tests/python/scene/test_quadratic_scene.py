@@ -137,9 +137,9 @@ def test_command_line_makes_and_solves_them(tmp_path):
     import trimesh
 
     trimesh.creation.icosphere(subdivisions=2, radius=40.0).export(tmp_path / "ball.stl")
-    made = run("mesh", "ball.stl", "ball.vtu", "--unit", "mm", "--max-size", "12mm", "--quadratic")
-    assert made.returncode == 0, made.stderr
-    assert "10-node tetrahedra" in made.stdout
+    result = run("mesh", "ball.stl", "ball.vtu", "--unit", "mm", "--max-size", "12mm", "--quadratic")
+    assert result.returncode == 0, result.stderr
+    assert "10-node tetrahedra" in result.stdout
     mesh = palpate.TetMesh.read(tmp_path / "ball.vtu")
     assert mesh.is_quadratic
     solve = ("--fix", "z < -2cm", "-o", "ball.palpate", "--element", "quadratic")

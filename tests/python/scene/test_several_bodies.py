@@ -93,8 +93,8 @@ def test_a_single_table_is_a_list_of_one(folder):
     listed = read(folder, SINGLE.replace("[body]", "[[body]]").replace("[tool]", "[[tool]]"))
     assert listed.model_dump() == scene.model_dump()
     tables = {"supports": scene.supports, "material": scene.material}
-    made = palpate.Scene(body=scene.bodies[0], tool=scene.tools[0], **tables)
-    assert made.model_dump() == scene.model_dump()
+    result = palpate.Scene(body=scene.bodies[0], tool=scene.tools[0], **tables)
+    assert result.model_dump() == scene.model_dump()
     (built,) = scene.build().bodies
     assert built.name == "a" and built.position == (0, 0, 0) and built.orientation == (1, 0, 0, 0)
     assert (built.body.element_materials[:, 0] == 12e3).all()

@@ -49,7 +49,7 @@ def test_a_region_of_the_mesh_file_gives_its_nodes_on_the_surface(folder, named)
 
 
 @pytest.mark.parametrize(
-    ("touch", "said"),
+    ("touch", "message"),
     [
         ('region = "z > "', r"scene.toml:7: touch.region: cannot read the predicate"),
         ("region = 3", r"scene.toml:7: touch.region: give a predicate"),
@@ -59,20 +59,20 @@ def test_a_region_of_the_mesh_file_gives_its_nodes_on_the_surface(folder, named)
         ("first = { shape = 'sphere', cente = 1 }", r"scene.toml:7: unknown key 'touch.first.cente'"),
     ],
 )
-def test_mistakes_are_told_with_their_line(folder, touch, said):
-    with pytest.raises(palpate.SceneError, match=said):
+def test_mistakes_are_told_with_their_line(folder, touch, message):
+    with pytest.raises(palpate.SceneError, match=message):
         scene(folder, f"[touch]\n{touch}")
 
 
 @pytest.mark.parametrize(
-    ("touch", "said"),
+    ("touch", "message"),
     [
         ('region = "z > 3m"', r"scene.toml:6: touch: touch: no surface node lies in 'z > 3m'"),
         ('region = "z > 3cm"\nfirst = "z < 1cm"', r"scene.toml:6: touch: first: none of its nodes may be touched"),
     ],
 )
-def test_regions_that_hold_nothing_are_told_with_their_line(folder, touch, said):
-    with pytest.raises(palpate.SceneError, match=said):
+def test_regions_that_hold_nothing_are_told_with_their_line(folder, touch, message):
+    with pytest.raises(palpate.SceneError, match=message):
         scene(folder, f"[touch]\n{touch}").build(progress=False)
 
 

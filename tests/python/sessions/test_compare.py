@@ -82,11 +82,11 @@ def test_the_command_ends_as_diff_does(file, recording, slippery, tmp_path, monk
     slippery.save(tmp_path / "slippery.mcap")
     result = command("slippery.mcap", "--out", "plots", "--json")
     assert result.returncode == 1, result
-    told = json.loads(result.stdout)
-    assert told["first"] == palpate.compare(recording, slippery).first.first and not told["same"]
+    data = json.loads(result.stdout)
+    assert data["first"] == palpate.compare(recording, slippery).first.first and not data["same"]
     assert (tmp_path / "plots" / "press-slippery.png").stat().st_size > 10_000
     table = command("slippery.mcap")
-    assert table.returncode == 1 and f"first difference: tick {told['first']}, " in table.stdout
+    assert table.returncode == 1 and f"first difference: tick {data['first']}, " in table.stdout
     same = command(file)
     assert same.returncode == 0 and "the same bits in all 300 ticks" in same.stdout
     refused(command(), "two recordings, or one and --scene")

@@ -105,10 +105,10 @@ def test_settings(messages, ours):
 
 
 def test_events(messages, ours):
-    told = messages["/events"]
-    at = [round(1000 * (event.stamp.sec + 1e-9 * event.stamp.nanosec)) for event in told]
-    assert [(tick, event.msg) for tick, event in zip(at, told, strict=True)] == list(ours.events)
-    assert [event.name for event in told] == ["palpate"]
+    result = messages["/events"]
+    at = [round(1000 * (event.stamp.sec + 1e-9 * event.stamp.nanosec)) for event in result]
+    assert [(tick, event.msg) for tick, event in zip(at, result, strict=True)] == list(ours.events)
+    assert [event.name for event in result] == ["palpate"]
 
 
 @pytest.mark.parametrize("tool", [0, 1])

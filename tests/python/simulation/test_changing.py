@@ -119,7 +119,7 @@ def test_a_moving_body_comes_in(green, tmp_path):
 
 def test_what_cannot_be_is_refused(green, tmp_path):
     with palpate.Simulation(scene_of(green)) as simulation:
-        for change, said in [
+        for change, message in [
             (lambda: simulation.remove_body(0), "needs a body"),
             (lambda: simulation.remove_tool(0), "needs a tool"),
             (lambda: simulation.remove_body(3), "there is no body 3"),
@@ -128,7 +128,7 @@ def test_what_cannot_be_is_refused(green, tmp_path):
             (lambda: simulation.place_body(0, (0, 0, float("nan"))), "finite"),
             (lambda: simulation.place_body(0, (0, 0, 0), (1, 1, 0, 0)), "unit quaternion"),
         ]:
-            with pytest.raises(palpate.Error, match=said):
+            with pytest.raises(palpate.Error, match=message):
                 change()
         for _ in range(3):
             simulation.add_tool(radius="4mm")

@@ -71,10 +71,10 @@ def test_a_hold_settles_where_newmark_does_without_a_jump(tmp_path, law, modes):
 
 @pytest.mark.parametrize("law", ["patch", "small patch"])
 def test_a_hold_settles_at_the_static_answer(tmp_path, law):
-    made = simulation(tmp_path, EXACT, LAWS[law])
-    force = made.run(fall_and_hold(0.004, 4000))[-1]
+    loop = simulation(tmp_path, EXACT, LAWS[law])
+    force = loop.run(fall_and_hold(0.004, 4000))[-1]
     radius = {"patch": 0.008, "small patch": 0.002}[law]
-    stiffness = np.column_stack([made.green.touch(TOP, unit, radius).force for unit in np.eye(3)])
+    stiffness = np.column_stack([loop.green.touch(TOP, unit, radius).force for unit in np.eye(3)])
     expected = np.linalg.solve(np.linalg.inv(stiffness) + np.eye(3) / COUPLING, [0, 0, 0.004])
     assert force == pytest.approx(expected, abs=1e-6 * np.linalg.norm(expected))
 
@@ -113,13 +113,13 @@ def test_a_press_converges_to_the_body_with_the_spring_built_in(tmp_path, dynami
     rayleigh, errors = (2.0, 5e-4), []
     for rate in (2000, 4000, 8000):
         settings = f"{dynamics}dt = {1 / rate}\nmodes = 'all'\nrayleigh = [{rayleigh[0]}, {rayleigh[1]}]\n"
-        made = simulation(tmp_path, settings, LAWS["node"], rate, cells=(4, 3, 3))
-        body = made.body
+        loop = simulation(tmp_path, settings, LAWS["node"], rate, cells=(4, 3, 3))
+        body = loop.body
         node = int(np.argmin(np.linalg.norm(body.mesh.nodes - TOP, axis=1)))
         time = np.arange(1, int(0.3 * rate) + 1) / rate
         depth = 4e-3 * np.sin(np.pi * np.minimum(time / 0.08, 0.5)) ** 2
         path = np.outer(depth, [0, 0, -1]) + np.outer(5e-4 * np.sin(40 * time) * (depth / 4e-3), [1, 0.5, 0])
-        forces = made.run(body.mesh.nodes[node] + [0, 0, RADIUS] + path)
+        forces = loop.run(body.mesh.nodes[node] + [0, 0, RADIUS] + path)
         expected = SpringAndBody(body, node, rayleigh, 1 / rate).forces(path)
         errors.append(np.abs(forces - expected).max() / np.abs(expected).max())
     assert errors[0] < error
@@ -157,7 +157,7 @@ def test_no_law_gives_out_more_than_was_put_in(tmp_path, law, dynamics, speed, s
 def test_a_tool_bound_by_a_stiff_spring_does_not_swing_itself_up(tmp_path):
     """Undamped, a tenth of a millisecond to ten of them: no step makes a lasting contact unstable."""
     for dt in ("0.2ms", "1ms", "5ms"):
-        made = simulation(tmp_path, f"{EXACT}dt = '{dt}'\nrayleigh = [0, 0]\n", LAWS["node"], cells=(4, 3, 3))
-        energy = made.play(fall_and_hold(0.003, 3000)).energy
+        loop = simulation(tmp_path, f"{EXACT}dt = '{dt}'\nrayleigh = [0, 0]\n", LAWS["node"], cells=(4, 3, 3))
+        energy = loop.play(fall_and_hold(0.003, 3000)).energy
         assert (energy.total[1000:] < 1.5 * energy.total[30:1000].max()).all()
         assert (energy.total <= energy.work * (1 + 1e-9) + 1e-15).all()

@@ -57,9 +57,9 @@ def test_a_held_press_comes_to_the_static_answer(tmp_path, weights, modes):
 
 def test_a_held_press_is_the_body_with_the_spring_built_in(tmp_path):
     """Newmark in accelerations for `K + k_c W W^T` under `k_c W d`; the spring itself is not damped."""
-    made = scene(tmp_path, "modes = 'all'\nrayleigh = [1.0, 2e-4]\n", fixed="z < 1e-6")
-    made = made.model_copy(update={"tools": [made.tools[0].model_copy(update={"contact_radius": 0.0})]})
-    simulation = palpate.Simulation(made)
+    built = scene(tmp_path, "modes = 'all'\nrayleigh = [1.0, 2e-4]\n", fixed="z < 1e-6")
+    built = built.model_copy(update={"tools": [built.tools[0].model_copy(update={"contact_radius": 0.0})]})
+    simulation = palpate.Simulation(built)
     body = simulation.body
     # Without a radius a contact carries the shape functions at the point: here of two corners of a triangle.
     nodes = [
@@ -99,8 +99,8 @@ def test_a_held_press_on_a_single_precision_store(tmp_path):
 
 
 def test_a_held_press_on_quadratic_elements_comes_to_the_static_answer(tmp_path):
-    made = scene(tmp_path, "modes = 60\n", fixed="z < 1e-6", more="element = 'quadratic'\n", cells=(6, 2, 2))
-    simulation = palpate.Simulation(made)
+    built = scene(tmp_path, "modes = 60\n", fixed="z < 1e-6", more="element = 'quadratic'\n", cells=(6, 2, 2))
+    simulation = palpate.Simulation(built)
     assert simulation.body.mesh.is_quadratic
     forces = simulation.run(approach_and_hold(0.003, 12_000))
     expected = static_force(simulation.green, np.array([0, 0, -0.003]))
@@ -138,9 +138,9 @@ def test_a_body_in_motion_sags_under_its_weight_and_moves_about_that(tmp_path):
 
 def test_a_strike_excites_each_mode_by_its_share(tmp_path):
     """After an impulse `J` on a patch `W` a mode swings as `Phi^T W J / omega sin(omega t)`, each on its own."""
-    made = scene(tmp_path, "scheme = 'exact'\nmodes = 12\nrayleigh = [0, 0]\n")
-    made = made.model_copy(update={"tools": [made.tools[0].model_copy(update={"contact_radius": 0.0})]})
-    simulation = palpate.Simulation(made)
+    built = scene(tmp_path, "scheme = 'exact'\nmodes = 12\nrayleigh = [0, 0]\n")
+    built = built.model_copy(update={"tools": [built.tools[0].model_copy(update={"contact_radius": 0.0})]})
+    simulation = palpate.Simulation(built)
     basis, nodes = simulation.motion.basis, simulation.green.surface_nodes
     struck = int(np.argmin(np.linalg.norm(simulation.body.mesh.nodes - [0.108, 0.02, 0.03], axis=1)))
     impulse, dt, tick = np.array([4e-4, -3e-4, -1e-3]), 1e-3, 20
@@ -312,9 +312,9 @@ def test_mistakes_in_the_dynamics_table(tmp_path, dynamics, message):
 
 
 def test_a_coupling_beyond_the_device_is_refused(tmp_path):
-    made = scene(tmp_path, "")
+    built = scene(tmp_path, "")
     (tmp_path / "beam.toml").write_text((tmp_path / "beam.toml").read_text().replace("500.0", "'9N/mm'"))
-    assert made.dynamics.coupling == 500
+    assert built.dynamics.coupling == 500
     with pytest.raises(
         palpate.SceneError, match=r"beam.toml:\d+: dynamics: .*coupling = 9000 N/m is stiffer than device"
     ):

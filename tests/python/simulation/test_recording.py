@@ -62,8 +62,8 @@ def test_a_run_is_saved_loaded_and_made_again(built, tmp_path):
         own = contacts[contacts["tool"] == tool]
         np.add.at(total, own["tick"], own["force"])
         assert np.abs(total + loaded.computed_forces[:, tool]).max() < 3e-5 * np.abs(total).max()
-    made = palpate.replay(loaded, built)
-    assert made.same and made.whole and made.ticks == 600
+    replayed = palpate.replay(loaded, built)
+    assert replayed.same and replayed.whole and replayed.ticks == 600
 
 
 def test_one_tool_keeps_its_shape(built, tmp_path):
@@ -107,8 +107,10 @@ def test_a_session_is_recorded_and_made_again(built, tmp_path):
     assert np.allclose(np.diff(recording.time) * 1e3, np.round(np.diff(recording.time) * 1e3), atol=1e-3)
     assert recording.compute_us.min() > 0 and (recording.limited.any() or len(recording.contacts) > 400)
     for file in (first, second):
-        made = palpate.replay(file, built)
-        assert made.same and made.whole and made.ticks > 50, [str(difference) for difference in made.differences[:3]]
+        replayed = palpate.replay(file, built)
+        assert replayed.same and replayed.whole and replayed.ticks > 50, [
+            str(difference) for difference in replayed.differences[:3]
+        ]
 
 
 def test_a_recording_asked_for_before_the_start_has_the_first_tick(built, tmp_path):
@@ -153,8 +155,8 @@ def test_a_changed_coefficient_is_found_and_named(built, scene_file, tmp_path):
     touched = int(np.flatnonzero(np.linalg.norm(recording.computed_forces, axis=2).any(axis=1))[0])
     tool = built.scene.tools[0].model_copy(update={"radius": built.scene.tools[0].radius * (1 + 1e-9)})
     changed = built.scene.model_copy(update={"tools": [tool, built.scene.tools[1]]})
-    made = palpate.replay(recording, BuiltScene(changed, built.bodies))
-    first = made.differences[0]
+    replayed = palpate.replay(recording, BuiltScene(changed, built.bodies))
+    first = replayed.differences[0]
     assert (first.of, first.quantity) == ("tool 0", "force of the contact law") and first.tick >= touched
     assert str(first).startswith(f"tick {first.tick}: tool 0: force of the contact law was ")
     # Another body is not compared at all.
@@ -173,8 +175,8 @@ def test_what_is_no_recording_is_refused(built, tmp_path):
     cut = palpate.Recording.load(tmp_path / "cut.mcap")
     assert cut.dropped is None and 100 < len(cut.ticks) < 600
     assert np.array_equal(cut.forces, recording.forces[: len(cut.ticks)])
-    made = palpate.replay(cut, built)
-    assert made.same and not made.whole and made.ticks == len(cut.ticks)
+    replayed = palpate.replay(cut, built)
+    assert replayed.same and not replayed.whole and replayed.ticks == len(cut.ticks)
 
 
 def unchanged(recording: palpate.Recording, whole: palpate.Recording) -> bool:

@@ -92,8 +92,8 @@ def test_a_line_tells_what_a_thing_is(built, block, block_green):
     assert f"{frame.time:.3f} s, 1 contact, forces on the devices [" in repr(frame)
     assert repr(frame.contacts[0]).startswith("Contact(tool 0, press, ")
     answer = block_green.solve(forces={int(block_green.touchable_nodes[-1]): (0.1, 0, 0)})
-    told = [block, block_green, touch, built.scene, recording, simulation, frame, frame.contacts[0], answer, mesh]
-    assert all("\n" not in repr(thing) and len(repr(thing)) < 250 for thing in told)
+    things = [block, block_green, touch, built.scene, recording, simulation, frame, frame.contacts[0], answer, mesh]
+    assert all("\n" not in repr(thing) and len(repr(thing)) < 250 for thing in things)
 
 
 def test_a_loop_that_does_not_run_is_a_fault_of_the_simulation_not_of_the_scene(built):

@@ -49,14 +49,14 @@ def test_the_thread_keeps_to_its_processors(block, block_green, by):
 
 @linux
 def test_a_priority_is_granted_or_warned_of(block, block_green):
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as record:
         warnings.simplefilter("always")
         with palpate.Simulation(scene_of(block, block_green, priority=7)):
             thread = int(thread_status("palpate-servo")["id"])
             granted = os.sched_getscheduler(thread) == os.SCHED_FIFO
             if granted:
                 assert os.sched_getparam(thread).sched_priority == 7
-    texts = [str(one.message) for one in said if one.category is palpate.SchedulingWarning]
+    texts = [str(one.message) for one in record if one.category is palpate.SchedulingWarning]
     assert len(texts) == (0 if granted else 1)
     assert granted or ("device.priority = 7" in texts[0] and "palpate doctor" in texts[0])
 
@@ -108,9 +108,9 @@ def test_what_the_machine_does_not_have_is_refused_by_its_key(block, block_green
 def test_a_mistake_in_the_file_has_its_line(tmp_path, text, words):
     path = tmp_path / "scene.toml"
     path.write_text(f'[body]\nmodel = "beam"\n[device]\n{text}\n')
-    with pytest.raises(palpate.SceneError, match=words) as said:
+    with pytest.raises(palpate.SceneError, match=words) as error:
         palpate.Scene.read(path)
-    assert "scene.toml:4" in str(said.value)
+    assert "scene.toml:4" in str(error.value)
 
 
 def test_ranges_are_those_of_the_kernel():

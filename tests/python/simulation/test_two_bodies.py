@@ -40,7 +40,7 @@ TURNED = unit(0.7, 0.45, -0.45, -0.25)
 def blocks(tmp_path_factory) -> list[tuple[palpate.Body, palpate.GreensFunction]]:
     """Two blocks of other sizes, meshes and materials."""
     folder = tmp_path_factory.mktemp("green")
-    made = (
+    result = (
         palpate.Body(box_mesh((6, 4, 4)), material=palpate.Material(10e3, 0.4), fixed=lambda p: p[:, 2] < 1e-9),
         palpate.Body(
             box_mesh((5, 4, 3), size=(0.06, 0.055, TOPS[1]), seed=3).to_quadratic(),
@@ -48,7 +48,7 @@ def blocks(tmp_path_factory) -> list[tuple[palpate.Body, palpate.GreensFunction]
             fixed=lambda p: p[:, 2] < 1e-9,
         ),
     )
-    return [(b, palpate.precompute(b, precision="f64", path=folder / f"{i}.palpate")) for i, b in enumerate(made)]
+    return [(b, palpate.precompute(b, precision="f64", path=folder / f"{i}.palpate")) for i, b in enumerate(result)]
 
 
 class Placed:

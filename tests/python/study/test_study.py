@@ -166,7 +166,7 @@ press.0.point = ["60mm", "25mm", "50mm"]
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (
             "[grid]\nmaterial.poissons_ratio = [0.3, 0.5]\n",
@@ -186,8 +186,8 @@ press.0.point = ["60mm", "25mm", "50mm"]
         (f"[grid]\nmaterial.density = {list(range(1, 10_002))}\n", r"10001 bodies; a study takes at most"),
     ],
 )
-def test_mistakes_are_told_with_their_line(text, said, folder):
-    with pytest.raises(palpate.Error, match=said) as error:
+def test_mistakes_are_told_with_their_line(text, message, folder):
+    with pytest.raises(palpate.Error, match=message) as error:
         Study.read(written(folder, BASE + text))
     assert "\n" not in str(error.value)
 

@@ -87,8 +87,8 @@ def input_deck(mesh, forces, boundary) -> str:
 def solved_by_calculix(deck: str, nodes: int, folder) -> tuple[np.ndarray, np.ndarray]:
     """Displacements and `K u` of all nodes."""
     (folder / "body.inp").write_text(deck)
-    made = subprocess.run(["ccx", "body"], cwd=folder, capture_output=True, text=True, timeout=280)
-    assert "*ERROR" not in made.stdout, made.stdout
+    result = subprocess.run(["ccx", "body"], cwd=folder, capture_output=True, text=True, timeout=280)
+    assert "*ERROR" not in result.stdout, result.stdout
     blocks = {"displacements": np.full((nodes, 3), np.nan), "forces": np.full((nodes, 3), np.nan)}
     table = None
     for line in (folder / "body.dat").read_text().splitlines():

@@ -156,9 +156,9 @@ def test_of_a_large_body_the_surface_alone_is_followed(sheet, monkeypatch):
             strain = session.simulation.strain_measure.largest(pushed)
         finally:
             session.close()
-    told = header["bodies"][0]
-    assert told["tets"] == len(arrays["0/tets"]) == 0 and not last["interior"][0]
-    assert {field["name"] for field in told["fields"]}.isdisjoint({"von_mises", "principal_stress"})
+    result = header["bodies"][0]
+    assert result["tets"] == len(arrays["0/tets"]) == 0 and not last["interior"][0]
+    assert {field["name"] for field in result["fields"]}.isdisjoint({"von_mises", "principal_stress"})
     faces = np.searchsorted(green.surface_nodes, green.surface_faces)
     assert strain == SurfaceStrain(green.surface_positions, faces).largest(pushed) > 1e-3
     exact = palpate.StressRecovery(body).recover(pushed)

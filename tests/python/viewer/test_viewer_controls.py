@@ -82,8 +82,8 @@ def test_a_number_is_typed_and_a_double_click_brings_the_default(page):
 )
 def test_what_is_no_stiffness_is_told(page, typed, why):
     fill(page, "stiffness", typed)
-    told = page.locator("#notices").get_by_text(f"Material stiffness{':' if 'not' in why else ''}")
-    told.filter(has_text=why).wait_for()
+    notice = page.locator("#notices").get_by_text(f"Material stiffness{':' if 'not' in why else ''}")
+    notice.filter(has_text=why).wait_for()
     page.locator("#reset").click()
     shows(page, "stiffness", "8.00 kPa")
 

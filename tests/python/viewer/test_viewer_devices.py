@@ -34,9 +34,9 @@ def test_a_device_is_shown_and_its_fault_told(block, block_green):
         device = {"kind": "haply", "address": address, "position": (0.025, 0.025, 0.056)}
         tools = [{"radius": "6mm"}, {"radius": "6mm"}]
         scene = palpate.Scene(body={"model": "beam"}, tool=tools, device=device)
-        with warnings.catch_warnings(record=True, action="always") as told:
+        with warnings.catch_warnings(record=True, action="always") as record:
             asyncio.run(session(BuiltScene.of(scene, block, block_green), process))
-    limited = [str(one.message) for one in told if issubclass(one.category, palpate.DeviceWarning)]
+    limited = [str(one.message) for one in record if issubclass(one.category, palpate.DeviceWarning)]
     holds = "tool 0: Haply Inverse3 0A01 holds contacts up to 800 N/m in this scene, which asks for 5000"
     assert [line.rpartition(": ")[0] for line in limited] == [holds]
 

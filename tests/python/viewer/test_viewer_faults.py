@@ -59,9 +59,9 @@ def test_a_fault_is_told_with_its_reason_and_cleared_by_a_reset(built):
             # Beyond the checks of the server, as a driver would.
             core = server._session.simulation._core
             core.set_target(0, ((float("nan"), 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)), (0.0, 0.0, 0.0), True, False)
-            told, _ = await client.frame_where(lambda header: header["fault"] is not None)
-            assert told["fault"].startswith("tool 0: the device reported a position that is not finite")
-            assert told["tools"][0]["force"] == [0, 0, 0]
+            message, _ = await client.frame_where(lambda header: header["fault"] is not None)
+            assert message["fault"].startswith("tool 0: the device reported a position that is not finite")
+            assert message["tools"][0]["force"] == [0, 0, 0]
             core.set_target(0, ((0.2, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)), (0.0, 0.0, 0.0), True, False)
             await client.say(type="reset")
             await client.frame_where(lambda header: header["fault"] is None)

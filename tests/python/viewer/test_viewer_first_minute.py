@@ -177,9 +177,9 @@ def test_every_number_has_a_label_and_a_unit(chromium, program):
     with opened(chromium, program) as page:
         press(page, 2)
         readouts = page.evaluate(READOUTS)
-        told = {readout["label"].strip(): readout["unit"].strip() for readout in readouts}
-        assert told.pop("Ticks") == "" and told.pop("Missed deadlines") == ""
-        assert told == {
+        result = {readout["label"].strip(): readout["unit"].strip() for readout in readouts}
+        assert result.pop("Ticks") == "" and result.pop("Missed deadlines") == ""
+        assert result == {
             "Force": "N",
             "Felt stiffness": "N/mm",
             "Depth": "mm",

@@ -46,20 +46,20 @@ def test_the_page_is_told_what_is_ready_and_what_it_paints_comes_next(scene):
 
     async def run():
         async with serving(built, growing=growing) as server, page(server) as client:
-            told, _ = await client.receive("computed")
-            entry = told["bodies"][0]
+            message, _ = await client.receive("computed")
+            entry = message["bodies"][0]
             assert np.isin(first, nodes_of(entry["ready"])).all() and entry["columns"] == 3 * len(positions)
             corner = (positions < [0.02, 0.02, 1.0]).all(axis=1) & (positions[:, 2] > 0.055)
             mask = base64.b64encode(np.packbits(corner, bitorder="little").tobytes()).decode()
             await client.say(type="paint", body=0, first=0, nodes=mask)
             wanted = np.flatnonzero(corner)
             while entry["ready"] is not None and not np.isin(wanted, nodes_of(entry["ready"])).all():
-                told, _ = await client.receive("computed")
-                entry = told["bodies"][0]
+                message, _ = await client.receive("computed")
+                entry = message["bodies"][0]
                 assert entry["stopped"] is None
             while entry["ready"] is not None:
-                told, _ = await client.receive("computed")
-                entry = told["bodies"][0]
+                message, _ = await client.receive("computed")
+                entry = message["bodies"][0]
             assert entry["done"] == entry["columns"] and entry["waiting"] is None
             # The loop has taken the store: the corner far from what came first can be pressed.
             await client.say(type="press", tool=0, position=[0.01, 0.01, SIDE + 0.02], grab=False)

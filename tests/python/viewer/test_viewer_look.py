@@ -86,8 +86,8 @@ def test_a_screenshot_carries_force_legend_and_scale(page, tmp_path):
     # What is written stands out as on the page itself.
     for selector in ("#force-value", "#legend-name", "#legend-max", "#legend-size", "#depth-value", "#scale"):
         on_page = pixels(page.locator(selector).screenshot())
-        told = [np.ptp(picture.reshape(-1, 3), axis=0).max() for picture in (part(shot, page, selector), on_page)]
-        assert told[0] > 100 and told[0] == pytest.approx(told[1], rel=0.3), selector
+        spreads = [np.ptp(picture.reshape(-1, 3), axis=0).max() for picture in (part(shot, page, selector), on_page)]
+        assert spreads[0] > 100 and spreads[0] == pytest.approx(spreads[1], rel=0.3), selector
     # The bar is as long as it says.
     bar = part(shot, page, "#scale")[-8]
     dark = np.flatnonzero(np.abs(bar - bar[-1]).max(axis=1) > 60)

@@ -40,15 +40,15 @@ def test_a_body_in_motion_is_struck_slowed_and_shown_by_modes(moving):
     async def session():
         async with serving(moving) as server, page(server) as client, page(server) as watcher:
             scene, arrays = await client.receive("scene")
-            told = scene["motion"]
-            assert told["frequencies"] == pytest.approx(moving.bodies[0].motion.basis.frequencies[:20].tolist())
-            assert scene["bodies"][0]["youngs_modulus"] is None and told["youngs_modulus"] == pytest.approx(10e3)
-            assert 0 < told["impulse"] < told["max_impulse"]
+            result = scene["motion"]
+            assert result["frequencies"] == pytest.approx(moving.bodies[0].motion.basis.frequencies[:20].tolist())
+            assert scene["bodies"][0]["youngs_modulus"] is None and result["youngs_modulus"] == pytest.approx(10e3)
+            assert 0 < result["impulse"] < result["max_impulse"]
             assert not arrays["0/free"].any()
             await client.say(type="set", time_scale=0.25)
             settings, _ = await watcher.receive("settings")
             assert settings["time_scale"] == 0.25
-            await client.say(type="strike", point=TOP, impulse=[0, 0, -told["impulse"]])
+            await client.say(type="strike", point=TOP, impulse=[0, 0, -result["impulse"]])
             _, arrays = await watcher.frame_where(lambda h: h["motion"]["struck_at"] is not None and h["strain"] > 1e-3)
             header, arrays = await client.frame_where(lambda h: h["motion"]["struck_at"] is not None)
             top = np.argmin(np.linalg.norm(moving.bodies[0].green.surface_positions - TOP, axis=1))

@@ -70,8 +70,8 @@ def test_the_size_of_the_body_is_told(page):
     sides = np.ptp(palpate.models.load("liver", paper=True).nodes, axis=0)
     text = page.get_by_test_id("legend-size").inner_text()
     assert text.startswith("Body of ") and text.endswith(" mm")
-    told = [float(number) for number in text.removeprefix("Body of ").removesuffix(" mm").split(" × ")]
-    assert told == pytest.approx(1e3 * sides, rel=6e-4)
+    result = [float(number) for number in text.removeprefix("Body of ").removesuffix(" mm").split(" × ")]
+    assert result == pytest.approx(1e3 * sides, rel=6e-4)
 
 
 RADIUS = 10e-3  # of the liver's tools

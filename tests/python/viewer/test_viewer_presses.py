@@ -29,8 +29,8 @@ def test_a_sliding_contact_is_told(block, block_green):
 
     async def session():
         async with serving(built) as server, page(server) as client:
-            told, _ = await client.receive("scene")
-            (tool,) = told["tools"]
+            message, _ = await client.receive("scene")
+            (tool,) = message["tools"]
             assert (tool["contact"], tool["friction"], tool["shape"]) == ("local", 0.2, "sphere")
             assert {"name": "sphere", "title": "Sphere"} in tool["shapes"]
 

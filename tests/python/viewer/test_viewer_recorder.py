@@ -44,15 +44,15 @@ def test_another_tool_ends_the_recording_and_says_so(built, tmp_path):
             error, _ = await client.receive("error")
             assert "already" in error["text"]
             await client.say(type="shape", tool=0, name="punch")
-            told, _ = await watcher.receive("recorded")
-            assert told["error"] is None and "another now" in told["reason"]
-            assert told["dropped"] == 0 and told["ticks"] > 50
+            message, _ = await watcher.receive("recorded")
+            assert message["error"] is None and "another now" in message["reason"]
+            assert message["dropped"] == 0 and message["ticks"] > 50
             await client.frame_where(lambda h: h["recording"] is None)
-            return told
+            return message
 
-    told = asyncio.run(session())
-    made = replayed(told["path"], built)
-    assert made.same and made.whole and made.ticks == told["ticks"]
+    message = asyncio.run(session())
+    result = replayed(message["path"], built)
+    assert result.same and result.whole and result.ticks == message["ticks"]
 
 
 def test_a_recording_that_fails_is_told_and_the_loop_goes_on(built, tmp_path):
@@ -62,20 +62,20 @@ def test_a_recording_that_fails_is_told_and_the_loop_goes_on(built, tmp_path):
         async with serving(built, recordings=tmp_path) as server, page(server) as client:
             await client.receive("scene")
             await client.say(type="record", on=True)
-            told, _ = await client.receive("recorded")
-            assert told["error"] is not None and told["reason"] is None
+            message, _ = await client.receive("recorded")
+            assert message["error"] is not None and message["reason"] is None
             header, _ = await client.frame_where(lambda h: h["recording"] is None)
             await client.frame_where(lambda h: h["ticks"] > header["ticks"] + 10)
-            return told
+            return message
 
     # No file may grow beyond this, as on a disk that is full.
     resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, before[1]))
     try:
-        told = asyncio.run(session())
+        message = asyncio.run(session())
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    made = replayed(told["path"], built)
-    assert made.same and not made.whole and made.ticks > 10
+    result = replayed(message["path"], built)
+    assert result.same and not result.whole and result.ticks > 10
 
 
 def test_what_the_command_line_records_is_told_and_ends_with_the_server(built, tmp_path):

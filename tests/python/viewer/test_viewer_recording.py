@@ -29,9 +29,9 @@ def recorded(chromium, cache, tmp_path_factory):
         until(page, lambda s: s["contacts"] == 0 and s["recording"]["size"] > 0)
         page.get_by_test_id("recording-stop").click()
         until(page, lambda s: s["recording"] is None)
-        told = eventually(page, page.get_by_test_id("recorded").inner_text, lambda text: "Recorded" in text)
+        result = eventually(page, page.get_by_test_id("recorded").inner_text, lambda text: "Recorded" in text)
         (path,) = folder.iterdir()
-        assert str(path) in told and f"palpate replay {path}" in told
+        assert str(path) in result and f"palpate replay {path}" in result
         page.get_by_label("Dismiss this message").last.click()
 
         # A folder that is gone stands for any that cannot be written.

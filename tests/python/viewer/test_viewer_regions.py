@@ -33,9 +33,9 @@ def built(tmp_path_factory) -> BuiltScene:
 
 def test_every_tetrahedron_is_told_its_region_and_that_its_material(built):
     header, arrays = messages.decode(Session(built).scene_message())
-    told = header["bodies"][0]["regions"]
-    assert [region["title"] for region in told] == ["Region 2", "Sphere", "Region 7"]
-    assert [region["youngs_modulus"] for region in told] == [10e3, 80e3, 10e3]
+    regions = header["bodies"][0]["regions"]
+    assert [region["title"] for region in regions] == ["Region 2", "Sphere", "Region 7"]
+    assert [region["youngs_modulus"] for region in regions] == [10e3, 80e3, 10e3]
     centres = arrays["0/nodes"][arrays["0/tets"]].mean(axis=1)
     in_ball = np.linalg.norm(centres - [0.04, 0.025, 0.025], axis=1) < 0.012
     expected = np.where(in_ball, 1, np.where(centres[:, 2] > 0.03, 2, 0))

@@ -17,16 +17,16 @@ export class DropZone {
       setup.open(files);
     };
     this.listen();
-    store.subscribe(["setup"], ({ setup: told }) => {
-      if (!told) return;
+    store.subscribe(["setup"], ({ setup: setupState }) => {
+      if (!setupState) return;
       // A dialog knows the last ending only: that of .nii.gz is .gz.
-      this.input.accept = told.endings.map((ending) => ending.slice(ending.lastIndexOf("."))).join();
-      const kinds = told.endings.map((ending) => ending.slice(1).toUpperCase()).join(", ");
-      setText(byId("empty-kinds"), `${kinds}; up to ${(told.limit / 1e6).toFixed(0)} MB`);
+      this.input.accept = setupState.endings.map((ending) => ending.slice(ending.lastIndexOf("."))).join();
+      const kinds = setupState.endings.map((ending) => ending.slice(1).toUpperCase()).join(", ");
+      setText(byId("empty-kinds"), `${kinds}; up to ${(setupState.limit / 1e6).toFixed(0)} MB`);
     });
     store.subscribe(["setup", "status", "role", "connection"], (state) => {
-      const { setup: told, status } = state;
-      byId("empty").hidden = !told?.editing || told.body !== null || Boolean(status?.text);
+      const { setup: setupState, status } = state;
+      byId("empty").hidden = !setupState?.editing || setupState.body !== null || Boolean(status?.text);
       byId<HTMLButtonElement>("file-choose").disabled = !inControl(state);
     });
   }

@@ -70,8 +70,8 @@ export class HistoryLog {
   }
 
   private dropOld(): void {
-    const kept = ROWS_MAX / 2;
-    for (const column of this.columns) column.copyWithin(0, ROWS_MAX - kept);
-    this.count = kept;
+    const remaining = ROWS_MAX / 2;
+    for (const column of this.columns) column.copyWithin(0, ROWS_MAX - remaining);
+    this.count = remaining;
   }
 }

@@ -46,8 +46,8 @@ export class LogWindow {
   }
 
   private dropOld(): void {
-    const kept = ROWS_MAX / 2;
-    for (const column of [this.time, this.force, this.compute]) column.copyWithin(0, ROWS_MAX - kept);
-    this.count = kept;
+    const remaining = ROWS_MAX / 2;
+    for (const column of [this.time, this.force, this.compute]) column.copyWithin(0, ROWS_MAX - remaining);
+    this.count = remaining;
   }
 }

@@ -13,7 +13,7 @@ const STILL_MS = 700;
 export class Spoken {
   private force = 0;
   private sinceMs = 0;
-  private told = true;
+  private announced = true;
 
   constructor(store: Store) {
     store.subscribe(["frame"], (state) => this.follow(state));
@@ -28,10 +28,10 @@ export class Spoken {
     if (Math.abs(force - this.force) > STILL * this.force) {
       this.force = force;
       this.sinceMs = nowMs;
-      this.told = false;
+      this.announced = false;
     }
-    if (this.told || nowMs - this.sinceMs < STILL_MS) return;
-    this.told = true;
+    if (this.announced || nowMs - this.sinceMs < STILL_MS) return;
+    this.announced = true;
     setText(byId("spoken"), sentence(state, tool, force));
   }
 }

@@ -25,9 +25,9 @@ export function themeColor(property: `--${string}`): string {
 export function followTheme(store: Store, control: Control): void {
   const light = window.matchMedia("(prefers-color-scheme: light)");
   const system = (): Theme => (light.matches ? "light" : "dark");
-  const kept = readStored(KEY);
-  let chosen = kept === "dark" || kept === "light";
-  control.chooseTheme(kept === "dark" || kept === "light" ? kept : system());
+  const stored = readStored(KEY);
+  let chosen = stored === "dark" || stored === "light";
+  control.chooseTheme(stored === "dark" || stored === "light" ? stored : system());
   light.addEventListener("change", () => {
     if (!chosen) control.chooseTheme(system());
   });

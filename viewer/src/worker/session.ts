@@ -208,7 +208,7 @@ export class WorkerSession {
     const header = {
       type: "frame",
       frame: this.frame,
-      ...this.told(tick),
+      ...this.recordedFields(tick),
       strain: Math.max(...pictures.map(({ strain }) => strain)),
       bodies: pictures.map(({ strain }) => ({ strain })),
       motion: this.motion,
@@ -229,7 +229,7 @@ export class WorkerSession {
     this.replies.message(encodeArrays(header, arrays));
   }
 
-  private told(tick: Tick): Omit<Tick, "recorded" | "body_time"> {
+  private recordedFields(tick: Tick): Omit<Tick, "recorded" | "body_time"> {
     const { time, tools, contacts, compute_us, wakeup_us, ticks, missed_deadlines, fault, realtime } = tick;
     return { time, tools, contacts, compute_us, wakeup_us, ticks, missed_deadlines, fault, realtime };
   }
@@ -277,15 +277,15 @@ const NEEDS_SERVER: Record<string, string> = {
 function thinned(numbers: number[], columns: number, peaks: number | null): Float32Array {
   const rows = numbers.length / columns;
   const stride = Math.max(Math.ceil(rows / LOG_SENT), 1);
-  const kept: number[] = [];
+  const reduced: number[] = [];
   for (let row = 0; row < rows; row += stride) {
     const group = Array.from({ length: Math.min(stride, rows - row) }, (_, k) => (row + k) * columns);
     for (let column = 0; column < columns; column++) {
       const values = group.map((at) => numbers[at + column]!);
-      kept.push(column === peaks ? Math.max(...values) : values[0]!);
+      reduced.push(column === peaks ? Math.max(...values) : values[0]!);
     }
   }
-  return Float32Array.from(kept);
+  return Float32Array.from(reduced);
 }
 
 /** v turned by a quaternion w x y z. */

@@ -32,20 +32,20 @@ pub fn store_file(name: &str) -> PathBuf {
     path
 }
 
-pub fn said() -> String {
+pub fn error_text() -> String {
     // SAFETY: a text of this thread.
     unsafe { CStr::from_ptr(palpate_last_error()) }.to_str().expect("UTF-8").to_string()
 }
 
 #[track_caller]
 pub fn done(status: Status) {
-    assert_eq!(status, Status::PalpateOk, "{}", said());
+    assert_eq!(status, Status::PalpateOk, "{}", error_text());
 }
 
 #[track_caller]
 pub fn refused(status: Status, wanted: Status, words: &str) {
     assert_eq!(status, wanted);
-    assert!(said().contains(words), "{}", said());
+    assert!(error_text().contains(words), "{}", error_text());
 }
 
 pub fn load(path: &std::path::Path) -> *mut Store {

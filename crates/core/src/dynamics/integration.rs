@@ -104,8 +104,8 @@ mod tests {
     fn held_forces_of_a_contact_keep_energy_or_lose_it_whatever_its_stiffness() {
         for spring in [1e4, 1e6, 1e8, 1e10] {
             for modes in [&MIXED[..], &MIXED[..1]] {
-                let kept = tied(held(0.5), modes, spring);
-                assert!(kept.iter().all(|energy| (energy / kept[0] - 1.0).abs() < 1e-8), "{spring:e}");
+                let energies = tied(held(0.5), modes, spring);
+                assert!(energies.iter().all(|energy| (energy / energies[0] - 1.0).abs() < 1e-8), "{spring:e}");
                 let lost = tied(held(0.6), modes, spring);
                 assert!(lost.windows(2).all(|pair| pair[1] <= pair[0] * (1.0 + 1e-12)), "{spring:e}");
                 assert!(lost[2999] < 0.95 * lost[0], "{spring:e}");

@@ -67,13 +67,13 @@ pub fn sums_keeping_heads(
     at: u64,
     length: usize,
     heads: &ColumnHeads,
-    mut kept: &mut [u8],
+    mut head_bytes: &mut [u8],
 ) -> Result<Vec<[u8; SUM]>> {
     let mut pieces = Vec::with_capacity(block_count(length));
     for start in (0..length).step_by(BLOCK) {
         let end = length.min(start + BLOCK);
-        let (piece, rest) = std::mem::take(&mut kept).split_at_mut(heads.before(end) - heads.before(start));
-        kept = rest;
+        let (piece, rest) = std::mem::take(&mut head_bytes).split_at_mut(heads.before(end) - heads.before(start));
+        head_bytes = rest;
         pieces.push((end - start, piece));
     }
     each(pieces, |block, (count, piece): (usize, &mut [u8])| {
@@ -107,14 +107,14 @@ mod tests {
         let bytes: Vec<u8> = (0..70).collect();
         let expected: Vec<u8> = bytes.chunks(7).flat_map(|column| &column[..3]).copied().collect();
         for block in [1, 2, 5, 9, 64, 70] {
-            let mut kept = Vec::new();
+            let mut head_bytes = Vec::new();
             for start in (0..70).step_by(block) {
                 let end = 70.min(start + block);
                 let mut piece = vec![0; heads.before(end) - heads.before(start)];
                 heads.copy(start, &bytes[start..end], &mut piece);
-                kept.extend(piece);
+                head_bytes.extend(piece);
             }
-            assert_eq!(kept, expected, "blocks of {block}");
+            assert_eq!(head_bytes, expected, "blocks of {block}");
         }
     }
 }

@@ -119,8 +119,8 @@ fn blocks(size: usize, boundary: usize) -> impl Iterator<Item = (usize, usize)> 
 /// Numbers of a front, and of its update.
 pub fn front_numbers(size: usize, boundary: usize) -> (usize, usize) {
     let numbers = |from: usize| -> usize {
-        let kept = blocks(size, boundary).filter(|&(first, _)| first >= from);
-        kept.map(|(first, width)| buffer_numbers(width * (size + boundary - first))).sum()
+        let panels = blocks(size, boundary).filter(|&(first, _)| first >= from);
+        panels.map(|(first, width)| buffer_numbers(width * (size + boundary - first))).sum()
     };
     (numbers(0), numbers(size))
 }

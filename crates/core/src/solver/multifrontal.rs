@@ -99,9 +99,9 @@ impl Schedule {
         &self,
         structure: &SymbolicSupernodalCholesky<usize>,
         threads: usize,
-        kept: &dyn Fn(usize) -> usize,
+        result_numbers: &dyn Fn(usize) -> usize,
     ) -> usize {
-        let mut account = MemoryCount { schedule: self, structure, kept, held: 0, peak: 0 };
+        let mut account = MemoryCount { schedule: self, structure, result_numbers, held: 0, peak: 0 };
         for unit in &self.units {
             let before = account.held;
             let mut tops = Vec::new();
@@ -143,7 +143,7 @@ impl Schedule {
             columns,
             buffers: Buffers::new(self.largest_front(structure)),
             updates: (0..self.parents.len()).map(|_| Mutex::new(None)).collect(),
-            kept: (0..self.parents.len()).map(|_| Mutex::new(None)).collect(),
+            results: (0..self.parents.len()).map(|_| Mutex::new(None)).collect(),
             keep,
         };
         let mut places = vec![0; structure.supernode_end().last().copied().unwrap_or(0)];
@@ -158,7 +158,7 @@ impl Schedule {
             }
         }
         let missing = || Error::Invalid("a supernode was left out of the factorisation".into());
-        run.kept.into_iter().map(|kept| kept.into_inner().ok().flatten().ok_or_else(missing)).collect()
+        run.results.into_iter().map(|results| results.into_inner().ok().flatten().ok_or_else(missing)).collect()
     }
 }
 
@@ -169,7 +169,7 @@ struct Run<'a, PreviousRanks> {
     columns: &'a dyn Columns,
     buffers: Buffers,
     updates: Vec<Mutex<Option<Update>>>,
-    kept: Vec<Mutex<Option<PreviousRanks>>>,
+    results: Vec<Mutex<Option<PreviousRanks>>>,
     keep: &'a (dyn Fn(&Eliminated) -> PreviousRanks + Sync),
 }
 
@@ -181,7 +181,7 @@ impl<PreviousRanks> Run<'_, PreviousRanks> {
             if self.schedule.parents[s] != NONE {
                 put(&self.updates[s], update);
             }
-            put(&self.kept[s], (self.keep)(&eliminated));
+            put(&self.results[s], (self.keep)(&eliminated));
             eliminated.recycle(&self.buffers);
         }
         Ok(())
@@ -226,7 +226,7 @@ fn not_positive() -> Error {
 struct MemoryCount<'a> {
     schedule: &'a Schedule,
     structure: &'a SymbolicSupernodalCholesky<usize>,
-    kept: &'a dyn Fn(usize) -> usize,
+    result_numbers: &'a dyn Fn(usize) -> usize,
     held: usize,
     peak: usize,
 }
@@ -240,9 +240,9 @@ impl MemoryCount<'_> {
         let (front, update) = numbers(s);
         let children: usize = self.schedule.children[s].iter().map(|&child| numbers(child as usize).1).sum();
         let update = if self.schedule.parents[s] == NONE { 0 } else { update };
-        let kept = (self.kept)(s);
+        let result_numbers = (self.result_numbers)(s);
         self.peak = self.peak.max(self.held + front);
-        self.held = self.held - children + kept;
+        self.held = self.held - children + result_numbers;
         self.peak = self.peak.max(self.held + front);
         self.held += update;
     }

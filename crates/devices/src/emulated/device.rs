@@ -135,9 +135,9 @@ mod tests {
         Mechanics { mass: 0.1, damping: 0.5, dry_friction: 0.0, encoder_step: 1e-5, delay: 0.0 };
 
     fn tick(device: &mut EmulatedDevice, tick: u64, force: DVec3) -> Reading {
-        let said = device.read(1_000_000 * tick, 1e-3).expect("an emulated device has no faults");
+        let reading = device.read(1_000_000 * tick, 1e-3).expect("an emulated device has no faults");
         device.write(Wrench { force, ..Wrench::default() }).expect("an emulated device has no faults");
-        said
+        reading
     }
 
     #[test]

@@ -83,8 +83,8 @@ fn traits(dhd: Dhd, id: Id) -> Traits {
         (limits.max_torque, limits.max_angular_damping) = (0.0, 0.0);
     }
     limits.max_force = dhd.max_force(id).map_or(limits.max_force, |set| limits.max_force.min(set));
-    let said = dhd.system_name(id);
-    let name = if said.is_empty() { name.to_owned() } else { said };
+    let system_name = dhd.system_name(id);
+    let name = if system_name.is_empty() { name.to_owned() } else { system_name };
     let name = format!("Force Dimension {name}");
     Traits { system_type, serial: dhd.serial(id), name, limits, has_wrist, has_active_wrist }
 }

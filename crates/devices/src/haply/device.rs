@@ -68,9 +68,9 @@ impl Device for Haply {
 
     fn read(&mut self, _now_ns: u64, period: f64) -> Result<Reading, DeviceFault> {
         self.hold_ns = hold_ns(self.least_hold_ns, period);
-        let said = self.latest();
-        self.fault = said.err();
-        said
+        let reading = self.latest();
+        self.fault = reading.err();
+        reading
     }
 
     /// The arm has no motors for torques.

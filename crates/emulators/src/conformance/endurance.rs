@@ -122,14 +122,14 @@ impl CircularPath {
         bench.set_tip(Tip::at(offset));
         remember(&mut self.places, self.facts.middle + offset, self.facts.late_ticks);
         let asked = Instant::now();
-        let (said, written) = self.spring.tick(device, now_ns);
+        let (reading, written) = self.spring.tick(device, now_ns);
         self.costs.push(asked.elapsed().as_secs_f64());
         // Two ticks that far apart are the machine's doing, and the driver is right to say so.
-        if said == Err(DeviceFault::Stale) && gap > self.facts.stale_after.as_secs_f64() {
+        if reading == Err(DeviceFault::Stale) && gap > self.facts.stale_after.as_secs_f64() {
             self.spring.fault = None;
             return Ok((self.costs.len() == self.ticks).then(|| self.figures()));
         }
-        let reading = said.map_err(|fault| format!("tick {tick}: a fault of a device that is well: {fault}"))?;
+        let reading = reading.map_err(|fault| format!("tick {tick}: a fault of a device that is well: {fault}"))?;
         if let Some(fault) = self.spring.fault {
             return Err(format!("tick {tick}: a fault of a device that is well: {fault}"));
         }
@@ -145,7 +145,7 @@ impl CircularPath {
 
     fn compare(&mut self, reading: &Reading, motors: DVec3, suspended: bool) -> CheckResult {
         let (place, tolerance) = (reading.pose.position, self.facts.position_tolerance);
-        if !self.places.iter().any(|told| (*told - place).length() <= tolerance) {
+        if !self.places.iter().any(|known| (*known - place).length() <= tolerance) {
             return Err(format!("the position is {place}, none of {:?} within {tolerance}", self.places));
         }
         let tolerance = self.facts.force_tolerance + STIFFNESS * self.facts.position_tolerance;

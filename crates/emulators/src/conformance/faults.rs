@@ -50,8 +50,8 @@ fn without_force<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance) -> Result
             Instant::now()
         });
         let asked_after = began.elapsed().as_secs_f64();
-        let (said, _) = spring.tick(device, now_ns);
-        if said.is_ok_and(|reading| !reading.pose.is_finite()) {
+        let (reading, _) = spring.tick(device, now_ns);
+        if reading.is_ok_and(|reading| !reading.pose.is_finite()) {
             return ControlFlow::Break(Err("a position that is no number was told as if it were one".to_owned()));
         }
         let Some(fault) = spring.fault else {
@@ -82,13 +82,13 @@ fn recovers<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
             bench.disturb(None);
             Instant::now()
         });
-        let (said, _) = spring.tick(device, now_ns);
-        good = if said.is_ok() { good + 1 } else { 0 };
+        let (reading, _) = spring.tick(device, now_ns);
+        good = if reading.is_ok() { good + 1 } else { 0 };
         let force = bench.motors().force;
         if good > 2 * facts.late_ticks && force.length() > facts.force_tolerance {
             return ControlFlow::Break(Err(format!("{force} N before the reset")));
         }
-        match said {
+        match reading {
             // A device that is back stays back.
             Ok(_) if good > 20 => ControlFlow::Break(Ok(())),
             Err(fault) if began.elapsed() > facts.recovers_within => {

@@ -228,8 +228,8 @@ impl Device for Driver {
 impl Drop for Driver {
     fn drop(&mut self) {
         let mut hardware = locked(&self.hardware);
-        let kept = matches!(hardware.flaw, Some(Flaw::ForceAfterClosing));
-        hardware.wrench = if kept { Wrench { force: DVec3::Z, torque: DVec3::ZERO } } else { Wrench::default() };
-        hardware.at = Instant::now() + if kept { Duration::from_secs(1) } else { Duration::ZERO };
+        let lingers = matches!(hardware.flaw, Some(Flaw::ForceAfterClosing));
+        hardware.wrench = if lingers { Wrench { force: DVec3::Z, torque: DVec3::ZERO } } else { Wrench::default() };
+        hardware.at = Instant::now() + if lingers { Duration::from_secs(1) } else { Duration::ZERO };
     }
 }

@@ -162,8 +162,8 @@ impl<B: Bench> Rig<B> {
             if let Some(act) = act.take() {
                 act(bench);
             }
-            let (said, written) = spring.tick(device, now_ns);
-            match (said, spring.fault) {
+            let (reading, written) = spring.tick(device, now_ns);
+            match (reading, spring.fault) {
                 (Ok(reading), None) => Ok(Observation { reading, written, motors: bench.motors() }),
                 (Err(fault), _) | (_, Some(fault)) => Err(format!("a fault of a device that is well: {fault}")),
             }

@@ -24,8 +24,8 @@ impl Spring {
 
     /// One tick: reads, answers, writes. What was read, and what was written.
     pub fn tick(&mut self, device: &mut dyn Device, now_ns: u64) -> (Result<Reading, DeviceFault>, Wrench) {
-        let said = device.read(now_ns, 1e-3);
-        let wrench = match said {
+        let reading = device.read(now_ns, 1e-3);
+        let wrench = match reading {
             Ok(reading) if self.fault.is_none() => {
                 let force = STIFFNESS * (self.anchor - reading.pose.position);
                 Wrench { force, torque: DVec3::ZERO }
@@ -39,6 +39,6 @@ impl Spring {
         if let Err(fault) = device.write(wrench) {
             self.fault.get_or_insert(fault);
         }
-        (said, wrench)
+        (reading, wrench)
     }
 }

@@ -40,8 +40,8 @@ fn pushes_back<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
 /// Writes a wrench until the motors must have it.
 pub fn write_and_settle<B: Bench>(rig: &mut Rig<B>, wrench: Wrench) -> Result<Wrench, String> {
     rig.after(rig.facts.late_ticks, move |bench, device, now_ns| {
-        let said = device.read(now_ns, PERIOD.as_secs_f64());
-        match said.and(device.write(wrench)) {
+        let reading = device.read(now_ns, PERIOD.as_secs_f64());
+        match reading.and(device.write(wrench)) {
             Ok(()) => Ok(bench.motors()),
             Err(fault) => Err(format!("{wrench:?} is answered by a fault: {fault}")),
         }

@@ -45,9 +45,9 @@ struct Loop {
 
 impl Loop {
     fn tick(&mut self, device: &mut dyn Device) {
-        let said = device.read(0, 1e-3);
+        let reading = device.read(0, 1e-3);
         self.released = self.released.saturating_sub(1);
-        if said.is_err() {
+        if reading.is_err() {
             self.faults.push(Instant::now());
             self.released = RESET;
         }

@@ -48,9 +48,9 @@ fn a_service_that_speaks_nonsense_is_told_to_take_the_force_off() {
     let began = Instant::now();
     while !service.is_finished() {
         assert!(began.elapsed() < Duration::from_secs(4), "the driver keeps the connection");
-        let said = device.read(0, 1e-3);
+        let reading = device.read(0, 1e-3);
         let _ = device
-            .write(Wrench { force: if said.is_ok() { 2.0 * DVec3::Z } else { DVec3::ZERO }, ..Wrench::default() });
+            .write(Wrench { force: if reading.is_ok() { 2.0 * DVec3::Z } else { DVec3::ZERO }, ..Wrench::default() });
         std::thread::sleep(Duration::from_millis(1));
     }
     let forces = service.join().expect("the service");

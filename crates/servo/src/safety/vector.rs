@@ -42,8 +42,8 @@ impl LimitedVector {
     /// What passes of `target`, finite: changed by at most `max_change` beyond what is released.
     pub fn pass(&mut self, target: DVec3, max_change: f64) -> DVec3 {
         let squared = self.previous.length_squared();
-        let kept = if squared > 0.0 { (self.previous.dot(target) / squared).clamp(0.0, 1.0) } else { 0.0 };
-        let released = self.previous * kept;
+        let share = if squared > 0.0 { (self.previous.dot(target) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        let released = self.previous * share;
         let change = target - released;
         let distance = change.length();
         self.previous = if distance <= max_change { target } else { released + change * (max_change / distance) };

@@ -121,13 +121,13 @@ fn count(mut force_loop: ForceLoop, mut handle: LoopHandle) -> BTreeMap<&'static
         }
         let start = allocations();
         force_loop.tick(tick * PERIOD_NS, PERIOD);
-        let made = allocations() - start;
+        let allocated = allocations() - start;
         let published = handle.latest();
         let recording =
             [0, 60].into_iter().filter(|at| tick % RECORDED == *at).map(|at| RECORDING[usize::from(at > 0)]);
         for kind in kinds(tick, &before, published).into_iter().chain(recording) {
             let (ticks, sum) = counts.entry(kind).or_insert((0, 0));
-            (*ticks, *sum) = (*ticks + 1, *sum + made);
+            (*ticks, *sum) = (*ticks + 1, *sum + allocated);
         }
         before = contacts(&published.state);
         assert_eq!(records.as_mut().is_some_and(|ring| ring.pop().is_ok()), tick % RECORDED < 60);
@@ -151,8 +151,8 @@ fn an_emulated_device_does_not_allocate() {
         let (mut handle, mut device) = emulated("emulated", tip, DeviceLimits::UNLIMITED);
         let start = allocations();
         for tick in 0..3000 {
-            let said = device.read(tick * PERIOD_NS, PERIOD).expect("an emulated device has no faults");
-            let force = -300.0 * said.pose.position.min(DVec3::ZERO);
+            let reading = device.read(tick * PERIOD_NS, PERIOD).expect("an emulated device has no faults");
+            let force = -300.0 * reading.pose.position.min(DVec3::ZERO);
             device.write(Wrench { force, ..Wrench::default() }).expect("an emulated device has no faults");
             handle.set(Command { target: (tick > 2000).then_some(DVec3::Y), ..Command::default() });
             handle.true_motion();

@@ -188,8 +188,8 @@ fn a_full_ring_drops_and_counts() {
     (0..5000).for_each(|tick| force_loop.tick(tick * PERIOD_NS, PERIOD));
     let progress = handle.latest().status.recording;
     assert_eq!((progress.ticks, progress.dropped), (4999, 4999 - 4096));
-    let kept = std::iter::from_fn(|| ring.pop().ok()).map(|record| record.tick).collect::<Vec<_>>();
-    assert_eq!(kept, (0..4096).collect::<Vec<_>>());
+    let ticks = std::iter::from_fn(|| ring.pop().ok()).map(|record| record.tick).collect::<Vec<_>>();
+    assert_eq!(ticks, (0..4096).collect::<Vec<_>>());
     handle.end_recording();
     force_loop.tick(5001 * PERIOD_NS, PERIOD);
     assert!(!handle.latest().status.recording.records && ring.pop().is_err());

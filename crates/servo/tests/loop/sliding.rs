@@ -28,17 +28,17 @@ fn run(moving: bool, shapes: [ToolShape; 2]) -> (Vec<[Wrench; 2]>, [u64; 2], u64
     let model = sliding(moving, shapes);
     let (mut force_loop, mut handle) =
         ForceLoop::new(model, vec![of_tool(0), of_tool(1)], limits, settings).expect("a valid loop");
-    let (mut wrenches, mut touching, mut made) = (Vec::new(), [0; 2], 0);
+    let (mut wrenches, mut touching, mut allocated) = (Vec::new(), [0; 2], 0);
     for tick in 0..TICKS {
         let start = allocations();
         force_loop.tick(tick * PERIOD_NS, PERIOD);
-        made += allocations() - start;
+        allocated += allocations() - start;
         let published = handle.latest();
         assert_eq!(published.status.fault, None);
         wrenches.push([0, 1].map(|tool| published.status.wrenches[tool]));
         published.state.contacts.iter().for_each(|(contact, _)| touching[contact.tool] += 1);
     }
-    (wrenches, touching, made)
+    (wrenches, touching, allocated)
 }
 
 #[test]
@@ -50,8 +50,8 @@ fn sliding_ticks_never_allocate_and_repeat_to_the_bit() {
         ToolShape::capsule(0.005, 0.005).expect("a capsule"),
     ];
     for (moving, shape) in [false, true].into_iter().flat_map(|moving| second.iter().map(move |s| (moving, s))) {
-        let (wrenches, touching, made) = run(moving, [sphere(), shape.clone()]);
-        assert_eq!(made, 0, "ticks allocate");
+        let (wrenches, touching, allocated) = run(moving, [sphere(), shape.clone()]);
+        assert_eq!(allocated, 0, "ticks allocate");
         assert!(touching.iter().all(|&ticks| (200..TICKS).contains(&ticks)), "{touching:?}");
         let pushed = wrenches.iter().map(|of_tick| of_tick[0].force.z).fold(0.0, f64::max);
         assert!(pushed > 0.01, "{pushed}");
@@ -81,9 +81,9 @@ fn a_tick_is_the_same_with_fresh_memory() {
         };
         ticks.map(of_tick).collect()
     };
-    let kept = wrenches(false);
-    assert!(kept.iter().any(|wrench| wrench.force.z > 1e-3));
-    assert!(kept == wrenches(true), "other bits");
+    let fresh = wrenches(false);
+    assert!(fresh.iter().any(|wrench| wrench.force.z > 1e-3));
+    assert!(fresh == wrenches(true), "other bits");
 }
 
 /// Sixteen are the most that a tick may take, eight where a tool takes pressure cells.

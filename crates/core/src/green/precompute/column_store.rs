@@ -119,8 +119,8 @@ impl ColumnStore {
         let parts = if begun.len() <= blocks.len() && blocks.iter().zip(&begun).all(same) {
             Arc::clone(&store.parts)
         } else {
-            let kept = begun.iter().map(Vec::len).sum();
-            Arc::new(store.parts.with_blocks_first(&begun).with_stages(kept, stages))
+            let prefix = begun.iter().map(Vec::len).sum();
+            Arc::new(store.parts.with_blocks_first(&begun).with_stages(prefix, stages))
         };
         store.arrange(parts)?;
         store.previous.resumed = store.done();

@@ -45,8 +45,8 @@ impl AssembledProblem {
     }
 
     /// The same with the columns behind the first `kept` in other stages of nodes ([`Layout::arrange`]).
-    pub fn with_stages(&self, kept: usize, stages: &[Vec<u32>]) -> Self {
-        self.changed(|layout| layout.arrange(kept, stages, &self.stiffness, &self.supports))
+    pub fn with_stages(&self, prefix: usize, stages: &[Vec<u32>]) -> Self {
+        self.changed(|layout| layout.arrange(prefix, stages, &self.stiffness, &self.supports))
     }
 
     /// The same with blocks of these rows first ([`Layout::put_blocks_first`]).

@@ -58,10 +58,10 @@ impl Growth<'_> {
                 continue;
             }
             let parts = &columns.parts;
-            let kept = store.begun();
-            let waiting = parts.layout.waiting_nodes(kept);
+            let prefix = store.begun();
+            let waiting = parts.layout.waiting_nodes(prefix);
             let stages = around(&positions(problem), &waiting, &painted, problem.touch.len() - waiting.len());
-            store.arrange(Arc::new(parts.with_stages(kept, &stages)))?;
+            store.arrange(Arc::new(parts.with_stages(prefix, &stages)))?;
             columns.arrange(Arc::clone(store.parts()));
         }
         Ok(())

@@ -87,14 +87,14 @@ impl Layout {
 
     /// Keeps the first `kept` places, which end where a block does, and solves the other columns by stages of nodes (ranks
     /// among the surface nodes), each of which stands in one of them.
-    pub fn arrange(&mut self, kept: usize, nodes: &[Vec<u32>], stiffness: &SymmetricCsc, supports: &Supports) {
-        let until = |part: &Range<usize>| part.start.min(kept)..part.end.min(kept);
+    pub fn arrange(&mut self, prefix: usize, nodes: &[Vec<u32>], stiffness: &SymmetricCsc, supports: &Supports) {
+        let until = |part: &Range<usize>| part.start.min(prefix)..part.end.min(prefix);
         for stage in &mut self.stages {
             *stage = Stage { supports: until(&stage.supports), forces: until(&stage.forces) };
         }
         let mut stage_of_row = vec![NONE; self.row_dofs.len()];
         // The remaining columns of partly solved nodes come first.
-        let cut: Vec<u32> = (0..kept).map(|place| self.row(place) as u32 / 3).collect();
+        let cut: Vec<u32> = (0..prefix).map(|place| self.row(place) as u32 / 3).collect();
         let first = std::iter::once((0, &cut));
         for (stage, nodes) in nodes.iter().enumerate().chain(first) {
             for row in nodes.iter().flat_map(|&node| [3 * node, 3 * node + 1, 3 * node + 2]) {
@@ -102,8 +102,8 @@ impl Layout {
             }
         }
         let stage_of_rank = |rank: u32| stage_of_row[self.row_of_rank[rank as usize] as usize];
-        self.ranks[kept..].sort_unstable_by_key(|&rank| (stage_of_rank(rank), rank));
-        let mut first = kept;
+        self.ranks[prefix..].sort_unstable_by_key(|&rank| (stage_of_rank(rank), rank));
+        let mut first = prefix;
         while first < self.columns {
             let stage = stage_of_rank(self.ranks[first]);
             let behind = &self.ranks[first..];

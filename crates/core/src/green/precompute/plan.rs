@@ -180,9 +180,9 @@ impl Sizes {
             let size = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
             (size, supernodes.supernode(s).pattern().len())
         };
-        let kept = |s: usize| computed * operator_numbers(sizes(s).0, sizes(s).1);
-        let fronts = schedule.peak_bytes(supernodes, threads, &kept);
-        let whole: usize = (0..supernodes.n_supernodes()).map(kept).sum();
+        let result_numbers = |s: usize| computed * operator_numbers(sizes(s).0, sizes(s).1);
+        let fronts = schedule.peak_bytes(supernodes, threads, &result_numbers);
+        let whole: usize = (0..supernodes.n_supernodes()).map(result_numbers).sum();
         // The loads of some columns, the columns, residual and correction; and the same in the sweep, with its entries.
         let columns = probe::SOLVED * dofs * (4 * 8 + 16 + computed);
         let patch = computed * scratch_numbers(tree, probe::WIDTH);

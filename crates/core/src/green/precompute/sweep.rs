@@ -68,8 +68,8 @@ impl<C: Number> Scratch<C> {
     }
 
     /// The first `width` columns of a kept row.
-    pub fn row(&self, kept: u32, width: usize) -> &[C] {
-        &self.x[kept as usize * self.stride..][..width]
+    pub fn row(&self, tree_row: u32, width: usize) -> &[C] {
+        &self.x[tree_row as usize * self.stride..][..width]
     }
 }
 

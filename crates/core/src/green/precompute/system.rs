@@ -35,8 +35,8 @@ impl System<'_> {
         let mut sums = vec![0.0; block.width];
         for rank in self.layout.panel_rows(block).into_iter().flatten() {
             let dof = self.layout.row_dofs[self.layout.row_of_rank[rank] as usize];
-            if let Some(kept) = self.layout.tree_row(tree, self.supports, dof) {
-                panel.extend(scratch.row(kept, block.width).iter().map(|value| T::from_f64(value.to_f64())));
+            if let Some(tree_row) = self.layout.tree_row(tree, self.supports, dof) {
+                panel.extend(scratch.row(tree_row, block.width).iter().map(|value| T::from_f64(value.to_f64())));
             } else {
                 self.reactions(tree, dof, block, scratch, &mut sums);
                 panel.extend(sums.iter().map(|&sum| T::from_f64(sum)));
@@ -48,8 +48,8 @@ impl System<'_> {
     fn reactions<C: Number>(&self, tree: &Tree, dof: u32, block: &Block, scratch: &Scratch<C>, sums: &mut [f64]) {
         sums.fill(0.0);
         for (other, stiffness) in self.stiffness.column(dof as usize) {
-            if let Some(kept) = self.layout.tree_row(tree, self.supports, other) {
-                let values = scratch.row(kept, block.width);
+            if let Some(tree_row) = self.layout.tree_row(tree, self.supports, other) {
+                let values = scratch.row(tree_row, block.width);
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += stiffness * value.to_f64());
                 continue;
             }

@@ -67,9 +67,9 @@ class HiddenBall:
         for x in np.arange(max(low[0], -reach), reach, 0.5):
             for y in np.arange(max(low[1], -reach), reach, 0.5):
                 parameters.RestrictH(x, y, 0, UNDER)
-        made = geometry.GenerateMesh(mp=parameters)
-        nodes = np.array([point.p for point in made.Points()]) * MM
-        elements = made.Elements3D().NumPy()
+        volume_mesh = geometry.GenerateMesh(mp=parameters)
+        nodes = np.array([point.p for point in volume_mesh.Points()]) * MM
+        elements = volume_mesh.Elements3D().NumPy()
         tets = elements["nodes"][:, [0, 2, 1, 3]].astype(np.int64) - 1
         return TetMesh(nodes, tets, elements["index"].astype(np.int64) - 1).to_quadratic()
 
