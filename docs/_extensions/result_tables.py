@@ -1,0 +1,123 @@
+"""Sphinx extension: tables of measured figures, from the JSON that `scripts/record_results.py` writes into docs/_results.
+
+The directive ``results`` names a file and, for ``verify``, the benchmarks to show. Each table ends with its command, date, commit and
+machine.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from datetime import date
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from docutils.parsers.rst import Directive
+from docutils.statemachine import StringList
+from sphinx.application import Sphinx
+from tables import table
+
+Rows = Sequence[dict[str, Any]]
+
+
+def verify(record: dict[str, Any], names: Sequence[str]) -> str:
+    """Return figures beside their targets; names of benchmarks choose among them."""
+    known = {row["benchmark"] for row in record["rows"]}
+    if missing := set(names) - known:
+        raise ValueError(f"verify.json has no benchmark {', '.join(sorted(missing))}")
+    rows = [row for row in record["rows"] if not names or row["benchmark"] in names]
+    lines = []
+    for name, group in groupby(rows, lambda row: row["benchmark"]):
+        for rank, row in enumerate(worst_of_kind(group)):
+            lines.append((f"`{name}`" if rank == 0 else "", row["quantity"], *figures(row)))
+    return table(("benchmark", "figure", "computed", "target", "error", "tolerance"), lines)
+
+
+def worst_of_kind(rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Of figures that should be zero and differ in their case alone (``case: figure``), only the worst."""
+    kinds: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        case, colon, kind = row["quantity"].rpartition(": ")
+        alike = bool(colon) and row["target"] == 0
+        kinds.setdefault(kind if alike else row["quantity"] + str(row["target"]), []).append(row)
+    for kind, alike in kinds.items():
+        worst = max(alike, key=lambda row: row["error"])
+        yield worst if len(alike) == 1 else worst | {"quantity": f"{kind}, worst of {len(alike)} cases"}
+
+
+def figures(row: dict[str, Any]) -> tuple[str, str, str, str]:
+    """Cells of one figure: computed, target, error, tolerance."""
+    unit = f" {row['unit']}" if row["unit"] else ""
+    exact = row["target"] == 0
+    error = "" if exact else f"{100 * row['error']:.2g} %"
+    bound = row["tolerance"]
+    tolerance = "shown" if bound is None else f"{bound:g}" if exact else f"{100 * bound:.2g} %"
+    if row["verdict"] == "FAIL":
+        tolerance += ", **missed**"
+    return f"{row['computed']:.4g}{unit}", f"{row['target']:.4g}{unit}", error, tolerance
+
+
+def elements(record: dict[str, Any], _: Sequence[str]) -> str:
+    """Return errors of a patch by element, size and Poisson's ratio."""
+    ratios = list(record["rows"][0]["errors"])
+    head = ("body", "nodes an element", "nodes", "time", "store", *(f"error, nu = {ratio}" for ratio in ratios))
+    lines = [
+        (
+            *(row["body"], str(row["element_nodes"]), str(row["nodes"])),
+            *(f"{row['precompute_cpu_s']:.2f} s", f"{row['store_bytes'] / 1e6:.1f} MB"),
+            *(f"{100 * row['errors'][ratio]:+.1f} %" for ratio in ratios),
+        )
+        for row in record["rows"]
+    ]
+    return table(head, lines)
+
+
+MAKERS: dict[str, Callable[[dict[str, Any], Sequence[str]], str]] = {"verify": verify, "elements": elements}
+
+
+def origin(record: dict[str, Any]) -> str:
+    """Return the sentence below a table: where its figures are from."""
+    day = date.fromisoformat(record["date"])
+    machine = record["machine"]
+    return (
+        f"`{record['command']}`, {day.day} {day:%B %Y}, commit `{record['commit']}`, "
+        f"{machine['cpus']} processors ({machine['processor']}, kernel {machine['kernel']})."
+    )
+
+
+def markdown(folder: Path, name: str, chosen: Sequence[str]) -> str:
+    """Return a table with its origin."""
+    path = folder / f"{name}.json"
+    if name not in MAKERS or not path.exists():
+        raise ValueError(f"docs/_results has no table '{name}'")
+    record = json.loads(path.read_text())
+    return f"{MAKERS[name](record, chosen)}\n{origin(record)}\n"
+
+
+class ResultsDirective(Directive):
+    """Write the table of a file of results."""
+
+    required_arguments = 1
+    optional_arguments = 100
+
+    def run(self) -> list[nodes.Node]:
+        """Make the table; an unknown file or benchmark is an error of the build."""
+        env = self.state.document.settings.env
+        name, *chosen = self.arguments
+        folder = Path(env.srcdir) / "_results"
+        env.note_dependency(str(folder / f"{name}.json"))
+        try:
+            text = markdown(folder, name, chosen)
+        except ValueError as error:
+            raise self.error(str(error)) from None
+        node = nodes.container()
+        self.state.nested_parse(StringList(text.splitlines(), source=name), self.content_offset, node)
+        return node.children
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directive."""
+    app.add_directive("results", ResultsDirective)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
