@@ -1,7 +1,7 @@
-"""Sphinx extension: tables of measured figures, from the JSON that `scripts/record_results.py` writes into docs/_results.
+"""Sphinx extension: tables of measured figures, from the JSON that `scripts/record_results.py` writes.
 
-The directive ``results`` names a file and, for ``verify``, the benchmarks to show. Each table ends with its command, date, commit and
-machine.
+The directive ``results`` names a file of docs/_results and, for ``verify``, the benchmarks to show. Below each table
+stand its command, date, commit and machine.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def worst_of_kind(rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """Of figures that should be zero and differ in their case alone (``case: figure``), only the worst."""
     kinds: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
-        case, colon, kind = row["quantity"].rpartition(": ")
+        _, colon, kind = row["quantity"].rpartition(": ")
         alike = bool(colon) and row["target"] == 0
         kinds.setdefault(kind if alike else row["quantity"] + str(row["target"]), []).append(row)
     for kind, alike in kinds.items():
@@ -74,7 +74,38 @@ def elements(record: dict[str, Any], _: Sequence[str]) -> str:
     return table(head, lines)
 
 
-MAKERS: dict[str, Callable[[dict[str, Any], Sequence[str]], str]] = {"verify": verify, "elements": elements}
+def contact(record: dict[str, Any], _: Sequence[str]) -> str:
+    """Return mean forces over those of the direct solution, and half their range over the places."""
+    head = ("", *(f"{1e3 * depth:g} mm deep" for depth in record["depths"]))
+    lines = [("direct solution", *(f"{1e3 * force:.1f} mN" for force in record["truth"]))]
+    for row, ratios in zip(record["rows"], record["ratios"], strict=True):
+        # A place a row, a depth a column.
+        columns = list(zip(*row["forces"], strict=True))
+        spreads = [(max(forces) - min(forces)) / 2 / (sum(forces) / len(forces)) for forces in columns]
+        cells = [f"{ratio:.2f} ± {100 * spread:.2g} %" for ratio, spread in zip(ratios, spreads, strict=True)]
+        lines.append((f"{row['method']} ({row['mesh']})", *cells))
+    return table(head, lines)
+
+
+def scale(record: dict[str, Any], _: Sequence[str]) -> str:
+    """Return seconds of each stage on the wall, of all processors, and memory, by size."""
+    rows = record["rows"]
+    lines = [("nodes", *(str(row["nodes"]) for row in rows))]
+    for stage in rows[0]["seconds"]:
+        pairs = ((row["seconds"][stage], row["cpu_seconds"][stage]) for row in rows)
+        lines.append((stage, *(f"{wall:.3g}; {cpu:.3g}" for wall, cpu in pairs)))
+    lines.append(("peak memory of the precomputation, MB", *(f"{row['peak'] / 1e6:.0f}" for row in rows)))
+    lines.append(("store, MB", *(f"{row['store'] / 1e6:.1f}" for row in rows)))
+    lines.append(("tick, median, us", *(f"{1e6 * row['tick_median']:.1f}" for row in rows)))
+    return table(("", *(f"{row['tetrahedra']} tetrahedra" for row in rows)), lines)
+
+
+MAKERS: dict[str, Callable[[dict[str, Any], Sequence[str]], str]] = {
+    "verify": verify,
+    "elements": elements,
+    "contact": contact,
+    "scale": scale,
+}
 
 
 def origin(record: dict[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """Sphinx extension: the page of a tutorial's scene, inside the tutorial.
 
-The directive ``scene`` names a file of docs/_scenes without its ending. All scenes that are named share one static site in the
-folder ``touch`` of the build, with one WebAssembly program.
+The directive ``scene`` names a file of docs/_scenes without its ending. All scenes share one static site in the folder
+``touch`` of the build, with one WebAssembly program.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sphinx.application import Sphinx
 
 FOLDER = "touch"
 PRECISION = "f16"
-FRAME = '<iframe src="{address}" title="{title}" loading="lazy" style="width:100%;height:460px;border:1px solid #8888"></iframe>'
+STYLE = "width:100%;height:460px;border:1px solid #8888"
 
 
 class SceneDirective(Directive):
@@ -32,7 +32,7 @@ class SceneDirective(Directive):
         up = "../" * env.docname.count("/")
         address = posixpath.join(up + FOLDER, f"index.html?scene={name}")
         link = f'<p><a href="{address}">Open it in a window of its own</a>.</p>'
-        frame = FRAME.format(address=address, title=f"Palpate: {name}")
+        frame = f'<iframe src="{address}" title="Palpate: {name}" loading="lazy" style="{STYLE}"></iframe>'
         return [nodes.raw("", f"{frame}\n{link}", format="html")]
 
 
