@@ -110,14 +110,15 @@ lint: $(VENV)/.installed
 	$(BIN)/python scripts/check_words.py
 
 # The site, docs/_build/html/index.html: the reference is generated from the program, the tutorials are run, warnings are
-# errors. Nothing is taken from the network once the packages are there. `make docs NOTEBOOKS=cache` runs changed tutorials only.
+# errors; scenes inside tutorials are the page and its program. Nothing is taken from the network once the packages are there.
+# `make docs NOTEBOOKS=cache` runs changed tutorials only.
 NOTEBOOKS ?= force
 $(VENV)/.docs: $(VENV)/.installed pyproject.toml
 	$(BIN)/python -c 'from importlib.metadata import requires; print(*[r.split(";")[0] for r in requires("palpate") if "docs" in r], sep="\n")' \
 		| $(BIN)/python -m pip install --quiet --disable-pip-version-check -r /dev/stdin
 	@touch $@
 
-docs: $(VENV)/.docs
+docs: $(VENV)/.docs $(PAGE) $(WEB)
 	$(BIN)/python -m sphinx -b html -q -W --keep-going -j auto -D nb_execution_mode=$(NOTEBOOKS) docs docs/_build/html
 
 clean:

@@ -12,8 +12,8 @@ project_copyright = "the Palpate authors"
 release = version = version_of("palpate")
 language = "en-GB"
 
-extensions = ["generated_reference", "myst_nb", "numpydoc", "sphinx.ext.autodoc"]
-exclude_patterns = ["_build", "_extensions"]
+extensions = ["generated_reference", "result_tables", "scene_sites", "myst_nb", "numpydoc", "sphinx.ext.autodoc"]
+exclude_patterns = ["_build", "_extensions", "_results", "_scenes"]
 
 # Links to headings of other pages, such as accuracy.md#which-element.
 myst_heading_anchors = 4

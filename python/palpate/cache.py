@@ -101,7 +101,7 @@ def _description(file: Path, leftover: bool) -> str:
     if _WRITTEN.search(file.name):
         return "being written"
     if file.name.endswith(".partial"):
-        return "interrupted; the same computation goes on from here"
+        return "interrupted; the same computation continues from here"
     if file.suffix != ".palpate":
         return "mesh of a benchmark"
     if file.name.endswith(".felt.palpate"):

@@ -217,7 +217,7 @@ def failure(future: Future) -> Exception:
     error = future.exception()
     if isinstance(error, KilledWorker):
         return ClusterError(
-            "a task has brought down several workers in turn, probably for want of memory: give them more, or fewer "
+            "several workers ended during the same task, probably because memory ran out: give them more, or fewer "
             "threads, or --memory"
         )
     if isinstance(error, ImportError):
@@ -264,7 +264,9 @@ def require_version(found: str | None, address: str) -> None:
 
 
 def _connection_lost_error() -> ClusterError:
-    return ClusterError("the scheduler is lost; what was finished is kept, and the same command goes on from there")
+    return ClusterError(
+        "the connection to the scheduler is lost; finished blocks are kept, and the same command continues from there"
+    )
 
 
 @contextlib.contextmanager

@@ -108,7 +108,9 @@ def test_a_scheduler_that_is_killed_loses_nothing(body, undisturbed, tmp_path_fa
             if done >= total // 2:
                 scheduler.kill()
 
-        with pytest.raises(palpate.ClusterError, match="the scheduler is lost; what was finished is kept"):
+        with pytest.raises(
+            palpate.ClusterError, match="the connection to the scheduler is lost; finished blocks are kept"
+        ):
             palpate.precompute(body, path=path, dask=address, progress=kill)
     assert os.listdir(tmp_path) == ["a.palpate.partial"]
     assert_finished_here(body, path, undisturbed, begun[-1])
@@ -120,7 +122,7 @@ def test_a_lost_connection_is_not_taken_for_a_full_disk(workers, body, tmp_path,
         client.sync(distributed.comm.connect, "tcp://127.0.0.1:1", timeout=0.2)
 
     monkeypatch.setattr(sys.modules["palpate.green.precompute"], "precompute_on", lose)
-    with pytest.raises(palpate.ClusterError, match="the scheduler is lost; what was finished is kept"):
+    with pytest.raises(palpate.ClusterError, match="the connection to the scheduler is lost; finished blocks are kept"):
         palpate.precompute(body, path=tmp_path / "a.palpate", dask=workers.scheduler_address)
 
 

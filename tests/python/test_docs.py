@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import re
 import subprocess
 import sys
@@ -20,7 +21,9 @@ sys.path.insert(0, str(ROOT / "docs" / "_extensions"))
 import c_pages  # noqa: E402
 import command_pages  # noqa: E402
 import python_pages  # noqa: E402
+import result_tables  # noqa: E402
 import scene_pages  # noqa: E402
+import scene_sites  # noqa: E402
 
 # Names of files and of modules in other languages that look alike.
 FILES = {"palpate.wasm", "palpate.h", "palpate.pc"}
@@ -127,3 +130,44 @@ def test_names_of_the_package_on_a_page_exist(page):
             if path in FILES:
                 break
             thing = getattr(thing, part, None) or importlib.import_module(path)
+
+
+RESULTS = ROOT / "docs" / "_results"
+
+
+def test_a_name_without_a_docstring_is_refused(monkeypatch):
+    def silent() -> None:
+        pass
+
+    monkeypatch.setattr(palpate, "silent", silent, raising=False)
+    with pytest.raises(SystemExit, match=r"palpate\.silent has no docstring"):
+        python_pages.directive("palpate.silent")
+    monkeypatch.setattr(palpate, "__all__", [*palpate.__all__, "silent"])
+    with pytest.raises(SystemExit, match="no chapter for silent"):
+        python_pages.page()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_tables_of_results_and_scenes_of_a_page_exist(page):
+    for name, *chosen in map(str.split, re.findall(r"^```\{results\} (.*)$", page.read_text(), re.MULTILINE)):
+        assert result_tables.markdown(RESULTS, name, chosen).count("|") > 20
+    for name in re.findall(r"^```\{scene\} (.*)$", page.read_text(), re.MULTILINE):
+        palpate.Scene.read(scene_sites.scene_files(ROOT / "docs")[name])
+
+
+def test_a_table_of_results_has_its_figures_machine_and_commit(tmp_path):
+    row = {"benchmark": "tip", "unit": "mm", "source": "", "tolerance": 0.01, "verdict": "FAIL", "error": 0.02}
+    rows = [row | {"quantity": "tip", "computed": 4.08, "target": 4.0}]
+    for case, error in (("left", 0.1), ("right", 0.3)):
+        rows.append(row | {"quantity": f"{case}: gap", "computed": error, "target": 0.0, "error": error})
+    record = {"command": "palpate verify", "date": "2026-11-24", "commit": "abc123", "rows": rows}
+    record["machine"] = {"processor": "fast", "cpus": 2, "kernel": "6.1"}
+    (tmp_path / "verify.json").write_text(json.dumps(record))
+    text = result_tables.markdown(tmp_path, "verify", ["tip"])
+    assert "| `tip` | tip | 4.08 mm | 4 mm | 2 % | 1 %, **missed** |" in text
+    # Cases of one figure that should be zero are one row, with the worst of them.
+    assert "|  | gap, worst of 2 cases | 0.3 mm | 0 mm |" in text and "left" not in text
+    assert "24 November 2026, commit `abc123`, 2 processors (fast, kernel 6.1)" in text
+    for wrong in (("verify", ["top"]), ("nothing", [])):
+        with pytest.raises(ValueError, match="has no"):
+            result_tables.markdown(tmp_path, *wrong)

@@ -36,10 +36,10 @@ export const TILT_MAX = 90;
 export const STRAIN = "strain";
 /** Why a body from a store, or one of very many elements, is not cut open. */
 export const NO_INSIDE =
-  "Only the surface of this body is known: a store holds no inside, and of more than 50,000 nodes none is computed. Open the scene or the mesh that a store was made from to cut it open.";
+  "Only the surface of this body is known: stores have no inside, and above 50,000 nodes it is not computed. To cut it open, open its scene or its mesh.";
 
 /** Why a large body is not. */
-const TOO_LARGE_TO_CUT = "A body that is drawn by fewer triangles than its surface has is not cut open.";
+const TOO_LARGE_TO_CUT = "This body cannot be cut open, because it is drawn with fewer triangles than its surface has.";
 
 export class Control {
   private changedMs = -Infinity;
@@ -349,7 +349,7 @@ export class Control {
     this.send({ type: "shape", tool: shownTool(this.store.get()) ?? 0, name });
   }
 
-  /** How many times as large as they are displacements are drawn. */
+  /** Factor by which displacements are drawn larger. */
   showScaled(shownScale: number): void {
     this.store.update({ shownScale });
   }

@@ -122,9 +122,11 @@ class Body:
 
         """
         if not self.fixed_mask.any():
-            raise BodyError("the body has no support: fix some nodes, or it flies away when touched")
+            raise BodyError(
+                "the body has no support, so a touch would move it away: fix at least three nodes that are not in line"
+            )
         if self.fixed_mask.all():
-            raise BodyError("every node is fixed: nothing is left to deform")
+            raise BodyError("every node is fixed, so nothing can deform: leave some nodes free")
         labels = element_components(self.mesh.tets, len(self.mesh.nodes))
         require_apart(self.mesh, labels)
         for part in np.unique(labels):

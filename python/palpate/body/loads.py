@@ -119,7 +119,7 @@ def _faces_of(mesh: TetMesh, where: Selection, what: str) -> np.ndarray:
     faces = mesh.surface_faces
     faces = faces[chosen[faces[:, :3]].all(axis=1)]
     if len(faces) == 0:
-        raise BodyError(f"{what}: no face of the surface has all its corners among the nodes named")
+        raise BodyError(f"{what}: no face of the surface has all of its corners among the given nodes: name more nodes")
     return faces
 
 

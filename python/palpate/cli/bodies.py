@@ -195,7 +195,7 @@ def read_any(
         )
     mesh = TetMesh.read(path, unit)
     if element == Element.LINEAR and mesh.is_quadratic:
-        raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or say quadratic")
+        raise MeshError(f"{path} holds 10-node tetrahedra: leave out --element, or give quadratic")
     return mesh.to_quadratic() if element == Element.QUADRATIC else mesh
 
 

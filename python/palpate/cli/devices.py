@@ -80,7 +80,7 @@ def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | Non
         kinds = [listing.kind for listing in found if any(device.id == id for device in listing.found)]
         if len(kinds) != 1:
             what = f"{' and '.join(kinds)} have a device '{id}': name the kind too" if kinds else f"there is no '{id}'"
-            raise DeviceError(f"{what}; 'palpate devices' lists what there is")
+            raise DeviceError(f"{what}; 'palpate devices' lists the devices that were found")
         return kinds[0], id
     for listing in found:
         if listing.ready:
@@ -91,7 +91,7 @@ def _choose_device(found: list[Listing], id: str | None) -> tuple[str, str | Non
     missing = [f"{listing.kind}: {listing.missing}" for listing in found if listing.missing is not None]
     if len(found) == 1 and missing:
         raise DeviceError(missing[0])
-    raise DeviceError("there is no device to check: 'palpate devices' lists what was searched for")
+    raise DeviceError("there is no device to check: 'palpate devices' lists where it searched")
 
 
 def _check(which: tuple[str, str | None], yes: bool, as_json: bool) -> bool:

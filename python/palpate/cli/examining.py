@@ -45,7 +45,7 @@ def nodule(
     """Find hidden nodules by touch alone in the browser: a staircase gives the contrast that this hand detects.
 
     The Weber fraction, with its interval, a plot and a table of all trials are written into --out and nowhere else. An
-    exam that was interrupted goes on with the same command.
+    exam that was interrupted continues with the same command.
 
     Example: palpate exam nodule --out anna
 
@@ -82,11 +82,11 @@ def _ask(library: Library, out: Path, seed: int | None, where: tuple[str, int, b
         print("\n".join(finish(course, out).lines()))
         return
     if course.answers:
-        print(f"going on with trial {course.trial.number} of {course.count}")
+        print(f"continuing with trial {course.trial.number} of {course.count}")
     host, port, browser = where
     open_viewer(ExamServer(course, out, host=host, port=port), browser=browser)
     if course.trial is not None:
-        print(f"{len(course.answers)} of {course.count} trials answered; the same command goes on")
+        print(f"{len(course.answers)} of {course.count} trials answered; the same command continues")
     else:
         print(f"wrote {out / 'exam.csv'}, exam.json and exam.png")
 

@@ -66,8 +66,8 @@ def map_command(
 ) -> None:
     """Press a grid of points on a body, without a hand, and map its stiffness and what lies hidden in it.
 
-    The tool is the scene's first. Curves, the map and pictures are written into a folder; Ctrl-C keeps what is
-    finished, and the same command goes on from there. 'palpate run FILE --map DIR/stiffness.vtu' shows the map.
+    The tool is the scene's first. Curves, the map and pictures are written into a folder; Ctrl-C keeps finished
+    presses, and the same command continues from there. 'palpate run FILE --map DIR/stiffness.vtu' shows the map.
 
     Example: palpate map scene.toml --grid 10mm --depth 3mm --speed 10mm/s
 
@@ -164,7 +164,10 @@ def _palpate(
         if other is not None or any(has_several_materials(body.body) for body in built.bodies):
             detection = compare(found, other, partial=folder / PLAIN_PARTIAL, progress=True)
     except KeyboardInterrupt:
-        print(f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on", file=sys.stderr)
+        print(
+            f"palpate: interrupted; finished presses are kept in {folder}, and the same command continues",
+            file=sys.stderr,
+        )
         raise typer.Exit(130) from None
     found.save(folder)
     if detection is not None:

@@ -63,9 +63,9 @@ def replay(
 def _report_text(file: Path, recording: Recording, replayed: Replayed) -> str:
     lines = [str(difference) for difference in replayed.differences[:SHOWN]]
     if len(replayed.differences) > SHOWN:
-        lines.append(f"and {len(replayed.differences) - SHOWN} more, of which the first is what to look at")
+        lines.append(f"and {len(replayed.differences) - SHOWN} more: look at the first")
     if not lines:
-        lines = [f"{file}: {replayed.ticks} ticks made again: every bit is as recorded"]
+        lines = [f"{file}: {replayed.ticks} ticks computed again: every bit is as recorded"]
     if not replayed.whole:
         lines.append(_gap_text(recording, replayed.ticks))
     return "\n".join(lines)
@@ -75,4 +75,4 @@ def _gap_text(recording: Recording, ticks: int) -> str:
     """Say why a recording could not be made again to its end."""
     if recording.dropped is None:
         return f"note: the file was cut short, by a crash or a full disk; it has {len(recording.ticks)} ticks"
-    return f"note: {recording.dropped} ticks were not recorded; what follows tick {ticks - 1} was not made again"
+    return f"note: {recording.dropped} ticks were not recorded; what follows tick {ticks - 1} was not computed again"

@@ -302,11 +302,14 @@ def _force_line(record: PressRecord, max_force: float) -> str:
 
 
 def _strain_line(record: PressRecord, strain_limit: float) -> str:
-    """Line with the largest strain, its limit, and a warning beyond the range of linear elasticity."""
+    """Line with the largest strain, its limit, and the stated error, or a warning beyond linear elasticity."""
     line = f"largest strain {100 * record.hardest.largest_strain:.1f} %"
     if record.limited:
         line += f", where the tool was limited ([view] strain_limit = {strain_limit:g})"
-    if not record.hardest.within_linear_range:
+    error = record.hardest.largest_error
+    if error is not None:
+        line += f", estimated error of the force {100 * error:.2g} %"
+    elif not record.hardest.within_linear_range:
         line += ": beyond 10 %, where linear elasticity is no longer accurate"
     return line
 
@@ -330,7 +333,7 @@ def _scripted(built: BuiltScene, name: str, seconds: float, out: Path, recording
         print(f"{title:9s} {row['p50']:7.1f}  {row['p99']:7.1f}  {row['p999']:7.1f}  {row['max']:7.1f}")
     print(f"missed deadlines: {statistics['missed_deadlines']}; wrote {out / name}.csv and .png")
     if recording is not None:
-        print(f"recorded {recording}: 'palpate replay {recording}' makes it again")
+        print(f"recorded {recording}: 'palpate replay {recording}' computes it again")
     priority, locked_memory = statistics["realtime"]
     if not (locked_memory and (priority or built.scene.device.priority == 0)):
         print(

@@ -75,7 +75,7 @@ def _target(file: Path, to: str | None, out: Path | None) -> Path:
         raise Error(f"--to {to}: unknown format; known are {known}")
     if out is None:
         if to is None:
-            raise Error(f"say --to or --out; formats are {known}")
+            raise Error(f"give --to or --out; formats are {known}")
         return file.with_suffix(f".{to}")
     if to is None or out.suffix.lower() == f".{to}":
         return out

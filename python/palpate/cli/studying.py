@@ -23,7 +23,7 @@ def study(
 ) -> None:
     """Solve many bodies or materials, press each of them, and write one table.
 
-    Ctrl-C keeps what is finished in the folder; the same command goes on from there. A study that has grown computes
+    Ctrl-C keeps finished bodies in the folder; the same command continues from there. A study with new cases computes
     only what is new.
 
     Example: palpate study study.toml
@@ -39,7 +39,7 @@ def study(
         try:
             result = read.run(folder, dask=workers)
         except KeyboardInterrupt:
-            text = f"palpate: interrupted; what is finished is kept in {folder}: the same command goes on"
+            text = f"palpate: interrupted; finished bodies are kept in {folder}, and the same command continues"
             print(text, file=sys.stderr)
             raise typer.Exit(130) from None
     _print_result(result, folder)

@@ -117,7 +117,9 @@ class PollingThread:
             return
         thread.join(CLOSING)
         if thread.is_alive():
-            self._warn("a call of it does not return: it may not have been closed, nor its last force taken back")
+            self._warn(
+                "a method of the device does not return: it may still be open, with its last force: switch it off"
+            )
 
     def _run(self, native: _native.ProgrammedDevice) -> None:
         """All that the thread does; nothing is raised out of it."""

@@ -121,7 +121,7 @@ class ModalBasis:
         key, description, eigenvalues, shapes = _native.load_basis(path)
         basis = cls(eigenvalues, shapes.reshape(-1, 3, len(eigenvalues)), key, json.loads(description))
         if mass is not None and basis.mass != mass:
-            raise StoreError(f"{path}: was made with the {basis.mass} mass matrix, the {mass} one is wanted")
+            raise StoreError(f"{path}: was made with the {basis.mass} mass matrix, but the {mass} one is needed")
         if body is not None and key != basis_key(body, basis.mass):
             raise StoreError(f"{path}: {_difference(basis, body)}; compute it again")
         return basis

@@ -40,7 +40,7 @@ def rayleigh_from_ratios(xi1: float, f1: float, xi2: float, f2: float) -> tuple[
     if min(a, b) < 0:
         low, high = sorted((f1 / f2, f2 / f1))
         raise BodyError(
-            f"ratios of {xi1} at {f1} Hz and {xi2} at {f2} Hz need a negative factor, which would feed other "
-            f"frequencies with energy: the quotient of the ratios must lie between {low:.4g} and {high:.4g}"
+            f"ratios of {xi1} at {f1} Hz and {xi2} at {f2} Hz need a negative factor, which would add energy "
+            f"at other frequencies: the quotient of the ratios must lie between {low:.4g} and {high:.4g}"
         )
     return float(a), float(b)

@@ -41,7 +41,7 @@ class Matrices:
         stiffness, mass_matrix = body.stiffness(), body.mass(lumped=mass == "lumped")
         free = np.setdiff1d(np.arange(stiffness.shape[0]), body.fixed_dofs)
         if len(free) == 0:
-            raise BodyError("every node is fixed: nothing is left to move")
+            raise BodyError("every node is fixed, so nothing can move: leave some nodes free")
         weightless = np.flatnonzero(mass_matrix.diagonal()[free] <= 0)
         if weightless.size:
             raise BodyError(f"node {free[weightless[0]] // 3} has no mass: a body in motion needs a positive density")

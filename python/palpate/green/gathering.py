@@ -16,7 +16,7 @@ from palpate.green.job import Job
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-# A block that was damaged on its way is asked for again, so often.
+# A block that was damaged in transit is asked for again, so often.
 MOST_DAMAGED = 3
 
 Report = Callable[[int, int], None] | None
@@ -53,7 +53,7 @@ def precompute_on(
         # Nobody needs to measure again for a worker that dies.
         client.cancel(measuring)
         if order != layout.order:
-            raise ClusterError("the workers order the columns otherwise: give them the same build of Palpate")
+            raise ClusterError("the workers order the columns differently: install the same build of Palpate there")
         store = _native.ColumnStore(layout, precision, CHOSEN, measured, what.target, what.description, claim)
         _, width, *_ = measured
         _gather(client, (held, job, order), width, store, report)
@@ -101,7 +101,7 @@ def _gather(
         if not store.put(block, *result_of(client, future)):
             damaged[block] += 1
             if damaged[block] == MOST_DAMAGED:
-                raise ClusterError(f"block {block} of columns was damaged on its way {MOST_DAMAGED} times")
+                raise ClusterError(f"block {block} of columns was damaged in transit {MOST_DAMAGED} times")
             waiting.append(block)
         tell()
 

@@ -118,7 +118,7 @@ def precompute(
                 discarded = precompute_on(client, job, claim, memory, report)
     if discarded:
         warnings.warn(
-            f"{job.target}.partial belonged to another computation and was thrown away", StoreWarning, stacklevel=2
+            f"{job.target}.partial belongs to another computation and was deleted", StoreWarning, stacklevel=2
         )
     green = job.load()
     job.make_room(written=True)
@@ -175,7 +175,7 @@ def _reporting_disk_failures(target: Path) -> Iterator[None]:
             raise
         raise StoreError(
             f"{error.filename or target}: {error.strerror or error}; finished columns are kept in {partial}: "
-            "once there is room, the same command goes on from there"
+            "free some disk space, and the same command continues from there"
         ) from error
 
 

@@ -124,7 +124,7 @@ def solve(problem: Arrays, job: FactorRequest, order: bytes, block: int, width: 
     factor = _factorize(problem, job)
     if factor.order != order:
         raise ClusterError(
-            f"the worker at {_address()} orders the columns otherwise: give it the same build of Palpate"
+            f"the worker at {_address()} orders the columns differently: install the same build of Palpate there"
         )
     return factor.solve(block, width)
 

@@ -95,7 +95,7 @@ class Wrapping:
         points = np.asarray(self.surface.shape.vertices)
         origin, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
         if not extent > 0:
-            raise MeshError(f"{self.name}: all of its points are one")
+            raise MeshError(f"{self.name}: all of its points coincide")
         size = extent / PARTS[self.element] if self.size is None else self.size
         arrays = self._run(origin, extent, size)
         wrap = _Wrapped(arrays, origin, extent)

@@ -52,7 +52,7 @@ class Peer:
         except (BlockingIOError, InterruptedError):
             return []
         if not data:
-            raise ConnectionError("it has gone")
+            raise ConnectionError("it closed the connection")
         if not self._reader.is_within_message:
             self._reading_since = now
         messages = self._reader.push(data)
@@ -96,7 +96,7 @@ class Peer:
         if self._reader.is_within_message and now - self._reading_since > PATIENCE:
             raise MessageError(f"a message was not complete after {PATIENCE:g} s")
         if self._unsent and now - self._sending_since > PATIENCE:
-            raise MessageError(f"it has taken nothing up for {PATIENCE:g} s")
+            raise MessageError(f"it has read nothing for {PATIENCE:g} s")
 
     def close(self) -> None:
         """Close the connection."""

@@ -238,7 +238,7 @@ class _Builder:
         if table.element == "linear" and mesh.is_quadratic:
             source = table.mesh or table.title
             with self._locating_errors_in_file(["body", self._rank, "element"]):
-                raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or say 'quadratic'")
+                raise SceneError(f"{source} holds 10-node tetrahedra: leave out body.element, or give 'quadratic'")
         if table.adds_middles:
             mesh = mesh.to_quadratic()
         # With the regions of the file, which those of the scene replace.

@@ -87,8 +87,8 @@ class Scene(SceneTables):
         if body.store is not None and given:
             where = located(path, text, ["body", rank, "store"])
             raise SceneError(
-                f"{where}: a store carries its own material, supports and loads, and where it may be touched, and "
-                "cannot move: leave those tables out"
+                f"{where}: a store has its own material, supports, loads and touch region, and it cannot move: "
+                "leave those tables out"
             )
 
     @classmethod

@@ -79,7 +79,7 @@ def export(
     with progress_reporter(f"writing {target.name}", progress) as report:
         if kind in TABLES:
             if rate is not None:
-                raise Error("a table has a row for every tick: a rate is for frames, as .pvd, .glb and .mp4 have them")
+                raise Error("a rate is for .pvd, .glb and .mp4; a table has a row for every tick: leave the rate out")
             return _write_tables(recorded, target, Span(start, end).within(recorded.time), report)
         span = Span(start, end, RATE if rate is None else rate)
         frames = RecordedFrames(recorded, span, scene)

@@ -142,7 +142,10 @@ class RecordedFrames:
             done = row + 1
             if differences and not self._warned:
                 tick, of, quantity = differences[0][:3]
-                _warn(f"frames are not as recorded from tick {tick} on ({of} {quantity}): made by another version?")
+                _warn(
+                    f"frames differ from the recording from tick {tick} on ({of} {quantity}); was it made by "
+                    "another version?"
+                )
                 self._warned = True
             frame = frame_of(again.frame(), self.simulation.bodies)
             yield RecordedFrame(row, float(self.recording.time[row]), frame, self._present[row])

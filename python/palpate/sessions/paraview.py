@@ -31,7 +31,7 @@ def frames_folder(path: Path) -> Path:
     """
     folder = path.with_name(f"{path.stem}_frames")
     if folder.exists() and not (folder.is_dir() and all(OURS.fullmatch(file.name) for file in folder.iterdir())):
-        raise Error(f"{folder}: exists, and holds what is no frame: give another --out, or move it away")
+        raise Error(f"{folder}: exists and contains other files than frames: give another --out, or move it")
     return folder
 
 

@@ -72,7 +72,7 @@ def require_readable(about: Mapping[str, str], name: str) -> None:
     except (KeyError, TypeError, ValueError) as error:
         raise SceneError(f"{name}: the recording is damaged: {type(error).__name__} in what was recorded") from None
     if not (all(given) and known):
-        raise SceneError(f"{name}: the recording is damaged: it does not say which scene was recorded")
+        raise SceneError(f"{name}: the recording is damaged: the recorded scene is missing")
 
 
 def scene_of(about: dict[str, str]) -> Scene:

@@ -59,7 +59,7 @@ def _moduli(body: BuiltBody, needed: bool) -> tuple[np.ndarray, np.ndarray, np.n
     known = body.green._core.surface_moduli()
     if known is None and needed:
         raise BodyError(
-            "this store of several materials does not say which is at the surface: compute it again, or give the tool "
+            "this store of several materials does not contain those at the surface: compute it again, or give the tool "
             "contact = 'patch'"
         )
     if known is None:

@@ -110,8 +110,8 @@ def warn_if_limited(core: _native.SimulationCore, tool: int, name: str) -> None:
     asked, held = _native.tool_stiffness(core)[tool]
     if held < asked:
         warnings.warn(
-            f"tool {tool}: {name} holds contacts up to {held:.4g} N/m in this scene, which asks for {asked:.4g}: what "
-            "is stiffer feels as stiff as that",
+            f"tool {tool}: {name} renders contacts up to {held:.4g} N/m, and this scene has up to {asked:.4g}: stiffer "
+            f"contacts feel softer than they are",
             DeviceWarning,
             stacklevel=4,
         )

@@ -65,7 +65,7 @@ class ReplayedSimulation(Simulation):
         assume_recorded(self._core, recorded.about)
         self.recorded, self.ticks = recorded, ticks_before_gap(recorded)
         if self.ticks == 0:
-            raise SceneError("the recording has no tick that can be made again")
+            raise SceneError("the recording has no tick that can be computed again")
         self.checked, self.restarts = 0, 0
         self.difference: Difference | None = None
         # Of all ticks: what computing took then, not now.

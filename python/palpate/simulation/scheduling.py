@@ -73,8 +73,8 @@ def start_loop(core: _native.SimulationCore, device: DeviceTable) -> None:
         return
     memory = "" if locked_memory else ", nor locked memory"
     warnings.warn(
-        f"device.priority = {device.priority}: the system granted no real-time priority{memory}; the loop runs as "
-        "others do and may wake late: 'palpate doctor' prints what to change",
+        f"device.priority = {device.priority}: the system granted no real-time priority{memory}; the loop runs "
+        "at normal priority and may wake late: 'palpate doctor' prints what to change",
         SchedulingWarning,
         stacklevel=3,
     )
@@ -92,7 +92,7 @@ def require_cpus(cpus: Sequence[int]) -> None:
     if not cpus:
         return
     if not hasattr(os, "sched_getaffinity"):
-        raise SceneError("device.cpus: this system keeps no thread to processors; leave the key out")
+        raise SceneError("device.cpus: this system cannot keep a thread to some processors: leave the key out")
     allowed = os.sched_getaffinity(0)
     missing = [cpu for cpu in cpus if cpu not in allowed]
     if missing:

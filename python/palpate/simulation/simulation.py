@@ -309,16 +309,19 @@ class Simulation(Adjustable, SceneEditing):
 
     def _error_text(self, error: float) -> str:
         return (
-            f"the stated error of the force reached {100 * error:.2g} % (`error` of the contacts): press less "
-            "deep, or see docs/accuracy.md"
+            f"the force of a contact may be off by {100 * error:.2g} % (`error` of the contacts): press less deep, or "
+            "make the elements smaller"
         )
 
     def _limit_text(self, what: str) -> str:
         if any(body.body is not None and is_hyperelastic(body.body) for body in self.bodies):
-            return f"{what} was held where the law of its material ends: its force is that of the last depth within it"
+            return (
+                f"{what} was held where the law of its material ends, so the force stays as it was at that depth: "
+                "press less deep"
+            )
         return (
             f"{what} was held at the strain limit of {100 * self.strain_limit:.0f} % (view.strain_limit): its "
-            f"force is that of the limit, not of its position; press less deep"
+            f"force stays as it was at that depth; press less deep"
         )
 
     def _read_frame(self) -> Frame:

@@ -144,7 +144,7 @@ def _entry(tables: Sequence[Any], step: str, key: Key) -> int:
     if not _is_rank(step):
         if len(tables) == 1:
             return 0
-        raise ValueError(f"there are {len(tables)} tables [[{key[0]}]]: say {key[0]}.0 for the first, and so on")
+        raise ValueError(f"there are {len(tables)} tables [[{key[0]}]]: write {key[0]}.0 for the first, and so on")
     if int(step) >= len(tables):
         raise ValueError(f"the last of the tables [[{key[0]}]] is {key[0]}.{len(tables) - 1}")
     return int(step)

@@ -34,7 +34,7 @@ class PressTable(Table):
     @model_validator(mode="after")
     def _presses(self) -> PressTable:
         if not any(self.displacement):
-            raise ValueError("a press must move something: its displacement has no component but 0 and '-'")
+            raise ValueError("a press needs a displacement: give a component other than 0 and '-'")
         return self
 
 

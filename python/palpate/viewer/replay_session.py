@@ -156,7 +156,7 @@ class ReplaySession(Session):
         if recorded.dropped is None:
             return "The file was cut short; this is what it has."
         if recorded.dropped > 0:
-            return f"{recorded.dropped} ticks were not recorded: what follows tick {ticks} cannot be made again."
+            return f"{recorded.dropped} ticks were not recorded: what follows tick {ticks} cannot be computed again."
         return None
 
     def _replay_header(self) -> dict[str, Any]:

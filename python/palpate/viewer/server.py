@@ -409,7 +409,7 @@ class ViewerServer:
             return
         make = lambda: Session(built, before.own_tools, before.maps, self._recordings)  # noqa: E731
         building = self.begin_building()
-        text = "Preparing the tool: a press goes on with it"
+        text = "Preparing the tool: a press that is held continues with it"
         self._build_task = asyncio.create_task(self.switch(text, make, self._keep_settings, building))
 
     def begin_building(self) -> CancellableTask:
@@ -479,7 +479,7 @@ class ViewerServer:
             for client in self._clients:
                 client.shown = None
             if isinstance(error, Error):
-                raise type(error)(f"{error}; the scene shown before goes on") from error
+                raise type(error)(f"{error}; the scene shown before stays") from error
             raise
         self._session = session
 

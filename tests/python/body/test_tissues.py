@@ -7,7 +7,7 @@ from pathlib import Path
 from palpate.body import Material
 from palpate.body.tissues import TISSUES
 
-VIEWER = Path(__file__).parents[3] / "docs" / "viewer.md"
+VIEWER = Path(__file__).parents[3] / "docs" / "materials.md"
 
 
 def test_each_tissue_is_a_material_and_stands_in_the_documents_with_its_source():

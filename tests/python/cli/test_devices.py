@@ -113,7 +113,7 @@ def test_a_wrong_sign_fails_the_check(pads):
     ("words", "message"),
     [
         (("lever", "--test", "--yes"), "lever: no service listens at ws://localhost:1: start it"),
-        (("--test", "--yes", "--id", "9"), "there is no '9'; 'palpate devices' lists what there is"),
+        (("--test", "--yes", "--id", "9"), "there is no '9'; 'palpate devices' lists the devices that were found"),
     ],
 )
 def test_what_cannot_be_checked_is_one_line(pads, words, message):

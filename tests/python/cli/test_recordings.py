@@ -38,13 +38,15 @@ def recorded(cache, tmp_path_factory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
         result = run("run", ROOT / "examples" / "block.toml", "--headless", 1.0, "--record", "press.mcap", cwd=folder)
-    assert result.returncode == 0 and "recorded press.mcap: 'palpate replay press.mcap' makes it again" in result.stdout
+    assert (
+        result.returncode == 0 and "recorded press.mcap: 'palpate replay press.mcap' computes it again" in result.stdout
+    )
     return folder / "press.mcap"
 
 
 def test_a_press_is_recorded_and_made_again(recorded, shared_cache, tmp_path):
     again = run("replay", recorded, "--headless", cwd=tmp_path)
-    assert again.returncode == 0 and again.stdout.strip().endswith("ticks made again: every bit is as recorded")
+    assert again.returncode == 0 and again.stdout.strip().endswith("ticks computed again: every bit is as recorded")
     force = np.linalg.norm(palpate.Recording.load(recorded).forces, axis=1)
     assert force.max() > 0.01
 

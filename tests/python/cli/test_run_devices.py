@@ -61,7 +61,7 @@ def test_a_library_moves_the_first_tool(scene, kind, variable, emulated):
     assert done.returncode == 0, done.stderr
     forces = largest_forces(scene)
     assert 0.02 < forces[0] < 3.3 and forces[1] == 0.0
-    assert ("holds contacts up to 400 N/m in this scene, which asks for 5000" in done.stderr) == (kind == "touch")
+    assert ("renders contacts up to 400 N/m, and this scene has up to 5000" in done.stderr) == (kind == "touch")
 
 
 @pytest.mark.slow

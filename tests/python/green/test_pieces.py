@@ -98,7 +98,7 @@ def test_a_block_that_was_damaged_on_its_way_is_asked_for_again(times, body, tmp
 
     monkeypatch.setattr(gathering, "spread", spread)
     if times == gathering.MOST_DAMAGED:
-        with pytest.raises(palpate.ClusterError, match="block 3 of columns was damaged on its way 3 times"):
+        with pytest.raises(palpate.ClusterError, match="block 3 of columns was damaged in transit 3 times"):
             gathering._gather(None, (), width, store, None)
         return
     gathering._gather(None, (), width, store, None)

@@ -79,7 +79,7 @@ def test_models_stores_and_views(tmp_path):
         ('[body]\nmodel = "kidny"', r"a\.toml:1: body: unknown model 'kidny'; there are doll, kidney"),
         ('[body]\nmodel = "doll"\nmesh = "a.vtu"', r"a\.toml:1: body: give exactly one of mesh, model and store"),
         ("[body]\nunit = 'mm'", r"a\.toml:1: body: give exactly one of"),
-        ('[body]\nstore = "a"\n[supports]\nfixed = "z < 0"', "carries its own material, supports and loads"),
+        ('[body]\nstore = "a"\n[supports]\nfixed = "z < 0"', "has its own material, supports, loads"),
         (
             '[body]\nmodel = "doll"\n[view]\ntarget = [0, 0]',
             r"a\.toml:4: view.target.* has too few entries",

@@ -206,5 +206,5 @@ def test_a_store_among_several_takes_no_tables_of_its_own(folder):
     built = read(folder, several).build().bodies
     assert built[0].body is None and built[1].body is not None
     assert built[0].green.youngs_modulus == 12e3
-    with pytest.raises(palpate.SceneError, match="a store carries its own material"):
+    with pytest.raises(palpate.SceneError, match="a store has its own material"):
         read(folder, several.replace('store = "a.palpate"', 'store = "a.palpate"\nmaterial = { youngs_modulus = 1e3 }'))

@@ -108,7 +108,7 @@ def test_a_time_series_replaces_an_earlier_one_and_nothing_else(recording, built
         palpate.export(recording, tmp_path / "press.pvd", rate=RATE, end=end, scene=built)
     assert len(list((tmp_path / "press_frames").iterdir())) == 4
     (tmp_path / "press_frames" / "notes.txt").write_text("mine")
-    with pytest.raises(palpate.Error, match=r"press_frames: exists, and holds what is no frame"):
+    with pytest.raises(palpate.Error, match=r"press_frames: exists and contains other files than frames"):
         palpate.export(recording, tmp_path / "press.pvd", scene=built)
 
 

@@ -147,7 +147,7 @@ def test_the_scene_of_a_recording_is_built_from_the_file_alone(scene_file, tmp_p
             capture_output=True,
             text=True,
         )
-        assert run.returncode == 0 and "400 ticks made again: every bit is as recorded" in run.stdout, run.stderr
+        assert run.returncode == 0 and "400 ticks computed again: every bit is as recorded" in run.stdout, run.stderr
 
 
 def test_a_changed_coefficient_is_found_and_named(built, scene_file, tmp_path):

@@ -227,7 +227,7 @@ def test_haptic_devices_are_counted_in_a_line():
     busy = replace(ready, id="1", obstacle=Obstacle("in use", "close it"))
     listings = (Listing("forcedimension", (ready, busy), None, {}), Listing("touch", (), Obstacle("no", "do"), {}))
     found = replace(report(doctor.Machine("Linux", "6.1")), devices=listings)
-    assert "haptic devices ready: forcedimension 1, touch none ('palpate devices' tells why)" in doctor.as_text(found)
+    assert "haptic devices ready: forcedimension 1, touch none ('palpate devices' shows why)" in doctor.as_text(found)
     assert doctor.as_json(found)["devices"]["forcedimension"] == {"found": 2, "ready": 1}
 
 

@@ -37,7 +37,7 @@ def test_a_device_is_shown_and_its_fault_told(block, block_green):
         with warnings.catch_warnings(record=True, action="always") as record:
             asyncio.run(session(BuiltScene.of(scene, block, block_green), process))
     limited = [str(one.message) for one in record if issubclass(one.category, palpate.DeviceWarning)]
-    holds = "tool 0: Haply Inverse3 0A01 holds contacts up to 800 N/m in this scene, which asks for 5000"
+    holds = "tool 0: Haply Inverse3 0A01 renders contacts up to 800 N/m, and this scene has up to 5000"
     assert [line.rpartition(": ")[0] for line in limited] == [holds]
 
 
@@ -51,7 +51,7 @@ def test_a_change_of_tool_that_fails_leaves_the_scene_as_it_was(block, block_gre
             process.kill()
             await client.say(type="shape", tool=1, name="punch")
             notice, _ = await client.receive("error")
-            assert "Haply" in notice["text"] and notice["text"].endswith("; the scene shown before goes on")
+            assert "Haply" in notice["text"] and notice["text"].endswith("; the scene shown before stays")
             again, _ = await client.receive("scene")
             assert [tool["shape"] for tool in again["tools"]] == ["sphere", "sphere"]
             assert [tool["device"] for tool in again["tools"]] == [None, None]

@@ -183,7 +183,7 @@ def test_a_tool_that_cannot_be_taken_leaves_the_one_before(block, block_green, m
         async with serving(built) as server, page(server) as client:
             await client.receive("scene")
             for name, words in (
-                ("punch", "connect it again; the scene shown before goes on"),
+                ("punch", "connect it again; the scene shown before stays"),
                 ("capsule", "report it"),
             ):
                 await client.say(type="shape", tool=0, name=name)

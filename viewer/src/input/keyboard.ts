@@ -6,9 +6,9 @@ import type { Viewport } from "../scene/viewport";
 
 /** Keys and what they do, in the order in which the help tells of them. */
 export const KEYS: readonly (readonly [key: string, what: string])[] = [
-  ["r", "reset: let go, clear a fault, put all sliders back"],
-  ["n", "pin the finger, or let pinned ones go"],
-  ["Escape", "let all fingers go, end a mode"],
+  ["r", "reset: release the tools, clear a fault, restore the sliders"],
+  ["n", "pin the tool, or release pinned ones"],
+  ["Escape", "release all tools, end a mode"],
   ["g", "grab instead of pressing"],
   ["k", "a click strikes, on a body in motion"],
   ["f", "the next field in colours"],
@@ -25,7 +25,7 @@ export const KEYS: readonly (readonly [key: string, what: string])[] = [
   ["Enter", "compute what is painted"],
   ["m", "in an exam: the nodule is where the tool touches"],
   ["0", "in an exam: there is none"],
-  ["Space", "press the middle of the picture, or let go; while it has the focus"],
+  ["Space", "press the middle of the picture, or release the tool; while the picture has the focus"],
   ["Arrows", "slide the tool, or turn the picture; while it has the focus"],
   ["PgDn PgUp", "deeper, or less deep; while the picture has the focus"],
   ["+ -", "zoom; while the picture has the focus"],

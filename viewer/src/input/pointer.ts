@@ -28,9 +28,9 @@ const CLICK_PX = 8;
 const HOVER_TRIANGLES_MAX = 30_000;
 /** By which the tool turns for each pixel that the pointer goes with Alt. */
 const DEGREES_PER_PIXEL = 0.5;
-const ALL_PINNED = "All tools are pinned: Escape lets them go.";
+const ALL_PINNED = "All tools are pinned: Escape releases them.";
 const INSIDE =
-  "The cut shows the inside, which no tool reaches: press the surface beside it, turn the body, or end the cut-away.";
+  "No tool reaches the inside that the cut shows: press the surface beside it, turn the body, or end the cut-away.";
 const ALL_MOVED = "Every tool is moved by a device: press with it.";
 
 /** What one pointer does from when it goes down on a body. */

@@ -146,7 +146,7 @@ def _load(taken: tuple[float, float] | None) -> Iterator[Advice]:
         yield Advice(
             "load",
             f"programs kept {100 * taken[0]:.0f} % of the processors' time busy while the loop ran",
-            ("# end what is not needed (top tells), or give the rest fewer processors: taskset, cpuset",),
+            ("# end unneeded programs (top lists them), or give the rest fewer processors: taskset, cpuset",),
         )
 
 
@@ -242,5 +242,5 @@ def _clock(machine: Machine) -> Iterator[Advice]:
         yield Advice(
             "clock",
             f"the clock '{source}' takes microseconds to read",
-            (remedy if better else "# no faster one is available; the kernel's log tells why",),
+            (remedy if better else "# no faster one is available; the kernel's log shows why",),
         )

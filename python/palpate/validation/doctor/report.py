@@ -188,7 +188,7 @@ def _last(report: Report) -> Iterator[str]:
     served = page.served_per_second
     yield f"page: {drawn}; served over the websocket: {'not measured' if served is None else f'{served:.0f} a second'}"
     counts = ", ".join(f"{listing.kind} {len(listing.ready) or 'none'}" for listing in report.devices)
-    yield f"haptic devices ready: {counts or NOT_AVAILABLE} ('palpate devices' tells why)"
+    yield f"haptic devices ready: {counts or NOT_AVAILABLE} ('palpate devices' shows why)"
     if report.advice:
         yield ""
         yield "what to change, the most important first:"

@@ -102,7 +102,8 @@ def slab(
     box(bounds=[(0, 0, 0), (2 * size, 2 * size, size)]).export(file)
     return Scene(
         body={"name": "slab", "mesh": str(file), "unit": "m", "max_element_size": 0.014, "refine": sizes},
-        material={"youngs_modulus": SOFT.youngs_modulus, "poissons_ratio": SOFT.poissons_ratio},
+        # The direct solution is linear, which scenes are not by default.
+        material={"law": "linear", "youngs_modulus": SOFT.youngs_modulus, "poissons_ratio": SOFT.poissons_ratio},
         region=[{"shape": "sphere", "center": centre, "radius": radius, "youngs_modulus": MODULUS}],
         supports={"fixed": "z < min + 1mm"},
         # The direct solution knows no friction.
