@@ -66,9 +66,9 @@ fn main() {
         let strain = StrainPreparer::new(&model);
         let replay = Replay::new(&model, &devices, SafetyLimits::default(), settings(), strain);
         let mut replay = replay.expect("a valid loop");
-        let ticks = Ticks::open(&recording(scene)).expect("a recording that the release build has written");
+        let records = Ticks::open(&recording(scene)).expect("a recording that the release build has written");
         let mut ticks = 0;
-        for record in ticks {
+        for record in records {
             let differences = replay.tick(&record.expect("whole messages")).expect("valid settings");
             assert!(differences.is_empty(), "{}: {}", scene.name, differences[0]);
             ticks += 1;
