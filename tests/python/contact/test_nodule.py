@@ -79,7 +79,8 @@ def plain(with_nodule):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("radius", sorted({radius for _, radius in NODULES}))
+@pytest.mark.campaign(2)
+@pytest.mark.parametrize("radius", sorted({radius for _, radius in NODULES}, reverse=True))
 def test_a_nodule_is_felt_as_the_direct_solution_says(plain, with_nodule, radius):
     line = np.linspace(0.02, 0.06, 81)
     middle = len(line) // 2

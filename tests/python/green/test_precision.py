@@ -351,7 +351,8 @@ def errors_of_moved_supports(bodies: int, each: int, folder) -> dict[str, np.nda
 @pytest.mark.parametrize(
     "bodies", [60, pytest.param(1000, marks=[pytest.mark.slow, pytest.mark.timeout(900)])], ids=["some", "5000"]
 )
-def test_answers_with_moved_supports_are_within_their_stated_error(bodies, tmp_path):
+def test_answers_with_moved_supports_are_within_their_stated_error(bodies, tmp_path, rounds):
+    bodies = rounds(bodies)
     with without_refusals():
         errors = errors_of_moved_supports(bodies, 5, tmp_path)
     for precision, (stated, true) in ((name, found.T) for name, found in errors.items()):

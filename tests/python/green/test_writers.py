@@ -134,10 +134,10 @@ def test_columns_that_another_program_changes_are_refused_and_computed_again(bod
 
 
 @pytest.mark.slow
-def test_races_of_two_writers_leave_a_store_that_is_right_or_none(body, expected, tmp_path):
+def test_races_of_two_writers_leave_a_store_that_is_right_or_none(body, expected, tmp_path, rounds):
     random = np.random.default_rng(7)
     pairs = list(itertools.product(FIRST, FIRST))
-    for k in range(20):
+    for k in range(rounds(20)):
         path = tmp_path / f"{k}.palpate"
         regions = pairs[k % len(pairs)]
         lives = [None if random.random() < 0.3 else float(random.uniform(0.05, 3.0)) for _ in range(2)]

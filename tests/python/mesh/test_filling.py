@@ -32,6 +32,7 @@ def told_loss(warned) -> float:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign(2)
 @pytest.mark.parametrize(
     ("name", "element"),
     [("torus", "quadratic"), ("cup", "linear"), ("cup", "quadratic"), ("knot", "quadratic"), ("bracket", "linear")],
