@@ -90,16 +90,16 @@ def test_the_scenes_of_the_page_on_scene_files_are_read(tmp_path):
     shutil.copy(ROOT / "examples" / "block.obj", tmp_path)
     page = (ROOT / "docs" / "scene.md").read_text()
     texts = [text.split("```")[0] for text in page.split("```toml\n")[1:]]
-    assert len(texts) == 6
+    assert len(texts) == 7
     for text in texts:
-        whole = text if "[[body]]" in text else f'[body]\nmodel = "liver"\n{text}'
+        whole = text if "[[body]]" in text or "[body]\n" in text else f'[body]\nmodel = "liver"\n{text}'
         (tmp_path / "page.toml").write_text(whole)
         palpate.Scene.read(tmp_path / "page.toml")
 
 
-def test_the_example_of_the_readme():
+def test_the_example_of_the_readme(tmp_path):
     code = (ROOT / "README.md").read_text().split("```python\n")[1].split("```")[0]
-    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=280)
+    result = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=280)
     assert result.returncode == 0, result.stderr
     body, device = (float(line.split("]")[0].split()[-1]) for line in result.stdout.splitlines())
     assert body < 0 < device  # pushed down, the body pushes the device up
