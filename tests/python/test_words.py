@@ -28,6 +28,7 @@ LONG = " ".join(["word"] * 36) + "."
         (LONG, "36 words in one sentence"),
         ("- an item\n  that tells", "'tells'"),
         ("[a link that told](page.md) you", "'told'"),
+        ("Axes are those of XYZQ.", "does not define 'XYZQ'"),
     ],
 )
 def test_a_habit_is_found(text, found, tmp_path):
@@ -42,6 +43,7 @@ def test_a_habit_is_found(text, found, tmp_path):
     [
         "It follows the tool, for two reasons.",
         "Edges no longer than 4 mm.",
+        "Scans in RAS, of a CT, as in CONTRIBUTING.md.",
         "`center` and ``color`` are keys.",
         "```\nthis tells nothing\n```",
         "    palpate tells  # code",
@@ -86,3 +88,28 @@ def test_sentences_have_their_lines(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# Title\n\nOne sentence, 2.5 mm long. Another one\nover two lines.\n\n- an item\n")
     assert [(s.line, len(s.words)) for s in markdown(page)] == [(3, 5), (3, 5), (6, 2)]
+
+
+def test_a_whole_file_is_never_allowed_and_exceptions_must_be_used(monkeypatch):
+    assert all(part and reason for _, part, reason in check_words.ALLOWED) and len(check_words.ALLOWED) < 10
+    assert check_words.unused_exceptions() == []
+    monkeypatch.setattr(check_words, "ALLOWED", (("README.md", "words that are not there", "none"),))
+    (problem,) = check_words.unused_exceptions()
+    assert "which is not there" in problem
+
+
+def test_an_exception_is_for_its_sentence_alone(monkeypatch, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Title\n\nThe page tells the force. It also tells the depth.\n")
+    monkeypatch.setattr(check_words, "ALLOWED", (("page.md", "tells the force", "a test"),))
+    (problem,) = check_words.problems_of(page)
+    assert problem.startswith("page.md:3: 'tells'")
+
+
+def test_planted_sentences_end_the_command(monkeypatch, tmp_path, capsys):
+    page = tmp_path / "page.md"
+    page.write_text("# Title\n\nA body of which one half is stiff.\n\nIt says nothing wrong.\n")
+    monkeypatch.setattr(sys, "argv", ["check_words.py", str(page)])
+    assert check_words.main() == 1 and "page.md:3: 'of which'" in capsys.readouterr().err
+    page.write_text("# Title\n\nOne half of a body is stiff.\n")
+    assert check_words.main() == 0
