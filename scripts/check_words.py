@@ -24,6 +24,10 @@ HABITS = (
         r"[,;:] for (it|they|he|she|there|this|that|these|those|its|their|nothing|no|only|the \w+ (is|are|has|have))\b",
         "write 'because', or a sentence of its own, instead of 'for'",
     ),
+    (
+        r", for (?:(?!which|that|example)[\w'-]+ ){1,6}(is|are|was|were|has|have|had|may|would|can|cannot|need|needs)\b",
+        "write 'because', or a sentence of its own, instead of 'for'",
+    ),
     (r"\b(whoever|whosoever)\b", "name the person or the thread"),
     (r"\bin earnest\b|\bhonest to\b|\bturned away\b|\bnothing to go by\b|\bdear in\b", "an image: say what is meant"),
     (r"\b(color|colors|gray|center|behavior|meter|meters|analyze|optimize|centered)\b(?! ?=)", "British spelling"),

@@ -12,7 +12,7 @@ class ComparedByValue:
     """Base of dataclasses (declared with ``eq=False``) whose fields may be arrays.
 
     Two are equal if they are of one class and all their compared fields are: arrays in shape and every number, where
-    NaN equals NaN. They cannot be hashed, for what is equal would have to have one hash.
+    NaN equals NaN. They cannot be hashed, because equal objects would need equal hashes.
     """
 
     __hash__ = None  # type: ignore[assignment]

@@ -22,6 +22,7 @@ LONG = " ".join(["word"] * 36) + "."
         ("The page tells the force.", "'tells'"),
         ("A body of which one half is stiff.", "'of which'"),
         ("It is refused, for it is too large.", "', for it'"),
+        ("No tool is ready, for ranks have moved.", "', for ranks have'"),
         ("A file that is no longer read.", "'no longer'"),
         ("The center of the ball.", "'center'"),
         ("Whoever draws calls it.", "'Whoever'"),

@@ -50,7 +50,7 @@ class Axes:
         return (self._signs * points * MILLIMETRES) @ self._placement[:3, :3].T + self._placement[:3, 3]
 
     def vector_to_wire(self, vector: np.ndarray) -> np.ndarray:
-        """Vector of the scene in the axes of the wire, in its own unit; torques too, for both are right-handed."""
+        """Vector of the scene in the axes of the wire, in its own unit; torques too, because both are right-handed."""
         return self._placement[:3, :3] @ (self._signs * vector)
 
 

@@ -117,7 +117,7 @@ class ViewerServer:
 
     @property
     def address(self) -> str:
-        """What a person opens; the token stays in the browser, for fragments are never sent."""
+        """What a person opens; the token stays in the browser, because fragments are never sent."""
         return self.addresses[0]
 
     @property

@@ -26,7 +26,7 @@ def kind_of(tool: ShapeTable) -> str:
 
 
 def shape_choices(own: ToolTable) -> list[dict[str, str]]:
-    """Entries of the page's list of shapes, for a tool as its scene has it: that shape is always among them."""
+    """Entries of the page's list of shapes, for a tool of a scene. Its own shape is always among them."""
     offered = dict(TITLES) if own.contact == "local" else {}
     kind = kind_of(own)
     offered.setdefault(kind, TITLES.get(kind) or title_of(Path(own.shape).stem))
