@@ -25,7 +25,7 @@ HABITS = (
         "write 'because', or a sentence of its own, instead of 'for'",
     ),
     (
-        r", for (?:(?!which|that|example)[\w'-]+ ){1,6}(is|are|was|were|has|have|had|may|would|can|cannot|need|needs)\b",
+        r", for (?:(?!which|that|example)[\w'-]+ ){1,6}(is|are|was|were|has|have|had|may|would|can|cannot|needs?)\b",
         "write 'because', or a sentence of its own, instead of 'for'",
     ),
     (r"\b(whoever|whosoever)\b", "name the person or the thread"),
@@ -94,9 +94,11 @@ def problems_of(path: Path) -> list[str]:
             continue
         spoken = re.sub(r"`+[^`]*`+", "", sentence.text)
         where = f"{name}:{sentence.line}"
-        for pattern, reason in HABITS:
-            if found := re.search(pattern, spoken, re.IGNORECASE):
-                problems.append(f"{where}: '{found[0]}': {reason}")
+        # The same advice is given once a sentence.
+        found = {
+            reason: m[0] for pattern, reason in reversed(HABITS) if (m := re.search(pattern, spoken, re.IGNORECASE))
+        }
+        problems += [f"{where}: '{words}': {reason}" for reason, words in found.items()]
         if len(sentence.words) > MAX_WORDS:
             opening = " ".join(sentence.text.split()[:8])
             problems.append(f"{where}: {len(sentence.words)} words in one sentence: {opening} ...")

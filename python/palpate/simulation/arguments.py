@@ -38,7 +38,8 @@ def tool_arguments(scene: SceneTables, rank: int) -> tuple[Any, ...]:
 def body_arguments(body: BuiltBody, local: bool) -> tuple[Any, ...]:
     """Arrays of one body in the order of the native module.
 
-    Elastic constants at the surface are given wherever they are known, because a tool under the local law may be added later.
+    Elastic constants at the surface are given wherever they are known, because a tool under the local law may come
+    later.
 
     Raises
     ------
