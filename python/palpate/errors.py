@@ -57,7 +57,7 @@ class ViewerError(Error):
 
 
 class DeviceError(Error):
-    """A haptic device that cannot be found or opened, or a device of a program that does not do what it says."""
+    """A haptic device that cannot be found or opened, or a device in Python whose methods fail."""
 
 
 class ClusterError(Error):
@@ -81,7 +81,7 @@ class StoreWarning(PalpateWarning):
 
 
 class PrecisionWarning(PalpateWarning):
-    """An answer, or what a store will answer, may be wrong by more than a per cent."""
+    """An answer, or the typical answers of a store, may be wrong by more than a per cent."""
 
 
 class SchedulingWarning(PalpateWarning):
@@ -97,4 +97,4 @@ class TouchWarning(PalpateWarning):
 
 
 class RecordingWarning(PalpateWarning):
-    """A recording is not whole, or is not made again as it was."""
+    """A recording is not whole, or its replay gives other numbers."""

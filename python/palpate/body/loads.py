@@ -30,8 +30,8 @@ class Loads(ComparedByValue):
     """Loads that act on a body at rest.
 
     Numbers are SI, and any of them may be text with a unit, such as ``"200Pa"``.
-    A part of the surface is named by node indices, an (n,) mask or a function of the (n, 3) positions; the faces all of
-    whose corners are named carry the load.
+    A part of the surface is named by node indices, an (n,) mask or a function of the (n, 3) positions; a face carries
+    the load if all of its corners are named.
 
     Parameters
     ----------

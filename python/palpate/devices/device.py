@@ -18,13 +18,13 @@ class Device(ABC):
 
     All its methods are called on one thread, which polls it at the rate of the force loop: :meth:`read`, then
     :meth:`write`, over and over. However long they take, the loop ticks on: it takes the latest reading, and after
-    50 ms without a new one its force is zero until a reset. What they raise is a fault of the tool, in one line
-    (:class:`DeviceWarning`, and ``fault`` of a frame); the device is then asked for a reading ten times a second.
+    50 ms without a new one its force is zero until a reset. If one of them raises, the tool has a fault, with the
+    reason in a :class:`DeviceWarning` and in ``fault`` of a frame. The device is then tried again ten times a second.
 
     Attributes
     ----------
     name
-        What a person knows it by; the name of the class unless given.
+        Name in messages; by default that of the class.
     limits
         What it can render.
     rate
@@ -62,7 +62,7 @@ class Device(ABC):
         return None if self._polling is None else self._polling.failure
 
     def open_for_loop(self, rate: float) -> _native.OpenedDevice:
-        """Open it and begin to poll it, for a loop of so many ticks a second; what the loop takes.
+        """Open the device and begin to poll it, for a loop of so many ticks a second.
 
         Raises
         ------

@@ -18,7 +18,7 @@ HAND_SPEED = 10.0
 
 @dataclass(frozen=True)
 class DeviceLimits:
-    """What a device can render. What it does not limit is infinite; the limits of the scene come on top.
+    """What a device can render. Quantities without a limit are infinite. The limits of the scene apply as well.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class DeviceLimits:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a device says, in its own frame: x to the right, y away from the person, z up.
+    """Measurement of a device, in its own frame: x to the right, y away from the person, z up.
 
     Attributes
     ----------

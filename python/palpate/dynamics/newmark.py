@@ -32,7 +32,7 @@ class Newmark:
         Time step, s.
     alpha, delta
         Weights of the new acceleration in displacement and velocity: (1/4, 1/2) keeps energy, (0, 1/2) is the central
-        difference method, (0.3025, 0.6) damps what is too fast for the step. Not used by ``"exponential"``.
+        difference method, (0.3025, 0.6) damps motions that are too fast for the step. Not used by ``"exponential"``.
     rayleigh
         a (1/s) and b (s); see :func:`palpate.rayleigh_from_ratios`.
     mass

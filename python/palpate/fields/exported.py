@@ -19,7 +19,7 @@ class Exportable(ABC):
 
     @abstractmethod
     def to_meshio(self) -> meshio.Mesh:
-        """Give what is at rest with its displacement, strain and stress at the nodes, as a mesh of meshio."""
+        """Return the body at rest with displacement, strain and stress at its nodes, as a mesh of meshio."""
 
     @abstractmethod
     def _drawn_surfaces(self) -> list[DeformedSurface]:
@@ -48,7 +48,7 @@ class Exportable(ABC):
         write_result(self.to_meshio(), path)
 
     def plot(self, magnification: float = 1.0) -> Figure:
-        """Picture of what is deformed, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
+        """Draw the deformed body, coloured by displacement, as a figure of matplotlib; ``savefig`` writes it.
 
         Parameters
         ----------

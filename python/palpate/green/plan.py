@@ -98,13 +98,13 @@ def plan(
 ) -> Plan:
     """Count what :func:`palpate.precompute` would do with the same arguments.
 
-    With ``dask`` the memory is that of a worker with as many threads as this process has, and may be more than there is
-    here; nobody is connected to.
+    With ``dask`` the memory is that of a worker with as many threads as this process has, and may be more than this
+    machine has. No connection is made.
 
     Raises
     ------
     BodyError
-        A bound of memory that cannot be kept, and what it refuses.
+        A bound of memory that is too small, or a body that :func:`palpate.precompute` refuses.
     StoreError
         Files that have no room on the disk.
 

@@ -42,9 +42,9 @@ def precompute(
 ) -> GreensFunction:
     """Green's function of a body, from its file if that matches, else computed and written there.
 
-    An interrupted computation leaves what it finished in ``<path>.partial``; the next one with the same arguments goes
-    on from there, to the same bits. One process writes a file at a time: a second one waits for the first, and then
-    takes what that has written, or goes on from it.
+    An interrupted computation leaves what it finished in ``<path>.partial``; the next call with the same arguments
+    continues from there, with the same bits. One process writes a file at a time: a second one waits for the first,
+    and then takes its file or continues it.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ def precompute(
         A supported body, with its loads.
     precision
         Stored number format: ``"f16"``, ``"f32"`` or ``"f64"``, of 2, 4 and 8 bytes an entry. Answers are computed in
-        double from what is stored. None: the cheapest in which typical contacts of this body are right to 0.03 %, as
-        measured on some columns.
+        double precision from the stored numbers. None: the cheapest in which typical contacts of this body are right
+        to 0.03 %, as measured on some columns.
     touch
         Region of the surface that may be touched: surface nodes, a mask of all nodes, a predicate such as
         ``"z > 3cm"``, a region of the mesh file by name or number, or a solid of :mod:`palpate.shapes`; None: all.

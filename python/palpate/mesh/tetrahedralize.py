@@ -102,7 +102,7 @@ def tetrahedralize(
     max_element_size
         Longest edge wanted, m or text such as ``"4mm"``; None: a fifteenth of the longest side, and where the surface
         is curved so strongly or the body so thin that more than a hundredth of the volume would be lost, down to a
-        sixtieth. What is lost all the same, or by the size given, a :class:`palpate.MeshWarning` tells.
+        sixtieth. A :class:`palpate.MeshWarning` reports a loss that remains.
     unit
         Unit of length of the surface; None: metres, of a segmentation that of the file, or millimetres.
     refine
@@ -118,7 +118,7 @@ def tetrahedralize(
     time_limit
         Seconds after which the mesher is stopped.
     progress
-        Show a bar on a terminal, or call a function with the stages done and all of them.
+        Whether to show a bar on a terminal; or a function of (stages done, all stages).
 
     Raises
     ------

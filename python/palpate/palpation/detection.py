@@ -115,7 +115,7 @@ def compare(
     partial: str | os.PathLike[str] | None = None,
     progress: bool | Callable[[int, int], None] = False,
 ) -> Detection:
-    """Palpate another scene at the points of a map, and find what is different.
+    """Palpate another scene at the points of a map, and find the differences.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StiffnessMap(MapRecord):
-    """What a palpation has found, one row for each of p points. Compared by value, number by number; not hashable.
+    """Results of a palpation, one row for each of p points. Compared by value, number by number; not hashable.
 
     Attributes
     ----------

@@ -68,7 +68,7 @@ class Scene(SceneTables):
             self._check_tables(rank)
 
     def start_paths_in(self, folder: str | os.PathLike[str]) -> None:
-        """Let the paths of a scene made by a program start in a folder."""
+        """Set the folder in which relative paths of a scene start that a program has made."""
         self._source = (Path(folder) / self.name, "")
 
     def _check_tables(self, rank: int) -> None:
@@ -132,7 +132,7 @@ class Scene(SceneTables):
         progress: bool | Callable[[int, int], None] = True,
         announce: Callable[[Expected], None] | None = None,
     ) -> tuple[BuiltScene, dict[int, BackgroundPrecompute]]:
-        """Build what is touched first, and go on with the rest in processes beside this one, by rank of the body.
+        """Build the part that is touched first, and compute the rest in other processes.
 
         Bodies without ``touch.first``, and those whose store is there, are built as a whole.
 

@@ -46,7 +46,7 @@ class QuantityDifference:
     quantity, unit
         What it is.
     is_input
-        Whether it is what a hand did, rather than what it felt.
+        Whether it is an input, such as the pose of a hand, rather than a result.
     largest, rms
         Largest and root mean square of the magnitude of the difference.
     tick, time

@@ -41,7 +41,7 @@ def export(
     """Write a recording in the format of a file's ending; nothing appears that is not complete.
 
     ``.csv`` and ``.parquet`` have one row a tick, and contacts in a second file, ``<name>-contacts``. ``.pvd``
-    (ParaView), ``.glb`` and ``.mp4`` show frames, for which the recording is made again.
+    (ParaView), ``.glb`` and ``.mp4`` show frames, for which the recording is computed again.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ def export(
     Raises
     ------
     Error
-        An unknown ending, a span without ticks, a recording that cannot be read or made again, or a package that is not
-        installed (``pip install 'palpate[export]'``).
+        An unknown ending, a span without ticks, a recording that cannot be read or computed again, or a package that
+        is not installed (``pip install 'palpate[export]'``).
 
     """
     target = Path(path)

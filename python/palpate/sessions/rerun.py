@@ -20,10 +20,10 @@ def rerun(
 ) -> Recording:
     """Give the inputs of a recording to another scene, without a clock, up to the first tick that was dropped.
 
-    Of the recording are what the devices said (poses, velocities, buttons), strikes, resets and slow motion; of the
-    scene its bodies, tools, device limits and all other settings. The same scene gives the same bits, apart from the
-    limit of strain where the recorded loop ran on a clock: its responses come 16 ticks after they were asked for, as
-    in :meth:`palpate.Simulation.play`.
+    Poses, velocities, buttons, strikes, resets and slow motion are those of the recording. Bodies, tools, limits of
+    devices and all other settings are those of the scene. The same scene gives the same bits, apart from the limit of
+    strain where the recorded loop ran on a clock: its responses come 16 ticks after they were asked for, as in
+    :meth:`palpate.Simulation.play`.
 
     Parameters
     ----------

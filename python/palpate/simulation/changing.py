@@ -65,8 +65,9 @@ class SceneEditing:
     ) -> int:
         """Add a body at a position, m, with an orientation, a unit quaternion w x y z; returns its rank.
 
-        It is computed first, if need be. A scene gives its first body, a mapping is taken as a ``[body]`` table; both
-        say where they stand, unless it is said here. Of a Green's function the file must be there.
+        It is computed first, if need be. The first body of a scene, or a mapping with the keys of a ``[body]`` table.
+        Their place counts unless ``position`` or ``orientation`` is given here. Of a Green's function the file must
+        be there.
 
         Raises
         ------

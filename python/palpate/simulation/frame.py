@@ -39,7 +39,7 @@ class Contact(ComparedByValue):
     anchor
         Where the tool carries no force (3,), m, in the world: the tool's displacement from there is that of the patch.
     displacement
-        Of the tool from the anchor (3,), m, in the world, as far as the limit of strain lets it.
+        Displacement of the tool from the anchor (3,), m, in the world, up to the limit of strain.
     limited
         Whether the tool goes farther than that.
     slipping
@@ -133,7 +133,7 @@ class Frame(ComparedByValue, Exportable):
     active
         (tools,) whether each tool is in the scene.
     limited
-        (tools,) whether each tool is kept from following its device by the limit of strain.
+        (tools,) whether the limit of strain keeps each tool from following its device.
     contacts
         One for each place at which a tool touches a body: up to three a tool and body under the local law.
     bodies
@@ -167,8 +167,8 @@ class Frame(ComparedByValue, Exportable):
     def to_meshio(self) -> meshio.Mesh:
         """All bodies at rest in the scene with displacement, strain and stress at the nodes, as a mesh of meshio.
 
-        The data are those of :meth:`palpate.Touch.to_meshio`; ``body`` numbers the cells, and what a body from a bare
-        store does not know is NaN.
+        The data are those of :meth:`palpate.Touch.to_meshio`; ``body`` numbers the cells. Fields that a body from a
+        bare store does not have are NaN.
         """
         return together([body.in_scene() for body in self.bodies])
 

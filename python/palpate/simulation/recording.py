@@ -201,10 +201,10 @@ class Recording(ComparedByValue):
         """(t,) number of each tick since the recording began; where some were dropped, they are missing."""
         return self._columns["number"]
 
-    positions = _column("positions", "Of the tips as the devices said, (t, 3) or (t, tools, 3), m.")
+    positions = _column("positions", "Of the tips as measured, (t, 3) or (t, tools, 3), m.")
     orientations = _column("orientations", "Of the tools, (t, 4) or (t, tools, 4), unit quaternions w x y z.")
-    velocities = _column("velocities", "Of the tips as the devices said, (t, 3) or (t, tools, 3), m/s.")
-    angular_velocities = _column("angular_velocities", "As the devices said, (t, 3) or (t, tools, 3), rad/s.")
+    velocities = _column("velocities", "Of the tips as measured, (t, 3) or (t, tools, 3), m/s.")
+    angular_velocities = _column("angular_velocities", "As measured, (t, 3) or (t, tools, 3), rad/s.")
     computed_forces = _column("computed_forces", "Before the safety stage, (t, 3) or (t, tools, 3), N.")
     computed_torques = _column(
         "computed_torques", "Before the safety stage, (t, 3) or (t, tools, 3), N m about the tips."

@@ -25,7 +25,7 @@ MOST_DIFFERENCES = 100
 
 @dataclass(frozen=True)
 class Difference:
-    """A quantity that came out otherwise than recorded.
+    """A quantity that differs from the recorded one.
 
     Attributes
     ----------

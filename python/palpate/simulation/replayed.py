@@ -38,7 +38,7 @@ class ReplayedSimulation(Simulation):
     recorded
         The recording.
     scene_as_built
-        The scene that makes it again.
+        The scene that computes it again.
     ticks
         How many of its ticks can be made again.
     made

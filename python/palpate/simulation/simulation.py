@@ -159,7 +159,7 @@ class Simulation(Adjustable, SceneEditing):
         self._start(lambda: connect(self._core, self.scene, self._given))
 
     def start_without_devices(self) -> None:
-        """Start the loop with simulated tools alone, whatever moves them in the scene: a device may have gone."""
+        """Start the loop with simulated tools only, also where the scene names devices: a device may have gone."""
         self._start(dict)
 
     def _start(self, connected: Callable[[], dict[int, str]]) -> None:
@@ -194,7 +194,7 @@ class Simulation(Adjustable, SceneEditing):
         """Record every tick from now on, or from the start of the loop, in a new file (MCAP).
 
         The loop begins anew: everything is let go of, bodies come to rest, and forces ramp in. Only from a known state
-        can a recording be replayed bit for bit. What was written is safe after a tenth of a second.
+        can a recording be replayed bit for bit. A tick is safely on the disk after a tenth of a second.
 
         Raises
         ------
@@ -239,8 +239,8 @@ class Simulation(Adjustable, SceneEditing):
     ) -> None:
         """Send a simulated tool to a position, m, and an orientation, a unit quaternion w x y z.
 
-        It follows smoothly. With a ``velocity``, m/s, the target goes on from there at that velocity until the next
-        call, for a tenth of a second at most, so that a moving pointer is followed without delay.
+        It follows smoothly. With a ``velocity``, m/s, the target moves on at that velocity until the next call, for
+        at most a tenth of a second, so that the tool follows a moving pointer without delay.
 
         Raises
         ------
