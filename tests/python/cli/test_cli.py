@@ -125,7 +125,10 @@ def test_scripted_press_is_limited_or_flagged(tmp_path):
     limited = run("run", "limited.toml", "--headless", "1", cwd=tmp_path).stdout
     assert "largest strain 10.0 %, where the tool was limited" in limited and "accurate" not in limited
     free = run("run", "free.toml", "--headless", "1", cwd=tmp_path).stdout
-    assert "beyond 10 %, where linear elasticity is no longer accurate" in free and "limited" not in free
+    assert "estimated error of the force" in free and "limited" not in free
+    (tmp_path / "linear.toml").write_text(f'{scene}[material]\nlaw = "linear"\n[view]\nstrain_limit = 0\n')
+    linear = run("run", "linear.toml", "--headless", "1", cwd=tmp_path).stdout
+    assert "beyond 10 %, where linear elasticity is no longer accurate" in linear and "estimated" not in linear
 
 
 def test_wrong_scene_costs_one_line(tmp_path):
