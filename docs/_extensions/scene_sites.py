@@ -43,14 +43,13 @@ def scene_files(srcdir: Path) -> dict[str, Path]:
 
 def write_scenes(app: Sphinx, failed: Exception | None) -> None:
     """Write the site of all scenes beside the pages that show it."""
-    if failed is not None or app.builder.format != "html":
+    files = scene_files(Path(app.srcdir))
+    if failed is not None or app.builder.format != "html" or not files:
         return
     from palpate.scene import Scene
     from palpate.viewer.site import with_precision, write_site
 
-    scenes = [
-        (name, with_precision(Scene.read(path), PRECISION)) for name, path in scene_files(Path(app.srcdir)).items()
-    ]
+    scenes = [(name, with_precision(Scene.read(path), PRECISION)) for name, path in files.items()]
     write_site(scenes, Path(app.outdir) / FOLDER)
 
 
