@@ -15,7 +15,7 @@ from sphinx.application import Sphinx
 
 FOLDER = "touch"
 PRECISION = "f16"
-STYLE = "width:100%;height:460px;border:1px solid #8888"
+STYLE = "width:100%;height:620px;border:1px solid #8888"
 
 
 class SceneDirective(Directive):
