@@ -2,7 +2,7 @@
 
 Usage: python scripts/record_results.py verify            # palpate verify --json
        python scripts/record_results.py elements          # python -m benches elements --json
-       python scripts/record_results.py tick-local tick local
+       python scripts/record_results.py palpation verify palpation
 The first word names the file; the others are the arguments of the benchmark, by default the first word.
 """
 

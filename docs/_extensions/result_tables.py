@@ -102,6 +102,7 @@ def scale(record: dict[str, Any], _: Sequence[str]) -> str:
 
 MAKERS: dict[str, Callable[[dict[str, Any], Sequence[str]], str]] = {
     "verify": verify,
+    "palpation": verify,
     "elements": elements,
     "contact": contact,
     "scale": scale,
