@@ -1,18 +1,12 @@
-"""What a segmentation file holds, read by a process of its own: a damaged file ends that process alone."""
+"""Summary of a segmentation file: its voxels and segments."""
 
 from __future__ import annotations
 
-import json
 import os
-import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from palpate.errors import MeshError
-from palpate.input_file import require_file
-from palpate.mesh.child import failure_of, run_limited
+from palpate.mesh.label_process import label_arrays
 
 TIME_LIMIT = 300.0  # s
 
@@ -50,18 +44,7 @@ def label_summary(
         A file that cannot be read, or a segment that it does not have.
 
     """
-    require_file(Path(path), MeshError)
-    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        job, summary_file = Path(folder) / "job.json", Path(folder) / "summary.json"
-        wanted = None if segments is None else list(segments)
-        job.write_text(json.dumps({"path": os.fspath(path), "unit": unit, "segments": wanted}))
-        command = [sys.executable, "-m", "palpate.segmentation.summary_child", str(job), str(summary_file)]
-        status = run_limited(command, time_limit)
-        found = json.loads(summary_file.read_text()) if summary_file.exists() else {}
-    if "reason" in found:
-        raise MeshError(found["reason"])
-    if status != 0 or "shape" not in found:
-        failure = failure_of(status, time_limit) or "returned nothing"
-        raise MeshError(f"{path}: the segmentation could not be read: its process {failure}")
-    known = tuple(SegmentSummary(*segment) for segment in found["segments"])
-    return LabelSummary(tuple(found["shape"]), tuple(found["spacing"]), found["voxel_volume"], known)
+    found = label_arrays("summary", path, unit, segments, time_limit)
+    rows = zip(*(found[name].tolist() for name in ("names", "values", "voxels")), strict=True)
+    shape, spacing = tuple(found["shape"].tolist()), tuple(found["spacing"].tolist())
+    return LabelSummary(shape, spacing, float(found["voxel_volume"]), tuple(SegmentSummary(*row) for row in rows))

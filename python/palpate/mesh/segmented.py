@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import functools
-import json
 import os
-import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from palpate.errors import MeshError, MeshWarning
-from palpate.input_file import require_file
-from palpate.mesh.child import failure_of, run_limited
+from palpate.errors import MeshWarning
 from palpate.mesh.filling import PARTS, Ball, Element
 from palpate.mesh.inner import InnerRegion, InnerRegions
+from palpate.mesh.label_process import label_arrays
 from palpate.mesh.surface_file import SurfaceFile
 from palpate.mesh.tetmesh import TetMesh
 from palpate.mesh.wrapping import Which, Wrapping
@@ -56,8 +51,7 @@ def segmented(
     """
     import trimesh
 
-    require_file(Path(path), MeshError)
-    found = _boundaries(path, segments, unit, time_limit)
+    found = label_arrays("boundaries", path, unit, segments, time_limit)
     name = str(path)
     if drawn is not None:
         drawn(found["vertices"], found["faces"])
@@ -87,26 +81,6 @@ def segmented(
     # In the order in which they were given, by which materials belong to them.
     numbers = {str(title): mesh.region_names[str(title)] for title in found["names"]}
     return TetMesh(mesh.nodes, mesh.tets, mesh.regions, numbers)
-
-
-def _boundaries(
-    path: str | os.PathLike[str], segments: Sequence[str | int], unit: str | None, time_limit: float
-) -> dict[str, np.ndarray]:
-    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        job, boundaries_file = Path(folder) / "job.json", Path(folder) / "boundaries.npz"
-        job.write_text(json.dumps({"path": os.fspath(path), "segments": list(segments), "unit": unit}))
-        command = [sys.executable, "-m", "palpate.segmentation.boundary_child", str(job), str(boundaries_file)]
-        status = run_limited(command, time_limit)
-        found: dict[str, np.ndarray] = {}
-        if boundaries_file.exists():
-            with np.load(boundaries_file) as result:
-                found = dict(result)
-    if "reason" in found:
-        raise MeshError(str(found["reason"]))
-    if status != 0 or "vertices" not in found:
-        failure = failure_of(status, time_limit) or "returned nothing"
-        raise MeshError(f"{path}: the segmentation could not be read: its process {failure}")
-    return found
 
 
 def _inner(found: dict[str, np.ndarray], element: Element, size: float) -> tuple[InnerRegions | None, list[Ball]]:
