@@ -136,18 +136,15 @@ class PlaceTable(Table):
         return members
 
 
-class RegionTable(PlaceTable):
-    """A material for part of the body.
-
-    What it does not say of its material is that of ``[material]``. Later tables override earlier ones.
-    """
+class PartMaterialTable(Table):
+    """Material of a part of the body; what it does not give is that of ``[material]``."""
 
     youngs_modulus: Pressure | None = None
-    """Young's modulus of the region. Default: that of `[material]`."""
+    """Young's modulus of the part. Default: that of `[material]`."""
     poissons_ratio: PoissonsRatio | None = None
-    """Poisson's ratio of the region, below 0.5. Default: that of `[material]`."""
+    """Poisson's ratio of the part, below 0.5. Default: that of `[material]`."""
     density: Density | None = None
-    """Density of the region, for weight and motion. Default: that of `[material]`."""
+    """Density of the part, for weight and motion. Default: that of `[material]`."""
     law: Law | None = None
     """Constitutive law: linear elasticity, or a hyperelastic one for strains beyond about 10 %. Default: that of
     `[material]`."""
@@ -165,35 +162,20 @@ class RegionTable(PlaceTable):
         return _completed(self, base)
 
 
-class SegmentTable(Table):
-    """A segment of a label map, and its material; what it does not give is that of ``[material]``."""
+class RegionTable(PartMaterialTable, PlaceTable):
+    """A material for part of the body. Later tables override earlier ones."""
 
+
+class _NamedSegment(Table):
     name: Annotated[int | str, _SEGMENT]
     """Name of the segment in the file, or its label."""
-    youngs_modulus: Pressure | None = None
-    """Young's modulus of the segment. Default: that of `[material]`."""
-    poissons_ratio: PoissonsRatio | None = None
-    """Poisson's ratio of the segment, below 0.5. Default: that of `[material]`."""
-    density: Density | None = None
-    """Density of the segment, for weight and motion. Default: that of `[material]`."""
-    law: Law | None = None
-    """Constitutive law: linear elasticity, or a hyperelastic one for strains beyond about 10 %. Default: that of
-    `[material]`."""
-    c10: Pressure | None = None
-    """First constant of `mooney-rivlin` and `yeoh`, as Abaqus and CalculiX define it. Default: that of `[material]`."""
-    c01: Pressure | None = None
-    """Second constant of `mooney-rivlin`. Default: that of `[material]`."""
-    c20: Pressure | None = None
-    """Second constant of `yeoh`. Default: that of `[material]`."""
-    c30: Pressure | None = None
-    """Third constant of `yeoh`. Default: that of `[material]`."""
-
-    def material(self, base: MaterialTable) -> Material:
-        """Material, completed from that of the body."""
-        return _completed(self, base)
 
 
-def _completed(table: RegionTable | SegmentTable, base: MaterialTable) -> Material:
+class SegmentTable(PartMaterialTable, _NamedSegment):
+    """A segment of a label map, and its material."""
+
+
+def _completed(table: PartMaterialTable, base: MaterialTable) -> Material:
     given = {name: getattr(base, name) for name in base.model_fields_set}
     own = {name: getattr(table, name) for name in MaterialTable.model_fields if getattr(table, name) is not None}
     if "law" in own:

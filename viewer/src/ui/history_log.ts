@@ -1,6 +1,7 @@
 // The last seconds of a body's motion, in its own time: displacement of the watched node, and where the energy is.
 
 import type { Vec3 } from "../net/protocol";
+import { Columns } from "./columns";
 
 /** Numbers in a row of a frame's history. */
 const COLUMNS = 8;
@@ -19,31 +20,25 @@ export interface History {
 }
 
 export class HistoryLog {
-  private readonly columns = Array.from({ length: COLUMNS }, () => new Float64Array(ROWS_MAX));
-  private count = 0;
+  private readonly columns = new Columns(COLUMNS, ROWS_MAX);
 
   append(rows: Float32Array): void {
-    for (let i = 0; i + COLUMNS <= rows.length; i += COLUMNS) {
-      if (this.count === ROWS_MAX) this.dropOld();
-      this.columns.forEach((column, k) => (column[this.count] = rows[i + k]!));
-      this.count += 1;
-    }
+    for (let i = 0; i + COLUMNS <= rows.length; i += COLUMNS) this.columns.push(rows, i);
   }
 
   clear(): void {
-    this.count = 0;
+    this.columns.clear();
   }
 
   /** The `span` seconds after `origin`, or those before now if there is none. */
   read(span: number, origin: number | null): History {
-    const time = this.columns[0]!;
-    const now = this.count > 0 ? time[this.count - 1]! : 0;
+    const now = this.columns.newest(0);
     const start = origin ?? now - span;
-    let first = this.count;
-    while (first > 0 && time[first - 1]! >= start) first -= 1;
+    const first = this.columns.firstSince(start);
+    const time = this.columns.part(0, first);
     let end = first;
-    while (end < this.count && time[end]! <= start + span) end += 1;
-    const part = (k: number) => this.columns[k]!.subarray(first, end);
+    while (end - first < time.length && time[end - first]! <= start + span) end += 1;
+    const part = (k: number) => this.columns.part(k, first, end);
     const millimetres = (k: number) => part(k).map((metres) => 1000 * metres);
     const [total, work] = [part(6), part(7)];
     return {
@@ -58,7 +53,9 @@ export class HistoryLog {
 
   /** The newest row: body time s, displacement m, energies J. */
   latest(): { bodyTime: number; displacement: Vec3; kinetic: number; strain: number; total: number; work: number } {
-    const [bodyTime, x, y, z, kinetic, strain, total, work] = this.columns.map((c) => c[this.count - 1] ?? 0);
+    const [bodyTime, x, y, z, kinetic, strain, total, work] = Array.from({ length: COLUMNS }, (_, k) =>
+      this.columns.newest(k),
+    );
     return {
       bodyTime: bodyTime!,
       displacement: [x!, y!, z!],
@@ -67,11 +64,5 @@ export class HistoryLog {
       total: total!,
       work: work!,
     };
-  }
-
-  private dropOld(): void {
-    const remaining = ROWS_MAX / 2;
-    for (const column of this.columns) column.copyWithin(0, ROWS_MAX - remaining);
-    this.count = remaining;
   }
 }
