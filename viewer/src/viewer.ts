@@ -1,4 +1,4 @@
-// The page put together: what arrives is kept until the next drawing, drawn, and acknowledged.
+// Composition of the page: each message is stored until the next drawing, drawn, and acknowledged.
 
 import { Control } from "./control";
 import { NodulePointer } from "./input/nodule_pointer";

@@ -1,4 +1,4 @@
-//! The frame in which every driver speaks, and those of the vendors.
+//! Coordinate axes of all drivers, and those of the vendors.
 //!
 //! Seen by the person in front of the device: `x` to the right, `y` away, `z` up; metres, newtons, radians. Every vendor's frame
 //! is a rotation of it by right angles, the same for positions, velocities, forces and torques.

@@ -1,4 +1,4 @@
-//! A gentle check of one device by itself: what it reads, and whether it pushes where it is told to.
+//! A gentle check of one device by itself: its readings, and whether it pushes in the commanded direction.
 //!
 //! A tick reads the device and writes it as a force loop does, through the same safety stage; what is computed in between is
 //! no body but a task: to watch, or to push along a direction with a force that rises evenly and then ends. A tip that runs away,

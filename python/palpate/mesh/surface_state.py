@@ -1,4 +1,4 @@
-"""What is wrong with a surface, and which mesher fills it."""
+"""Defects of a surface, and the mesher that fills it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What peers may say to a simulation, and what they get of it."""
+"""Messages from peers to a simulation, and its messages to them."""
 
 from __future__ import annotations
 

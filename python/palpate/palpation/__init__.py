@@ -1,4 +1,4 @@
-"""Palpation by a protocol instead of a hand: stiffness over the surface of a body, and what lies hidden in it."""
+"""Palpation by a protocol instead of a hand: stiffness over the surface of a body, and hidden nodules."""
 
 from palpate.palpation.detection import Detection, compare, homogeneous
 from palpate.palpation.records import Nodule, PressCurve

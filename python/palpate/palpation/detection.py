@@ -1,4 +1,4 @@
-"""What lies hidden in a body: its stiffness beside that of the same body of one material.
+"""Detection of hidden nodules: stiffness of a body beside that of the same body of one material.
 
 Both are palpated alike, so the shape of the body, its supports and what a mesh is off drop out of the ratio. A nodule
 is a peak of `|ratio - 1|`; its place is that of the bump `A / (1 + r^2 / w^2)^2` fitted to the points around in the

@@ -1,4 +1,4 @@
-"""Values at scattered places of a surface, taken to all of it.
+"""Interpolation of values at scattered places of a surface.
 
 Interpolated by radial basis functions, `sum w_i |x - x_i| + c`, over the closest places: what was measured stands at
 its place, between places it is as smooth as that allows. Distances are those of places and normals together, so that

@@ -1,4 +1,4 @@
-"""One press: the path of the tool, and what its force tells of the surface.
+"""One press: the path of the tool, and the stiffness found from its force.
 
 The tool comes along the inward normal until it has gone `d` beyond first touch. With the component `F` of its force
 along the outward normal,

@@ -1,4 +1,4 @@
-"""Scenes: what to touch and with what, as read from a file."""
+"""Scenes: bodies, tools and devices, as read from a file."""
 
 from palpate.scene.build import BuiltBody, BuiltScene, mesh_of_body, unsolved_body
 from palpate.scene.dynamics import BodyMotion, DynamicsTable, StrikeTable

@@ -1,4 +1,4 @@
-"""Bodies that take long to compute are touched early: at first where the page shows their middle."""
+"""Early touch of bodies that take long to compute: the middle of the picture is computed first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Segments of a label map that make a body by default: the largest, and those that hang together with it."""
+"""Segments of a label map that make a body by default: the largest, and those connected with it."""
 
 from __future__ import annotations
 

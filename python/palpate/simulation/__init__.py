@@ -1,4 +1,4 @@
-"""The force loop of a scene, what is read of it, and what it leaves behind."""
+"""The force loop of a scene, its frames, logs and recordings."""
 
 from palpate.simulation.about import scene_of, shown_of
 from palpate.simulation.frame import BodyFrame, Contact, Frame, frame_of

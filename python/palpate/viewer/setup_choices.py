@@ -1,4 +1,4 @@
-"""What a person chooses for a body that is set up in the page, and how messages change it."""
+"""Choices for a body that is set up in the page, and the messages that change them."""
 
 from __future__ import annotations
 

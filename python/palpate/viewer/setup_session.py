@@ -1,4 +1,4 @@
-"""What a page shows while a body is set up: its surface, at rest. No loop runs."""
+"""Session of a body that is set up: the page shows its surface at rest, and no loop runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// Two fingers are for the camera: its controls get the event of the first finger, which they missed, before that of the second.
+// Hand-over of a press to the camera at the second finger: its controls first get the event of the first finger, which they missed.
 
 import type { Place } from "../window_regions";
 

@@ -1,4 +1,4 @@
-// One key for each thing that a mouse hand may want at once.
+// Keyboard shortcuts, for what a hand at the mouse needs at once.
 
 import type { Control } from "../control";
 import type { Painting } from "../painting";

@@ -1,4 +1,4 @@
-// Colours of a field come over the tissue, and go, within a moment: the eye keeps the shape while they change.
+// Colours of a field fade in over the tissue and out again, so that the shape stays recognisable.
 
 import type { FieldShares } from "./field_material";
 

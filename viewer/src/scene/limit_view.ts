@@ -1,4 +1,4 @@
-// Where the pointer wants the tool while it is limited: a ring there, and a line to it from the tool.
+// Target of a tool that the strain limit holds back: a ring at the pointer, and a line to it from the tool.
 
 import * as THREE from "three";
 

@@ -1,4 +1,4 @@
-// The memory of the graphics card, which three.js frees only where it is asked to.
+// Release of memory of the graphics card, which three.js keeps until it is asked.
 
 import * as THREE from "three";
 

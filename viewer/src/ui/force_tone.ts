@@ -1,4 +1,4 @@
-// A tone whose amplitude is the force: what stands for touch where a mouse is all there is. Differences of amplitude that
+// A tone whose amplitude is the force, in place of touch where only a mouse is connected. Differences of amplitude that
 // an ear tells apart are about as large a part of it as differences of force for a hand.
 
 const PITCH_HZ = 220;

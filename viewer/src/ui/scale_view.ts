@@ -1,4 +1,4 @@
-// In a corner of the picture: the axes of the scene as they are seen, and a bar of a round length.
+// Axes of the scene and a scale bar of a round length, in a corner of the picture.
 
 import * as THREE from "three";
 

@@ -1,4 +1,4 @@
-// The picture to keep: the scene, and over it what stands there on the page, the legend, the force and the scale.
+// Screenshot of the scene with the legend, the force and the scale over it.
 
 import type { Viewport } from "../scene/viewport";
 import { byId } from "./dom";

@@ -1,4 +1,4 @@
-//! The inside of a body, where the offline part that factorises it is left out: there is none.
+//! Stand-in for the displacements inside a body in builds without the offline part: there are none.
 
 use crate::Result;
 

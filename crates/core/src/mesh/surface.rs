@@ -1,4 +1,4 @@
-//! The touchable boundary: rest positions, outward faces and the triangles they are drawn by, and who is next to whom.
+//! The touchable boundary: rest positions, outward faces and the triangles they are drawn by, and which are neighbours.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! The part of the series that a half-space under the whole patch has, which the local law of a contact stands for.
+//! Series of a half-space under the whole patch, which the local contact law represents.
 
 use super::half_space_table::{NEO_HOOKEAN, POLYNOMIAL, RATIOS};
 use crate::contact::local::{StrainLaw, interpolate};

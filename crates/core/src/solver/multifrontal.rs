@@ -1,4 +1,4 @@
-//! Multifrontal factorisation: supernode by supernode, what each adds to those above handed up and then forgotten.
+//! Multifrontal factorisation: supernode by supernode; the update of each is added to its parent and then dropped.
 //!
 //! The caller takes the finished columns of every supernode and keeps what it needs of them, in the form and the number
 //! format it needs: the factor as a whole is never held. A left-looking factorisation must hold all of it in double

@@ -1,4 +1,4 @@
-//! What the service says of one Inverse3 in its messages. Every field may be missing, and keys come in any order.
+//! Entries of one Inverse3 in the messages of the service. Every field may be missing, and keys come in any order.
 
 use glam::DVec3;
 use serde_json::Value;

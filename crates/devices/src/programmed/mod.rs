@@ -1,4 +1,4 @@
-//! A device that a program brings: its own thread measures and moves motors, however long that takes, and the servo reads and
+//! A device defined by a program: its own thread measures and moves motors, however long that takes, and the servo reads and
 //! writes memory.
 //!
 //! Readings go one way and wrenches the other through triple buffers: the latest counts, and neither side ever waits. The

@@ -1,4 +1,4 @@
-//! What every driver must do, checked against its emulated device.
+//! Requirements on every driver, checked against its emulated device.
 //!
 //! A driver's tests implement [`Bench`] and call [`assert_conforms`]. The suite plays the person (puts the tip somewhere, moves
 //! it, presses buttons), the hardware's bad days ([`Disturbance`]) and the force loop, and compares what the driver says with

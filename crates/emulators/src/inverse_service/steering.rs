@@ -1,4 +1,4 @@
-//! What a test and an emulated arm hand each other, wait-free: a test that is interrupted while it holds a lock would hold up the
+//! Wait-free hand-off between a test and an emulated arm: a test that is interrupted while it holds a lock would hold up the
 //! service, and what it then sees late is not late by the driver.
 
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! All that this crate asks of a system: the clock, waiting, priority, processors and locked memory. A file a system, with the
+//! Interface to the operating system: the clock, waiting, priority, processors and locked memory. A file a system, with the
 //! same functions.
 
 #[cfg(target_family = "wasm")]

@@ -1,4 +1,4 @@
-"""What a machine can give a force loop at 1 kHz: ``palpate doctor``."""
+"""Fitness of a machine for a force loop at 1 kHz: ``palpate doctor``."""
 
 from __future__ import annotations
 

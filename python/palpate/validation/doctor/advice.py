@@ -1,4 +1,4 @@
-"""What to change on a machine so that a loop at 1 kHz keeps its deadlines, in order of importance.
+"""Advice: changes to a machine so that a loop at 1 kHz keeps its deadlines, in order of importance.
 
 The order is that of what each takes from a loop at the worst: without a real-time priority any other program stays
 before it for milliseconds, a quota stops it for tens of them, a processor that shares or sleeps costs tens of

@@ -1,4 +1,4 @@
-"""A tool slid over a body at constant depth: what the elements make of a force that should be even, and its jumps."""
+"""A tool slid over a body at constant depth: variation of a force that should be even, and its jumps."""
 
 from __future__ import annotations
 
