@@ -34,7 +34,7 @@ import { DropZone } from "./ui/drop_zone";
 import { SetupPanel } from "./ui/setup_panel";
 import { ScaleView } from "./ui/scale_view";
 import { SettingsPanel } from "./ui/settings_panel";
-import { Spoken } from "./ui/spoken";
+import { SpokenForce } from "./ui/spoken_force";
 import { Statistics } from "./ui/statistics";
 import { TimeLine } from "./ui/time_line";
 import { followTheme } from "./ui/theme";
@@ -90,7 +90,7 @@ export class Viewer {
     this.plots = new Plots(store);
     this.statistics = new Statistics(store);
     new Readout(store);
-    new Spoken(store);
+    new SpokenForce(store);
     new Legend(store, control);
     new ScaleView(viewport, store);
     new Panel(store, control, viewport);

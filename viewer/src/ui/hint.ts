@@ -1,7 +1,7 @@
 // The hint line about mouse controls, until it is dismissed.
 
 import { byId } from "./dom";
-import { writeStored, readStored } from "./stored";
+import { writeStored, readStored } from "./storage";
 
 const KEY = "hint-dismissed";
 

@@ -8,7 +8,7 @@ import type { Axis, Layer, Store } from "../store";
 import { byId, press, setText } from "./dom";
 import { download, takePicture } from "./screenshot";
 import { Slider } from "./slider";
-import { readStored, writeStored } from "./stored";
+import { readStored, writeStored } from "./storage";
 
 const LAYERS: Layer[] = ["colors", "wireframe", "supports", "cutaway", "plots"];
 const AXES: Axis[] = ["x", "y", "z"];

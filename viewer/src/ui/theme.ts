@@ -3,7 +3,7 @@
 import type { Control } from "../control";
 import type { Store, Theme } from "../store";
 import { byId } from "./dom";
-import { writeStored, readStored } from "./stored";
+import { writeStored, readStored } from "./storage";
 
 const KEY = "theme";
 const known = new Map<string, string>();

@@ -10,7 +10,7 @@ import { inMillimetres, newtonsPerMillimetre, threeDigits, wholePercent } from "
 const STILL = 0.02;
 const STILL_MS = 700;
 
-export class Spoken {
+export class SpokenForce {
   private force = 0;
   private sinceMs = 0;
   private announced = true;
