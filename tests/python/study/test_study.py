@@ -175,7 +175,10 @@ press.0.point = ["60mm", "25mm", "50mm"]
         ("[grid]\nmaterial.youngs = [1]\n", r"study.toml:18: unknown key 'material.youngs'; did you mean"),
         ("[grid]\nmaterial.poissons_ratio = 0.4\n", r"study.toml:18: grid.material.poissons_ratio: give a list"),
         ("[grid]\ntool.radius = [1]\n", r"study.toml:18: tool.radius: a study varies body, material"),
-        ("[grid]\npress.radius = [1]\n", r"study.toml:18: press.radius: there are 2 tables \[\[press\]\]: write press.0"),
+        (
+            "[grid]\npress.radius = [1]\n",
+            r"study.toml:18: press.radius: there are 2 tables \[\[press\]\]: write press.0",
+        ),
         ("[grid]\npress.2.radius = [1]\n", r"study.toml:18: press.2.radius: the last of the tables \[\[press\]\]"),
         ("[grid]\npress.1.radius = [0.01, -1]\n", r"study.toml:18: press.radius: must be greater than"),
         ('[[case]]\nbody.mesh = "missing.vtu"\n', r"missing.vtu: no such file"),
