@@ -51,7 +51,7 @@ def cylinder() -> Cylinder:
 
 
 def on_eight_nodes(body: Cylinder, folder: Path, loads: np.ndarray) -> np.ndarray:
-    """Return CalculiX's displacements (n, 2) of a cylinder's nodes; those in the middles of elements are none of its."""
+    """Return CalculiX's displacements (n, 2) of a cylinder's nodes, NaN in the middles of elements."""
     # Corners counterclockwise, then the middles of sides.
     eight = body.elements[:, [0, 6, 8, 2, 3, 7, 5, 1]]
     used, rows = np.unique(eight, return_inverse=True)

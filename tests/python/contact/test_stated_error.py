@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cylinders import RADIUS, references
 
+from benches.strain.cylinders import RADIUS, references
 from palpate.simulation import Simulation
 
 # Largest error of a force, to 30 % of the height, on elements of 12 mm.
