@@ -135,9 +135,7 @@ def strain(
     if ticks:
         first, second = sliding_ticks()
         for name, times in (("A", first), ("B", second)):
-            print(
-                f"sliding ticks of {name}: median {times.median:.1f} us, 99.9 % {times.p999:.1f} us, worst {times.worst:.0f} us"
-            )
+            print(f"{name}, sliding, us: median {times.median:.1f}, 99.9 % {times.p999:.1f}, worst {times.worst:.0f}")
         return
     folder, rows = make_folder(out), []
     for case in cases(cell, only, places):

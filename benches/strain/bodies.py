@@ -6,8 +6,10 @@ that both have the same elements.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +22,8 @@ from palpate.validation.verify.contact.reference import graded
 from palpate.validation.verify.grids import lattice, mapped
 
 MODULUS, POISSON = 10e3, 0.45
+# Forces of full solutions on the meshes of the bodies below.
+SOLVED = Path(__file__).with_name("solid_forces.json")
 # Edges of elements below the sphere, m, and distance up to which they are that fine.
 CELL, FINE = 0.004, 0.012
 # Longest step of a full solution over the radius.
@@ -57,9 +61,17 @@ class Pressed:
         return palpate.Body(self.mesh, material=palpate.Material(MODULUS, self.poisson, law=law), fixed=self.held)
 
     def full(self) -> np.ndarray:
-        """Return forces along the normal, N, down to where Newton's method converges."""
+        """Return forces along the normal, N, down to where Newton's method converges; stored beside this file."""
         if self.forces is not None:
             return self.forces
+        asked = {"nodes": len(self.mesh.nodes), "depths": self.depths.tolist()}
+        found = _stored().get(self.name, {})
+        if {key: found.get(key) for key in asked} != asked:
+            found = {**asked, "forces": self._solved()}
+            SOLVED.write_text(json.dumps({**_stored(), self.name: found}, indent=1) + "\n")
+        return np.array(found["forces"])
+
+    def _solved(self) -> list[float]:
         solid = Solid(self.mesh, NeoHookean(MODULUS, self.poisson), self.held.all(axis=1))
         found, reached = [], 0.0
         for depth in self.depths:
@@ -69,8 +81,12 @@ class Pressed:
             except DivergedError:
                 break
             reached = depth
-            found.append(abs(force @ self.normal))
-        return np.array(found)
+            found.append(round(abs(float(force @ self.normal)), 6))
+        return found
+
+
+def _stored() -> dict[str, dict]:
+    return json.loads(SOLVED.read_text()) if SOLVED.exists() else {}
 
 
 def cylinders(cell: float = CELL) -> Iterator[Pressed]:
