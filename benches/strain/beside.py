@@ -47,7 +47,8 @@ def pressed(case: Pressed, law: str, series: bool, folder: Path) -> tuple[np.nda
     """Return forces along the normal, N, and stated errors at the depths of a case."""
     body = case.body(law)
     surface = body.mesh.surface_nodes
-    near = np.linalg.norm(body.mesh.nodes[surface] - case.place, axis=1) < TOUCHED * RADIUS
+    offset = body.mesh.nodes[surface] - case.place
+    near = (np.linalg.norm(offset, axis=1) < TOUCHED * RADIUS) & (offset @ case.normal > -RADIUS)
     green = palpate.precompute(body, touch=surface[near], path=folder / f"{law}.palpate", progress=False)
     table = {"name": "body", "model": "liver"}  # the table asks for a source; the body is given
     scene = Scene(body=table, tool=[sphere(RADIUS, 0.0)], device=UNLIMITED, view={"strain_limit": 0.0})

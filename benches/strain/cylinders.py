@@ -92,7 +92,8 @@ class Cylinder:
         bottom = places[:, 2] < -self.height + 1e-9
         if self.support == "table":
             fixed[bottom, 2] = True
-            fixed[np.hypot(places[:, 0], places[:, 1]) < 1e-9, :2] = True
+            # Not at the top: a held node below the contact takes compliance from it.
+            fixed[bottom & (np.hypot(places[:, 0], places[:, 1]) < 1e-9), :2] = True
             fixed[bottom & (np.abs(places[:, 1]) < 1e-9), 1] = True
         elif self.support == "bonded":
             fixed[bottom] = True

@@ -1,4 +1,4 @@
-"""Deep presses in the page: the error of the force is shown, or the strain is warned of where the material is linear."""
+"""Deep presses in the page: the error of the force is shown, or the strain is warned of if the law is linear."""
 
 from __future__ import annotations
 

@@ -13,13 +13,15 @@ use crate::green::{Problem, Progress};
 use crate::mesh::{Surface, node_elements};
 use crate::{Error, Result};
 
-/// Radius of the patch over the tool's, and over the thickness of the body below it.
-const RADII: f64 = 3.0;
+/// Radius of the patch over the tool's, and over the thickness of the body below it. A patch that is cut off by the sides of a column
+/// has no half-space below it: with three radii the force on a column of 2.5 radii was 14 % off, with 7.5 it is within 1 %. Where the
+/// sides are farther away both agree.
+const RADII: f64 = 7.5;
 const THICKNESSES: f64 = 1.5;
 /// Least radius of the patch over the tool's. A patch that stays as wide as the contact has a limit load, which a sphere has not.
 const LEAST_RADII: f64 = 0.9;
-/// Distance of places over the radius of their patches: the coefficients are as smooth as the patch is wide.
-const SPACING: f64 = 0.3;
+/// Distance of places over the tool's radius: the coefficients are as smooth as the patch is wide.
+const SPACING: f64 = 0.9;
 /// Distance up to which a place counts at a fan, over that of places.
 const REACH: f64 = 2.0;
 /// Cosine between normals of fans on one side of a body.
@@ -55,7 +57,7 @@ impl<'a> SeriesPlan<'a> {
     pub fn new(problem: &'a Problem, laws: &'a [StrainLaw], radius: f64) -> Result<Self> {
         let surface = problem.surface()?;
         let smooth = SmoothSurface::new(&surface);
-        let spacing = SPACING * RADII * radius;
+        let spacing = SPACING * radius;
         let touched = |fan: &Fan| problem.touch.binary_search(&fan.node).is_ok();
         let chosen = spread(smooth.fans(), spacing, touched);
         let geometry = PatchGeometry::new(&surface);
