@@ -14,7 +14,7 @@ use crate::mesh::{Surface, node_elements};
 use crate::{Error, Result};
 
 /// Radius of the patch over the tool's, and over the thickness of the body below it. A patch that is cut off by the sides of a column
-/// has no half-space below it: with three radii the force on a column of 2.5 radii was 14 % off, with 7.5 it is within 1 %. Where the
+/// has no half-space below it: with three radii the force on a column of 2.5 radii was 14 % off, with 7.5 it is within 2 %. Where the
 /// sides are farther away both agree.
 const RADII: f64 = 7.5;
 const THICKNESSES: f64 = 1.5;
