@@ -119,7 +119,6 @@ impl<'a> SeriesPlan<'a> {
         let cubic = q2 - inward * (2.0 / 3.0 * q2.dot(inward));
         let quartic = q3 - inward * (0.75 * q3.dot(inward));
         let compliance = first.dot(inward);
-        let ending = (at.fifth.abs() / (0.5 * LARGEST_REST * compliance)).cbrt();
         let [second, third] = [q2, q3].map(|field| field.dot(inward));
         let hardening = (-third / compliance).max(0.0);
         // The displacement of order four that c_1 y + c_2 y^2 lacks.
