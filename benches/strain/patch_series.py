@@ -30,7 +30,7 @@ def half_space_terms(material: Material) -> np.ndarray:
     """Return `h_1`, `h_2` and `h_3` of a material of `E = 1`."""
     r, z = graded(FINE, 1.5, GROWTH, EXTENT), graded(FINE, 1.0, GROWTH, EXTENT)
     cylinder = Cylinder(r, -z, material)
-    load = _load(cylinder)
+    load = patch_weights(cylinder)
     _, stiffness = cylinder._internal(np.zeros_like(cylinder.nodes), True)
     free = cylinder._free
     factor = splu(stiffness[free][:, free].tocsc())
@@ -47,9 +47,9 @@ def half_space_terms(material: Material) -> np.ndarray:
     return np.array(terms)
 
 
-def _load(cylinder: Cylinder) -> np.ndarray:
-    """Return the weights of the patch of radius 1 along z."""
-    at = cylinder.nodes[cylinder._edges][:, :, 0] @ cylinder._edge_shape.T
+def patch_weights(cylinder: Cylinder, radius: float = 1.0) -> np.ndarray:
+    """Return the weights of the patch of a radius, m, along z."""
+    at = cylinder.nodes[cylinder._edges][:, :, 0] @ cylinder._edge_shape.T / radius
     pressure = np.where(at < 1.0, (1.0 - np.minimum(at, 1.0) ** 2) ** 2, 0.0) * cylinder._edge_weight
     load = np.zeros(cylinder.nodes.shape)
     np.add.at(load[:, 1], cylinder._edges, pressure @ cylinder._edge_shape)

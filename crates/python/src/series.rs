@@ -30,7 +30,7 @@ fn laws((known, of_element): &LawArguments<'_>) -> palpate_core::Result<Vec<Stra
 /// Coefficients and positions of the fans.
 type SeriesArrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
-/// Coefficients (fans, 7) of the higher orders of a body's displacement for tools of a radius, m, and positions (fans, 3), m, from the
+/// Coefficients (fans, 8) of the higher orders of a body's displacement for tools of a radius, m, and positions (fans, 3), m, from the
 /// file beside its store. If there is none, it is computed and written; `progress` is called with places done and all of them.
 #[pyfunction]
 #[pyo3(signature = (arguments, law_arguments, radius, store, green_key, progress=None))]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cylinders import RADIUS, references
 
+from benches.strain.cylinders import RADIUS, references
 from palpate.simulation import Simulation
 
 # Largest error of a force, to 30 % of the height, on elements of 12 mm.
@@ -22,6 +22,14 @@ def test_forces_are_those_of_a_full_solution_within_the_stated_error(name, tmp_p
     assert (errors < stated).all()
     # It says something.
     assert stated.max() < (0.07 if name.startswith("block") else 0.15)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.45, 0.49])
+def test_a_column_has_the_force_of_a_full_solution(nu, tmp_path):
+    """A patch of three radii, which its sides cut off, would be 4 to 14 % off."""
+    (column,) = (body for body in references(0.006) if body.name == f"column {nu}")
+    forces, _ = column.pressed(tmp_path)
+    assert np.abs(forces / column.forces - 1.0).max() < 0.02
 
 
 def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):

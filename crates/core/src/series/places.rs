@@ -13,13 +13,15 @@ use crate::green::{Problem, Progress};
 use crate::mesh::{Surface, node_elements};
 use crate::{Error, Result};
 
-/// Radius of the patch over the tool's, and over the thickness of the body below it.
-const RADII: f64 = 3.0;
+/// Radius of the patch over the tool's, and over the thickness of the body below it. A patch that is cut off by the sides of a column
+/// has no half-space below it: with three radii the force on a column of 2.5 radii was 14 % off, with 7.5 it is within 2 %. Where the
+/// sides are farther away both agree.
+const RADII: f64 = 7.5;
 const THICKNESSES: f64 = 1.5;
 /// Least radius of the patch over the tool's. A patch that stays as wide as the contact has a limit load, which a sphere has not.
 const LEAST_RADII: f64 = 0.9;
-/// Distance of places over the radius of their patches: the coefficients are as smooth as the patch is wide.
-const SPACING: f64 = 0.3;
+/// Distance of places over the tool's radius: the coefficients are as smooth as the patch is wide.
+const SPACING: f64 = 0.9;
 /// Distance up to which a place counts at a fan, over that of places.
 const REACH: f64 = 2.0;
 /// Cosine between normals of fans on one side of a body.
@@ -55,7 +57,7 @@ impl<'a> SeriesPlan<'a> {
     pub fn new(problem: &'a Problem, laws: &'a [StrainLaw], radius: f64) -> Result<Self> {
         let surface = problem.surface()?;
         let smooth = SmoothSurface::new(&surface);
-        let spacing = SPACING * RADII * radius;
+        let spacing = SPACING * radius;
         let touched = |fan: &Fan| problem.touch.binary_search(&fan.node).is_ok();
         let chosen = spread(smooth.fans(), spacing, touched);
         let geometry = PatchGeometry::new(&surface);
@@ -117,19 +119,26 @@ impl<'a> SeriesPlan<'a> {
         let cubic = q2 - inward * (2.0 / 3.0 * q2.dot(inward));
         let quartic = q3 - inward * (0.75 * q3.dot(inward));
         let compliance = first.dot(inward);
-        let ending = (at.fifth.abs() / (0.5 * LARGEST_REST * compliance)).cbrt();
-        let ending = ending.max(softest(compliance, [2.0 * q2.dot(inward), 3.0 * q3.dot(inward)]));
-        let fields = [cubic.x, cubic.y, cubic.z, quartic.x, quartic.y, quartic.z, ending];
+        let [second, third] = [q2, q3].map(|field| field.dot(inward));
+        let hardening = (-third / compliance).max(0.0);
+        // The displacement of order four that c_1 y + c_2 y^2 lacks.
+        let fifth = at.fifth + 0.4 * hardening * second;
+        let ending = (fifth.abs() / (0.5 * LARGEST_REST * compliance)).cbrt();
+        let ending = ending.max(softest(compliance, [2.0 * second, 3.0 * third]));
+        // So far of y.
+        let ending = if ending > 0.0 { ending / (1.0 + hardening / (ending * ending)) } else { 0.0 };
+        let fields = [cubic.x, cubic.y, cubic.z, quartic.x, quartic.y, quartic.z, ending, hardening];
         // A place on a support is not displaced.
         if fields.iter().all(|field| field.is_finite()) { fields } else { SeriesFields::default() }
     }
 }
 
-/// One over the force from which `c + s_2 F + s_3 F^2`, the compliance along the force, is less than a part of what it was; zero if
-/// there is none. The energy is convex up to there.
+/// One over the `y` from which the compliance along the force is less than a part of what it was; zero if there is none. The energy
+/// is convex up to there. A body that softens has the compliance `c + s_2 y + s_3 y^2` and `y = F`, one that hardens `c + s_2 y`
+/// times a positive factor.
 fn softest(compliance: f64, [second, third]: [f64; 2]) -> f64 {
-    // In x = 1/F: (1 - part) c x^2 + s_2 x + s_3 = 0, its largest root.
-    let whole = (1.0 - LEAST_COMPLIANCE) * compliance;
+    // In x = 1/y: (1 - part) c x^2 + s_2 x + s_3 = 0, its largest root.
+    let (whole, third) = ((1.0 - LEAST_COMPLIANCE) * compliance, third.max(0.0));
     let discriminant = second * second - 4.0 * whole * third;
     if discriminant < 0.0 { 0.0 } else { ((discriminant.sqrt() - second) / (2.0 * whole)).max(0.0) }
 }
@@ -224,7 +233,9 @@ mod tests {
     fn the_series_ends_where_the_compliance_vanishes() {
         // 1 - 0.4 F reaches 0.2 at F = 2, and 1 - 0.2 F^2 too.
         assert!((softest(1.0, [-0.4, 0.0]) - 0.5).abs() < 1e-14);
-        assert!((softest(1.0, [0.0, -0.2]) - 0.5).abs() < 1e-14);
+        // One that hardens has none, unless the second order softens it.
+        assert_eq!(softest(1.0, [0.0, -0.2]), 0.0);
+        assert!((softest(1.0, [-0.4, -0.2]) - 0.5).abs() < 1e-14);
         assert_eq!(softest(1.0, [0.3, 0.1]), 0.0);
     }
 }

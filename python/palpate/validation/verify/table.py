@@ -7,7 +7,17 @@ from collections.abc import Sequence
 from palpate.errors import Error
 from palpate.validation.verify import bending, curved, exactness, felt, half_space, palpation, surface, vibration
 from palpate.validation.verify.check import Benchmark
-from palpate.validation.verify.contact import balance, beside, energy, friction, groove, pressing, shapes, sliding
+from palpate.validation.verify.contact import (
+    balance,
+    beside,
+    energy,
+    friction,
+    groove,
+    large_strain,
+    pressing,
+    shapes,
+    sliding,
+)
 
 BENCHMARKS = {
     benchmark.name: benchmark
@@ -30,6 +40,7 @@ BENCHMARKS = {
         Benchmark("fv52", "NAFEMS FV52, plate on hard simple supports, 10 nodes", vibration.plate, slow=True),
         Benchmark("felt", "Stiffness felt on a block", felt.felt_stiffness, slow=True),
         Benchmark("hertz", "A sphere in the tick, R = 10 mm, on a block of 10 kPa", pressing.hertz, slow=True),
+        Benchmark("strain", "A sphere pressed deep, neo-Hookean, E = 10 kPa", large_strain.large_strain, slow=True),
         Benchmark("shapes", "An ellipsoid and a rounded punch in the tick", shapes.shapes, slow=True),
         Benchmark("beside", "A sphere beside an edge, and beside another", beside.edges_and_neighbours, slow=True),
         Benchmark("groove", "A sphere in a groove: two places at once", groove.groove, slow=True),

@@ -123,6 +123,27 @@ mod tests {
         }
     }
 
+    /// The same at `nu = 0.3` (E = 1 Pa, a sphere of 1 m). The bound is close enough that 5 % of `q_1` shows.
+    #[test]
+    fn a_compressible_half_space_and_an_error_of_its_first_coefficient() {
+        let terms = crate::contact::local::strain_terms(&crate::contact::local::StrainLaw::NeoHookean, 0.3);
+        let off = |terms: &StrainTerms| {
+            let error = |(d, newtons): (f64, f64)| {
+                let modulus = 1.0 / (1.0 - 0.3 * 0.3);
+                let force = indent_sphere(d, 1.0, modulus).corrected(&correct_sphere(d, 1.0, modulus, terms)).force;
+                (force / newtons - 1.0).abs()
+            };
+            [(0.2, 0.132877), (0.5, 0.514701), (0.8, 1.012844), (1.0, 1.383851)]
+                .map(error)
+                .into_iter()
+                .fold(0.0, f64::max)
+        };
+        assert!(off(&terms) < 2e-3, "{}", off(&terms));
+        for factor in [0.95, 1.05] {
+            assert!(off(&[factor * terms[0], terms[1], terms[2]]) > 2.5e-3);
+        }
+    }
+
     /// The same of materials between those of the table (E = 1 Pa, nu = 0.4, a sphere of 1 m), which the fit has not seen.
     #[test]
     fn materials_between_those_of_the_table() {

@@ -6,7 +6,18 @@
 //! U(f) = F^2 b_3 . f + F^3 b_4 . f,    u = dU/df
 //! ```
 //!
-//! is added to the linear `f^T C_reg f / 2`. Terms of the second and higher order in the tangential force are left out: without
+//! is added to the linear `f^T C_reg f / 2`.
+//!
+//! A plate that is clamped hardens as it bends. Its displacement `q = c_1 F + c_2 F^2 - c_3 F^3` has a maximum at about one thickness,
+//! whereas the series by `y`, `F = y + kappa y^3` with `kappa = c_3/c_1`, goes on. Where `c_3 > 0`, `F^2` and `F^3` are therefore
+//! replaced by the `P_2(F)`, `P_3(F)` for which `q = c_1 y + c_2 y^2`: their displacements are `d(F P_2)/dF = 3 y^2` and, with
+//! `y = F - kappa h`, `d(F P_3)/dF = 4 h = 4 y^3`. They are `F^2` and `F^3` for small forces:
+//!
+//! ```text
+//! F P_2 = y^3 + 9/5 kappa y^5    F P_3 = y^4 + 2 kappa y^6    dP_2/dkappa = -6/5 y^5/F    dP_3/dkappa = -2 y^6/F
+//! ```
+//!
+//! Terms of the second and higher order in the tangential force are left out: without
 //! friction it is a small part of the pressing one. Beyond the force `F_e` at which the series ends the powers go on as straight
 //! lines, `F^k -> F_e^k + k F_e^(k-1) (F - F_e)`, so that no energy comes from outside the series' range.
 //!
@@ -18,13 +29,16 @@ use crate::contact::smooth::Blended;
 use crate::tensor::outer;
 
 /// Numbers at a fan.
-pub const SERIES_FIELDS: usize = 7;
-/// `b_3` (m/N^2), `b_4` (m/N^3) and `1/F_e` (1/N) at a fan. All are zero where no series is known.
+pub const SERIES_FIELDS: usize = 8;
+/// `b_3` (m/N^2), `b_4` (m/N^3), `1/F_e` (1/N) and `kappa` (1/N^2) at a fan. All are zero where no series is known.
 pub type SeriesFields = [f64; SERIES_FIELDS];
 /// Fields of `b_3`, of `b_4` and of `1/F_e`.
 const CUBIC: usize = 0;
 const QUARTIC: usize = 3;
 const ENDING: usize = 6;
+const HARDENING: usize = 7;
+/// Newton steps to `y`; four give all digits.
+const STEPS: usize = 6;
 
 /// Displacement, energy and their derivatives at one force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,19 +72,82 @@ impl Default for HigherOrders {
     }
 }
 
-/// `F^k`, straight beyond `F_e`: value, first and second derivative by `F`, derivative by `F_e`.
-fn power(k: i32, force: f64, ending: f64) -> [f64; 4] {
-    let degree = f64::from(k);
-    let at = |base: f64| {
-        let low = base.powi(k - 2);
-        [low * base * base, degree * low * base, degree * (degree - 1.0) * low]
-    };
-    if force <= ending {
-        let [value, slope, curvature] = at(force);
-        return [value, slope, curvature, 0.0];
+/// A function of the pressing force, with its derivatives by the force, by `F_e` and by `kappa`.
+#[derive(Clone, Copy, Debug)]
+struct Power {
+    value: f64,
+    slope: f64,
+    curvature: f64,
+    by_ending: f64,
+    by_hardening: f64,
+    slope_by_hardening: f64,
+}
+
+impl Power {
+    /// `P_2`.
+    fn hardening_square(force: f64, hardening: f64) -> Self {
+        let y = hardened(force, hardening);
+        let square = y * y;
+        let bent = hardening * square;
+        let by_force = 1.0 / (1.0 + 3.0 * bent);
+        // F P_2' = 3 y^2 - P_2.
+        let value = square * (1.0 + 1.8 * bent) / (1.0 + bent);
+        let slope = (3.0 * square - value) / force;
+        let by_hardening = -1.2 * square * square * y / force;
+        Self {
+            value,
+            slope,
+            curvature: (6.0 * y * by_force - 2.0 * slope) / force,
+            by_ending: 0.0,
+            by_hardening,
+            slope_by_hardening: (-6.0 * square * square * by_force - by_hardening) / force,
+        }
     }
-    let [value, slope, curvature] = at(ending);
-    [value + slope * (force - ending), slope, 0.0, curvature * (force - ending)]
+
+    /// `P_3`.
+    fn hardening_cube(force: f64, hardening: f64) -> Self {
+        let y = hardened(force, hardening);
+        let square = y * y;
+        let bent = hardening * square;
+        let by_force = 1.0 / (1.0 + 3.0 * bent);
+        // F P_3' = 4 y^3 - P_3.
+        let value = square * y * (1.0 + 2.0 * bent) / (1.0 + bent);
+        let slope = (4.0 * square * y - value) / force;
+        let by_hardening = -2.0 * square * square * square / force;
+        Self {
+            value,
+            slope,
+            curvature: (12.0 * square * by_force - 2.0 * slope) / force,
+            by_ending: 0.0,
+            by_hardening,
+            slope_by_hardening: (-12.0 * square * square * y * by_force - by_hardening) / force,
+        }
+    }
+
+    /// The function straight beyond `ending`, where `self` is its value there.
+    fn straight_from(self, ending: f64, force: f64) -> Self {
+        let beyond = force - ending;
+        Self {
+            value: self.value + self.slope * beyond,
+            curvature: 0.0,
+            by_ending: self.curvature * beyond,
+            by_hardening: self.by_hardening + self.slope_by_hardening * beyond,
+            ..self
+        }
+    }
+}
+
+/// `y` of `F = y + kappa y^3`.
+fn hardened(force: f64, hardening: f64) -> f64 {
+    let bent = 1.0 + hardening * force * force;
+    let (half, quarter) = (bent.sqrt(), bent.sqrt().sqrt());
+    // Close to F / bent^(1/3) for all forces.
+    let mut y = force / (half / (quarter / quarter.sqrt()));
+    for _ in 0..STEPS {
+        let bent = hardening * y * y;
+        y -= (y + bent * y - force) / (1.0 + 3.0 * bent);
+    }
+    y
 }
 
 /// Higher orders at the force `force` on a body of outward `normal` (with its derivative `turning` by the tool's position), where the
@@ -90,20 +167,27 @@ pub fn higher_orders(
     let ending = 1.0 / inverse_ending;
     let inward = -normal;
     let mut found = HigherOrders { fraction: pressing * inverse_ending, ..HigherOrders::default() };
+    let within = pressing.min(ending);
+    let hardening = fields.values[HARDENING];
+    let powers =
+        [(CUBIC, Power::hardening_square(within, hardening)), (QUARTIC, Power::hardening_cube(within, hardening))];
     let (mut by_pressing, mut by_ending) = (0.0, 0.0);
-    for (first, degree) in [(CUBIC, 2), (QUARTIC, 3)] {
+    for (first, at_most) in powers {
+        let power = if pressing > ending { at_most.straight_from(ending, pressing) } else { at_most };
+        let Power { value, slope, curvature, by_hardening, slope_by_hardening, .. } = power;
         let b = DVec3::from_slice(&fields.values[first..first + 3]);
-        let [value, slope, curvature, of_ending] = power(degree, pressing, ending);
         let along = b.dot(force);
         found.displacement += inward * (slope * along) + b * value;
         found.compliance += outer(inward, inward) * (curvature * along) + (outer(inward, b) + outer(b, inward)) * slope;
         found.energy += value * along;
         let gradient: DVec3 = (0..3).map(|axis| fields.slope(first + axis) * force[axis]).sum();
-        found.slope += gradient * value;
+        let harder = fields.slope(HARDENING);
+        found.slope += gradient * value + harder * (by_hardening * along);
         let by_component = DMat3::from_cols(fields.slope(first), fields.slope(first + 1), fields.slope(first + 2));
         found.slope_by_force += by_component * value + outer(gradient, inward) * slope;
+        found.slope_by_force += outer(harder, b * by_hardening + inward * (slope_by_hardening * along));
         by_pressing += slope * along;
-        by_ending += of_ending * along;
+        by_ending += power.by_ending * along;
     }
     found.slope -= turning.transpose() * force * by_pressing;
     found.slope -= fields.slope(ENDING) * (by_ending * ending * ending);
@@ -120,7 +204,7 @@ mod tests {
     fn fields(at: DVec3) -> Blended<SERIES_FIELDS> {
         let slopes: [DVec3; SERIES_FIELDS] =
             std::array::from_fn(|k| DVec3::new(0.2 * k as f64 - 0.5, 0.3, -0.1 * k as f64) * 0.3);
-        let start = [0.2, -0.3, 0.5, -0.1, 0.07, 0.11, 0.8];
+        let start = [0.2, -0.3, 0.5, -0.1, 0.07, 0.11, 0.8, 1.3];
         let values = std::array::from_fn(|k| start[k] + slopes[k].dot(at));
         Blended::from_parts(values, slopes)
     }
@@ -148,6 +232,22 @@ mod tests {
                     / (2.0 * h);
                 assert!((by_force - here.compliance * axis).length() < 1e-8);
             }
+        }
+    }
+
+    /// Displacements of a spring `F = y + kappa y^3` are those of both functions, which are powers of the force at small ones.
+    #[test]
+    fn a_hardening_spring_is_followed() {
+        for (hardening, force) in [(0.7, 0.02), (0.7, 1.0), (0.7, 30.0), (0.0, 2.0)] {
+            let y = hardened(force, hardening);
+            assert!((y + hardening * y.powi(3) - force).abs() < 1e-14 * force, "{force}");
+            let p = Power::hardening_cube(force, hardening);
+            // y = F - kappa d(F P)/dF / 4.
+            let displacement = force - hardening * 0.25 * (p.value + force * p.slope);
+            assert!((displacement - y).abs() < 1e-13 * force);
+            let square = Power::hardening_square(force, hardening);
+            assert!((square.value + force * square.slope - 3.0 * y * y).abs() < 1e-13 * force * force);
+            assert!(hardening * force * force > 1e-3 || (p.value / force.powi(3) - 1.0).abs() < 2e-3);
         }
     }
 

@@ -1,4 +1,4 @@
-"""Cylinders of 10-node elements pressed in the middle, as the axisymmetric reference solver has them."""
+"""Cylinders of 10-node elements that a sphere presses in the middle, as the axisymmetric reference solver has them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ from palpate.scene import BuiltScene, Scene
 from palpate.scene.series import with_series
 from palpate.simulation import Simulation
 from palpate.validation.verify.contact.loop import UNLIMITED, sphere
+from palpate.validation.verify.contact.reference import graded
 
 RADIUS = 0.01
-REFERENCES = Path(__file__).parents[1] / "data/large_strain.json"
+REFERENCES = Path(__file__).parents[2] / "tests/data/large_strain.json"
 # Tetrahedra of a cuboid, by its corners 4 x + 2 y + z.
 CUBOID = ((0, 4, 6, 7), (0, 4, 7, 5), (0, 5, 7, 1), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7))
+# Distance from the middle up to which elements are fine, over the sphere's radius.
+REACH = 1.6
 # Longest edges of elements, m, and radius of the part of the top that may be touched.
 EDGE, TOUCHED = 0.012, 0.036
 LAWS = {
@@ -41,26 +44,30 @@ class Cylinder:
     law: str
     depths: list[float]
     forces: list[float]
+    # Edges of elements below the sphere, m; None: equal elements of EDGE.
+    cell: float | None = None
 
     def material(self, modulus: float = 10e3) -> palpate.Material:
+        """Return its material."""
         half = modulus / (4.0 * (1.0 + self.nu))
         constants = {name: half * value for name, value in LAWS[self.law].items()}
         given = {"youngs_modulus": modulus} if self.law == "neo-hookean" else {}
         return palpate.Material(poissons_ratio=self.nu, law=self.law, **given, **constants)
 
     def mesh(self) -> palpate.TetMesh:
-        across = 2 * max(1, round(self.radius / EDGE))
-        down = max(2, round(self.height / EDGE))
-        x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, across + 1)], indexing="ij")
-        # Squares around the middle become circles; their polygons are scaled to the circle's area.
+        """Return elements that follow the circle at the rim."""
+        axis, z = self._axes()
+        x, y = np.meshgrid(axis, axis, indexing="ij")
+        # Squares around the middle become circles towards the rim; the rim's polygon is scaled to the circle's area.
         square, distance = np.maximum(np.abs(x), np.abs(y)), np.hypot(x, y)
-        stretch = np.divide(square, distance, out=np.zeros_like(x), where=distance > 0)
-        z = np.linspace(-self.height, 0.0, down + 1)
-        plane = self.radius * np.stack([x * stretch, y * stretch], -1)
+        rounded = 1.0 if self.cell is None else (square / self.radius) ** 2
+        stretch = 1.0 - rounded + rounded * np.divide(square, distance, out=np.zeros_like(x), where=distance > 0)
+        plane = np.stack([x * stretch, y * stretch], -1)
         first, second = plane[1:, 1:] - plane[:-1, :-1], plane[:-1, 1:] - plane[1:, :-1]
         area = 0.5 * np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]).sum()
         plane *= np.sqrt(np.pi * self.radius**2 / area)
         nodes = np.concatenate([np.dstack([plane, np.full_like(x, height)]).reshape(-1, 3) for height in z])
+        across, down = len(axis) - 1, len(z) - 1
         number = np.arange(len(nodes)).reshape(down + 1, across + 1, across + 1)
         tets = []
         for k, i, j in itertools.product(range(down), range(across), range(across)):
@@ -68,14 +75,25 @@ class Cylinder:
             tets += [[corners[corner] for corner in tet] for tet in CUBOID]
         return palpate.TetMesh(nodes, np.array(tets)).to_quadratic()
 
+    def _axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return coordinates across and down, m."""
+        if self.cell is not None:
+            reach = REACH * RADIUS
+            across = graded(-self.radius, self.radius, 0.0, min(reach, self.radius), self.cell)
+            return across, -graded(0.0, self.height, 0.0, min(reach, self.height), self.cell)[::-1]
+        across, down = 2 * max(1, round(self.radius / EDGE)), max(2, round(self.height / EDGE))
+        return np.linspace(-self.radius, self.radius, across + 1), np.linspace(-self.height, 0.0, down + 1)
+
     def body(self) -> palpate.Body:
+        """Return the body with its supports."""
         mesh = self.mesh()
         places = mesh.nodes
         fixed = np.zeros(places.shape, bool)
         bottom = places[:, 2] < -self.height + 1e-9
         if self.support == "table":
             fixed[bottom, 2] = True
-            fixed[np.hypot(places[:, 0], places[:, 1]) < 1e-9, :2] = True
+            # Not at the top: a held node below the contact takes compliance from it.
+            fixed[bottom & (np.hypot(places[:, 0], places[:, 1]) < 1e-9), :2] = True
             fixed[bottom & (np.abs(places[:, 1]) < 1e-9), 1] = True
         elif self.support == "bonded":
             fixed[bottom] = True
@@ -110,6 +128,6 @@ class Cylinder:
         return force, stated
 
 
-def references() -> list[Cylinder]:
+def references(cell: float | None = None) -> list[Cylinder]:
     """Cylinders with forces by full Newton's method (`python -m benches strain-references`)."""
-    return [Cylinder(**case) for case in json.loads(REFERENCES.read_text()).values() if case["forces"]]
+    return [Cylinder(**case, cell=cell) for case in json.loads(REFERENCES.read_text()).values() if case["forces"]]

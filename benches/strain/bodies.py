@@ -1,0 +1,155 @@
+"""Bodies that the law at large strain is measured on, with forces of full Newton's method.
+
+Cylinders have forces of fine axisymmetric elements (`strain-references`). The others are solved on their own mesh, so
+that both have the same elements.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import palpate
+from benches.strain.axisymmetric import DivergedError
+from benches.strain.cylinders import RADIUS, references
+from benches.strain.materials import NeoHookean
+from benches.strain.solid import Solid
+from palpate.validation.verify.contact.reference import graded
+from palpate.validation.verify.grids import lattice, mapped
+
+MODULUS, POISSON = 10e3, 0.45
+# Forces of full solutions on the meshes of the bodies below.
+SOLVED = Path(__file__).with_name("solid_forces.json")
+# Edges of elements below the sphere, m, and distance up to which they are that fine.
+CELL, FINE = 0.004, 0.012
+# Longest step of a full solution over the radius.
+STEP = 0.15
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A neo-Hookean body, the place where a sphere of 10 mm presses it, and depths, m.
+
+    Attributes
+    ----------
+    name, mesh, held, poisson
+        10-node elements; mask (n, 3) of what is held.
+    place, normal
+        Point of the surface, m, and its outward normal.
+    depths
+        Ascending, m.
+    forces
+        Of full Newton's method, N; None: they are solved on the mesh.
+
+    """
+
+    name: str
+    mesh: palpate.TetMesh
+    held: np.ndarray
+    place: np.ndarray
+    normal: np.ndarray
+    depths: np.ndarray
+    poisson: float = POISSON
+    forces: np.ndarray | None = None
+
+    def body(self, law: str) -> palpate.Body:
+        """Return the body with a law."""
+        return palpate.Body(self.mesh, material=palpate.Material(MODULUS, self.poisson, law=law), fixed=self.held)
+
+    def full(self) -> np.ndarray:
+        """Return forces along the normal, N, down to where Newton's method converges; stored beside this file."""
+        if self.forces is not None:
+            return self.forces
+        asked = {"nodes": len(self.mesh.nodes), "depths": self.depths.tolist()}
+        found = _stored().get(self.name, {})
+        if {key: found.get(key) for key in asked} != asked:
+            found = {**asked, "forces": self._solved()}
+            SOLVED.write_text(json.dumps({**_stored(), self.name: found}, indent=1) + "\n")
+        return np.array(found["forces"])
+
+    def _solved(self) -> list[float]:
+        solid = Solid(self.mesh, NeoHookean(MODULUS, self.poisson), self.held.all(axis=1))
+        found, reached = [], 0.0
+        for depth in self.depths:
+            try:
+                for step in np.linspace(reached, depth, int(np.ceil((depth - reached) / (STEP * RADIUS))) + 1)[1:]:
+                    force = solid.press(self.place + self.normal * (RADIUS - step), RADIUS)
+            except DivergedError:
+                break
+            reached = depth
+            found.append(round(abs(float(force @ self.normal)), 6))
+        return found
+
+
+def _stored() -> dict[str, dict]:
+    return json.loads(SOLVED.read_text()) if SOLVED.exists() else {}
+
+
+def cylinders(cell: float = CELL) -> Iterator[Pressed]:
+    """Return blocks of 25 and 50 mm on a smooth table, bonded layers and columns, a plate held at its rim."""
+    for case in references(cell):
+        if case.name.startswith("random"):
+            continue
+        body = case.body()
+        held = np.zeros((len(body.mesh.nodes), 3), bool)
+        held.ravel()[body.fixed_dofs] = True
+        up = np.array([0.0, 0.0, 1.0])
+        yield Pressed(
+            case.name, body.mesh, held, 0.0 * up, up, np.array(case.depths), case.nu, forces=np.array(case.forces)
+        )
+
+
+def _cuboid(name: str, axes: list[np.ndarray], is_held: str, place: tuple[float, float], depths: np.ndarray) -> Pressed:
+    mesh = mapped(lattice(*axes), quadratic=True)
+    x, _, z = mesh.nodes.T
+    held = {
+        "bottom": z < 1e-9,
+        "left": x < 1e-9,
+        "both ends": (x < 1e-9) | (x > axes[0][-1] - 1e-9),
+    }[is_held]
+    top = np.array([*place, axes[2][-1]])
+    return Pressed(name, mesh, np.repeat(held[:, None], 3, axis=1), top, np.array([0.0, 0.0, 1.0]), depths)
+
+
+def cuboids() -> Iterator[Pressed]:
+    """Return a cantilever, a plate clamped at two sides and a block beside its edge."""
+    equal = np.linspace
+    axes = [equal(0, 0.1, 21), equal(0, 0.02, 5), equal(0, 0.02, 5)]
+    yield _cuboid("cantilever", axes, "left", (0.08, 0.01), np.array([0.005, 0.01, 0.02]))
+    axes = [equal(0, 0.1, 19), 0.03 + graded(-0.03, 0.03, 0.0, FINE, 0.006), equal(0, 0.01, 4)]
+    yield _cuboid("plate at two sides", axes, "both ends", (0.05, 0.03), np.array([0.005, 0.01, 0.015]))
+    beside = 0.012
+    x = graded(0.0, 0.06, beside, FINE, CELL)
+    axes = [x, 0.03 + graded(-0.03, 0.03, 0.0, FINE, CELL), 0.03 - graded(0.0, 0.03, 0.0, FINE, CELL)[::-1]]
+    yield _cuboid("12 mm from an edge", axes, "bottom", (beside, 0.03), np.array([0.003, 0.006, 0.009]))
+
+
+def liver(places: int) -> Iterator[Pressed]:
+    """Press the built-in liver at nodes of the side that it does not lie on."""
+    mesh = palpate.models.liver()
+    # It lies on its back, as in the demo.
+    held = np.repeat((mesh.nodes[:, 1] > 0.02)[:, None], 3, axis=1)
+    rng = np.random.default_rng(5)
+    normals = vertex_normals(mesh)
+    corners = np.unique(mesh.tets[:, :4])
+    front = mesh.surface_nodes[normals[mesh.surface_nodes, 1] < -0.7]
+    upper = np.intersect1d(front, corners)
+    for node in rng.choice(upper, places, replace=False):
+        yield Pressed(
+            f"liver, node {node}", mesh, held, mesh.nodes[node], normals[node], np.array([0.005, 0.01, 0.015])
+        )
+
+
+def vertex_normals(mesh: palpate.TetMesh) -> np.ndarray:
+    """Return outward unit normals (n, 3) at surface nodes, zero elsewhere."""
+    normals = np.zeros_like(mesh.nodes)
+    corners = mesh.nodes[mesh.surface_triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    for k in range(3):
+        np.add.at(normals, mesh.surface_triangles[:, k], across)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
