@@ -19,6 +19,8 @@ from palpate.scene import Scene
 # The first touch lies at most this part of the depth away from where the data have it.
 MOST_OFFSET = 0.1
 MOST_STEPS = 40
+# Changes of the logarithm of a region's modulus that are tried before the fit.
+TRIED_RATIOS = (-2.0, -1.0, 1.0, 2.0)
 POISSON = "material.poissons_ratio"
 
 
@@ -135,7 +137,9 @@ class _Search:
         self, free: list[Unknown], held: dict[str, str], start: np.ndarray | None = None
     ) -> tuple[np.ndarray, Spread]:
         """Fit; as long as an interval is too wide, hold the widest and fit again. ``free`` loses what is held."""
-        vector = np.array([u.start for u in free] + [0.0] * self._touches) if start is None else start
+        vector = start
+        if vector is None:
+            vector = self._with_best_ratios(free, np.array([u.start for u in free] + [0.0] * self._touches))
         while True:
             vector = self._solve(free, vector)
             spread = self._spread(free, vector)
@@ -181,18 +185,37 @@ class _Search:
             columns.append((shift / self._scale)[self._used])
         return np.array(columns).T
 
+    def _with_best_modulus(self, free: Sequence[Unknown], start: np.ndarray) -> np.ndarray:
+        """Take the first modulus that fits best with all else as it is: forces are linear in it."""
+        if not free or free[0].name != "material.youngs_modulus" or self._presses.has_pad:
+            return start
+        model = self._residuals(free, start) * self._scale + self._data.force[self._used]
+        factor = (model @ self._data.force[self._used]) / (model @ model)
+        moved = start.copy()
+        if factor > 0:
+            moved[0] = np.clip(start[0] + np.log(factor), free[0].low, free[0].high)
+        return moved
+
+    def _with_best_ratios(self, free: Sequence[Unknown], start: np.ndarray) -> np.ndarray:
+        """Begin where the ratio of each region's modulus fits best: far from it the curves hardly depend on it."""
+        best = self._with_best_modulus(free, start)
+        for rank, unknown in enumerate(free):
+            if rank == 0 or not unknown.name.endswith("youngs_modulus"):
+                continue
+            tried = [best]
+            for change in TRIED_RATIOS:
+                moved = best.copy()
+                moved[rank] = np.clip(best[rank] + change, unknown.low, unknown.high)
+                tried.append(self._with_best_modulus(free, moved))
+            best = min(tried, key=lambda vector: float((self._residuals(free, vector) ** 2).sum()))
+        return best
+
     def _solve(self, free: Sequence[Unknown], start: np.ndarray) -> np.ndarray:
         if not len(start):
             return start
         low = np.array([u.low for u in free] + [-MOST_OFFSET] * self._touches)
         high = np.array([u.high for u in free] + [MOST_OFFSET] * self._touches)
-        start = np.clip(start, low, high)
-        if free and free[0].name == "material.youngs_modulus" and not self._presses.has_pad:
-            # The modulus that fits best with all else as it is.
-            model = self._residuals(free, start) * self._scale + self._data.force[self._used]
-            factor = (model @ self._data.force[self._used]) / (model @ model)
-            if factor > 0:
-                start[0] = np.clip(start[0] + np.log(factor), low[0], high[0])
+        start = self._with_best_modulus(free, np.clip(start, low, high))
         inside = np.clip(start, low + 1e-9, high - 1e-9)
         solution = least_squares(
             lambda v: self._residuals(free, v),

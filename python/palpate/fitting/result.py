@@ -203,7 +203,8 @@ def fitted_parameters(
     deviation = np.sqrt(np.einsum("ij,jk,ik->i", derivative, covariance, derivative))
     widths = spread.factor * deviation
     own = [names.index(u.name) for u in free]
-    correlation = derivative[own] @ covariance @ derivative[own].T / np.outer(deviation[own], deviation[own])
+    spreads = np.maximum(deviation[own], 1e-300)
+    correlation = derivative[own] @ covariance @ derivative[own].T / spreads / spreads[:, None]
     found = []
     for name, width, moves in zip(names, widths, np.abs(derivative).max(axis=1, initial=0.0) > 0, strict=True):
         value = values[name]

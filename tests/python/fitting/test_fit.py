@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +17,7 @@ PLACES = np.array([[0.04, 0.025, 0.05], [0.025, 0.025, 0.05]])
 FILE = """
 # A phantom on a table.
 [body]
-mesh = "{mesh}"   # in millimetres
-unit = "mm"
-max_element_size = "14mm"
+mesh = "{mesh}"   # in metres
 
 [supports]
 fixed = "z < min + 1mm"
@@ -47,9 +46,10 @@ def scene(block_file, modulus="10kPa", more="") -> Scene:
 
 @pytest.fixture(scope="module")
 def block_file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("fit") / "block.obj"
-    palpate_root = __import__("pathlib").Path(__file__).parents[3]
-    path.write_bytes((palpate_root / "examples" / "block.obj").read_bytes())
+    """Volume mesh of a block of 80 x 50 x 50 mm: filled once."""
+    path = tmp_path_factory.mktemp("fit") / "block.vtu"
+    surface = Path(__file__).parents[3] / "examples" / "block.obj"
+    palpate.tetrahedralize(surface, max_element_size=0.016, unit="mm").to_quadratic().write(path)
     return path
 
 
@@ -169,7 +169,7 @@ def test_a_scene_keeps_its_words_and_gets_the_values(block_file, tmp_path):
     found = palpate.fit(start, synthetic(start, factor=2.0, noise=0.0), hold=["poissons_ratio", "region.0.youngs_modulus"])
     found.write_scene(tmp_path / "fitted.toml")
     text = (tmp_path / "fitted.toml").read_text()
-    assert "# A phantom on a table." in text and "# the upper layer" in text and "# in millimetres" in text
+    assert "# A phantom on a table." in text and "# the upper layer" in text and "# in metres" in text
     read = Scene.read(tmp_path / "fitted.toml")
     assert read.material.youngs_modulus == pytest.approx(20e3, rel=1e-4)
     assert read.region[0].youngs_modulus == pytest.approx(20e3, rel=1e-4)
@@ -184,7 +184,7 @@ def test_a_scene_keeps_its_words_and_gets_the_values(block_file, tmp_path):
     ("tables", "words"),
     [
         ({"tool": {"radius": 0.006, "contact": "node"}}, "'node' has no law"),
-        ({"loads": [{"kind": "gravity"}]}, "leave the loads out"),
+        ({"loads": [{"gravity": [0, 0, -9.81]}]}, "leave the loads out"),
         ({"body": [{"model": "beam"}, {"model": "liver"}]}, "several bodies"),
     ],
 )
