@@ -15,7 +15,7 @@ from palpate.cli.app import app
 def fit_command(
     measured: Annotated[Path, typer.Argument(help="CSV file of force against depth, with units in its header.")],
     scene: Annotated[Path, typer.Argument(help="Scene (.toml): body, supports, indenter and a first material.")],
-    force_unit: Annotated[str | None, typer.Option(help="Unit of the forces, such as mN, where the header has none.")] = None,
+    force_unit: Annotated[str | None, typer.Option(help="Unit of the forces, such as mN.")] = None,
     depth_unit: Annotated[str | None, typer.Option(help="Unit of the depths, such as um.")] = None,
     force_column: Annotated[str | None, typer.Option(help="Title of the column of forces.")] = None,
     depth_column: Annotated[str | None, typer.Option(help="Title of the column of depths.")] = None,
@@ -30,10 +30,10 @@ def fit_command(
         Path | None, typer.Option(help="Picture of curves and residuals, .png or .svg; default: <measured>-fit.png.")
     ] = None,
 ) -> None:
-    """Fit Young's moduli, and what else the data tell, to indentations; write the scene with the result.
+    """Fit Young's moduli, and what else the data determine, to indentations; write the scene with the result.
 
     Force against depth is compared with the press of the scene's first tool at the same places, by the law of its
-    material. Intervals are of 95 %. What the data cannot tell stays as it is in the scene.
+    material. Intervals are of 95 %. What the data cannot determine stays as it is in the scene.
 
     Example: palpate fit measured.csv scene.toml
 
@@ -55,7 +55,9 @@ def fit_command(
     with status_line(f"fitting {scene} to {measured}"):
         found = fit(scene, data, hold=hold or (), find_touch=find_touch)
     rows, curves = len(found.measured.force), len(found.measured.names)
-    print(f"{rows} rows of {curves} curve{'s' if curves > 1 else ''}; {found.solved} bodies solved")
+    print(
+        f"{rows} rows of {curves} curve{'s' if curves > 1 else ''}; {found.solved} bod{'ies' if found.solved != 1 else 'y'} solved"
+    )
     for name, point in zip(found.measured.names, found.points, strict=True):
         print(f"{name}: pressed at (" + ", ".join(f"{1e3 * x:.1f}" for x in point) + ") mm")
     for parameter in found.parameters:

@@ -31,10 +31,10 @@ class FindNodule(gymnasium.Env):
     A slab of 60 x 60 x 30 mm has a nodule of 12 mm, twelve times stiffer, its middle 9 to 13 mm deep, anywhere but near
     the sides. A ball of 5 mm palpates it.
 
-    Observation: (6,) float32: position of the ball's lowest point, m, from the middle of the upper surface; force on the
-    ball, N. Action: (4,) float32 in [-1, 1]: motion in units of 2 mm, and, where above 0.5, the declaration that the
-    nodule lies below the ball, which ends the episode. Reward: 1 for a right declaration (within 6 mm, seen from above),
-    less 0.001 a step.
+    An observation has six numbers. Three are the position of the ball's lowest point, m, from the middle of the upper
+    surface; three are the force on the ball, N. An action has four, from -1 to 1: a motion in units of 2 mm, and a
+    declaration. Above 0.5 that says that the nodule lies below the ball, and ends the episode. A right declaration pays
+    1 (within 6 mm, seen from above); each step costs 0.001.
 
     Parameters
     ----------

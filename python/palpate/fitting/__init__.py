@@ -1,8 +1,7 @@
 """Fit of a scene's material to indentations that were measured."""
 
-from palpate.fitting.csv_file import read_indentations
 from palpate.fitting.fit import fit
 from palpate.fitting.measurements import Indentations
 from palpate.fitting.result import Fit, FittedParameter
 
-__all__ = ["Fit", "FittedParameter", "Indentations", "fit", "read_indentations"]
+__all__ = ["Fit", "FittedParameter", "Indentations", "fit"]

@@ -1,4 +1,4 @@
-"""Indentations from CSV files as indenters export them: columns and units are found by the header."""
+"""CSV files as indenters export them: columns and units are found by the header."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from palpate.errors import FitError
-from palpate.fitting.measurements import Indentations
 from palpate.input_file import require_file
 from palpate.units import FORCE_UNITS, LENGTH_UNITS, TIME_UNITS
 
@@ -48,15 +47,15 @@ class _Column:
     unit: str | None
 
 
-def read_indentations(
+def read_columns(
     path: str | os.PathLike[str],
     *,
     force_unit: str | None = None,
     depth_unit: str | None = None,
     force_column: str | None = None,
     depth_column: str | None = None,
-) -> Indentations:
-    """Read a CSV file of force against depth.
+) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Read the columns of a CSV file of force against depth in SI units, and the name of each row's place.
 
     The header names the columns with their units, such as ``Force (N)``, ``Displacement [mm]`` or ``Depth um``; a row
     of units may follow it. Columns of time, of a place's name, of its x, y and z, and of the indenter's radius or
@@ -69,7 +68,7 @@ def read_indentations(
     force_unit, depth_unit
         Units of these columns, instead of those of the header.
     force_column, depth_column
-        Titles of these columns, where the words of the header do not say.
+        Titles of these columns, where the words of the header are others.
 
     Raises
     ------
@@ -93,11 +92,11 @@ def read_indentations(
     for number, row in enumerate(table[first:], first):
         if not any(cell.strip() for cell in row):
             continue
-        for name in values:
-            values[name].append(_number(path, number, row, columns[name], decimal) * scales[name])
+        for name, column in values.items():
+            column.append(_number(path, number, row, columns[name], decimal) * scales[name])
         if "place" in columns:
             places.append(row[columns["place"].number].strip() if columns["place"].number < len(row) else "")
-    return _assembled(path, {name: np.array(column) for name, column in values.items()}, places)
+    return {name: np.array(column) for name, column in values.items()}, places
 
 
 def _text(path: Path) -> str:
@@ -163,7 +162,7 @@ def _words(title: str) -> str:
 
 
 def _unit(title: str, name: str) -> str | None:
-    """Unit in a title: in brackets, behind a slash, or its last word if that is one."""
+    """Return the unit in a title: in brackets, behind a slash, or its last word if that is one."""
     match = _UNIT.search(title)
     if match is not None:
         return match[1] if match[1] is not None else match[2]
@@ -187,9 +186,7 @@ def _with_unit(column: _Column, units: Sequence[str]) -> _Column:
     return _Column(column.number, column.title, unit or None)
 
 
-def _scales(
-    path: Path, head: int, columns: Mapping[str, _Column], given: Mapping[str, str | None]
-) -> dict[str, float]:
+def _scales(path: Path, head: int, columns: Mapping[str, _Column], given: Mapping[str, str | None]) -> dict[str, float]:
     """Factor of each column to SI units."""
     scales = {}
     for name, column in columns.items():
@@ -217,30 +214,3 @@ def _number(path: Path, line: int, row: Sequence[str], column: _Column, decimal:
         shown = f"'{text}' is not a number" if text else "nothing"
         raise FitError(f"{path}, line {line + 1}, column '{column.title}': {shown}")
     return value
-
-
-def _assembled(path: Path, values: Mapping[str, np.ndarray], places: Sequence[str]) -> Indentations:
-    """Put the columns together: curves by name or by place, signs so that pressing is positive."""
-    if not len(values["force"]):
-        raise FitError(f"{path}: no rows below the header")
-    force, depth = (column * (1 if abs(column.max()) >= abs(column.min()) else -1) for column in _pair(values))
-    axes = [values[axis] for axis in "xyz" if axis in values]
-    if len(axes) not in (0, 3):
-        raise FitError(f"{path}: a place needs the columns x, y and z, or none of them")
-    keys = list(zip(places or [""] * len(force), *(axes or [np.zeros(len(force))]), strict=True))
-    order = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
-    names = tuple(str(key[0]) or f"curve {rank + 1}" for key, rank in order.items())
-    points = np.array([key[1:] for key in order]) if axes else None
-    radius = values["radius"] if "radius" in values else values["diameter"] / 2 if "diameter" in values else None
-    if radius is not None and np.ptp(radius) > 0:
-        raise FitError(f"{path}: more than one radius of the indenter: give each its own file")
-    curve = np.array([order[key] for key in keys])
-    try:
-        one = None if radius is None else float(radius[0])
-        return Indentations(force, depth, curve, points, names, values.get("time"), one)
-    except FitError as error:
-        raise FitError(f"{path}: {error}") from None
-
-
-def _pair(values: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    return values["force"], values["depth"]

@@ -35,7 +35,7 @@ def fit(
     """Fit the material of a scene to measured indentations, by least squares on the scene's own law.
 
     Young's modulus of ``[material]`` and of each region with one of its own, and constants of ``mooney-rivlin`` and
-    ``yeoh``, are fitted as far as the data can tell them. Poisson's ratio is, where its interval is narrow enough.
+    ``yeoh``, are fitted as far as the data determine them. Poisson's ratio is, where its interval is narrow enough.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def fit(
     Returns
     -------
     Fit
-        Values with their intervals, the fitted scene, residuals, and what the data cannot tell.
+        Values with their intervals, the fitted scene, residuals, and what the data cannot determine.
 
     Raises
     ------
@@ -77,11 +77,9 @@ def fit(
 
 
 class _Search:
-    """Fits the unknowns that the data tell, and holds the others."""
+    """Fits the unknowns that the data determine, and holds the others."""
 
-    def __init__(
-        self, unknowns: Unknowns, presses: Presses, data: Indentations, find_touch: bool, confidence: float
-    ):
+    def __init__(self, unknowns: Unknowns, presses: Presses, data: Indentations, find_touch: bool, confidence: float):
         self._unknowns, self._presses, self._confidence = unknowns, presses, confidence
         self._all, self._data = data, data.loading()
         self._find_touch = find_touch
@@ -94,7 +92,7 @@ class _Search:
         self._deepest = np.array([self._data.depth[self._data.curve == k].max() for k in range(len(self._data.names))])
 
     def run(self, chosen: Sequence[Unknown], scene: Scene) -> Fit:
-        """Fit, hold what cannot be told, and try Poisson's ratio last."""
+        """Fit, hold what the data do not determine, and try Poisson's ratio last."""
         held: dict[str, str] = {}
         free = [u for u in chosen if u.name != POISSON]
         vector, spread = self._fit_what_is_told(free, held)
@@ -107,7 +105,7 @@ class _Search:
                 vector, spread = self._fit_what_is_told(tried, held, start)
                 free = tried
             else:
-                held[POISSON] = f"the data tell it to within {predicted:.2g} only"
+                held[POISSON] = f"the data determine it to within {predicted:.2g} only"
         if not self._used.any():
             raise FitError("the law of the material ends before the first row: press less deep")
         numbers = as_numbers(self._unknowns, free, vector)
@@ -151,7 +149,7 @@ class _Search:
                 return vector, spread
             name, width = free[worst].name, spread.half_widths[worst]
             reach = f"a factor {np.exp(min(width, 20.0)):.2g}" if name.endswith("youngs_modulus") else f"{width:.2g}"
-            held[name] = f"the data tell it to within {reach} only"
+            held[name] = f"the data determine it to within {reach} only"
             del free[worst]
             vector = np.delete(vector, worst)
 
@@ -168,7 +166,7 @@ class _Search:
         return ((forces - self._data.force) / self._scale)[self._used]
 
     def _jacobian(self, free: Sequence[Unknown], vector: np.ndarray) -> np.ndarray:
-        """Derivatives of the residuals: exact where a number scales or shifts the curves, else differences."""
+        """Return derivatives of the residuals: exact where a number scales or shifts the curves, else differences."""
         numbers, offsets = as_numbers(self._unknowns, free, vector), self._offsets(free, vector)
         columns, here = [], self._residuals(free, vector)
         for rank, unknown in enumerate(free):
@@ -232,8 +230,7 @@ class _Search:
     def _spread(self, free: Sequence[Unknown], vector: np.ndarray) -> Spread:
         residuals = self._residuals(free, vector)
         if len(residuals) <= len(vector):
-            raise FitError(f"{len(residuals)} rows cannot tell {len(vector)} numbers: measure more, or hold some")
+            raise FitError(f"{len(residuals)} rows cannot determine {len(vector)} numbers: measure more, or hold some")
         if not len(vector):
             return Spread(np.empty((0, 0)), 0.0, 1.0, 1.0)
         return spread_of(self._jacobian(free, vector), residuals, self._data.curve[self._used], self._confidence)
-

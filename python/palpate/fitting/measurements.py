@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
 from palpate.equality import ComparedByValue
 from palpate.errors import FitError
+from palpate.fitting.csv_file import read_columns
 
 # A press has reached its largest depth where it comes as close to it as this part of its range.
 AT_DEEPEST = 0.002
@@ -28,7 +29,7 @@ class Indentations(ComparedByValue):
     curve
         (n,) number of the curve that a row belongs to, from 0 on.
     points
-        (curves, 3) m: where each curve was measured, in the scene; None where the data do not say.
+        (curves, 3) m: where each curve was measured, in the scene; None where the data have none.
     names
         Name of each curve.
     time
@@ -76,8 +77,29 @@ class Indentations(ComparedByValue):
         return f"Indentations({len(self.names)} curves, {len(self.force)} rows, to {deepest:.3g} mm)"
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], **options: Any) -> Indentations:
-        """Read a CSV file; see :func:`palpate.fitting.read_indentations` for the options.
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        force_unit: str | None = None,
+        depth_unit: str | None = None,
+        force_column: str | None = None,
+        depth_column: str | None = None,
+    ) -> Indentations:
+        """Read a CSV file as indenters export it.
+
+        The header names the columns with their units, such as ``Force (N)``, ``Displacement [mm]`` or ``Depth um``; a
+        row of units may follow it. Columns of time, of a place's name, of its x, y and z, and of the indenter's radius
+        or diameter are read where they are. Signs are turned so that pressing is positive.
+
+        Parameters
+        ----------
+        path
+            The file.
+        force_unit, depth_unit
+            Units of these columns, instead of those of the header.
+        force_column, depth_column
+            Titles of these columns, where the words of the header are others.
 
         Raises
         ------
@@ -85,12 +107,12 @@ class Indentations(ComparedByValue):
             No such file, columns or units that are not clear, or a cell that is no number, with its line.
 
         """
-        from palpate.fitting.csv_file import read_indentations
-
-        return read_indentations(path, **options)
+        units = {"force_unit": force_unit, "depth_unit": depth_unit}
+        values, places = read_columns(path, **units, force_column=force_column, depth_column=depth_column)
+        return _assembled(Path(path), values, places)
 
     def loading(self) -> Indentations:
-        """Return the rows up to the largest depth of each curve, in the order of time: what an elastic law describes."""
+        """Return the rows up to the largest depth of each curve, in the order of time."""
         order = np.arange(len(self.force)) if self.time is None else np.argsort(self.time, kind="stable")
         kept = []
         for k in range(len(self.names)):
@@ -117,3 +139,28 @@ class Indentations(ComparedByValue):
             if depth[-1] < 0.3 * depth.max() and work > 0:
                 found[name] = float(np.trapezoid(force, depth) / work)
         return found
+
+
+def _assembled(path: Path, values: Mapping[str, np.ndarray], places: Sequence[str]) -> Indentations:
+    """Put the columns together: curves by name or by place, signs so that pressing is positive."""
+    if not len(values["force"]):
+        raise FitError(f"{path}: no rows below the header")
+    force, depth = (
+        column if abs(column.max()) >= abs(column.min()) else -column for column in (values["force"], values["depth"])
+    )
+    axes = [values[axis] for axis in "xyz" if axis in values]
+    if len(axes) not in (0, 3):
+        raise FitError(f"{path}: a place needs the columns x, y and z, or none of them")
+    keys = list(zip(places or [""] * len(force), *(axes or [np.zeros(len(force))]), strict=True))
+    order = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
+    names = tuple(str(key[0]) or f"curve {rank + 1}" for key, rank in order.items())
+    points = np.array([key[1:] for key in order]) if axes else None
+    radius = values["radius"] if "radius" in values else values["diameter"] / 2 if "diameter" in values else None
+    if radius is not None and np.ptp(radius) > 0:
+        raise FitError(f"{path}: more than one radius of the indenter: give each its own file")
+    curve = np.array([order[key] for key in keys])
+    try:
+        one = None if radius is None else float(radius[0])
+        return Indentations(force, depth, curve, points, names, values.get("time"), one)
+    except FitError as error:
+        raise FitError(f"{path}: {error}") from None

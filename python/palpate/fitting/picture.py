@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.atomic import written_beside
 from palpate.figures import COLORS, empty_figure
-
-if TYPE_CHECKING:
-    from palpate.fitting.result import Fit
+from palpate.fitting.measurements import Indentations
 
 # More names than these are not written into the picture.
 MOST_NAMES = 8
 
 
-def picture_of_fit(found: Fit, path: Path) -> None:
-    """Draw into a file, written beside and renamed."""
+def picture_of_fit(measured: Indentations, predicted: np.ndarray, used: np.ndarray, title: str, path: Path) -> None:
+    """Draw forces (n,), N, and whether rows (n,) were used, into a file that is written beside and renamed."""
     figure = empty_figure(6.4, 5.2)
     curves, residuals = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-    measured, largest = found.measured, np.abs(found.measured.force).max()
+    largest = np.abs(measured.force).max()
     for k, name in enumerate(measured.names):
         rows = np.flatnonzero(measured.curve == k)
         rows = rows[np.argsort(measured.depth[rows])]
         color, depth = COLORS[k % len(COLORS)], 1e3 * measured.depth[rows]
         label = name if len(measured.names) <= MOST_NAMES else None
         curves.plot(depth, measured.force[rows], ".", color=color, ms=4, label=label)
-        curves.plot(depth, found.predicted[rows], color=color, lw=1.4)
-        left = ~found.used[rows]
+        curves.plot(depth, predicted[rows], color=color, lw=1.4)
+        left = ~used[rows]
         curves.plot(depth[left], measured.force[rows][left], "x", color="0.5", ms=5)
-        residuals.plot(depth, 100 * found.residuals[rows] / largest, ".", color=color, ms=4)
+        residuals.plot(depth, 100 * (measured.force - predicted)[rows] / largest, ".", color=color, ms=4)
     residuals.axhline(0.0, color="0.4", lw=0.8)
-    curves.set(ylabel="force (N)", title="; ".join(str(p) for p in found.parameters if p.fitted)[:90])
+    curves.set(ylabel="force (N)", title=title)
     curves.title.set_fontsize(9)
     residuals.set(xlabel="depth (mm)", ylabel="residual (% of largest)")
     curves.legend(frameon=False)

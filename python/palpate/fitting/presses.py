@@ -1,4 +1,4 @@
-"""Presses of a scene's tool as they were measured, computed by the scene's own law for each material that a fit tries."""
+"""Presses of a scene's tool as they were measured, computed by the scene's own law for materials that a fit tries."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Presses:
         return self._scene.tools[0].pad_youngs_modulus is not None
 
     def forces(self, numbers: Mapping[str, float], offsets: np.ndarray) -> np.ndarray:
-        """Forces (n,), N, at the measured depths less the offset of each curve."""
+        """Return forces (n,), N, at the measured depths less the offset of each curve."""
         return self._read(numbers, offsets, 0)
 
     def slopes(self, numbers: Mapping[str, float], offsets: np.ndarray) -> np.ndarray:

@@ -137,7 +137,7 @@ class Fit:
         for i, j in zip(*np.triu_indices(len(self.names), 1), strict=True):
             if abs(self.correlation[i, j]) > STRONGLY_CORRELATED:
                 pair = f"{self.names[i]} and {self.names[j]}"
-                found.append(f"{pair} are correlated by {self.correlation[i, j]:.3f}: the data hardly tell them apart")
+                found.append(f"{pair} are correlated by {self.correlation[i, j]:.3f}: the data hardly separate them")
         if not self.used.all():
             found.append(f"{(~self.used).sum()} rows lie deeper than the law of the material reaches, and are left out")
         if self.inflation > 1.0:
@@ -162,7 +162,8 @@ class Fit:
         if path.suffix.lower() not in (".png", ".svg"):
             raise FitError(f"{path}: a picture ends in .png or .svg")
         require_writable(path, FitError)
-        picture_of_fit(self, path)
+        title = "; ".join(str(p) for p in self.parameters if p.fitted)[:90]
+        picture_of_fit(self.measured, self.predicted, self.used, title, path)
 
     def write_scene(self, path: str | os.PathLike[str]) -> None:
         """Write the scene's file with the fitted values; all else in it, comments too, stays as it is.
@@ -224,5 +225,7 @@ def fitted_parameters(
 def _quantity(name: str, value: float) -> str:
     if name.endswith("poissons_ratio"):
         return f"{value:.4g}"
-    scale, unit = next(pair for pair in ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa")) if abs(value) < 1e3 * pair[0] or pair[0] == 1e6)
+    scale, unit = next(
+        pair for pair in ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa")) if abs(value) < 1e3 * pair[0] or pair[0] == 1e6
+    )
     return f"{value / scale:.4g} {unit}"

@@ -1,4 +1,4 @@
-"""Intervals of a least-squares fit, and whether its data can tell the unknowns apart."""
+"""Intervals of a least-squares fit, and whether its data can separate the unknowns."""
 
 from __future__ import annotations
 
@@ -47,7 +47,9 @@ def spread_of(jacobian: np.ndarray, residuals: np.ndarray, curve: np.ndarray, co
     inflation = _inflation(residuals, curve)
     covariance = inflation * (weighted @ weighted.T) / np.outer(scale, scale)
     freedom = max(1.0, n / inflation - p)
-    return Spread(covariance, float(student.ppf(0.5 + 0.5 * confidence, freedom)), singular[0] / singular[-1], inflation)
+    return Spread(
+        covariance, float(student.ppf(0.5 + 0.5 * confidence, freedom)), singular[0] / singular[-1], inflation
+    )
 
 
 def _inflation(residuals: np.ndarray, curve: np.ndarray) -> float:

@@ -43,7 +43,7 @@ class Unknown:
     step
         Change that differences are taken with.
     telling
-        Half the width of an interval beyond which the data cannot tell the number.
+        Half the width of an interval beyond which the data do not determine the number.
 
     """
 
@@ -57,7 +57,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Slot:
-    """A table with a modulus of its own: its key in the scene, its place in the lists, and its material as it stands."""
+    """A table with a modulus of its own: its key in the scene, its place in the lists, and its material."""
 
     key: str
     rank: int | None
@@ -161,7 +161,9 @@ class Unknowns:
             if slot.rank is None:
                 (in_scene if body.material is None else in_body)["material"] = changed
             else:
-                (in_body if slot.key == "segment" or body.region is not None else in_scene)[slot.key][slot.rank] = changed
+                (in_body if slot.key == "segment" or body.region is not None else in_scene)[slot.key][slot.rank] = (
+                    changed
+                )
         return scene.model_copy(update={**in_scene, "bodies": [body.model_copy(update=in_body)]})
 
 

@@ -1,4 +1,4 @@
-"""Fits find the material of synthetic indentations with noise, and report what these cannot tell."""
+"""Fits find the material of synthetic indentations with noise, and report what these do not determine."""
 
 from __future__ import annotations
 
@@ -138,19 +138,21 @@ def test_a_layer_that_the_tool_does_not_feel_is_not_told(block_file):
     truth = scene(block_file, "15kPa", deep.format("10kPa"))
     found = palpate.fit(truth, synthetic(truth, depth=0.003), hold=["poissons_ratio"])
     upper, lower = found["region.0.youngs_modulus"], found["material.youngs_modulus"]
-    assert "tell it to within a factor" in upper.note and upper.low < 10e3 < upper.high
+    assert "determine it to within a factor" in upper.note and upper.low < 10e3 < upper.high
     assert lower.value / upper.value == pytest.approx(1.5, rel=1e-6), "their ratio stays that of the scene"
 
 
 def test_constants_of_mooney_and_rivlin_are_told_or_said_not_to_be(block_file):
     start = scene(block_file, "10kPa", "").model_copy()
-    material = palpate.Scene(body={"model": "beam"}, material={"law": "mooney-rivlin", "c10": 1500, "c01": 1000}).material
+    material = palpate.Scene(
+        body={"model": "beam"}, material={"law": "mooney-rivlin", "c10": 1500, "c01": 1000}
+    ).material
     start = start.model_copy(update={"material": material})
     found = palpate.fit(start, synthetic(start, depth=0.009, noise=0.005), hold=["poissons_ratio"])
     total = found["material.c10"].value + found["material.c01"].value
     assert total == pytest.approx(2500, rel=0.03)
     share = found["material.c01"]
-    assert "the data tell it to within" in share.note or share.low <= 1000 <= share.high
+    assert "the data determine it to within" in share.note or share.low <= 1000 <= share.high
 
 
 def test_the_first_touch_can_be_found(block_file):
@@ -166,7 +168,9 @@ def test_the_first_touch_can_be_found(block_file):
 
 def test_a_scene_keeps_its_words_and_gets_the_values(block_file, tmp_path):
     start = scene(block_file, "10kPa", SOFT_TOP.format("10kPa"))
-    found = palpate.fit(start, synthetic(start, factor=2.0, noise=0.0), hold=["poissons_ratio", "region.0.youngs_modulus"])
+    found = palpate.fit(
+        start, synthetic(start, factor=2.0, noise=0.0), hold=["poissons_ratio", "region.0.youngs_modulus"]
+    )
     found.write_scene(tmp_path / "fitted.toml")
     text = (tmp_path / "fitted.toml").read_text()
     assert "# A phantom on a table." in text and "# the upper layer" in text and "# in metres" in text
@@ -176,7 +180,7 @@ def test_a_scene_keeps_its_words_and_gets_the_values(block_file, tmp_path):
     for ending in ("png", "svg"):
         found.picture(tmp_path / f"fit.{ending}")
         assert (tmp_path / f"fit.{ending}").stat().st_size > 5000
-    with pytest.raises(palpate.FitError, match="ends in .png or .svg"):
+    with pytest.raises(palpate.FitError, match=r"ends in \.png or \.svg"):
         found.picture(tmp_path / "fit.gif")
 
 

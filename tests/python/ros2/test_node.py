@@ -1,7 +1,7 @@
 """The node of ROS 2 against messages that have the fields and types of their definitions, and no others.
 
-The definitions are those of ROS 2 (common_interfaces); mcap_ros2 serialises what the node publishes by them, and the one
-of WrenchStamped equals that of Palpate's recordings. ROS 2 itself is not there.
+The definitions are those of ROS 2 (common_interfaces); mcap_ros2 serialises what the node publishes by them.
+That of WrenchStamped equals that of Palpate's recordings. ROS 2 itself is not there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,11 @@ from palpate.scene import BuiltScene, Scene
 
 NODE = Path(__file__).parents[3] / "examples" / "ros2" / "palpate_node.py"
 LINE = "\n" + "=" * 80 + "\nMSG: "
-HEADER = "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id" + LINE + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
+HEADER = (
+    "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id"
+    + LINE
+    + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
+)
 VECTOR = "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z"
 WRENCH = (
     f"std_msgs/Header header\ngeometry_msgs/Wrench wrench{LINE}{HEADER}{LINE}"
@@ -82,13 +86,11 @@ class Publisher:
 class Node:
     """What the node uses of rclpy's: a name, parameters, publishers, subscriptions, timers and a clock."""
 
-    given: dict = {}
-
     def __init__(self, name):
         self.name, self.publishers, self.subscriptions, self.timers = name, {}, {}, []
 
     def declare_parameter(self, name, default):
-        return types.SimpleNamespace(value=self.given.get(name, default))
+        return types.SimpleNamespace(value=default)
 
     def create_publisher(self, kind, topic, depth):
         self.publishers[topic] = Publisher(kind, topic, depth)
