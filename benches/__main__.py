@@ -12,6 +12,7 @@ from benches.paper import paper
 from benches.precompute import precompute
 from benches.record import record
 from benches.scale import scale
+from benches.sensor import sensor
 from benches.strain.patch_table import patch_table
 from benches.strain.references import strain_references
 from benches.strain.table import strain_table
@@ -31,7 +32,7 @@ app = typer.Typer(
 )
 for command in (
     *(tick, contact, scale, precompute, surface, elements),
-    *(paper, dynamics, record, viewer, zwidth, touches, fill),
+    *(paper, dynamics, record, viewer, zwidth, touches, fill, sensor),
     strain_table,
     patch_table,
     strain_references,

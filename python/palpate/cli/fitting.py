@@ -55,9 +55,8 @@ def fit_command(
     with status_line(f"fitting {scene} to {measured}"):
         found = fit(scene, data, hold=hold or (), find_touch=find_touch)
     rows, curves = len(found.measured.force), len(found.measured.names)
-    print(
-        f"{rows} rows of {curves} curve{'s' if curves > 1 else ''}; {found.solved} bod{'ies' if found.solved != 1 else 'y'} solved"
-    )
+    solved = "1 body" if found.solved == 1 else f"{found.solved} bodies"
+    print(f"{rows} rows of {curves} curve{'s' if curves > 1 else ''}; {solved} solved")
     for name, point in zip(found.measured.names, found.points, strict=True):
         print(f"{name}: pressed at (" + ", ".join(f"{1e3 * x:.1f}" for x in point) + ") mm")
     for parameter in found.parameters:

@@ -31,10 +31,10 @@ class FindNodule(gymnasium.Env):
     A slab of 60 x 60 x 30 mm has a nodule of 12 mm, twelve times stiffer, its middle 9 to 13 mm deep, anywhere but near
     the sides. A ball of 5 mm palpates it.
 
-    An observation has six numbers. Three are the position of the ball's lowest point, m, from the middle of the upper
-    surface; three are the force on the ball, N. An action has four, from -1 to 1: a motion in units of 2 mm, and a
-    declaration. Above 0.5 that says that the nodule lies below the ball, and ends the episode. A right declaration pays
-    1 (within 6 mm, seen from above); each step costs 0.001.
+    An observation has six numbers: the position of the ball's lowest point, m, and the force on the ball, N. The
+    middle of the upper surface is the origin. An action has four numbers from -1 to 1. Three are a motion in units of
+    2 mm. The fourth, above 0.5, declares that the nodule lies below the ball, and ends the episode. A right declaration
+    pays 1, a step costs 0.001. Right is within 6 mm, seen from above.
 
     Parameters
     ----------
