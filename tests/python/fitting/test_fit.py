@@ -207,3 +207,24 @@ def test_what_cannot_be_is_refused(block_file):
     far = palpate.Indentations(np.linspace(0, 1, 9), np.linspace(0, 1e-3, 9), None, [[1.0, 0.0, 0.0]])
     with pytest.raises(palpate.FitError, match="from the surface"):
         palpate.fit(start, far)
+
+
+def test_a_bonded_layer_has_the_modulus_of_a_published_formula(tmp_path):
+    """Dimitriadis, Horkay, Maresca, Kachar and Chadwick, Biophys. J. 82 (2002): a ball on a bonded layer."""
+    from palpate.environments.slab import SIDES, _mesh
+
+    _mesh().to_quadratic().write(tmp_path / "slab.vtu")
+    text = FILE.format(mesh="slab.vtu", modulus="5kPa", more='law = "linear"')
+    (tmp_path / "slab.toml").write_text(text.replace('radius = "6mm"', 'radius = "5mm"\nfriction = 0'))
+    modulus, ratio, radius, height = 23e3, 0.45, 5e-3, SIDES[2]
+    depth = np.linspace(0, 1.5e-3, 40)
+    chi = np.sqrt(radius * depth) / height
+    a = -(1.2876 - 1.4678 * ratio + 1.3442 * ratio**2) / (1 - ratio)
+    b = (0.6387 - 1.0277 * ratio + 1.5164 * ratio**2) / (1 - ratio)
+    series = 1 - 2 * a / math.pi * chi + (2 * a / math.pi) ** 2 * chi**2
+    series -= 8 / math.pi**3 * (a**3 + 4 * math.pi**2 / 15 * b) * chi**3
+    series += 16 * a / math.pi**4 * (a**3 + 3 * math.pi**2 / 5 * b) * chi**4
+    force = 4 / 3 * modulus / (1 - ratio**2) * np.sqrt(radius) * depth**1.5 * series
+    found = palpate.fit(tmp_path / "slab.toml", palpate.Indentations(force, depth), hold=["poissons_ratio"])
+    # Elements of 6 mm, and sides of the slab that are free at 30 mm.
+    assert found["material.youngs_modulus"].value == pytest.approx(modulus, rel=0.05) and found.scatter < 0.01
