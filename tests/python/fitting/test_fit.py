@@ -124,6 +124,7 @@ def test_of_100_cases_90_intervals_cover_the_modulus(block_file, proportional):
     assert covered >= 90 and near == 100, f"seed {seed}: {covered} covered, {near} near"
 
 
+@pytest.mark.slow
 def test_two_layers_are_told_apart_where_the_tool_feels_both(block_file):
     truth = scene(block_file, "20kPa", SOFT_TOP.format("6kPa"))
     start = scene(block_file, "10kPa", SOFT_TOP.format("10kPa"))
@@ -133,6 +134,7 @@ def test_two_layers_are_told_apart_where_the_tool_feels_both(block_file):
     assert hard.fitted and hard.low <= 20e3 <= hard.high and hard.value == pytest.approx(20e3, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_layer_that_the_tool_does_not_feel_is_not_told(block_file):
     deep = SOFT_TOP.replace("38mm", "3mm")
     truth = scene(block_file, "15kPa", deep.format("10kPa"))
@@ -142,6 +144,7 @@ def test_a_layer_that_the_tool_does_not_feel_is_not_told(block_file):
     assert lower.value / upper.value == pytest.approx(1.5, rel=1e-6), "their ratio stays that of the scene"
 
 
+@pytest.mark.slow
 def test_constants_of_mooney_and_rivlin_are_told_or_said_not_to_be(block_file):
     start = scene(block_file, "10kPa", "").model_copy()
     material = palpate.Scene(
