@@ -12,6 +12,7 @@ from benches.paper import paper
 from benches.precompute import precompute
 from benches.record import record
 from benches.scale import scale
+from benches.sensor import sensor
 from benches.strain.beside import strain
 from benches.strain.patch_table import patch_table
 from benches.strain.references import strain_references
@@ -32,7 +33,7 @@ app = typer.Typer(
 )
 for command in (
     *(tick, contact, scale, precompute, surface, elements),
-    *(paper, dynamics, record, viewer, zwidth, touches, fill),
+    *(paper, dynamics, record, viewer, zwidth, touches, fill, sensor),
     strain,
     strain_table,
     patch_table,

@@ -50,7 +50,7 @@ FORBIDDEN = {
 # all of them. The package itself, which exports the public names, comes after them.
 PYTHON_ORDER = (
     *("segmentation", "mesh", "body", "fields", "green", "dynamics", "models", "scene", "devices", "simulation"),
-    *("openigtlink", "palpation", "sessions", "study"),
+    *("openigtlink", "palpation", "fitting", "environments", "sessions", "study"),
     *("viewer", "validation/plots", "exam", "validation/verify", "validation/ticks", "validation/doctor"),
     "cli",
 )

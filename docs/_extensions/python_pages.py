@@ -22,6 +22,7 @@ CHAPTERS = {
     "Bodies in motion": ("modes", "ModalBasis", "rayleigh_from_ratios", "Newmark", "Energy"),
     "Scenes and the force loop": ("Scene", "Simulation", "Frame", "Contact", "pack"),
     "Contact as a sensor": ("Sensor", "SensorContacts"),
+    "Fit to measurements": ("fit", "Fit", "FittedParameter", "Indentations"),
     "Devices": ("Device", "DeviceLimits", "Reading"),
     "Recordings": (
         *("Recording", "RecordingStatus", "replay", "Replayed", "Difference", "rerun", "compare", "Comparison"),

@@ -20,6 +20,7 @@ from palpate.errors import (
     DeviceError,
     DeviceWarning,
     Error,
+    FitError,
     LockingWarning,
     MeshError,
     MeshWarning,
@@ -38,6 +39,7 @@ from palpate.errors import (
     ViewerError,
 )
 from palpate.fields import StressRecovery, SurfaceStress
+from palpate.fitting import Fit, FittedParameter, Indentations, fit
 from palpate.green import Answer, GreensFunction, Plan, Touch, plan, precompute
 from palpate.mesh import TetMesh, shapes, tetrahedralize
 from palpate.scene import Scene
@@ -72,8 +74,12 @@ __all__ = [
     "Difference",
     "Energy",
     "Error",
+    "Fit",
+    "FitError",
+    "FittedParameter",
     "Frame",
     "GreensFunction",
+    "Indentations",
     "Loads",
     "LockingWarning",
     "Material",
@@ -110,6 +116,7 @@ __all__ = [
     "ViewerError",
     "compare",
     "export",
+    "fit",
     "models",
     "modes",
     "pack",

@@ -33,6 +33,10 @@ class SimulationError(Error):
     """A simulation that cannot go on: its loop does not run, or a fault has latched."""
 
 
+class FitError(Error):
+    """Measurements that cannot be read, or that the material of a scene cannot be fitted to."""
+
+
 class UnitError(Error):
     """An unknown unit, or a quantity that cannot be read."""
 

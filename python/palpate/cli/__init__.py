@@ -5,6 +5,7 @@ from palpate.cli import (  # noqa: F401  they register their commands
     devices,
     doctor,
     examining,
+    fitting,
     mapping,
     packing,
     recordings,
