@@ -157,6 +157,21 @@ pub unsafe extern "C" fn palpate_run(positions: *const f64, count: usize) -> i32
     })
 }
 
+/// Times of ticks and forces on devices at given positions of all tools (three numbers each), as numbers; see
+/// [`run::times`].
+///
+/// # Safety
+/// Numbers within this module's memory, aligned; four of the orientation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_times(positions: *const f64, count: usize, orientation: *const [f64; 4]) -> i32 {
+    // SAFETY: by the caller.
+    let (positions, orientation) = unsafe { (std::slice::from_raw_parts(positions, count), *orientation) };
+    with_session(|session, _, numbers| {
+        *numbers = run::times(session, positions, orientation).map_err(|error| error.to_string())?;
+        Ok(())
+    })
+}
+
 /// Ends the recording: the bytes of its file, as text.
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_end_recording() -> i32 {
