@@ -14,6 +14,8 @@ use crate::{frame, run};
 
 /// Where the files of the scene are provided.
 const FOLDER: &str = "scene";
+/// What the names of files of contacts end with.
+const CONTACTS: &str = ".contact.palpate";
 
 #[derive(Default)]
 struct Module {
@@ -75,11 +77,11 @@ pub unsafe extern "C" fn palpate_provide(name: *const u8, name_length: usize, by
     files::provide(Path::new(FOLDER).join(&*String::from_utf8_lossy(name)), bytes.to_vec());
 }
 
-/// Opens the scene whose files were provided, and forgets them.
+/// Opens the scene whose files were provided, and forgets them but for those of contacts, which other tools may need.
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_open() -> i32 {
     let opened = Session::open(&Path::new(FOLDER).join("scene.json"));
-    files::forget_provided();
+    files::keep_provided(|path| path.to_string_lossy().ends_with(CONTACTS));
     let mut module = module();
     let module = module.get_or_insert_default();
     match opened {

@@ -19,7 +19,7 @@ from browser import PATIENCE
 import palpate
 from palpate import simulation
 from palpate.scene import model_scene
-from palpate.viewer.site import _program, with_precision, write_site
+from palpate.viewer.site import find_program, with_precision, write_site
 
 ROOT = Path(__file__).resolve().parents[3]
 HARNESS = ROOT / "tests" / "web_run.mjs"
@@ -92,15 +92,15 @@ def test_forces_in_webassembly_are_the_native_ones_to_the_bit(site, tmp_path, na
 
 def test_program_and_liver_are_small(site):
     _, _, sizes = site
-    assert sizes["program"] <= LARGEST_PROGRAM
-    assert sizes["liver"] <= LARGEST_SCENE
+    assert sizes.program <= LARGEST_PROGRAM
+    assert sizes.scenes["liver"] <= LARGEST_SCENE
 
 
 def test_a_folder_of_something_else_is_not_replaced(site, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(palpate.Error, match="folder of something else"):
         write_site([("block", site[1]["block"])], tmp_path)
-    assert _program().is_file()
+    assert find_program().is_file()
 
 
 def waited(holds) -> None:
