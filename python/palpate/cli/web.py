@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def web(
     scenes: Annotated[
         list[str],
-        typer.Argument(help="Scene files (.toml), precomputed stores, or names of built-in models.", metavar="SCENE..."),
+        typer.Argument(help="Scene files (.toml), stores, or built-in models.", metavar="SCENE..."),
     ],
     out: Annotated[Path, typer.Argument(help="Folder to write; an earlier site there is replaced.")],
     precision: Annotated[

@@ -37,7 +37,7 @@ _PAGE = """<!doctype html>
   </head>
   <body>
     <h1>Soft bodies to touch</h1>
-    <p>Choose a body, then press on it with the pointer. Forces are computed a thousand times a second, in this page.</p>
+    <p>Choose a body, then press on it with the pointer. Your browser computes the forces, 1000 times a second.</p>
     <ul>
 {cards}
     </ul>

@@ -101,7 +101,11 @@ def _parts(built: BuiltScene, frame: Frame) -> list[Part]:
     if force.any():
         shaft = arrow()
         length = 0.8 * ARROW_PART * float(np.ptp(np.concatenate([s.positions for s in surfaces]), axis=0).max())
-        placed = rotated(length * shaft.vertices, tuple(turning_z_to(force))) + tip + tool.vertices[:, 2].max() * units(force)
+        placed = (
+            rotated(length * shaft.vertices, tuple(turning_z_to(force)))
+            + tip
+            + tool.vertices[:, 2].max() * units(force)
+        )
         parts.append(_part(placed, shaft.faces, np.tile(FORCE_COLOR, (len(placed), 1))))
     return parts
 
@@ -128,7 +132,9 @@ def _drawn(parts: list[Part]) -> np.ndarray:
     placed[..., :2] = (placed[..., :2] - 0.5 * (low + high)[:2]) * scale + 0.5 * size
     seen = np.flatnonzero(area_vectors(placed)[:, 2] < 0)  # rows count downwards
     # Beside the light's own direction, the viewer's gives roundness.
-    bright = AMBIENT + (1 - AMBIENT) * (0.75 * np.clip(normals @ LIGHT, 0, 1) + 0.25 * np.clip(normals @ TOWARDS_VIEWER, 0, 1))
+    bright = AMBIENT + (1 - AMBIENT) * (
+        0.75 * np.clip(normals @ LIGHT, 0, 1) + 0.25 * np.clip(normals @ TOWARDS_VIEWER, 0, 1)
+    )
     lit = np.clip(colors * bright[..., None], 0, 1)
     pixels, depths = np.zeros((size[1], size[0], 4), dtype=np.uint8), np.full((size[1], size[0]), -np.inf)
     for k in seen:
@@ -151,4 +157,6 @@ def _fill(pixels: np.ndarray, depths: np.ndarray, corners: np.ndarray, colors: n
     block = np.s_[low[1] : high[1] + 1, low[0] : high[0] + 1]
     nearer = (shares >= -1e-9).all(axis=0) & (depth > depths[block])
     depths[block][nearer] = depth[nearer]
-    pixels[block][nearer] = np.column_stack([255 * shares[:, nearer].T @ colors, np.full(nearer.sum(), 255)]).astype(np.uint8)
+    pixels[block][nearer] = np.column_stack([255 * shares[:, nearer].T @ colors, np.full(nearer.sum(), 255)]).astype(
+        np.uint8
+    )

@@ -1,0 +1,56 @@
+"""Tests of the page that need no server, once more on a page without one: the same functions, with a worker as carrier."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from browser import MARKS, opened
+from viewer.test_viewer_controls import test_reset_puts_all_sliders_back_at_once  # noqa: F401
+from viewer.test_viewer_page import (  # noqa: F401
+    test_a_drag_slides_along_the_surface,
+    test_a_grab_pulls,
+    test_a_press_begins_at_the_surface_and_comes_to_a_gentle_depth,
+    test_a_press_is_felt_shown_and_released,
+    test_deformation_drawn_larger_is_marked,
+    test_felt_stiffness_is_the_slope_of_force_against_depth,
+    test_friction_bounds_the_force_along_the_surface,
+    test_stiffness_scales_the_force_at_once,
+    test_the_depth_is_told_by_wheel_second_button_and_shift,
+    test_the_size_of_the_body_is_told,
+)
+from web_site import served
+
+from palpate.scene import model_scene
+from palpate.viewer.site import write_site
+
+pytestmark = MARKS
+
+
+@pytest.fixture(scope="module")
+def program(cache, tmp_path_factory):
+    """The paper's liver, as in the demo, from a plain file server."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        folder = tmp_path_factory.mktemp("static") / "site"
+        write_site([("liver", model_scene("liver", paper=True).build(progress=False))], folder)
+    with served(folder) as address:
+        yield SimpleNamespace(address=f"{address}/index.html")
+
+
+@pytest.fixture
+def page(chromium, program):
+    with opened(chromium, program) as page:
+        yield page
+
+
+@pytest.mark.parametrize(
+    ("message", "reason"),
+    [
+        ({"type": "mode", "mode": 0}, "To show a mode needs Palpate on this computer"),
+        ({"type": "setup"}, "This needs Palpate on this computer"),
+    ],
+)
+def test_what_needs_a_server_is_refused_plainly(page, message, reason):
+    page.evaluate("(message) => window.palpate.send(message)", message)
+    page.get_by_text(reason).wait_for()
