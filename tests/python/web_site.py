@@ -80,7 +80,7 @@ def page_of(chromium, address: str, ready: str = "window.palpate.ready"):
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.goto(address)
-    page.evaluate(f"() => {ready or null}")
+    page.evaluate(f"() => {ready}")
     yield page
     assert not errors, errors
     context.close()

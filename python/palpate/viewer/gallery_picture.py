@@ -1,7 +1,7 @@
 """The picture of a scene in a gallery: its bodies pressed by the first tool, drawn by this program.
 
-Triangles are drawn with a depth for each pixel and lit by their nodes' normals, at twice the size, which is then halved. What
-is beside the bodies is transparent, so that a picture stands on any page.
+Triangles are drawn with a depth for each pixel and lit by their nodes' normals, at twice the size, which is then
+halved. What is beside the bodies is transparent, so that a picture stands on any page.
 """
 
 from __future__ import annotations
@@ -101,11 +101,8 @@ def _parts(built: BuiltScene, frame: Frame) -> list[Part]:
     if force.any():
         shaft = arrow()
         length = 0.8 * ARROW_PART * float(np.ptp(np.concatenate([s.positions for s in surfaces]), axis=0).max())
-        placed = (
-            rotated(length * shaft.vertices, tuple(turning_z_to(force)))
-            + tip
-            + tool.vertices[:, 2].max() * units(force)
-        )
+        foot = tip + tool.vertices[:, 2].max() * units(force)
+        placed = rotated(length * shaft.vertices, tuple(turning_z_to(force))) + foot
         parts.append(_part(placed, shaft.faces, np.tile(FORCE_COLOR, (len(placed), 1))))
     return parts
 

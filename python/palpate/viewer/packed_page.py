@@ -29,7 +29,7 @@ FOLLOWED = 12
 
 
 def packed_page(built: BuiltScene, name: str) -> bytes:
-    """Return the file of a scene, called ``name`` in the page: names and sizes of its parts as JSON, the parts; compressed.
+    """Return the file of a scene, called ``name`` in the page: a header of JSON, then the parts, compressed.
 
     Of each store only the part that contacts and pictures read is taken, with the same numbers: forces are those of the
     store to the bit.

@@ -1,4 +1,4 @@
-"""Tests of the page that need no server, once more on a page without one: the same functions, with a worker as carrier."""
+"""Tests of the page that need no server, once more on a page without one: a worker is its carrier."""
 
 from __future__ import annotations
 
@@ -42,15 +42,3 @@ def program(cache, tmp_path_factory):
 def page(chromium, program):
     with opened(chromium, program) as page:
         yield page
-
-
-@pytest.mark.parametrize(
-    ("message", "reason"),
-    [
-        ({"type": "mode", "mode": 0}, "To show a mode needs Palpate on this computer"),
-        ({"type": "setup"}, "This needs Palpate on this computer"),
-    ],
-)
-def test_what_needs_a_server_is_refused_plainly(page, message, reason):
-    page.evaluate("(message) => window.palpate.send(message)", message)
-    page.get_by_text(reason).wait_for()

@@ -25,10 +25,13 @@ document.body.append(el);
 window.clean = widget.render({ model, el });
 const frame = el.querySelector("iframe");
 window.ready = new Promise((resolve) => {
-  const look = () => (frame.contentWindow.palpate ? frame.contentWindow.palpate.ready.then(resolve) : setTimeout(look, 20));
+  const look = () => {
+    const { palpate } = frame.contentWindow;
+    return palpate ? palpate.ready.then(resolve) : setTimeout(look, 20);
+  };
   look();
 });
-window.run = (positions) => frame.contentWindow.palpate.run(Float64Array.from(positions)).then((forces) => Array.from(forces));
+window.run = async (positions) => Array.from(await frame.contentWindow.palpate.run(Float64Array.from(positions)));
 </script></body></html>"""
 
 
@@ -48,7 +51,7 @@ def test_the_widget_runs_the_scene_to_the_bit(chromium, built, tmp_path):
     (tmp_path / "widget.mjs").write_text(str(widget._esm))
     (tmp_path / "index.html").write_text(HOST)
     positions = drag(built)
-    with served(tmp_path) as address, page_of(chromium, f"{address}/index.html", "") as page:
+    with served(tmp_path) as address, page_of(chromium, f"{address}/index.html", "null") as page:
         page.wait_for_function("window.ready", timeout=1e3 * PATIENCE)
         page.evaluate("() => window.ready")
         assert page.locator("iframe").bounding_box()["height"] == 300
