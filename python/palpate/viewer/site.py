@@ -49,8 +49,10 @@ class SiteSizes:
         return self.program + sum(self.scenes.values()) + self.pictures
 
 
-def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path) -> SiteSizes:
-    """Write a folder that any web host serves: a page of one scene, or of several with a page of pictures before it.
+def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gallery: bool | None = None) -> SiteSizes:
+    """Write a folder that any web host serves: the page, or with ``gallery`` a page of pictures before it.
+
+    By default several scenes get a gallery.
 
     The page opens the first scene, and another one by ``?scene=NAME``. An earlier site of that name is replaced, when
     the new one is complete.
@@ -68,7 +70,7 @@ def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path) -> 
     names = [plain_name(name) for name, _ in scenes]
     if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
         raise ViewerError(f"two scenes are called '{twice}': rename one of the files")
-    is_gallery, sizes, pictures = len(names) > 1, {}, 0
+    is_gallery, sizes, pictures = len(names) > 1 if gallery is None else gallery, {}, 0
     with folder_beside(path) as folder:
         _copy_page(folder, names, is_gallery)
         shutil.copyfile(program, folder / PROGRAM)
@@ -147,7 +149,7 @@ def _copy_page(folder: Path, names: Sequence[str], is_gallery: bool) -> None:
     """Copy the built page, which opens a scene of the folder and offers the others as models."""
     shutil.copytree(static_folder(), folder, dirs_exist_ok=True)
     page = folder / PAGE
-    choices = [{"name": name, "title": title_of(name)} for name in names] if is_gallery else []
+    choices = [{"name": name, "title": title_of(name)} for name in names] if len(names) > 1 else []
     head = f"  {meta('scene', names[0])}\n    {meta('scenes', json.dumps(choices))}\n  </head>"
     text = page.read_text(encoding="utf-8").replace("</head>", head, 1)
     page.unlink()

@@ -11,7 +11,7 @@ import pytest
 from command_line import run, run_bench
 
 ROOT = Path(__file__).parents[3]
-NAMES = {"tick", "contact", "scale", "precompute", "surface", "elements", "paper", "dynamics", "record", "viewer"}
+NAMES = {"tick", "contact", "scale", "precompute", "surface", "elements", "paper", "dynamics", "record", "viewer", "web"}
 NAMES |= {"zwidth", "touches"}
 
 

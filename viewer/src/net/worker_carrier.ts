@@ -32,7 +32,7 @@ export interface Site {
   /** The scene that opens first, and all to choose from. */
   scene: string;
   models: Choice[];
-  sceneUrl(name: string): string;
+  sceneUrl: (name: string) => string;
 }
 
 export interface SiteListener {
