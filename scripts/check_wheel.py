@@ -1,4 +1,4 @@
-"""Check a built wheel: its size, its tags, its version, and that the page of the viewer is inside.
+"""Check a built wheel: its size and its program's, its tags, its version, and that the page of the viewer is inside.
 
 Usage: check_wheel.py [FOLDER or WHEEL]; of a folder the newest wheel is taken, default: dist.
 """
@@ -14,6 +14,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 # Size that a wheel may have, bytes: as much as a person waits for without noticing.
 LARGEST = 15_000_000
+# The same of the program of pages without a server, which every visitor fetches.
+LARGEST_PROGRAM = 2_500_000
 PAGE = "palpate/viewer/static/index.html"
 PROGRAM = "palpate/viewer/web/palpate.wasm"
 
@@ -53,6 +55,9 @@ def problems(wheel: Path) -> list[str]:
         found.append(f"is for one Python only ({abi}, not abi3)")
     with zipfile.ZipFile(wheel) as contents:
         names = contents.namelist()
+        program = contents.getinfo(PROGRAM).file_size if PROGRAM in names else 0
+    if program > LARGEST_PROGRAM:
+        found.append(f"has a program of {program / 1e6:.1f} MB, at most {LARGEST_PROGRAM / 1e6:.1f} MB are allowed")
     if PAGE not in names:
         found.append("has no page: 'make viewer' builds it")
     if PROGRAM not in names:
