@@ -43,7 +43,7 @@ def about(
 
 
 def recorded_tables(scene: SceneTables) -> dict[str, Any]:
-    """Tables as they were given; the law of each tool is named, for its default follows from other keys."""
+    """Tables as they were given; the law of each tool is named: its default follows from other keys."""
     tables = scene.model_dump(mode="json", by_alias=True, exclude_unset=True)
     tools = [tool.model_dump(mode="json", by_alias=True, exclude_unset=True) for tool in scene.tools]
     tables["tool"] = [{**given, "contact": tool.contact} for given, tool in zip(tools, scene.tools, strict=True)]

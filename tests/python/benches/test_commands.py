@@ -11,8 +11,8 @@ import pytest
 from command_line import run, run_bench
 
 ROOT = Path(__file__).parents[3]
-NAMES = {"tick", "contact", "scale", "precompute", "surface", "elements", "paper", "dynamics", "record", "viewer", "web"}
-NAMES |= {"zwidth", "touches"}
+NAMES = {"tick", "contact", "scale", "precompute", "surface", "elements", "paper", "dynamics", "record", "viewer"}
+NAMES |= {"zwidth", "touches", "web"}
 
 
 def test_every_benchmark_is_listed():
