@@ -189,6 +189,7 @@ class TestPage:
         with served(folder.parents[1]) as address, page_of(chromium, f"{address}/sub/site/", "null") as page:
             assert page.locator("a").count() == page.locator("img").count() == 4
             page.locator("a", has_text="Block").click()
+            page.wait_for_url("**/touch.html?scene=block")
             page.evaluate("() => window.palpate.ready")
             page.locator("#shape").select_option("capsule")
             until(page, lambda s: s["shape"] == "capsule")
