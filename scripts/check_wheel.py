@@ -18,6 +18,7 @@ LARGEST = 15_000_000
 LARGEST_PROGRAM = 2_500_000
 PAGE = "palpate/viewer/static/index.html"
 PROGRAM = "palpate/viewer/web/palpate.wasm"
+WIDGET = "palpate/viewer/widget.mjs"
 
 
 def main() -> int:
@@ -62,6 +63,8 @@ def problems(wheel: Path) -> list[str]:
         found.append("has no page: 'make viewer' builds it")
     if PROGRAM not in names:
         found.append("has no program for pages without a server: 'make web' builds it")
+    if WIDGET not in names:
+        found.append("has no script for widgets in notebooks")
     if not any("/licenses/" in name and name.endswith("THIRD-PARTY.md") for name in names):
         found.append("does not name the work of others (THIRD-PARTY.md)")
     foreign = sorted(name for name in names if not re.match(r"palpate(-[^/]*\.dist-info)?/", name))

@@ -161,6 +161,7 @@ class TestPage:
                 page.evaluate("(p) => window.palpate.move(p)", place)
                 page.wait_for_timeout(30)
             waited(lambda: page.evaluate("() => Math.hypot(...window.palpate.frame().tools[0].force)") > 0.05)
+            assert page.evaluate("() => window.palpate.frame().contacts[0].error") > 0, "a law beyond small strain"
             with page.expect_download() as download:
                 page.evaluate("() => document.getElementById('record').click()")
             path = tmp_path / "page.mcap"
