@@ -15,20 +15,22 @@ import numpy as np
 from browser import PATIENCE
 
 import palpate
+from palpate.viewer.tool_shapes import radius_of
 
 HARNESS = Path(__file__).resolve().parents[1] / "web_run.mjs"
 
 
 def drag(built) -> np.ndarray:
-    """Down onto the highest free place, of a level top its middle, half a tool deep, and 15 mm along it: (600, 3) m."""
+    """Down onto the highest free place, of a level top its middle, two fifths of its radius deep, and 15 mm along it: (600, 3) m."""
     body = built.bodies[0]
     green = body.green
     free = ~np.isin(green.surface_nodes, green.fixed_nodes)
     places = green.surface_positions[free]
     places = places[places[:, 2] > places[:, 2].max() - 1e-6]
     top = places[np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))]
-    radius = built.scene.tools[0].shape_arguments(built.scene.folder)[1][0]
-    height = np.concatenate([np.linspace(1.5, 0.6, 200), np.full(400, 0.6)]) * radius
+    tool = built.scene.tools[0]
+    above = np.concatenate([np.linspace(0.5, -0.4, 200), np.full(400, -0.4)])
+    height = tool.reach + above * radius_of(tool, built.scene.folder)
     along = np.concatenate([np.zeros(200), np.linspace(0.0, 0.015, 400)])
     return body.points_to_scene(top + np.column_stack([0.3 * along, along, height]))
 
@@ -60,11 +62,17 @@ def waited(holds) -> None:
         time.sleep(0.05)
 
 
+class QuietHandler(http.server.SimpleHTTPRequestHandler):
+    """Serves files, and prints nothing of it."""
+
+    def log_message(self, *_) -> None:
+        """Drop the line."""
+
+
 @contextlib.contextmanager
 def served(folder: Path):
     """Address of a plain file server."""
-    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(folder))
-    handler.log_message = lambda *_: None  # type: ignore[attr-defined]
+    handler = functools.partial(QuietHandler, directory=str(folder))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://127.0.0.1:{server.server_address[1]}"

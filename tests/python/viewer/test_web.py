@@ -209,7 +209,7 @@ class TestPage:
             page.reload()
             page.evaluate("() => window.palpate.ready")
             assert state(page)["scene"] == "beam"
-        recording = palpate.Recording.read(tmp_path / "page.mcap")
+        recording = palpate.Recording.load(tmp_path / "page.mcap")
         assert json.loads(recording.about["scene"])["tool"][0]["shape"] == "capsule"
         again = simulation.replay(tmp_path / "page.mcap")
         assert again.ticks > 100
