@@ -15,13 +15,16 @@ import numpy as np
 from browser import PATIENCE
 
 import palpate
-from palpate.viewer.tool_shapes import radius_of
+from palpate.viewer.tool_shapes import kind_of, radius_of
 
 HARNESS = Path(__file__).resolve().parents[1] / "web_run.mjs"
 
 
 def drag(built) -> np.ndarray:
-    """Down onto the highest free place, of a level top its middle, two fifths of its radius deep, and 15 mm along it: (600, 3) m."""
+    """Down onto the highest free place, of a level top its middle, and 15 mm along it: (600, 3) m.
+
+    Two fifths of the tool's radius deep; the origin of a surface file is its middle.
+    """
     body = built.bodies[0]
     green = body.green
     free = ~np.isin(green.surface_nodes, green.fixed_nodes)
@@ -29,8 +32,10 @@ def drag(built) -> np.ndarray:
     places = places[places[:, 2] > places[:, 2].max() - 1e-6]
     top = places[np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))]
     tool = built.scene.tools[0]
+    radius = radius_of(tool, built.scene.folder)
+    front = radius if kind_of(tool) == "surface" else tool.reach
     above = np.concatenate([np.linspace(0.5, -0.4, 200), np.full(400, -0.4)])
-    height = tool.reach + above * radius_of(tool, built.scene.folder)
+    height = front + above * radius
     along = np.concatenate([np.zeros(200), np.linspace(0.0, 0.015, 400)])
     return body.points_to_scene(top + np.column_stack([0.3 * along, along, height]))
 
