@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 from browser import MARKS, opened
-from viewer import test_viewer_controls as controls
-from viewer import test_viewer_page as pages
 from web_site import served
 
 from palpate.scene import model_scene
 from palpate.viewer.site import write_site
+from viewer import test_viewer_controls as controls
+from viewer import test_viewer_page as pages
 
 pytestmark = MARKS
 
