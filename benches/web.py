@@ -112,7 +112,8 @@ def web(as_json: Json = False) -> None:
     with progress_reporter("timing ticks", True) as report:
         for count, name in enumerate(names, 1):
             rows.append(measure(name))
-            report(count, len(names))
+            if report is not None:
+                report(count, len(names))
     lines = [
         [
             row.tick,

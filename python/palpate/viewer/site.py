@@ -143,6 +143,8 @@ def _require_replaceable(path: Path) -> None:
         raise ViewerError(f"{path}: is a folder of something else: give another name")
     if path.exists() and not path.is_dir():
         raise ViewerError(f"{path}: is a file: give another name, or delete it first")
+    if not path.absolute().parent.is_dir():
+        raise ViewerError(f"{path}: there is no folder {path.parent}; make it first")
 
 
 def _copy_page(folder: Path, names: Sequence[str], is_gallery: bool) -> None:
