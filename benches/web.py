@@ -89,7 +89,8 @@ def _web_times(play: Play, folder: Path, where: Path) -> tuple[np.ndarray, np.nd
     words = ["node", HARNESS, find_program(), folder, path, found, 2, ticks, *play.orientation]
     ended = subprocess.run([str(word) for word in words], capture_output=True, text=True)
     if ended.returncode != 0:
-        raise Error(f"Node: {ended.stderr.strip().splitlines()[-1]}")
+        reasons = [line for line in ended.stderr.splitlines() if "Error: " in line]
+        raise Error(f"Node: {reasons[0] if reasons else ended.stderr.strip()}")
     numbers = np.frombuffer(found.read_bytes())
     return numbers[: 2 * ticks].reshape(2, ticks), numbers[2 * ticks :].reshape(play.path.shape)
 
