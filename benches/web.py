@@ -28,7 +28,7 @@ from palpate.validation.ticks import tick_times
 from palpate.viewer.site import find_program
 
 HARNESS = Path(__file__).with_name("web_ticks.mjs")
-# A tick in a page may take so many times as long as a native one: measured 1.3 to 2.5.
+# A tick in a page may take so many times as long as a native one: measured 0.8 to 1.5.
 AIM = 3.0
 # Rounds, in each of which both sides play once after a play that warms them up.
 ROUNDS = 3
