@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: demo test campaigns install web wheel sdist other-build sanitize lint docs viewer check-tools clean
+.PHONY: demo test campaigns install web site wheel sdist other-build sanitize lint docs viewer check-tools clean
 .DEFAULT_GOAL := demo
 
 check-tools:
@@ -49,6 +49,13 @@ $(WEB): Cargo.lock scripts/build_web.sh $(shell find $(WEB_CRATES:%=crates/%) -n
 	scripts/build_web.sh $@
 
 web: $(WEB)
+
+# A gallery for any web host, docs/_site: the built-in bodies and examples (docs/web.md).
+SITE ?= docs/_site
+SITE_SCENES := liver kidney doll beam $(addprefix examples/,nodule.toml large_strain.toml impact.toml two_bodies.toml)
+site: $(VENV)/.installed $(PAGE) $(WEB)
+	$(BIN)/palpate web $(SITE_SCENES) $(SITE) --precision f16
+	$(BIN)/python scripts/check_site.py $(SITE)
 
 # libpalpate for programs in C and C++: library, header, pkg-config, CMake (docs/c-api.md).
 PREFIX ?= /usr/local
@@ -122,4 +129,4 @@ docs: $(VENV)/.docs $(PAGE) $(WEB)
 	$(BIN)/python -m sphinx -b html -q -W --keep-going -j auto -D nb_execution_mode=$(NOTEBOOKS) docs docs/_build/html
 
 clean:
-	rm -rf docs/_build docs/reference target $(VENV) viewer/node_modules python/palpate/viewer/static python/palpate/viewer/web
+	rm -rf docs/_build docs/_site docs/reference target $(VENV) viewer/node_modules python/palpate/viewer/static python/palpate/viewer/web

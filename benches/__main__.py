@@ -21,6 +21,7 @@ from benches.surface import surface
 from benches.tick import tick
 from benches.touches import touches
 from benches.viewer import viewer
+from benches.web import web
 from benches.zwidth import zwidth
 from palpate.cli.app import run_commands
 
@@ -33,7 +34,7 @@ app = typer.Typer(
 )
 for command in (
     *(tick, contact, scale, precompute, surface, elements),
-    *(paper, dynamics, record, viewer, zwidth, touches, fill, sensor),
+    *(paper, dynamics, record, viewer, web, zwidth, touches, fill, sensor),
     strain,
     strain_table,
     patch_table,

@@ -219,7 +219,7 @@ def local_cases(_settings: Settings) -> Iterator[Case]:
     for cells in PLATES:
         for name in _motions(np.zeros(3)) if cells == PLATES[0] else (SLIDES,):
             labels = {"surface nodes": surface_nodes(cells), "tick": name}
-            yield Case("local", labels, partial(_local_play, cells, name))
+            yield Case("local", labels, partial(local_play, cells, name))
 
 
 def _slide(middle: np.ndarray) -> np.ndarray:
@@ -250,7 +250,13 @@ def _motions(middle: np.ndarray) -> dict[str, tuple[list[dict], np.ndarray, Sequ
     }
 
 
-def _local_play(cells: tuple[int, int, int], name: str) -> Play:
+def motion_names() -> list[str]:
+    """Return every kind of tick under the local law."""
+    return list(_motions(np.zeros(3)))
+
+
+def local_play(cells: tuple[int, int, int], name: str) -> Play:
+    """Prepare a kind of tick on a plate."""
     body, green = _plate(cells)
     middle = press_centres(body, [(0.0, 0.0)])[0]
     tools, path, orientation = _motions(middle)[name]

@@ -1,4 +1,4 @@
-"""Check a built wheel: its size, its tags, its version, and that the page of the viewer is inside.
+"""Check a built wheel: its size and its program's, its tags, its version, and that the page of the viewer is inside.
 
 Usage: check_wheel.py [FOLDER or WHEEL]; of a folder the newest wheel is taken, default: dist.
 """
@@ -14,8 +14,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 # Size that a wheel may have, bytes: as much as a person waits for without noticing.
 LARGEST = 15_000_000
+# The same of the program of pages without a server, which every visitor fetches.
+LARGEST_PROGRAM = 2_500_000
 PAGE = "palpate/viewer/static/index.html"
 PROGRAM = "palpate/viewer/web/palpate.wasm"
+WIDGET = "palpate/viewer/widget.mjs"
 
 
 def main() -> int:
@@ -53,10 +56,15 @@ def problems(wheel: Path) -> list[str]:
         found.append(f"is for one Python only ({abi}, not abi3)")
     with zipfile.ZipFile(wheel) as contents:
         names = contents.namelist()
+        program = contents.getinfo(PROGRAM).file_size if PROGRAM in names else 0
+    if program > LARGEST_PROGRAM:
+        found.append(f"has a program of {program / 1e6:.1f} MB, at most {LARGEST_PROGRAM / 1e6:.1f} MB are allowed")
     if PAGE not in names:
         found.append("has no page: 'make viewer' builds it")
     if PROGRAM not in names:
         found.append("has no program for pages without a server: 'make web' builds it")
+    if WIDGET not in names:
+        found.append("has no script for widgets in notebooks")
     if not any("/licenses/" in name and name.endswith("THIRD-PARTY.md") for name in names):
         found.append("does not name the work of others (THIRD-PARTY.md)")
     foreign = sorted(name for name in names if not re.match(r"palpate(-[^/]*\.dist-info)?/", name))

@@ -35,6 +35,7 @@ from browser import (  # noqa: E402
     until,
 )
 from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
+from web_site import served  # noqa: E402
 
 import palpate  # noqa: E402
 from shrink_pictures import shrunk  # noqa: E402
@@ -191,6 +192,18 @@ def setup(chromium: Browser, out: Path) -> None:
             program.stop()
 
 
+def web(chromium: Browser, out: Path) -> None:
+    """Show the first page of the gallery that `make site` builds; it must be there."""
+    site = ROOT / "docs" / "_site"
+    if not (site / "touch.html").is_file():
+        raise SystemExit(f"{site} is missing: 'make site' builds it")
+    with served(site) as address:
+        page = chromium.new_page(viewport={"width": 1240, "height": 720}, color_scheme="dark")
+        page.goto(f"{address}/index.html")
+        page.screenshot(path=out / "web.png")
+        page.close()
+
+
 PICTURES: dict[str, Callable[[Browser, Path], None]] = {
     "viewer": viewer,
     "two-fingers": two_fingers,
@@ -200,6 +213,7 @@ PICTURES: dict[str, Callable[[Browser, Path], None]] = {
     "regions": regions,
     "nodule": nodule,
     "setup": setup,
+    "web": web,
 }
 
 

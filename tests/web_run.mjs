@@ -1,10 +1,10 @@
-// Opens a scene of `palpate web` in Node and runs positions: node web_run.mjs PROGRAM SCENE POSITIONS FORCES [REPEATS].
-// Positions and forces are files of numbers (float64); what a tick took on average, us, goes to the output.
+// Opens a scene of `palpate web` in Node and runs positions: node web_run.mjs PROGRAM SCENE POSITIONS FORCES [SHAPE].
+// Positions and forces are files of numbers (float64); SHAPE is one that the page offers for the first tool.
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { gunzipSync } from "node:zlib";
 
-const [program, scene, positionsFile, forcesFile, repeats = "1"] = process.argv.slice(2);
+const [program, scene, positionsFile, forcesFile, shape] = process.argv.slice(2);
 const { instance } = await WebAssembly.instantiate(readFileSync(program), { palpate: { now_ms: () => performance.now() } });
 const run = instance.exports;
 
@@ -25,22 +25,23 @@ const began = performance.now();
 const file = gunzipSync(readFileSync(scene));
 const length = file.readUInt32LE(0);
 let at = (4 + length + 7) & ~7;
+let page = null;
 for (const { name, size } of JSON.parse(file.subarray(4, 4 + length).toString())) {
   const bytes = file.subarray(at, at + size);
   if (!name.startsWith("page/")) {
     within(Buffer.from(name), (n, count) => within(bytes, (b, bytesLength) => run.palpate_provide(n, count, b, bytesLength)));
   }
+  if (name === "page/page.bin") page = JSON.parse(bytes.subarray(4, 4 + bytes.readUInt32LE(0)).toString());
   at = (at + size + 7) & ~7;
 }
 check(run.palpate_open());
 const opened = performance.now() - began;
 const positions = readFileSync(positionsFile);
 const numbers = positions.length / 8;
-let took = Infinity;
-for (let k = 0; k < Number(repeats); k++) {
-  const start = performance.now();
-  within(positions, (p) => check(run.palpate_run(p, numbers)));
-  took = Math.min(took, performance.now() - start);
+if (shape) {
+  const command = { do: "tool", tool: 0, description: page.shapes[0][shape].description };
+  within(Buffer.from(JSON.stringify(command)), (text, count) => check(run.palpate_command(text, count)));
 }
+within(positions, (p) => check(run.palpate_run(p, numbers)));
 writeFileSync(forcesFile, new Uint8Array(run.memory.buffer, run.palpate_numbers(), 8 * run.palpate_numbers_length()));
-console.log(JSON.stringify({ opened_ms: opened, tick_us: (1e3 * took) / (numbers / 3) }));
+console.log(JSON.stringify({ opened_ms: opened }));

@@ -50,7 +50,7 @@ def write_scenes(app: Sphinx, failed: Exception | None) -> None:
     from palpate.viewer.site import with_precision, write_site
 
     scenes = [(name, with_precision(Scene.read(path), PRECISION)) for name, path in files.items()]
-    write_site(scenes, Path(app.outdir) / FOLDER)
+    write_site(scenes, Path(app.outdir) / FOLDER, gallery=False)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

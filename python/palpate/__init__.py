@@ -57,6 +57,7 @@ from palpate.simulation import (
     pack,
     replay,
 )
+from palpate.viewer.widget import widget
 
 __version__ = version("palpate")
 
@@ -128,4 +129,5 @@ __all__ = [
     "rerun",
     "shapes",
     "tetrahedralize",
+    "widget",
 ]

@@ -9,35 +9,20 @@ import "./ui/setup.css";
 
 import { Connection } from "./net/connection";
 import { WorkerCarrier } from "./net/worker_carrier";
+import type { Site } from "./net/worker_carrier";
+import { keepFiles, showSceneInAddress, siteOfPage } from "./site";
 import { showConnection, showPageMessage } from "./ui/notices";
 import { Viewer } from "./viewer";
 
-/** Scenes of a folder beside the page: their names have no slash. */
-const SCENE_NAME = /^[\w-]+$/;
-
-/** The scene of a page without a server, which `palpate web` writes into the page; null where a server brings it. */
-function packedScene(): string | null {
-  const content = document.querySelector<HTMLMetaElement>('meta[name="palpate-scene"]')?.content;
-  if (!content) return null;
-  const asked = new URLSearchParams(location.search).get("scene");
-  return asked && SCENE_NAME.test(asked) ? asked : content;
-}
-
-function startPacked(name: string): void {
-  const url = (path: string) => new URL(path, document.baseURI).href;
-  const failed = (reason: string) => showPageMessage(`This page cannot run the scene: ${reason}`);
-  new Viewer((handlers) => new WorkerCarrier(url("palpate.wasm"), url(`scenes/${name}.palpate`), handlers, failed)).start();
-  // For the next visit, without a network too.
-  void keepFiles().catch(() => undefined);
-}
-
-async function keepFiles(): Promise<void> {
-  if (!("serviceWorker" in navigator)) return;
-  await navigator.serviceWorker.register("./sw.js");
-  const { active } = await navigator.serviceWorker.ready;
-  const fetched = performance.getEntriesByType("resource").map(({ name }) => name);
-  const ofWorker = ["palpate.wasm", `scenes/${packedScene()}.palpate`].map((path) => new URL(path, document.baseURI).href);
-  active?.postMessage([location.href.split("#")[0], ...fetched, ...ofWorker]);
+function startPacked(site: Site): void {
+  const listener = {
+    onOpened: (scene: string) => {
+      if (site.models.length > 0) showSceneInAddress(scene);
+      void keepFiles(site, scene).catch(() => undefined);
+    },
+    onFailure: (reason: string) => showPageMessage(`This page cannot run the scene: ${reason}`),
+  };
+  new Viewer((handlers) => new WorkerCarrier(site, handlers, listener)).start();
 }
 
 function startFromServer(): void {
@@ -53,10 +38,10 @@ function startFromServer(): void {
 }
 
 function start(): void {
-  const packed = packedScene();
+  const site = siteOfPage();
   try {
-    if (packed === null) startFromServer();
-    else startPacked(packed);
+    if (site === null) startFromServer();
+    else startPacked(site);
   } catch (error) {
     const reason = error instanceof Error ? error.message : String(error);
     showPageMessage(`This browser cannot show the page, it needs WebGL 2 (${reason}).`);

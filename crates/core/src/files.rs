@@ -23,9 +23,11 @@ pub fn provide(path: impl Into<PathBuf>, bytes: Vec<u8>) {
     provided().get_or_insert_default().insert(path.into(), bytes.into());
 }
 
-/// Forgets what was provided. What has been opened stays.
-pub fn forget_provided() {
-    *provided() = None;
+/// Forgets what was provided, but for the paths that are to be kept. What has been opened stays.
+pub fn keep_provided(keep: impl Fn(&Path) -> bool) {
+    if let Some(files) = provided().as_mut() {
+        files.retain(|path, _| keep(path));
+    }
 }
 
 /// Opens a file for reading by position.
@@ -77,6 +79,8 @@ pub(crate) fn unwritten(path: &Path, error: SafeTensorError) -> Error {
 
 fn partial_path(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.partial", std::process::id()));
+    // A browser has no processes.
+    let process = if cfg!(target_family = "wasm") { 0 } else { std::process::id() };
+    name.push(format!(".{process}.partial"));
     path.with_file_name(name)
 }

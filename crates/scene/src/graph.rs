@@ -91,6 +91,15 @@ impl Scene {
         Some(self.tools.remove(rank).1)
     }
 
+    /// Exchanges a tool for another one at the same rank, which gets a handle of its own; `None` if there is none of that handle.
+    pub fn replace_tool(&mut self, id: ToolId, tool: Tool) -> Option<ToolId> {
+        let rank = self.tools.iter().position(|(other, _)| *other == id)?;
+        let fresh = ToolId(self.next_tool);
+        self.next_tool += 1;
+        self.tools[rank] = (fresh, tool);
+        Some(fresh)
+    }
+
     /// The bodies, in the order in which they were added.
     pub fn bodies(&self) -> impl Iterator<Item = (BodyId, &Body)> + Clone {
         self.bodies.iter().map(|(id, body)| (*id, body))

@@ -17,7 +17,7 @@ mod tool;
 
 pub use body::{Body, Motion, placement, unit_quaternion};
 pub use graph::{BodyId, Scene, ToolId};
-pub use packed::checksum;
+pub use packed::{checksum, read_tool};
 pub use prepared::{PreparedScene, carried_over};
 pub use store_defaults::{largest_contact_radius, moduli_of_store};
 pub use tool::{DEFAULT_FRICTION, DEFAULT_MAX_STIFFNESS, Tool};

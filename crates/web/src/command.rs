@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use palpate_core::Result;
 use palpate_core::simulation::Strike;
+use palpate_scene::read_tool;
 use serde::Deserialize;
 
 use crate::session::Session;
@@ -36,6 +37,13 @@ pub enum Command {
         rank: usize,
         /// What to.
         value: f64,
+    },
+    /// Gives a tool another shape and law.
+    Tool {
+        /// Its rank.
+        tool: usize,
+        /// An entry of `tools` in `scene.json`; without one, the scene's own.
+        description: Option<serde_json::Value>,
     },
     /// Lets go of everything and clears faults.
     Reset,
@@ -76,6 +84,9 @@ impl Command {
             Command::Press { tool, position, orientation, grab } => session.press(tool, position, orientation, grab),
             Command::Release { tool } => session.release(tool),
             Command::Set { name, rank, value } => session.set(&name, rank, value),
+            Command::Tool { tool, description } => {
+                session.exchange_tool(tool, description.as_ref().map(read_tool).transpose()?)
+            }
             Command::Reset => session.paced.handle.reset(),
             Command::Strike { body, point, impulse, duration } => {
                 let radius = session.scene.settings.contact_radius[0];

@@ -14,6 +14,8 @@ use crate::{frame, run};
 
 /// Where the files of the scene are provided.
 const FOLDER: &str = "scene";
+/// What the names of files of contacts end with.
+const CONTACTS: &str = ".contact.palpate";
 
 #[derive(Default)]
 struct Module {
@@ -75,11 +77,11 @@ pub unsafe extern "C" fn palpate_provide(name: *const u8, name_length: usize, by
     files::provide(Path::new(FOLDER).join(&*String::from_utf8_lossy(name)), bytes.to_vec());
 }
 
-/// Opens the scene whose files were provided, and forgets them.
+/// Opens the scene whose files were provided, and forgets them but for those of contacts, which other tools may need.
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_open() -> i32 {
     let opened = Session::open(&Path::new(FOLDER).join("scene.json"));
-    files::forget_provided();
+    files::keep_provided(|path| path.to_string_lossy().ends_with(CONTACTS));
     let mut module = module();
     let module = module.get_or_insert_default();
     match opened {
@@ -153,6 +155,21 @@ pub unsafe extern "C" fn palpate_run(positions: *const f64, count: usize) -> i32
     let positions = unsafe { std::slice::from_raw_parts(positions, count) };
     with_session(|session, _, numbers| {
         *numbers = run::forces(session, positions).map_err(|error| error.to_string())?;
+        Ok(())
+    })
+}
+
+/// Times of ticks and forces on devices at given positions of all tools (three numbers each), as numbers; see
+/// [`run::times`].
+///
+/// # Safety
+/// Numbers within this module's memory, aligned; four of the orientation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_times(positions: *const f64, count: usize, orientation: *const [f64; 4]) -> i32 {
+    // SAFETY: by the caller.
+    let (positions, orientation) = unsafe { (std::slice::from_raw_parts(positions, count), *orientation) };
+    with_session(|session, _, numbers| {
+        *numbers = run::times(session, positions, orientation).map_err(|error| error.to_string())?;
         Ok(())
     })
 }

@@ -48,6 +48,8 @@ pub fn frame(session: &mut Session) -> Value {
             "depth": own(contact.depth),
             "stiffness": own(contact.stiffness),
             "slipping": contact.slipping,
+            // A linear material states none.
+            "error": (contact.error > 0.0).then_some(contact.error),
         })
     };
     let contacts: Vec<Value> = state.contacts.iter().map(|(c, _)| contact(c)).collect();

@@ -2,7 +2,7 @@
 
 use palpate_core::simulation::Pose;
 use palpate_core::{Error, Result};
-use palpate_servo::{Script, run};
+use palpate_servo::{Recording, Script, run};
 
 use crate::session::Session;
 
@@ -12,23 +12,50 @@ use crate::session::Session;
 /// # Errors
 /// Positions that are no rows of three.
 pub fn forces(session: &Session, positions: &[f64]) -> Result<Vec<f64>> {
-    let (rows, rest) = positions.as_chunks::<3>();
-    if !rest.is_empty() {
-        return Err(Error::Invalid(format!("positions are rows of three numbers, got {}", positions.len())));
-    }
-    let scene = &session.scene;
-    let tools = scene.tools.len();
+    let tools = session.scene.tools.len();
     let away = Pose { position: glam::DVec3::NAN, ..Pose::default() };
     let of_tick = |&row: &[f64; 3]| (0..tools).map(move |tool| if tool == 0 { Session::pose(row) } else { away });
-    let poses: Vec<Pose> = rows.iter().flat_map(of_tick).collect();
+    let poses: Vec<Pose> = rows(positions)?.iter().flat_map(of_tick).collect();
+    let made = play(session, &poses)?;
+    Ok(made.forces.chunks_exact(tools).flat_map(|forces| forces[0].to_array()).collect())
+}
+
+/// The time that each tick takes, us, and after all of them the forces on the devices, N: positions of all tools
+/// (ticks x tools x 3), m, each turned by one orientation (w x y z).
+///
+/// # Errors
+/// Positions that are no rows of three for each tool, or a fault.
+pub fn times(session: &Session, positions: &[f64], [w, x, y, z]: [f64; 4]) -> Result<Vec<f64>> {
+    let orientation = glam::DQuat::from_xyzw(x, y, z, w).normalize();
+    let poses: Vec<Pose> = rows(positions)?.iter().map(|&row| Pose { orientation, ..Session::pose(row) }).collect();
+    let made = play(session, &poses)?;
+    match made.fault {
+        Some(fault) => Err(Error::Invalid(fault.to_string())),
+        None => Ok(made
+            .compute_ns
+            .iter()
+            .map(|&ns| 1e-3 * ns as f64)
+            .chain(made.forces.iter().flat_map(|f| f.to_array()))
+            .collect()),
+    }
+}
+
+fn rows(positions: &[f64]) -> Result<&[[f64; 3]]> {
+    match positions.as_chunks::<3>() {
+        (rows, []) => Ok(rows),
+        _ => Err(Error::Invalid(format!("positions are rows of three numbers, got {}", positions.len()))),
+    }
+}
+
+fn play(session: &Session, poses: &[Pose]) -> Result<Recording> {
+    let scene = &session.scene;
     let script = Script {
         period: 1.0 / scene.scheduling.rate,
-        poses: &poses,
+        poses,
         grabs: &[],
         strikes: &[],
         watch: &[],
         devices: &scene.devices,
     };
-    let made = run(&scene.model, scene.limits, scene.settings, &scene.strain, &script, |_| {})?;
-    Ok(made.forces.chunks_exact(tools).flat_map(|forces| forces[0].to_array()).collect())
+    run(&scene.model, scene.limits, scene.settings, &scene.strain, &script, |_| {})
 }

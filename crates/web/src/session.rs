@@ -10,12 +10,15 @@ use palpate_core::{Error, Result};
 use palpate_devices::simulated::{Handle, Target, simulated};
 use palpate_devices::{Device, DeviceLimits, MountedDevice, Workspace};
 use palpate_recording::{Header, TickWriter};
-use palpate_scene::{PreparedScene, Scene};
+use palpate_scene::{PreparedScene, Scene, Tool};
 use palpate_servo::{LogRow, PacedLoop, Published, TickRecord};
 use rtrb::Consumer;
 
 /// A scene and its loop.
 pub struct Session {
+    graph: Scene,
+    /// Tools as the scene has them.
+    own_tools: Vec<Tool>,
     pub(crate) scene: PreparedScene,
     pub(crate) paced: PacedLoop,
     tools: Vec<(Handle, Target)>,
@@ -37,18 +40,30 @@ impl Session {
     /// # Errors
     /// A file that is missing or damaged; see [`Scene::prepare`].
     pub fn open(folder: &Path) -> Result<Self> {
-        let scene = Scene::load(folder)?.prepare()?;
-        let (handles, devices): (Vec<_>, Vec<_>) = scene.devices.iter().map(device_of).unzip();
-        let paced = PacedLoop::new(
-            scene.model.clone(),
-            devices,
-            scene.limits,
-            scene.settings,
-            scene.strain.clone(),
-            1.0 / scene.scheduling.rate,
-        )?;
-        let tools = handles.into_iter().map(|handle| (handle, Target::default())).collect();
-        Ok(Self { scene, paced, tools, recording: None, rows: Vec::new() })
+        let graph = Scene::load(folder)?;
+        let scene = graph.prepare()?;
+        let own_tools = graph.tools().map(|(_, tool)| tool.clone()).collect();
+        let (paced, tools) = start(&scene)?;
+        Ok(Self { graph, own_tools, scene, paced, tools, recording: None, rows: Vec::new() })
+    }
+
+    /// Gives a tool another shape and law, or those of the scene again: a new loop on the same bodies, settings at their first
+    /// values.
+    ///
+    /// # Errors
+    /// No such tool, a tool that the bodies refuse, or a recording under way; everything stays as it was.
+    pub fn exchange_tool(&mut self, rank: usize, tool: Option<Tool>) -> Result<()> {
+        if self.recording.is_some() {
+            return Err(Error::Invalid("end the recording before you choose another tool".into()));
+        }
+        self.tool(rank)?;
+        let mut graph = self.graph.clone();
+        graph.replace_tool(self.scene.tools[rank], tool.unwrap_or_else(|| self.own_tools[rank].clone()));
+        let (scene, _) = graph.prepare_change(&self.scene)?;
+        let (paced, tools) = start(&scene)?;
+        (self.graph, self.scene, self.paced, self.tools) = (graph, scene, paced, tools);
+        self.rows.clear();
+        Ok(())
     }
 
     /// Makes the ticks that are due at a time of the page's clock, ns; how many.
@@ -184,6 +199,15 @@ impl Recording {
             }
         }
     }
+}
+
+/// A loop of a scene, and what moves its tools.
+fn start(scene: &PreparedScene) -> Result<(PacedLoop, Vec<(Handle, Target)>)> {
+    let (handles, devices): (Vec<_>, Vec<_>) = scene.devices.iter().map(device_of).unzip();
+    let period = 1.0 / scene.scheduling.rate;
+    let paced =
+        PacedLoop::new(scene.model.clone(), devices, scene.limits, scene.settings, scene.strain.clone(), period)?;
+    Ok((paced, handles.into_iter().map(|handle| (handle, Target::default())).collect()))
 }
 
 /// A simulated device with the limits that the scene gives it, and what moves it.

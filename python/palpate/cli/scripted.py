@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.errors import SceneError
 from palpate.scene import BuiltScene
+from palpate.scene.press_place import press_place
 from palpate.simulation import Frame, Simulation
 
 # Pointer rate of a person's mouse, Hz: the simulated device smooths it as it would theirs.
 POINTER_RATE = 120.0
-# How deep the script presses, as a part of the body's longest side: small strains.
-DEPTH = 0.03
 # Frames of a run of which the strain is computed, afterwards: it takes milliseconds of each.
 STRAIN_SAMPLES = 100
 # A tool that is limited at less than this part of the limit of strain has just begun to touch.
@@ -63,7 +61,7 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
 
     A tool that a device moves goes where the hand on it does.
     """
-    rest, depth = _target(built)
+    rest, depth = press_place(built)
     logs, depths, sampled = [], [], []
     limited: list[Frame] = []
     interrupted, refused = False, None
@@ -102,20 +100,6 @@ def scripted_press(built: BuiltScene, seconds: float, recording: Path | None = N
     most = AT_LIMIT * built.scene.view.strain_limit
     held = any(frame.largest_strain >= most for frame in limited)
     return PressRecord(log, *columns, hardest, last, held, _force_on_body(hardest), interrupted, refused)
-
-
-def _target(built: BuiltScene) -> tuple[np.ndarray, float]:
-    """Where the tool's origin rests when it just touches, m, and how deep it presses, m."""
-    body = built.bodies[0]
-    green, nodes = body.green, body.points_to_scene(body.green.surface_positions)
-    free = np.flatnonzero(~np.isin(green.surface_nodes, green.fixed_nodes))
-    if len(free) == 0:
-        raise SceneError("the whole surface is fixed: nothing can be pressed")
-    size = float(np.ptp(nodes, axis=0).max())
-    highest = free[nodes[free, 2] > nodes[free, 2].max() - 0.01 * size]
-    middle = nodes[:, :2].mean(axis=0)
-    top = nodes[highest[np.argmin(np.linalg.norm(nodes[highest, :2] - middle, axis=1))]]
-    return top + [0, 0, built.scene.tools[0].reach], DEPTH * size
 
 
 def _force_on_body(frame: Frame) -> float:

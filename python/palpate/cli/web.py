@@ -1,36 +1,55 @@
-"""The command that writes a page without a server."""
+"""The command that writes pages without a server."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from palpate.cli.app import app
 
+if TYPE_CHECKING:
+    from palpate.scene import Scene
+
 
 @app.command()
 def web(
-    scene: Annotated[Path, typer.Argument(help="A scene file (.toml), or a precomputed store.")],
+    scenes: Annotated[
+        list[str],
+        typer.Argument(help="Scene files (.toml), stores, or built-in models.", metavar="SCENE..."),
+    ],
     out: Annotated[Path, typer.Argument(help="Folder to write; an earlier site there is replaced.")],
     precision: Annotated[
         str | None,
         typer.Option(help="Numbers in the stores: f16 is half as large to fetch as f32; default: the scene's."),
     ] = None,
 ) -> None:
-    """Write a scene as a static site: page and WebAssembly, for any web host.
+    """Write scenes as a static site: page and WebAssembly, for any web host.
 
-    Example: palpate web scene.toml site, then python -m http.server -d site
+    Several scenes get a first page with a picture of each.
+
+    Example: palpate web liver scene.toml site, then python -m http.server -d site
     """
-    from palpate.scene import Scene
     from palpate.viewer.site import with_precision, write_site
 
-    read = Scene.of_store(scene) if scene.suffix == ".palpate" else Scene.read(scene)
-    built = (read if precision is None else with_precision(read, precision)).build()
-    sizes = write_site([(read.name, built)], out)
-    program = sizes.pop("program")
-    error = max(body.green._core.typical_errors[0] for body in built.bodies)
-    size = sum(sizes.values())
-    print(f"{out}: program {program / 1e6:.1f} MB, scene {size / 1e6:.1f} MB; forces right to {100 * error:.2g} %")
+    read = {given: _scene(given) for given in scenes}
+    chosen = read if precision is None else {given: with_precision(scene, precision) for given, scene in read.items()}
+    built = [(Path(given).stem, scene.build()) for given, scene in chosen.items()]
+    sizes = write_site(built, out)
+    for (_, scene), (name, size) in zip(built, sizes.scenes.items(), strict=True):
+        error = max(body.green._core.typical_errors[0] for body in scene.bodies)
+        print(f"{name}: {size / 1e6:.1f} MB, forces right to {100 * error:.2g} %")
+    print(f"{out}: program {sizes.program / 1e6:.1f} MB, in all {sizes.total / 1e6:.1f} MB")
     print(f"python -m http.server -d {out}")
+
+
+def _scene(given: str) -> Scene:
+    """Scene of a file, a store, or a built-in model."""
+    from palpate import models
+    from palpate.scene import Scene, model_scene
+
+    path = Path(given)
+    if given in models.NAMES and not path.exists():
+        return model_scene(given)
+    return Scene.of_store(path) if path.suffix == ".palpate" else Scene.read(path)

@@ -28,7 +28,7 @@ def about(
     return {
         "format": str(FORMAT),
         "version": _native.__version__,
-        "scene": json.dumps(_tables(scene)),
+        "scene": json.dumps(recorded_tables(scene)),
         "name": scene.name,
         "folder": str(scene.folder.absolute()),
         "bodies": json.dumps([body.name for body in bodies]),
@@ -42,8 +42,8 @@ def about(
     }
 
 
-def _tables(scene: SceneTables) -> dict[str, Any]:
-    """Tables as they were given; the law of each tool is named, for its default follows from other keys."""
+def recorded_tables(scene: SceneTables) -> dict[str, Any]:
+    """Tables as they were given; the law of each tool is named: its default follows from other keys."""
     tables = scene.model_dump(mode="json", by_alias=True, exclude_unset=True)
     tools = [tool.model_dump(mode="json", by_alias=True, exclude_unset=True) for tool in scene.tools]
     tables["tool"] = [{**given, "contact": tool.contact} for given, tool in zip(tools, scene.tools, strict=True)]

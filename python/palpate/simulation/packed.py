@@ -10,7 +10,7 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -65,8 +65,13 @@ def _require_replaceable(path: Path) -> None:
         raise SceneError(f"{path}: there is no folder {path.parent}; make it first")
 
 
-def describe(built: BuiltScene, folder: Path, inside: bool = True) -> dict[str, Any]:
-    """Write stores and arrays into the folder; what ``scene.json`` says of them."""
+def describe(
+    built: BuiltScene, folder: Path, inside: bool = True, others: Sequence[SceneTables] = ()
+) -> dict[str, Any]:
+    """Write stores and arrays into the folder; what ``scene.json`` says of them.
+
+    What contact needs is written for the tools of ``others`` too, scenes of the same bodies.
+    """
     scene, device = built.scene, built.scene.device
     local = any(tool.contact == "local" for tool in scene.tools)
     bodies, described = [], []
@@ -76,22 +81,22 @@ def describe(built: BuiltScene, folder: Path, inside: bool = True) -> dict[str, 
         arguments = body_arguments(body, local)
         described.append(_body(body, arguments, store, folder / f"body-{rank}.arrays.safetensors", inside))
         bodies.append((_native.GreenCore.load(store), *arguments[1:]))
-    tools = [tool_arguments(scene, rank) for rank in range(len(scene.tools))]
     # Whatever is refused is refused here; and what contact needs beyond the stores is kept beside them.
-    _native.SimulationCore(
-        bodies,
-        tools,
-        (largest_force(scene), device.max_slew, device.ramp),
-        scene.view.strain_limit,
-        (device.rate, device.cpus, device.priority),
-    )
+    for one in (scene, *others):
+        _native.SimulationCore(
+            bodies,
+            [tool_arguments(one, rank) for rank in range(len(one.tools))],
+            (largest_force(one), device.max_slew, device.ramp),
+            one.view.strain_limit,
+            (device.rate, device.cpus, device.priority),
+        )
     return {
         "format": FORMAT,
         "version": VERSION,
         "palpate": version("palpate"),
         "name": scene.name,
         "bodies": described,
-        "tools": [_tool(scene, rank, tool, folder) for rank, tool in enumerate(tools)],
+        "tools": [describe_tool(scene, rank, folder) for rank in range(len(scene.tools))],
         "device": {
             "max_force": largest_force(scene),
             "max_slew": device.max_slew,
@@ -145,8 +150,9 @@ def _body(body: BuiltBody, arguments: tuple[Any, ...], store: Path, path: Path, 
     }
 
 
-def _tool(scene: SceneTables, rank: int, arguments: tuple[Any, ...], folder: Path) -> dict[str, Any]:
-    (kind, lengths, vertices, triangles), law, max_stiffness, pad, settings = arguments
+def describe_tool(scene: SceneTables, rank: int, folder: Path) -> dict[str, Any]:
+    """Write the surface of a tool from a file into the folder; its entry of ``scene.json``."""
+    (kind, lengths, vertices, triangles), law, max_stiffness, pad, settings = tool_arguments(scene, rank)
     device = scene.device_of(rank)
     arrays = None
     if kind == "surface":

@@ -12,20 +12,24 @@ from typing import Any
 import numpy as np
 
 from palpate import _native
+from palpate._native import TOOL_SETTINGS
 from palpate.errors import ViewerError
 from palpate.scene import BuiltScene
-from palpate.simulation.packed import SCENE_FILE, describe
+from palpate.scene.tables import SceneTables
+from palpate.simulation.about import recorded_tables
+from palpate.simulation.packed import SCENE_FILE, describe, describe_tool
 from palpate.viewer.fields import DISPLACEMENT, SURFACE_STRAIN
 from palpate.viewer.messages import decode, encode, numbered
 from palpate.viewer.session import Session
-from palpate.viewer.shown_body import ShownBody
+from palpate.viewer.shown_body import ShownBody, title_of
+from palpate.viewer.tool_shapes import kind_of, outline, shape_choices, with_shape
 
 # Nodes inside of a body follow so many nodes of its surface where it is cut open.
 FOLLOWED = 12
 
 
-def packed_page(built: BuiltScene) -> bytes:
-    """Return the file: names and sizes of its parts as JSON, then the parts, compressed.
+def packed_page(built: BuiltScene, name: str) -> bytes:
+    """Return the file of a scene, called ``name`` in the page: a header of JSON, then the parts, compressed.
 
     Of each store only the part that contacts and pictures read is taken, with the same numbers: forces are those of the
     store to the bit.
@@ -39,17 +43,18 @@ def packed_page(built: BuiltScene) -> bytes:
     if any(built.scene.device_of(tool).kind != "simulated" for tool in range(len(built.scene.tools))):
         raise ViewerError("a page without a server has no devices: give its tools the kind 'simulated'")
     session = Session(built)
-    files = {"page/scene.bin": _scene(session), "page/page.bin": _page(session), **_program_files(built)}
+    files = {"page/scene.bin": _scene(session, name), "page/page.bin": _page(session, name), **_program_files(session)}
     header = json.dumps([{"name": name, "size": len(data)} for name, data in files.items()]).encode()
     parts = [struct.pack("<I", len(header)) + header, *files.values()]
     return gzip.compress(b"".join(part + b"\0" * (-len(part) % 8) for part in parts), 9, mtime=0)
 
 
-def _program_files(built: BuiltScene) -> dict[str, bytes]:
+def _program_files(session: Session) -> dict[str, bytes]:
     """Files of a packed scene without the inside of its bodies, by name."""
+    others = [scene for tool in range(len(session.own_tools)) for scene in _with_other_shapes(session, tool).values()]
     with tempfile.TemporaryDirectory() as where:
         folder = Path(where)
-        description = describe(built, folder, inside=False)
+        description = describe(session.built, folder, False, others)
         files = {SCENE_FILE: json.dumps(description, allow_nan=False).encode()}
         for path in sorted(folder.iterdir()):
             store = next((one for one in description["bodies"] if one["store"]["file"] == path.name), None)
@@ -57,34 +62,56 @@ def _program_files(built: BuiltScene) -> dict[str, bytes]:
     return files
 
 
-def _scene(session: Session) -> bytes:
+def _scene(session: Session, name: str) -> bytes:
     """Scene message, with what this page offers."""
     header, arrays = decode(session.scene_message())
     del header["arrays"]
+    header["name"], header["title"] = name, title_of(name)
     offered = [{"name": field.name, "title": field.title} for field in (DISPLACEMENT, SURFACE_STRAIN)]
     for body in header["bodies"]:
         body["fields"] = offered
-    for tool in header["tools"]:
-        tool["shapes"] = [choice for choice in tool["shapes"] if choice["name"] == tool["shape"]]
     return encode(header, {name: (array.dtype.str[1:], array) for name, array in arrays.items()})
 
 
-def _page(session: Session) -> bytes:
+def _page(session: Session, name: str) -> bytes:
     """Return what the worker knows beside the scene message."""
     built, tools = session.built, len(session.built.scene.tools)
     about = session.simulation._about((tools, tools == 1), clock=True)
     header = {
         "version": about["version"],
-        "name": built.scene.name,
+        "name": name,
         "about": {**about, "strain": "surface"},
         "settings": session.settings(),
         "centre": session._centre.tolist(),
         "size": session.size,
+        "shapes": [_other_shapes(session, tool) for tool in range(tools)],
         "max_radii": [float(radius) for radius in session._max_radii],
         "bodies": [_body(session, rank) for rank in range(len(built.bodies))],
         "motion": _motion(session),
     }
     return encode(header, numbered([_arrays(shown) for shown in session._bodies]))
+
+
+def _with_other_shapes(session: Session, tool: int) -> dict[str, SceneTables]:
+    """Scenes in which a tool has another shape that it may take, by the name of the shape."""
+    scene, own = session.built.scene, session.own_tools[tool]
+    names = [choice["name"] for choice in shape_choices(own) if choice["name"] != kind_of(own)]
+    tables = {name: with_shape(own, name, scene.folder) for name in names}
+    before, after = scene.tools[:tool], scene.tools[tool + 1 :]
+    return {name: scene.model_copy(update={"tools": [*before, one, *after]}) for name, one in tables.items()}
+
+
+def _other_shapes(session: Session, tool: int) -> dict[str, Any]:
+    """Shapes that a tool may take in place of its own: each for the loop, for the scene message and for recordings."""
+    found = {}
+    for name, scene in _with_other_shapes(session, tool).items():
+        table = scene.tools[tool]
+        found[name] = {
+            "description": describe_tool(scene, tool, scene.folder),
+            "entry": {**outline(table, scene.folder)[0], **{key: getattr(table, key) for key in TOOL_SETTINGS}},
+            "table": recorded_tables(scene)["tool"][tool],
+        }
+    return found
 
 
 def _body(session: Session, rank: int) -> dict[str, Any]:

@@ -3,53 +3,91 @@
 from __future__ import annotations
 
 import html
+import json
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from palpate.atomic import folder_beside
 from palpate.errors import ViewerError
 from palpate.scene import BuiltScene, Scene
+from palpate.viewer.gallery import PICTURES, Card, gallery_page
+from palpate.viewer.gallery_picture import gallery_picture
 from palpate.viewer.packed_page import packed_page
+from palpate.viewer.shown_body import title_of
 
 PROGRAM, PAGE, SCENES = "palpate.wasm", "index.html", "scenes"
+# The page of a gallery, whose first page is that of the pictures.
+TOUCH_PAGE = "touch.html"
 
 
-def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path) -> dict[str, int]:
-    """Write a folder that any web host serves; the page opens the first scene, and another one by ``?scene=NAME``.
+@dataclass(frozen=True)
+class SiteSizes:
+    """Bytes of a site.
 
-    An earlier site of that name is replaced, when the new one is complete.
+    Attributes
+    ----------
+    program
+        Page and WebAssembly, which all scenes share.
+    scenes
+        Of each scene by its name.
+    pictures
+        Of the gallery with its page; 0 of a site with one scene.
 
-    Returns
-    -------
-    dict
-        Bytes of the program (page and WebAssembly), and of each scene by its name.
+    """
+
+    program: int
+    scenes: dict[str, int]
+    pictures: int
+
+    @property
+    def total(self) -> int:
+        """All of it."""
+        return self.program + sum(self.scenes.values()) + self.pictures
+
+
+def write_site(scenes: Sequence[tuple[str, Scene | BuiltScene]], path: Path, gallery: bool | None = None) -> SiteSizes:
+    """Write a folder that any web host serves: the page, or with ``gallery`` a page of pictures before it.
+
+    By default several scenes get a gallery.
+
+    The page opens the first scene, and another one by ``?scene=NAME``. An earlier site of that name is replaced, when
+    the new one is complete.
 
     Raises
     ------
     ViewerError
-        A place that is no site, or a package without page or program.
+        A place that is no site, scenes of one name, or a package without page or program.
     Error
         As of :meth:`palpate.Scene.build`.
 
     """
     _require_replaceable(path)
-    program = _program()
+    program = find_program()
     names = [plain_name(name) for name, _ in scenes]
-    sizes: dict[str, int] = {}
+    if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
+        raise ViewerError(f"two scenes are called '{twice}': rename one of the files")
+    is_gallery, sizes, pictures = len(names) > 1 if gallery is None else gallery, {}, 0
     with folder_beside(path) as folder:
-        _copy_page(folder, names[0])
+        _copy_page(folder, names, is_gallery)
         shutil.copyfile(program, folder / PROGRAM)
-        sizes["program"] = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+        size_of_program = _size(folder.rglob("*"))
         (folder / SCENES).mkdir()
+        cards = []
         for name, (_, scene) in zip(names, scenes, strict=True):
             built = scene if isinstance(scene, BuiltScene) else scene.build()
-            data = packed_page(built)
+            data = packed_page(built, name)
             (folder / SCENES / f"{name}.palpate").write_bytes(data)
             sizes[name] = len(data)
-    return sizes
+            if is_gallery:
+                cards.append(_card(folder, name, built, len(data)))
+        if is_gallery:
+            (folder / PAGE).write_text(gallery_page(cards, TOUCH_PAGE), encoding="utf-8")
+            pictures = _size([folder / PAGE, *(folder / PICTURES).iterdir()])
+    return SiteSizes(size_of_program, sizes, pictures)
 
 
 def with_precision(scene: Scene, precision: str) -> Scene:
@@ -63,14 +101,30 @@ def plain_name(name: str) -> str:
     return re.sub(r"[^\w-]+", "-", name) or "scene"
 
 
-def _require_replaceable(path: Path) -> None:
-    if path.is_dir() and any(path.iterdir()) and not (path / PROGRAM).is_file():
-        raise ViewerError(f"{path}: is a folder of something else: give another name")
-    if path.exists() and not path.is_dir():
-        raise ViewerError(f"{path}: is a file: give another name, or delete it first")
+def static_folder() -> Path:
+    """Folder of the built page.
+
+    Raises
+    ------
+    ViewerError
+        A package built without the page.
+
+    """
+    static = Path(str(resources.files("palpate.viewer") / "static"))
+    if not (static / PAGE).is_file():
+        raise ViewerError("the viewer's page is not built: run 'make viewer' (it needs Node)")
+    return static
 
 
-def _program() -> Path:
+def find_program() -> Path:
+    """Path of the WebAssembly.
+
+    Raises
+    ------
+    ViewerError
+        A package built without it.
+
+    """
     program = Path(str(resources.files("palpate.viewer") / "web" / PROGRAM))
     if not program.is_file():
         raise ViewerError(
@@ -79,12 +133,40 @@ def _program() -> Path:
     return program
 
 
-def _copy_page(folder: Path, name: str) -> None:
-    """Copy the built page, which opens a scene of the folder."""
-    static = Path(str(resources.files("palpate.viewer") / "static"))
-    if not (static / PAGE).is_file():
-        raise ViewerError("the viewer's page is not built: run 'make viewer' (it needs Node)")
-    shutil.copytree(static, folder, dirs_exist_ok=True)
-    text = (folder / PAGE).read_text()
-    meta = f'<meta name="palpate-scene" content="{html.escape(name)}" />'
-    (folder / PAGE).write_text(text.replace("</head>", f"  {meta}\n  </head>", 1))
+def meta(name: str, content: str) -> str:
+    """Element of a page's head that its script reads."""
+    return f'<meta name="palpate-{name}" content="{html.escape(content)}" />'
+
+
+def _require_replaceable(path: Path) -> None:
+    if path.is_dir() and any(path.iterdir()) and not (path / PROGRAM).is_file():
+        raise ViewerError(f"{path}: is a folder of something else: give another name")
+    if path.exists() and not path.is_dir():
+        raise ViewerError(f"{path}: is a file: give another name, or delete it first")
+    if not path.absolute().parent.is_dir():
+        raise ViewerError(f"{path}: there is no folder {path.parent}; make it first")
+
+
+def _copy_page(folder: Path, names: Sequence[str], is_gallery: bool) -> None:
+    """Copy the built page, which opens a scene of the folder and offers the others as models."""
+    shutil.copytree(static_folder(), folder, dirs_exist_ok=True)
+    page = folder / PAGE
+    choices = [{"name": name, "title": title_of(name)} for name in names] if len(names) > 1 else []
+    head = f"  {meta('scene', names[0])}\n    {meta('scenes', json.dumps(choices))}\n  </head>"
+    text = page.read_text(encoding="utf-8").replace("</head>", head, 1)
+    page.unlink()
+    (folder / (TOUCH_PAGE if is_gallery else PAGE)).write_text(text, encoding="utf-8")
+
+
+def _card(folder: Path, name: str, built: BuiltScene, size: int) -> Card:
+    """Write the picture of a scene; what the gallery shows of it."""
+    picture = folder / PICTURES / f"{name}.webp"
+    picture.parent.mkdir(exist_ok=True)
+    picture.write_bytes(gallery_picture(built))
+    nodes = sum(len(body.body.mesh.nodes) if body.body else len(body.green.surface_nodes) for body in built.bodies)
+    moves = any(body.motion is not None for body in built.bodies)
+    return Card(name, title_of(name), nodes, moves, size)
+
+
+def _size(files: Iterable[Path]) -> int:
+    return sum(file.stat().st_size for file in files if file.is_file())

@@ -12,7 +12,7 @@ from command_line import run, run_bench
 
 ROOT = Path(__file__).parents[3]
 NAMES = {"tick", "contact", "scale", "precompute", "surface", "elements", "paper", "dynamics", "record", "viewer"}
-NAMES |= {"zwidth", "touches"}
+NAMES |= {"zwidth", "touches", "web"}
 
 
 def test_every_benchmark_is_listed():

@@ -2,18 +2,43 @@
 
 import { receive } from "./carrier";
 import type { Carrier, ConnectionHandlers } from "./carrier";
-import type { ClientMessage } from "./protocol";
+import type { Choice, ClientMessage } from "./protocol";
+
+/** A scene for the worker: addresses of program and scene, and the scenes that the page offers. */
+export interface OpenScene {
+  program: string;
+  url: string;
+  name: string;
+  models: Choice[];
+}
 
 /** What the page asks of the worker, and what comes back. */
 export type ToWorker =
-  | { kind: "open"; program: string; scene: string }
+  | { kind: "open"; scene: OpenScene }
   | { kind: "message"; message: ClientMessage }
   | { kind: "run"; id: number; positions: Float64Array };
 export type FromWorker =
   | { kind: "message"; data: string | ArrayBuffer }
+  | { kind: "opened"; name: string }
   | { kind: "file"; name: string; bytes: ArrayBuffer }
   | { kind: "forces"; id: number; forces: Float64Array }
   | { kind: "failed"; id: number | null; reason: string };
+
+/** Where the files of a page are. */
+export interface Site {
+  program: string;
+  /** The worker's script; null for the one beside the page's own. */
+  worker: string | null;
+  /** The scene that opens first, and all to choose from. */
+  scene: string;
+  models: Choice[];
+  sceneUrl: (name: string) => string;
+}
+
+export interface SiteListener {
+  onOpened(scene: string): void;
+  onFailure(reason: string): void;
+}
 
 export class WorkerCarrier implements Carrier {
   readonly hasServer = false;
@@ -22,23 +47,31 @@ export class WorkerCarrier implements Carrier {
   private count = 0;
 
   constructor(
-    private readonly program: string,
-    private readonly scene: string,
+    private readonly site: Site,
     private readonly handlers: ConnectionHandlers,
-    private readonly onFailure: (reason: string) => void,
+    private readonly listener: SiteListener,
   ) {
-    this.worker = new Worker(new URL("../worker/main.ts", import.meta.url), { type: "module" });
+    this.worker = site.worker
+      ? new Worker(site.worker, { type: "module" })
+      : new Worker(new URL("../worker/main.ts", import.meta.url), { type: "module" });
     this.worker.onmessage = (event: MessageEvent<FromWorker>) => this.receive(event.data);
-    this.worker.onerror = (event) => this.onFailure(event.message);
+    this.worker.onerror = (event) => this.listener.onFailure(event.message);
   }
 
   open(): void {
     this.handlers.onState("connecting");
-    this.post({ kind: "open", program: this.program, scene: this.scene });
+    this.openScene(this.site.scene);
+  }
+
+  private openScene(name: string): void {
+    const { program, sceneUrl, models } = this.site;
+    this.post({ kind: "open", scene: { program, url: sceneUrl(name), name, models } });
   }
 
   send(message: ClientMessage): void {
-    this.post({ kind: "message", message });
+    // The names are those that the site has offered.
+    if (message.type === "model") this.openScene(message.name);
+    else this.post({ kind: "message", message });
   }
 
   /** Files go to a server only. */
@@ -58,6 +91,8 @@ export class WorkerCarrier implements Carrier {
     switch (message.kind) {
       case "message":
         return receive(message.data, this.handlers);
+      case "opened":
+        return this.listener.onOpened(message.name);
       case "file":
         return offer(message.name, message.bytes);
       case "forces":
@@ -65,7 +100,7 @@ export class WorkerCarrier implements Carrier {
         this.runs.delete(message.id);
         return;
       case "failed":
-        if (message.id === null) return this.onFailure(message.reason);
+        if (message.id === null) return this.listener.onFailure(message.reason);
         this.runs.get(message.id)?.reject(new Error(message.reason));
         this.runs.delete(message.id);
     }

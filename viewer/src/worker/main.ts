@@ -1,6 +1,6 @@
 // The worker of a page without a server: loads program and scene, and wakes as often as a browser lets it.
 
-import type { FromWorker, ToWorker } from "../net/worker_carrier";
+import type { FromWorker, OpenScene, ToWorker } from "../net/worker_carrier";
 import { Program } from "./program";
 import { fetchPackage } from "./scene_package";
 import { WorkerSession } from "./session";
@@ -8,6 +8,7 @@ import { WorkerSession } from "./session";
 /** Timers of a browser come after 4 ms at the earliest. */
 const WAKE_MS = 1;
 
+let module: Promise<WebAssembly.Module> | null = null;
 let program: Program | null = null;
 let session: WorkerSession | null = null;
 
@@ -15,21 +16,29 @@ function post(message: FromWorker, transfer: Transferable[] = []): void {
   self.postMessage(message, { transfer });
 }
 
-async function open(programUrl: string, sceneUrl: string): Promise<void> {
-  const bytes = fetch(programUrl).then((answer) => {
-    if (!answer.ok) throw new Error(`${programUrl}: ${answer.status} ${answer.statusText}`);
-    return answer.arrayBuffer();
-  });
-  const [module, scene] = await Promise.all([bytes, fetchPackage(sceneUrl)]);
-  program = await Program.load(module, () => performance.now());
-  for (const [name, file] of scene.files) program.provide(name, file);
+async function compiled(url: string): Promise<WebAssembly.Module> {
+  const answer = await fetch(url);
+  if (!answer.ok) throw new Error(`${url}: ${answer.status} ${answer.statusText}`);
+  return WebAssembly.compile(await answer.arrayBuffer());
+}
+
+/** Opens a scene in place of the one that runs, which goes on until then. */
+async function open({ program: programUrl, url, name, models }: OpenScene): Promise<void> {
+  module ??= compiled(programUrl);
+  const [code, scene] = await Promise.all([module, fetchPackage(url)]);
+  const next = await Program.load(code, () => performance.now());
+  for (const [file, bytes] of scene.files) next.provide(file, bytes);
   scene.files.clear();
-  program.open();
+  next.open();
+  const isFirst = session === null;
+  session?.close();
+  program = next;
   session = new WorkerSession(program, scene, {
     message: (data) => post({ kind: "message", data }, typeof data === "string" ? [] : [data]),
-    file: (name, file) => post({ kind: "file", name, bytes: file }, [file]),
-  });
-  wake();
+    file: (file, bytes) => post({ kind: "file", name: file, bytes }, [bytes]),
+  }, models);
+  post({ kind: "opened", name });
+  if (isFirst) wake();
 }
 
 function wake(): void {
@@ -42,14 +51,35 @@ function wake(): void {
 }
 
 function fail(id: number | null, error: unknown): void {
-  post({ kind: "failed", id, reason: error instanceof Error ? error.message : String(error) });
+  post({ kind: "failed", id, reason: reasonOf(error) });
+}
+
+function reasonOf(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+function say(message: object): void {
+  post({ kind: "message", data: JSON.stringify(message) });
+}
+
+/** Opens another scene of the page; one that cannot be had leaves the one that runs. */
+async function change(scene: OpenScene): Promise<void> {
+  const status = (text: string) => say({ type: "status", text, progress: null, left_s: null });
+  status(`Loading ${scene.name}`);
+  try {
+    await open(scene);
+  } catch (error) {
+    say({ type: "error", text: reasonOf(error) });
+  }
+  status("");
 }
 
 self.onmessage = (event: MessageEvent<ToWorker>): void => {
   const message = event.data;
   switch (message.kind) {
     case "open":
-      open(message.program, message.scene).catch((error: unknown) => fail(null, error));
+      if (session) void change(message.scene);
+      else open(message.scene).catch((error: unknown) => fail(null, error));
       return;
     case "message":
       session?.handle(message.message);

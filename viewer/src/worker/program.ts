@@ -34,6 +34,7 @@ export type Command =
   | { do: "press"; tool: number; position: Vec3; orientation?: readonly number[]; grab: boolean }
   | { do: "release"; tool: number }
   | { do: "set"; name: string; rank: number; value: number }
+  | { do: "tool"; tool: number; description?: object | undefined }
   | { do: "reset" }
   | { do: "strike"; body: number; point: Vec3; impulse: Vec3; duration: number }
   | { do: "watch"; body: number; node: number }
@@ -42,8 +43,8 @@ export type Command =
 export class Program {
   private constructor(private readonly exports: Exports) {}
 
-  static async load(module: BufferSource, now: () => number): Promise<Program> {
-    const { instance } = await WebAssembly.instantiate(module, { palpate: { now_ms: now } });
+  static async load(module: WebAssembly.Module, now: () => number): Promise<Program> {
+    const instance = await WebAssembly.instantiate(module, { palpate: { now_ms: now } });
     return new Program(instance.exports as unknown as Exports);
   }
 

@@ -1,8 +1,17 @@
 // The packed scene of a page: one file, compressed, of the files that the program reads and what the page draws.
 
 import { decodeArrays } from "../net/protocol";
-import type { SettingsMessage, Vec3 } from "../net/protocol";
-import type { AnyArray } from "../net/protocol";
+import type { AnyArray, SettingsMessage, ToolMessage, Vec3 } from "../net/protocol";
+
+/** A shape that a tool of the scene may take in place of its own. */
+export interface PackedShape {
+  /** The tool for the loop: an entry of `tools` in a packed scene. */
+  description: object;
+  /** What differs in its entry of the scene message. */
+  entry: Partial<ToolMessage>;
+  /** Its table of a scene file, for recordings. */
+  table: object;
+}
 
 /** What the page has to know of a scene beside its picture; written by `palpate web`. */
 export interface PageData {
@@ -14,6 +23,8 @@ export interface PageData {
   /** Middle of all bodies, and their longest side, m. */
   centre: Vec3;
   size: number;
+  /** Of each tool, by their names. */
+  shapes: Record<string, PackedShape>[];
   /** Largest contact radius of each tool, m. */
   max_radii: number[];
   bodies: { size: number; nodes_per_face: number; position: Vec3; orientation: [number, number, number, number] }[];

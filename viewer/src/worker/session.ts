@@ -1,7 +1,8 @@
 // The session of one page without a server: answers its messages as the server would, on the loop in WebAssembly.
 
 import { encodeArrays } from "../net/protocol";
-import type { ClientMessage, MotionFrame, SettingsMessage, Vec3 } from "../net/protocol";
+import type { Choice, ClientMessage, MotionFrame, SettingsMessage, ShapeName, Vec3 } from "../net/protocol";
+import { OfferedTools } from "./offered_tools";
 import { BodyPicture } from "./picture";
 import type { Program, Tick } from "./program";
 import type { ScenePackage } from "./scene_package";
@@ -33,21 +34,37 @@ export class WorkerSession {
   private bodyTime = 0;
   private motion: MotionFrame | null;
   private begun = 0;
+  private readonly tools: OfferedTools;
 
   constructor(
     private readonly program: Program,
     private readonly scene: ScenePackage,
     private readonly replies: Replies,
+    /** Other scenes that the page may ask for. */
+    models: Choice[],
   ) {
     const { data, arrays } = scene;
     this.pictures = data.bodies.map((body, i) => new BodyPicture(arrays, i, body.nodes_per_face, body.size));
     this.settings = data.settings;
-    this.motion = data.motion && { watched: data.motion.watched, struck_at: null, mode: null };
-    if (data.motion) program.command({ do: "watch", body: data.motion.body, node: data.motion.watched });
-    if (data.settings.time_scale !== null) program.command({ do: "set", name: "time_scale", rank: 0, value: data.settings.time_scale });
-    this.text({ type: "welcome", role: "control", version: data.version, models: [] });
-    replies.message(scene.scene.slice(0));
+    this.tools = new OfferedTools(data, scene.scene);
+    this.motion = this.begin();
+    this.text({ type: "welcome", role: "control", version: data.version, models });
+    replies.message(this.tools.sceneMessage());
     this.text(this.settings);
+  }
+
+  /** Saves a recording under way. */
+  close(): void {
+    if (this.program.tick().recorded) this.record(false);
+  }
+
+  /** A loop that begins: what it watches, its pace; the motion of its frames. */
+  private begin(): MotionFrame | null {
+    const { program, settings, scene: { data: { motion } } } = this;
+    if (settings.time_scale !== null) this.apply("time_scale", 0, settings.time_scale);
+    if (!motion) return null;
+    program.command({ do: "watch", body: motion.body, node: motion.watched });
+    return { watched: motion.watched, struck_at: null, mode: null };
   }
 
   /** Makes the ticks that are due, and a frame if the page has shown the last one. */
@@ -97,6 +114,8 @@ export class WorkerSession {
         if (!strike) throw new Error("repeat: the scene has no strike of its own");
         return this.strike(strike.point, strike.impulse, this.scene.data.motion!.body);
       }
+      case "shape":
+        return this.shape(message.tool, message.name);
       case "record":
         return this.record(message.on);
       case "cutaway":
@@ -120,7 +139,6 @@ export class WorkerSession {
       case "replay":
       case "save":
       case "setup":
-      case "shape":
       case "touch":
       case "upload":
         throw new Error(`${NEEDS_SERVER[message.type] ?? "This"} needs Palpate on this computer: pip install palpate`);
@@ -153,6 +171,26 @@ export class WorkerSession {
     this.text(this.settings);
   }
 
+  /** Another loop on the same bodies, with the settings of now. */
+  private shape(tool: number, name: string): void {
+    if (name === this.settings.shape[tool]) return;
+    this.close();
+    this.program.command({ do: "tool", tool, description: this.tools.choose(tool, name) });
+    const { settings, scene } = this;
+    this.settings = { ...settings, shape: settings.shape.with(tool, name as ShapeName) };
+    settings.contact_radius.forEach((radius, rank) => this.apply("contact_radius", rank, radius));
+    settings.friction.forEach((friction, rank) => this.apply("friction", rank, friction));
+    settings.youngs_modulus.forEach((modulus, body) => {
+      const first = scene.data.settings.youngs_modulus[body];
+      if (modulus !== null && first) this.apply("stiffness_scale", body, modulus / first);
+    });
+    this.apply("strain_limit", 0, settings.strain_limit);
+    [this.log, this.history, this.bodyTime] = [[], [], 0];
+    this.motion = this.begin();
+    this.replies.message(this.tools.sceneMessage());
+    this.text(this.settings);
+  }
+
   private apply(name: string, rank: number, value: number): void {
     this.program.command({ do: "set", name, rank, value });
   }
@@ -165,7 +203,7 @@ export class WorkerSession {
     first.youngs_modulus.forEach((modulus, body) => modulus !== null && this.apply("stiffness_scale", body, 1));
     this.apply("strain_limit", 0, first.strain_limit);
     this.program.command({ do: "reset" });
-    this.settings = { ...first, time_scale: this.settings.time_scale };
+    this.settings = { ...first, time_scale: this.settings.time_scale, shape: this.settings.shape };
     this.text(this.settings);
   }
 
@@ -186,7 +224,7 @@ export class WorkerSession {
   private record(on: boolean): void {
     if (on) {
       this.begun = Date.now();
-      this.program.command({ do: "record", about: this.scene.data.about, begun_ms: this.begun });
+      this.program.command({ do: "record", about: this.tools.about(), begun_ms: this.begun });
       return;
     }
     const { ticks } = this.program.tick().recorded ?? { ticks: 0 };
@@ -266,8 +304,6 @@ export class WorkerSession {
 
 /** What a server does, in the words of its refusal. */
 const NEEDS_SERVER: Record<string, string> = {
-  shape: "Another shape of the tool",
-  model: "Another model",
   mode: "To show a mode",
   replay: "A replay",
   answer: "An exam",

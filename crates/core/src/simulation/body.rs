@@ -9,6 +9,7 @@ use crate::contact::smooth::{DrawnSurface, Fan, FootPoint, Neighbourhood, Smooth
 use crate::contact::{Moduli, PatchGeometry, SeriesFields, SurfacePoint, SurfaceQuery, barycentric, known_fans};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
+use crate::math::sincos;
 use crate::memory::Ranges;
 use crate::mesh::Surface;
 use crate::{Error, Result};
@@ -293,7 +294,7 @@ fn inverse_sizes(query: &SurfaceQuery, fan: &Fan, mean_edge: f64) -> [f64; 2] {
     let inverse = |direction: DVec3| 1.0 / (inside + query.distance_along(fan.position + inward * inside, direction));
     let (first, second) = inward.any_orthonormal_pair();
     let inclined = (0..DIRECTIONS).map(|k| {
-        let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS)).sin_cos();
+        let (sin, cos) = sincos(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));
         inverse(inward * 0.5 + (first * cos + second * sin) * 0.75f64.sqrt()).powi(2)
     });
     let mean_square = inclined.sum::<f64>() / f64::from(DIRECTIONS);

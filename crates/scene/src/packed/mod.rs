@@ -10,4 +10,4 @@ mod elements;
 mod read;
 
 pub use arrays::checksum;
-pub use read::{SCENE_FILE, read};
+pub use read::{SCENE_FILE, read, read_tool};

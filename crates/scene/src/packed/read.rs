@@ -138,6 +138,19 @@ fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(files::read(path).map_err(io)?).map_err(|_| refused(path, "is no text"))
 }
 
+/// Reads one tool as `scene.json` describes it; its shape is not that of a file.
+///
+/// # Errors
+/// A description that is none, or that names arrays.
+pub fn read_tool(description: &serde_json::Value) -> Result<Tool> {
+    let described: ToolDescription = serde_json::from_value(description.clone())
+        .map_err(|error| Error::Invalid(format!("this describes no tool: {error}")))?;
+    if described.shape.arrays.is_some() {
+        return Err(Error::Invalid("a tool whose shape is a file's comes with its scene only".into()));
+    }
+    tool(Path::new(""), described)
+}
+
 fn tool(folder: &Path, described: ToolDescription) -> Result<Tool> {
     let ShapeDescription { kind, lengths, arrays } = described.shape;
     let shape = match arrays {

@@ -1,8 +1,6 @@
 //! WebAssembly: the page's clock. There is one thread, and nothing waits.
 #![allow(unsafe_code)] // a function of the page
 
-use palpate_core::memory::Ranges;
-
 #[link(wasm_import_module = "palpate")]
 unsafe extern "C" {
     /// Milliseconds of the page's monotonic clock.
@@ -21,28 +19,3 @@ pub fn computed_ns() -> u64 {
 
 /// The page calls the ticks that are due: nothing waits here.
 pub fn sleep_until_ns(_deadline: u64) {}
-
-/// None is granted.
-pub fn request_realtime_priority(_priority: u8) -> bool {
-    false
-}
-
-/// There are none to choose from.
-pub fn allowed_cpus() -> Vec<usize> {
-    Vec::new()
-}
-
-/// There are none to choose from.
-pub fn keep_to_cpus(_cpus: &[usize]) -> bool {
-    false
-}
-
-/// None is locked.
-pub fn lock(_memory: Ranges) -> bool {
-    false
-}
-
-/// None is locked.
-pub fn lock_thread() -> bool {
-    false
-}

@@ -11,6 +11,7 @@
 //! Hertz's pressure is the limit of small `x`; at `x = 0.5` what is left out is 2 % of the largest pressure. Along a row both powers of
 //! `w` have a primitive; across the rows Gauss' rule is exact for a contact within one rectangle.
 
+use crate::math::asin;
 use glam::{DVec2, DVec3};
 
 /// Points and weights of Gauss' rule with four points on [-1, 1].
@@ -97,7 +98,7 @@ fn primitives(u: f64, squared: f64) -> [f64; 2] {
     let c = squared.sqrt();
     let u = u.clamp(-c, c);
     let root = (squared - u * u).max(0.0).sqrt();
-    let angle = (u / c).clamp(-1.0, 1.0).asin();
+    let angle = asin((u / c).clamp(-1.0, 1.0));
     let first = 0.5 * (u * root + squared * angle);
     let third = 0.125 * (u * root * (5.0 * squared - 2.0 * u * u) + 3.0 * squared * squared * angle);
     [first, third]
