@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{OtherPlanes, Plane, PressedSurface};
 use crate::contact::shape::ToolShape;
 use crate::contact::{SurfaceQuery, Tessellation};
+use crate::tensor::{across, outer, skew};
 
 /// Motion of a tool, over its thickness, below which the near pieces stay the same.
 const MOVED: f64 = 1e-3;
@@ -47,14 +48,19 @@ pub struct NearPiece {
     pub normal: DVec3,
     /// Its area, m^2.
     pub area: f64,
+    /// Half width of the tool, m.
+    pub thickness: f64,
     /// Farthest corner from the middle, m.
     pub size: f64,
     /// Share that belongs to the contact: less than one for a wall that rises over it.
     pub contact_share: f64,
     /// Distance of the middle from the tool, m, negative inside.
     pub distance: f64,
-    /// Its derivatives by the tool's position, and by its rotation about its origin, m.
+    /// Its derivatives by the tool's position, and by its rotation about its origin, m. The first is the tool's own normal, from the
+    /// piece towards the tool.
     pub by_pose: [DVec3; 2],
+    /// Derivatives of that normal by the tool's position and rotation; zero beyond the margin.
+    pub tool_normal_by: [DMat3; 2],
     /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing_cosine: f64,
     /// Its derivatives by the tool's position and rotation.
@@ -157,6 +163,24 @@ impl PlacedShape<'_> {
         by_pose[1] += arm.cross(self.contact_normal) * rise;
         (distance, by_pose)
     }
+
+    /// Derivatives of the tool's normal at a point, the first of the distance's derivatives, by position and rotation.
+    ///
+    /// With the gradient `g` of the distance, which turns by `H`, and the projection `P` across the contact's normal above the
+    /// tool's middle, the normal is `-P g` but for a constant.
+    fn normal_by_pose(&self, point: DVec3, centre: DVec3) -> [DMat3; 2] {
+        let normal = self.contact_normal;
+        let above = (point - centre).dot(normal);
+        let at = point - normal * above.max(0.0) - self.position;
+        let (gradient, turning) = self.shape.turning_gradient(self.rotation.transpose() * at);
+        let turning = self.rotation * turning * self.rotation.transpose();
+        if above <= 0.0 {
+            return [turning, skew(self.rotation * gradient) - turning * skew(at)];
+        }
+        let level = across(normal);
+        let lifted = outer(normal, (centre - self.position).cross(normal)) + skew(at);
+        [level * turning * level, level * (skew(self.rotation * gradient) - turning * lifted)]
+    }
 }
 
 impl NearPieces {
@@ -193,6 +217,7 @@ impl NearPieces {
         self.centre += displacement;
         for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(displacement);
+            near.by_pose[0] += near.tool_normal_by[0] * displacement;
             near.facing_cosine += near.facing_cosine_by[0].dot(displacement);
         }
     }
@@ -222,11 +247,11 @@ impl NearPieces {
                 return;
             }
             for piece in triangle * count..(triangle + 1) * count {
-                let near = near_piece(fine, tool, piece, (centre, headroom, viewpoint));
+                let near = near_piece(fine, tool, piece, (centre, headroom, viewpoint), margin);
                 if near.distance < near.size + margin && self.pieces.len() < MAX_PIECES {
                     self.pieces.push(near);
                 } else if is_opposite {
-                    let near = near_piece(fine, &unlifted, piece, (centre, 0.0, centre));
+                    let near = near_piece(fine, &unlifted, piece, (centre, 0.0, centre), f64::NEG_INFINITY);
                     if near.distance < near.size + margin && self.opposite.len() < MAX_OPPOSITE {
                         self.opposite.push(near);
                     }
@@ -241,6 +266,7 @@ fn near_piece(
     tool: &PlacedShape<'_>,
     piece: u32,
     (centre, headroom, viewpoint): (DVec3, f64, DVec3),
+    margin: f64,
 ) -> NearPiece {
     let corners = fine.corners(piece);
     let [a, b, c] = corners;
@@ -249,6 +275,7 @@ fn near_piece(
     let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
     let (distance, by_pose) = tool.distance(middle, centre, headroom);
     let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
+    let tool_normal_by = if distance < margin { tool.normal_by_pose(middle, centre) } else { [DMat3::ZERO; 2] };
     let (facing_cosine, facing_cosine_by) = tool.cosine_to_viewpoint((middle, normal), viewpoint);
     NearPiece {
         piece,
@@ -256,10 +283,12 @@ fn near_piece(
         middle,
         normal,
         area,
+        thickness: tool.shape.thickness(),
         size,
         contact_share: 1.0,
         distance,
         by_pose,
+        tool_normal_by,
         facing_cosine,
         facing_cosine_by,
     }
