@@ -3,13 +3,11 @@
 //! The pieces `i` of the surface near the tool, at distances `s_i` from it, have the weights
 //!
 //! ```text
-//! w_i = A_i (1 - s_i/m)^2 eta(n_i . d_i)      x = sum w_i x_i / sum w_i        n = sum w_i t_i / |sum w_i t_i|
+//! w_i = A_i (1 - s_i/m)^2 eta(n_i . d_i)      x = sum w_i x_i / sum w_i        n = sum w_i n_i / |sum w_i n_i|
 //! ```
 //!
-//! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. The normal
-//! is that of the tool: `t_i` is the gradient of its distance at a piece, from the piece towards the tool. On a plane all parts along
-//! the plane cancel, for the integral of `grad phi(s)`, `phi' = (1 - s/m)^2`, over it is zero; so it is the body's normal there. On an
-//! edge it is the tool's, whereas the mean of the sides' own normals turns over from one side of a blade to the other. The factor
+//! for `s_i < m`. The contact's middle `x` and normal `n` are means over them, and so are all fields known at the nodes. Over a sharp
+//! edge `n_i` is the tool's own normal instead (`edge_normal`), for the mean of the sides' turns over between them. The factor
 //! `eta` excludes pieces that face away from the tool's middle, in the direction `d_i`, as the other side of a plate does. The
 //! plane of the contact is raised over `x` to the highest piece that the tool may touch. All this is a function of the tool's pose
 //! alone with exact derivatives, as long as the tool's middle has not sunk in; from then on the middle is taken as lifted along the
@@ -19,6 +17,7 @@
 //! tick is therefore flattened to that plane, completely if it is steeper than 78 degrees and not at all up to 45. It is pressed by
 //! an additional contact of the same tool, on a plane of its own. A piece belongs to the plane that it is most parallel to.
 
+mod edge_normal;
 mod near;
 
 use glam::{DMat3, DVec3};
@@ -54,9 +53,6 @@ const WALL_SHARE: f64 = 0.9;
 const LEAST_COMMON_NORMAL: f64 = 0.05;
 /// Distance of a piece from the tool lowers its height for the plane by this factor.
 const DISTANCE_SLOPE: f64 = 4.0;
-/// Distances of a piece, over the tool's thickness, from which the tool's normal begins to count there, and counts alone: deep inside
-/// of a tool, beyond its middle surfaces, its normal jumps.
-const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
 /// Largest cosine between a piece's normal and the motion of the tool, which does not come through the body.
 const MOTION_COSINE: f64 = 0.5;
 /// Least cosine between a piece's normal and the direction to the tool for a contact to begin there.
@@ -115,7 +111,7 @@ pub struct FootprintScratch {
     pub others: OtherPlanes,
 }
 
-/// Mean normal of the tool at the pieces, and its derivatives by the tool's position and rotation.
+/// Mean normal of the pieces, and its derivatives by the tool's position and rotation.
 #[derive(Clone, Copy)]
 struct MeanNormal {
     normal: DVec3,
@@ -131,6 +127,9 @@ struct Sums {
     place_by: [DMat3; 2],
     normal: DVec3,
     normal_by: [DMat3; 2],
+    /// Of places along their pieces' normals.
+    offset: f64,
+    offset_by: [DVec3; 2],
 }
 
 impl PressedSurface {
@@ -182,13 +181,14 @@ impl FootprintScratch {
     /// The footprint of a tool whose near pieces are known, and the weights of the fans below it. `None` if no piece is near.
     pub fn find(
         &mut self,
-        fine: &Tessellation,
-        smooth: &SmoothSurface,
+        tool: &PlacedShape<'_>,
+        (fine, smooth): (&Tessellation, &SmoothSurface),
         known: Plane,
         weights: &mut FanWeights,
     ) -> Option<Footprint> {
         self.flatten_walls(fine, known);
-        let sums = self.sum()?;
+        let mut sums = self.sum()?;
+        self.turn_to_tool(tool, &mut sums);
         let MeanNormal { normal, by: normal_by } = sums.mean_normal(known.normal);
         let inverse = 1.0 / sums.weight;
         let middle = sums.place * inverse;
@@ -231,18 +231,22 @@ impl FootprintScratch {
             place_by: [DMat3::ZERO; 2],
             normal: DVec3::ZERO,
             normal_by: [DMat3::ZERO; 2],
+            offset: 0.0,
+            offset_by: [DVec3::ZERO; 2],
         };
         for near in &self.near.pieces {
             let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
             let place = near.middle - self.near.centre;
             sums.weight += weight;
             sums.place += place * weight;
-            let (normal, normal_by) = near.contact_normal();
-            sums.normal += normal * weight;
+            sums.normal += near.normal * weight;
+            let offset = place.dot(near.normal);
+            sums.offset += offset * weight;
             for k in 0..2 {
                 sums.weight_by[k] += by[k];
                 sums.place_by[k] += outer(place, by[k]);
-                sums.normal_by[k] += outer(normal, by[k]) + normal_by[k] * weight;
+                sums.normal_by[k] += outer(near.normal, by[k]);
+                sums.offset_by[k] += by[k] * offset;
             }
         }
         (sums.weight > 0.0).then_some(sums)
@@ -316,15 +320,6 @@ impl NearPiece {
         let area = self.area * self.contact_share;
         let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * area);
         Some((area * nearness * nearness * eta, by))
-    }
-
-    /// Normal that the piece gives to the contact, and its derivatives: the tool's or, deep in the tool, its own.
-    fn contact_normal(&self) -> (DVec3, [DMat3; 2]) {
-        let (share, rise) = smooth_step(self.distance / self.thickness, OWN_NORMAL);
-        let difference = self.by_pose[0] - self.normal;
-        let rise = rise / self.thickness;
-        let by = [0, 1].map(|k| self.tool_normal_by[k] * share + outer(difference, self.by_pose[k]) * rise);
-        (self.normal + difference * share, by)
     }
 
     /// Share to which the piece is a wall rising over a plane: one if it is steep, or more parallel to one of the `others`, and the

@@ -48,18 +48,17 @@ pub struct NearPiece {
     pub normal: DVec3,
     /// Its area, m^2.
     pub area: f64,
-    /// Half width of the tool, m.
-    pub thickness: f64,
     /// Farthest corner from the middle, m.
     pub size: f64,
     /// Share that belongs to the contact: less than one for a wall that rises over it.
     pub contact_share: f64,
     /// Distance of the middle from the tool, m, negative inside.
     pub distance: f64,
-    /// Its derivatives by the tool's position, and by its rotation about its origin, m. The first is the tool's own normal, from the
-    /// piece towards the tool.
+    /// Its derivatives by the tool's position, and by its rotation about its origin, m.
     pub by_pose: [DVec3; 2],
-    /// Derivatives of that normal by the tool's position and rotation; zero beyond the margin.
+    /// The tool's own normal, from the piece towards the tool, where it has been found.
+    pub tool_normal: DVec3,
+    /// Its derivatives by the tool's position and rotation.
     pub tool_normal_by: [DMat3; 2],
     /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing_cosine: f64,
@@ -80,6 +79,8 @@ pub struct NearPieces {
     pub margin: f64,
     /// The plane to which walls have been flattened, beside which others.
     pub(super) flattened_to: Option<(Plane, OtherPlanes)>,
+    /// Whether the pieces have the tool's normals.
+    has_tool_normals: bool,
     /// Key of the latest search, and the present position of the tool, m.
     key: Option<SearchKey>,
     position: DVec3,
@@ -105,6 +106,7 @@ impl Default for NearPieces {
             centre: DVec3::ZERO,
             margin: 0.0,
             flattened_to: None,
+            has_tool_normals: false,
             key: None,
             position: DVec3::ZERO,
         }
@@ -164,22 +166,23 @@ impl PlacedShape<'_> {
         (distance, by_pose)
     }
 
-    /// Derivatives of the tool's normal at a point, the first of the distance's derivatives, by position and rotation.
+    /// The tool's normal at a point, and its derivatives by position and rotation.
     ///
     /// With the gradient `g` of the distance, which turns by `H`, and the projection `P` across the contact's normal above the
-    /// tool's middle, the normal is `-P g` but for a constant.
-    fn normal_by_pose(&self, point: DVec3, centre: DVec3) -> [DMat3; 2] {
+    /// tool's middle, the normal is `-P g`.
+    fn normal(&self, point: DVec3, centre: DVec3) -> (DVec3, [DMat3; 2]) {
         let normal = self.contact_normal;
         let above = (point - centre).dot(normal);
         let at = point - normal * above.max(0.0) - self.position;
         let (gradient, turning) = self.shape.turning_gradient(self.rotation.transpose() * at);
         let turning = self.rotation * turning * self.rotation.transpose();
+        let gradient = self.rotation * gradient;
         if above <= 0.0 {
-            return [turning, skew(self.rotation * gradient) - turning * skew(at)];
+            return (-gradient, [turning, skew(gradient) - turning * skew(at)]);
         }
         let level = across(normal);
         let lifted = outer(normal, (centre - self.position).cross(normal)) + skew(at);
-        [level * turning * level, level * (skew(self.rotation * gradient) - turning * lifted)]
+        (-(level * gradient), [level * turning * level, level * (skew(gradient) - turning * lifted)])
     }
 }
 
@@ -217,14 +220,27 @@ impl NearPieces {
         self.centre += displacement;
         for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(displacement);
-            near.by_pose[0] += near.tool_normal_by[0] * displacement;
+            near.tool_normal += near.tool_normal_by[0] * displacement;
             near.facing_cosine += near.facing_cosine_by[0].dot(displacement);
+        }
+    }
+
+    /// Finds the tool's normals at the pieces that count, once after a search.
+    pub(super) fn find_tool_normals(&mut self, tool: &PlacedShape<'_>) {
+        if self.has_tool_normals {
+            return;
+        }
+        self.has_tool_normals = true;
+        let (centre, margin) = (self.centre, self.margin);
+        for near in self.pieces.iter_mut().filter(|near| near.distance < margin + MOVED * tool.shape.thickness()) {
+            (near.tool_normal, near.tool_normal_by) = tool.normal(near.middle, centre);
         }
     }
 
     fn search(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PlacedShape<'_>) {
         let (fine, margin) = (&pressed.fine, pressed.margin);
         self.flattened_to = None;
+        self.has_tool_normals = false;
         self.pieces.clear();
         self.opposite.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
@@ -247,11 +263,11 @@ impl NearPieces {
                 return;
             }
             for piece in triangle * count..(triangle + 1) * count {
-                let near = near_piece(fine, tool, piece, (centre, headroom, viewpoint), margin);
+                let near = near_piece(fine, tool, piece, (centre, headroom, viewpoint));
                 if near.distance < near.size + margin && self.pieces.len() < MAX_PIECES {
                     self.pieces.push(near);
                 } else if is_opposite {
-                    let near = near_piece(fine, &unlifted, piece, (centre, 0.0, centre), f64::NEG_INFINITY);
+                    let near = near_piece(fine, &unlifted, piece, (centre, 0.0, centre));
                     if near.distance < near.size + margin && self.opposite.len() < MAX_OPPOSITE {
                         self.opposite.push(near);
                     }
@@ -266,7 +282,6 @@ fn near_piece(
     tool: &PlacedShape<'_>,
     piece: u32,
     (centre, headroom, viewpoint): (DVec3, f64, DVec3),
-    margin: f64,
 ) -> NearPiece {
     let corners = fine.corners(piece);
     let [a, b, c] = corners;
@@ -275,7 +290,6 @@ fn near_piece(
     let size = corners.iter().map(|corner| corner.distance_squared(middle)).fold(0.0, f64::max).sqrt();
     let (distance, by_pose) = tool.distance(middle, centre, headroom);
     let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
-    let tool_normal_by = if distance < margin { tool.normal_by_pose(middle, centre) } else { [DMat3::ZERO; 2] };
     let (facing_cosine, facing_cosine_by) = tool.cosine_to_viewpoint((middle, normal), viewpoint);
     NearPiece {
         piece,
@@ -283,12 +297,12 @@ fn near_piece(
         middle,
         normal,
         area,
-        thickness: tool.shape.thickness(),
         size,
         contact_share: 1.0,
         distance,
         by_pose,
-        tool_normal_by,
+        tool_normal: DVec3::ZERO,
+        tool_normal_by: [DMat3::ZERO; 2],
         facing_cosine,
         facing_cosine_by,
     }

@@ -10,6 +10,7 @@
 use glam::{DMat3, DVec3};
 
 use super::super::super::shape::ToolShape;
+use crate::math::hypot;
 
 /// Most steps towards the direction of a side's support.
 const MAX_SUPPORT_STEPS: usize = 50;
@@ -76,11 +77,11 @@ impl ToolInSurfaceFrame<'_> {
     fn axes(&self) -> ([DVec3; 2], DVec3) {
         let extents = self.rotation * self.shape.extents() * self.rotation.transpose();
         let (difference, mixed) = (extents.x_axis.x - extents.y_axis.y, 2.0 * extents.x_axis.y);
-        let spread = difference.hypot(mixed);
+        let spread = hypot(difference, mixed);
         if spread <= LEAST_SINE * LEAST_SINE {
             return ([DVec3::X, DVec3::Y], DVec3::ZERO);
         }
-        let (sin, cos) = (0.5 * mixed.atan2(difference)).sin_cos();
+        let (sin, cos) = half_angle(difference / spread, mixed / spread);
         let (first, second) = (DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0));
         let turning = (extents * second).cross(first) + (extents * first).cross(second);
         ([first, second], turning / spread)
@@ -154,4 +155,14 @@ impl RectangleSide {
     fn reversed(self) -> Self {
         Self { coordinate: -self.coordinate, gradient: -self.gradient, by_surface: -self.by_surface, ..self }
     }
+}
+
+/// Sine and cosine, the latter not negative, of half of an angle.
+fn half_angle(cos: f64, sin: f64) -> (f64, f64) {
+    if cos >= 0.0 {
+        let half = (0.5 * (1.0 + cos)).sqrt();
+        return (0.5 * sin / half, half);
+    }
+    let half = (0.5 * (1.0 - cos)).sqrt();
+    (half.copysign(sin), 0.5 * sin.abs() / half)
 }

@@ -1,0 +1,84 @@
+//! The normal of a contact over a sharp edge: that of the tool.
+//!
+//! The mean of the pieces' own normals `n_i` turns over from one side of a blade to the other while the tool moves by a fraction of its
+//! radius. The gradient `t_i` of the tool's distance, from a piece towards the tool, does not. So a share `c` of the contact's
+//! normal is the tool's,
+//!
+//! ```text
+//! n ~ sum w_i (n_i + c (t_i - n_i))        c = step(1 - N^2) step((mean(n_i . x_i) - N . X)/h)
+//! ```
+//!
+//! with the means `N` of the normals and `X` of the places, and the tool's half width `h`. The first factor is zero where the surface
+//! is nearly plane, the second one in creases, where the tool's normals point from one wall to the other. On a plane both normals
+//! are the same, for `sum w_i t_i` along it is the integral of the gradient of a function that ends at zero.
+
+use glam::{DMat3, DVec3};
+
+use super::{FootprintScratch, NearPiece, PlacedShape, Sums, smooth_step};
+use crate::tensor::outer;
+
+/// Distances of a piece, over the tool's thickness, from which the tool's normal begins to count there, and counts alone: deep inside
+/// of a tool, beyond its middle surfaces, its normal jumps.
+const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
+/// Spread of the pieces' normals, one less the square of their mean, from which an edge is sharp, and fully so.
+const SHARP: [f64; 2] = [0.1, 0.3];
+/// How far the pieces open like a fan, over the tool's thickness, from which the edge bulges, and fully so.
+const BULGING: [f64; 2] = [0.0, 0.02];
+
+impl FootprintScratch {
+    /// Mixes the tool's own normals into the sum of normals, over a sharp edge that bulges.
+    pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, sums: &mut Sums) {
+        let (share, share_by) = sums.sharpness(tool.shape.thickness());
+        if share == 0.0 {
+            return;
+        }
+        self.near.find_tool_normals(tool);
+        let (mut difference, mut difference_by) = (DVec3::ZERO, [DMat3::ZERO; 2]);
+        for near in &self.near.pieces {
+            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
+            let (turned, turned_by) = near.turned(tool.shape.thickness());
+            difference += turned * weight;
+            for k in 0..2 {
+                difference_by[k] += outer(turned, by[k]) + turned_by[k] * weight;
+            }
+        }
+        sums.normal += difference * share;
+        for k in 0..2 {
+            sums.normal_by[k] += difference_by[k] * share + outer(difference, share_by[k]);
+        }
+    }
+}
+
+impl NearPiece {
+    /// Difference of the tool's normal and the piece's own, and its derivatives; zero deep in the tool.
+    fn turned(&self, thickness: f64) -> (DVec3, [DMat3; 2]) {
+        let (share, rise) = smooth_step(self.distance / thickness, OWN_NORMAL);
+        let difference = self.tool_normal - self.normal;
+        let rise = rise / thickness;
+        let by = [0, 1].map(|k| self.tool_normal_by[k] * share + outer(difference, self.by_pose[k]) * rise);
+        (difference * share, by)
+    }
+}
+
+impl Sums {
+    /// Share to which the pieces are a sharp edge that bulges, and its derivatives: with mean normal `n` and place `x`, the
+    /// pieces' normals spread by `1 - n^2`, and `mean(n_i . x_i) - n . x` is positive where they open like a fan.
+    fn sharpness(&self, thickness: f64) -> (f64, [DVec3; 2]) {
+        let inverse = 1.0 / self.weight;
+        let (normal, place, offset) = (self.normal * inverse, self.place * inverse, self.offset * inverse);
+        let (spread, slope) = smooth_step(1.0 - normal.length_squared(), SHARP);
+        if spread == 0.0 {
+            return (0.0, [DVec3::ZERO; 2]);
+        }
+        let (fan, fan_slope) = smooth_step((offset - normal.dot(place)) / thickness, BULGING);
+        let by = [0, 1].map(|k| {
+            let weight_by = self.weight_by[k];
+            let normal_by = (self.normal_by[k] - outer(normal, weight_by)) * inverse;
+            let place_by = (self.place_by[k] - outer(place, weight_by)) * inverse;
+            let offset_by = (self.offset_by[k] - weight_by * offset) * inverse;
+            let fan_by = offset_by - normal_by.transpose() * place - place_by.transpose() * normal;
+            fan_by * (spread * fan_slope / thickness) - normal_by.transpose() * normal * (2.0 * slope * fan)
+        });
+        (spread * fan, by)
+    }
+}
