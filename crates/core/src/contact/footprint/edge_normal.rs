@@ -82,3 +82,59 @@ impl Sums {
         (spread * fan, by)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+    use crate::contact::SurfaceQuery;
+    use crate::contact::footprint::{Plane, PressedSurface};
+    use crate::contact::regular::FanFields;
+    use crate::contact::shape::ToolShape;
+    use crate::contact::smooth::tests::{cube, near};
+    use crate::contact::smooth::{FanWeights, SmoothSurface};
+
+    /// From one side of a cube's edge to the other the normal's derivatives are its differences over small motions and rotations.
+    #[test]
+    fn over_an_edge_the_normal_turns_as_its_derivatives_say() {
+        let surface = cube();
+        let (query, smooth) = (SurfaceQuery::new(&surface).expect("triangles"), SmoothSurface::new(&surface));
+        let fields = vec![FanFields::default(); smooth.fans().len()];
+        let shapes = [
+            ToolShape::ellipsoid(DVec3::new(0.2, 0.15, 0.1)).expect("a shape"),
+            ToolShape::punch(0.1, 0.03).expect("a shape"),
+            ToolShape::capsule(0.1, 0.1).expect("a shape"),
+        ];
+        for shape in &shapes {
+            let pressed = PressedSurface::new(&surface, &query, &smooth, &fields, shape.thickness());
+            let mut weights = FanWeights::new(near(&smooth));
+            let mut normal_at = |place: DVec3, orientation: DQuat, towards: DVec3| {
+                let mut scratch = FootprintScratch::default();
+                let (rotation, penetration) = (DMat3::from_quat(orientation), 0.01);
+                let at = PlacedShape { shape, position: place, rotation, contact_normal: towards, penetration };
+                let known = Plane { point: DVec3::new(1.0, 0.52, 1.0), normal: towards };
+                scratch.near.find(&pressed, &query, &at);
+                scratch.find(&at, (&pressed.fine, &smooth), known, &mut weights).expect("a footprint")
+            };
+            for k in 0..9 {
+                let angle = (f64::from(k) * 11.25 + 0.3).to_radians();
+                let towards = DVec3::new(angle.sin(), 0.02, angle.cos()).normalize();
+                let orientation = DQuat::from_rotation_arc(DVec3::Z, towards) * DQuat::from_rotation_x(0.4);
+                let lowest = orientation * shape.support(orientation.conjugate() * -towards);
+                let place = DVec3::new(1.0, 0.52, 1.0) - lowest - 0.01 * towards;
+                let by = normal_at(place, orientation, towards).normal_by;
+                let h = 1e-6;
+                for axis in DVec3::AXES {
+                    let moved = [h, -h].map(|h| normal_at(place + h * axis, orientation, towards).normal);
+                    let turned = |h: f64| DQuat::from_scaled_axis(h * axis) * orientation;
+                    let turned = [h, -h].map(|h| normal_at(place, turned(h), towards).normal);
+                    for ([ahead, behind], by) in [(moved, by[0]), (turned, by[1])] {
+                        let error = ((ahead - behind) / (2.0 * h) - by * axis).length();
+                        assert!(error < 1e-3 * (1.0 / shape.thickness()), "{error:e} {shape:?} {angle} {axis}");
+                    }
+                }
+            }
+        }
+    }
+}
