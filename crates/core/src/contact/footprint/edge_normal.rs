@@ -21,9 +21,9 @@ use crate::tensor::outer;
 /// of a tool, beyond its middle surfaces, its normal jumps.
 const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
 /// Spread of the pieces' normals, one less the square of their mean, from which an edge is sharp, and fully so.
-const SHARP: [f64; 2] = [0.1, 0.3];
+const SHARP: [f64; 2] = [0.05, 0.2];
 /// How far the pieces open like a fan, over the tool's thickness, from which the edge bulges, and fully so.
-const BULGING: [f64; 2] = [0.0, 0.02];
+const BULGING: [f64; 2] = [-0.01, 0.0];
 
 impl FootprintScratch {
     /// Mixes the tool's own normals into the sum of normals, over a sharp edge that bulges.
