@@ -20,10 +20,10 @@ use crate::tensor::outer;
 /// Distances of a piece, over the tool's thickness, from which the tool's normal begins to count there, and counts alone: deep inside
 /// of a tool, beyond its middle surfaces, its normal jumps.
 const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
-/// Spread of the pieces' normals, one less the square of their mean, from which an edge is sharp, and fully so.
-const SHARP: [f64; 2] = [0.05, 0.2];
 /// How far the pieces open like a fan, over the tool's thickness, from which the edge bulges, and fully so.
-const BULGING: [f64; 2] = [-0.01, 0.0];
+const BULGING: [f64; 2] = [-0.02, 0.0];
+/// Share of walls in what is near the tool from which the contact lies in a hollow, and fully so.
+const WALLS: [f64; 2] = [0.0, 0.1];
 
 impl FootprintScratch {
     /// Mixes the tool's own normals into the sum of normals, over a sharp edge that bulges.
@@ -66,10 +66,6 @@ impl Sums {
     fn sharpness(&self, thickness: f64) -> (f64, [DVec3; 2]) {
         let inverse = 1.0 / self.weight;
         let (normal, place, offset) = (self.normal * inverse, self.place * inverse, self.offset * inverse);
-        let (spread, slope) = smooth_step(1.0 - normal.length_squared(), SHARP);
-        if spread == 0.0 {
-            return (0.0, [DVec3::ZERO; 2]);
-        }
         let (fan, fan_slope) = smooth_step((offset - normal.dot(place)) / thickness, BULGING);
         let by = [0, 1].map(|k| {
             let weight_by = self.weight_by[k];
@@ -77,9 +73,16 @@ impl Sums {
             let place_by = (self.place_by[k] - outer(place, weight_by)) * inverse;
             let offset_by = (self.offset_by[k] - weight_by * offset) * inverse;
             let fan_by = offset_by - normal_by.transpose() * place - place_by.transpose() * normal;
-            fan_by * (spread * fan_slope / thickness) - normal_by.transpose() * normal * (2.0 * slope * fan)
+            fan_by * (fan_slope / thickness)
         });
-        (spread * fan, by)
+        // Beside a wall the contact's pieces end as at an edge.
+        let all = self.weight + self.walls;
+        let (hollow, slope) = smooth_step(self.walls / all, WALLS);
+        let by = [0, 1].map(|k| {
+            let walls_by = (self.walls_by[k] * self.weight - self.weight_by[k] * self.walls) / (all * all);
+            by[k] * (1.0 - hollow) - walls_by * (slope * fan)
+        });
+        (fan * (1.0 - hollow), by)
     }
 }
 

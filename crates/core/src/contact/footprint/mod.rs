@@ -130,6 +130,9 @@ struct Sums {
     /// Of places along their pieces' normals.
     offset: f64,
     offset_by: [DVec3; 2],
+    /// Weight of the walls beside them, which are no part of the contact.
+    walls: f64,
+    walls_by: [DVec3; 2],
 }
 
 impl PressedSurface {
@@ -233,16 +236,21 @@ impl FootprintScratch {
             normal_by: [DMat3::ZERO; 2],
             offset: 0.0,
             offset_by: [DVec3::ZERO; 2],
+            walls: 0.0,
+            walls_by: [DVec3::ZERO; 2],
         };
         for near in &self.near.pieces {
-            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
+            let Some((whole, whole_by)) = near.weigh_whole(self.near.margin) else { continue };
+            let (weight, by) = (whole * near.contact_share, whole_by.map(|by| by * near.contact_share));
             let place = near.middle - self.near.centre;
+            sums.walls += whole - weight;
             sums.weight += weight;
             sums.place += place * weight;
             sums.normal += near.normal * weight;
             let offset = place.dot(near.normal);
             sums.offset += offset * weight;
             for k in 0..2 {
+                sums.walls_by[k] += whole_by[k] - by[k];
                 sums.weight_by[k] += by[k];
                 sums.place_by[k] += outer(place, by[k]);
                 sums.normal_by[k] += outer(near.normal, by[k]);
@@ -309,17 +317,22 @@ impl FootprintScratch {
 }
 
 impl NearPiece {
-    /// Weight of a piece, and its derivatives by the tool's position and rotation; `None` for zero.
+    /// Weight of a piece in the contact, and its derivatives by the tool's position and rotation; `None` for zero.
     fn weigh(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
+        let (whole, by) = self.weigh_whole(margin)?;
+        Some((whole * self.contact_share, by.map(|by| by * self.contact_share)))
+    }
+
+    /// Weight of a piece, whether it belongs to the contact or to a wall, and its derivatives.
+    fn weigh_whole(&self, margin: f64) -> Option<(f64, [DVec3; 2])> {
         let nearness = 1.0 - self.distance / margin;
         let (eta, rise) = smooth_step(self.facing_cosine, FACING);
         if nearness <= 0.0 || eta <= 0.0 {
             return None;
         }
         let (by_distance, by_facing) = (-2.0 * nearness * eta / margin, nearness * nearness * rise);
-        let area = self.area * self.contact_share;
-        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * area);
-        Some((area * nearness * nearness * eta, by))
+        let by = [0, 1].map(|k| (self.by_pose[k] * by_distance + self.facing_cosine_by[k] * by_facing) * self.area);
+        Some((self.area * nearness * nearness * eta, by))
     }
 
     /// Share to which the piece is a wall rising over a plane: one if it is steep, or more parallel to one of the `others`, and the
