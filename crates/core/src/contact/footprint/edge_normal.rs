@@ -1,0 +1,143 @@
+//! The normal of a contact over a sharp edge: that of the tool.
+//!
+//! The mean of the pieces' own normals `n_i` turns over from one side of a blade to the other while the tool moves by a fraction of its
+//! radius. The gradient `t_i` of the tool's distance, from a piece towards the tool, does not. So a share `c` of the contact's
+//! normal is the tool's,
+//!
+//! ```text
+//! n ~ sum w_i (n_i + c (t_i - n_i))        c = step(1 - N^2) step((mean(n_i . x_i) - N . X)/h)
+//! ```
+//!
+//! with the means `N` of the normals and `X` of the places, and the tool's half width `h`. The first factor is zero where the surface
+//! is nearly plane, the second one in creases, where the tool's normals point from one wall to the other. On a plane both normals
+//! are the same, for `sum w_i t_i` along it is the integral of the gradient of a function that ends at zero.
+
+use glam::{DMat3, DVec3};
+
+use super::{FootprintScratch, NearPiece, PlacedShape, Sums, smooth_step};
+use crate::tensor::outer;
+
+/// Distances of a piece, over the tool's thickness, from which the tool's normal begins to count there, and counts alone: deep inside
+/// of a tool, beyond its middle surfaces, its normal jumps.
+const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
+/// How far the pieces open like a fan, over the tool's thickness, from which the edge bulges, and fully so.
+const BULGING: [f64; 2] = [-0.02, 0.0];
+/// Share of walls in what is near the tool from which the contact lies in a hollow, and fully so.
+const WALLS: [f64; 2] = [0.0, 0.1];
+
+impl FootprintScratch {
+    /// Mixes the tool's own normals into the sum of normals, over a sharp edge that bulges.
+    pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, sums: &mut Sums) {
+        let (share, share_by) = sums.sharpness(tool.shape.thickness());
+        if share == 0.0 {
+            return;
+        }
+        self.near.find_tool_normals(tool);
+        let (mut difference, mut difference_by) = (DVec3::ZERO, [DMat3::ZERO; 2]);
+        for near in &self.near.pieces {
+            let Some((weight, by)) = near.weigh(self.near.margin) else { continue };
+            let (turned, turned_by) = near.turned(tool.shape.thickness());
+            difference += turned * weight;
+            for k in 0..2 {
+                difference_by[k] += outer(turned, by[k]) + turned_by[k] * weight;
+            }
+        }
+        sums.normal += difference * share;
+        for k in 0..2 {
+            sums.normal_by[k] += difference_by[k] * share + outer(difference, share_by[k]);
+        }
+    }
+}
+
+impl NearPiece {
+    /// Difference of the tool's normal and the piece's own, and its derivatives; zero deep in the tool.
+    fn turned(&self, thickness: f64) -> (DVec3, [DMat3; 2]) {
+        let (share, rise) = smooth_step(self.distance / thickness, OWN_NORMAL);
+        let difference = self.tool_normal - self.normal;
+        let rise = rise / thickness;
+        let by = [0, 1].map(|k| self.tool_normal_by[k] * share + outer(difference, self.by_pose[k]) * rise);
+        (difference * share, by)
+    }
+}
+
+impl Sums {
+    /// Share to which the pieces are a sharp edge that bulges, and its derivatives: with mean normal `n` and place `x`, the
+    /// pieces' normals spread by `1 - n^2`, and `mean(n_i . x_i) - n . x` is positive where they open like a fan.
+    fn sharpness(&self, thickness: f64) -> (f64, [DVec3; 2]) {
+        let inverse = 1.0 / self.weight;
+        let (normal, place, offset) = (self.normal * inverse, self.place * inverse, self.offset * inverse);
+        let (fan, fan_slope) = smooth_step((offset - normal.dot(place)) / thickness, BULGING);
+        let by = [0, 1].map(|k| {
+            let weight_by = self.weight_by[k];
+            let normal_by = (self.normal_by[k] - outer(normal, weight_by)) * inverse;
+            let place_by = (self.place_by[k] - outer(place, weight_by)) * inverse;
+            let offset_by = (self.offset_by[k] - weight_by * offset) * inverse;
+            let fan_by = offset_by - normal_by.transpose() * place - place_by.transpose() * normal;
+            fan_by * (fan_slope / thickness)
+        });
+        // Beside a wall the contact's pieces end as at an edge.
+        let all = self.weight + self.walls;
+        let (hollow, slope) = smooth_step(self.walls / all, WALLS);
+        let by = [0, 1].map(|k| {
+            let walls_by = (self.walls_by[k] * self.weight - self.weight_by[k] * self.walls) / (all * all);
+            by[k] * (1.0 - hollow) - walls_by * (slope * fan)
+        });
+        (fan * (1.0 - hollow), by)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+    use crate::contact::SurfaceQuery;
+    use crate::contact::footprint::{Plane, PressedSurface};
+    use crate::contact::regular::FanFields;
+    use crate::contact::shape::ToolShape;
+    use crate::contact::smooth::tests::{cube, near};
+    use crate::contact::smooth::{FanWeights, SmoothSurface};
+
+    /// From one side of a cube's edge to the other the normal's derivatives are its differences over small motions and rotations.
+    #[test]
+    fn over_an_edge_the_normal_turns_as_its_derivatives_say() {
+        let surface = cube();
+        let (query, smooth) = (SurfaceQuery::new(&surface).expect("triangles"), SmoothSurface::new(&surface));
+        let fields = vec![FanFields::default(); smooth.fans().len()];
+        let shapes = [
+            ToolShape::ellipsoid(DVec3::new(0.2, 0.15, 0.1)).expect("a shape"),
+            ToolShape::punch(0.1, 0.03).expect("a shape"),
+            ToolShape::capsule(0.1, 0.1).expect("a shape"),
+        ];
+        for shape in &shapes {
+            let pressed = PressedSurface::new(&surface, &query, &smooth, &fields, shape.thickness());
+            let mut weights = FanWeights::new(near(&smooth));
+            let mut normal_at = |place: DVec3, orientation: DQuat, towards: DVec3| {
+                let mut scratch = FootprintScratch::default();
+                let (rotation, penetration) = (DMat3::from_quat(orientation), 0.01);
+                let at = PlacedShape { shape, position: place, rotation, contact_normal: towards, penetration };
+                let known = Plane { point: DVec3::new(1.0, 0.52, 1.0), normal: towards };
+                scratch.near.find(&pressed, &query, &at);
+                scratch.find(&at, (&pressed.fine, &smooth), known, &mut weights).expect("a footprint")
+            };
+            for k in 0..9 {
+                let angle = (f64::from(k) * 11.25 + 0.3).to_radians();
+                let towards = DVec3::new(angle.sin(), 0.02, angle.cos()).normalize();
+                let orientation = DQuat::from_rotation_arc(DVec3::Z, towards) * DQuat::from_rotation_x(0.4);
+                let lowest = orientation * shape.support(orientation.conjugate() * -towards);
+                let place = DVec3::new(1.0, 0.52, 1.0) - lowest - 0.01 * towards;
+                let by = normal_at(place, orientation, towards).normal_by;
+                let h = 1e-6;
+                for axis in DVec3::AXES {
+                    let moved = [h, -h].map(|h| normal_at(place + h * axis, orientation, towards).normal);
+                    let turned = |h: f64| DQuat::from_scaled_axis(h * axis) * orientation;
+                    let turned = [h, -h].map(|h| normal_at(place, turned(h), towards).normal);
+                    for ([ahead, behind], by) in [(moved, by[0]), (turned, by[1])] {
+                        let error = ((ahead - behind) / (2.0 * h) - by * axis).length();
+                        assert!(error < 1e-3 * (1.0 / shape.thickness()), "{error:e} {shape:?} {angle} {axis}");
+                    }
+                }
+            }
+        }
+    }
+}
