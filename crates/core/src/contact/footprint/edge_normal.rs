@@ -1,16 +1,17 @@
-//! The normal of a contact over a sharp edge: that of the tool.
+//! The normal of a contact over an edge: that of the tool.
 //!
 //! The mean of the pieces' own normals `n_i` turns over from one side of a blade to the other while the tool moves by a fraction of its
 //! radius. The gradient `t_i` of the tool's distance, from a piece towards the tool, does not. So a share `c` of the contact's
 //! normal is the tool's,
 //!
 //! ```text
-//! n ~ sum w_i (n_i + c (t_i - n_i))        c = step(1 - N^2) step((mean(n_i . x_i) - N . X)/h)
+//! n ~ sum w_i (n_i + c (t_i - n_i))        c = step((mean(n_i . x_i) - N . X)/h) (1 - step(v/(v + sum w_i)))
 //! ```
 //!
-//! with the means `N` of the normals and `X` of the places, and the tool's half width `h`. The first factor is zero where the surface
-//! is nearly plane, the second one in creases, where the tool's normals point from one wall to the other. On a plane both normals
-//! are the same, for `sum w_i t_i` along it is the integral of the gradient of a function that ends at zero.
+//! with the means `N` of the normals and `X` of the places, the tool's half width `h`, and the weight `v` of walls beside the contact.
+//! The first factor is zero in creases, where the tool's normals point from one wall to the other. The second is zero beside
+//! a wall: the contact's pieces end there as at an edge, and the body does not. On a plane both normals are the same, for
+//! `sum w_i t_i` along it is the integral of the gradient of a function that ends at zero.
 
 use glam::{DMat3, DVec3};
 
@@ -20,15 +21,15 @@ use crate::tensor::outer;
 /// Distances of a piece, over the tool's thickness, from which the tool's normal begins to count there, and counts alone: deep inside
 /// of a tool, beyond its middle surfaces, its normal jumps.
 const OWN_NORMAL: [f64; 2] = [-0.75, -0.25];
-/// How far the pieces open like a fan, over the tool's thickness, from which the edge bulges, and fully so.
+/// Measure of a bulge, `mean(n_i . x_i) - N . X` over the tool's thickness, below which the pieces lie in a crease, and not at all.
 const BULGING: [f64; 2] = [-0.02, 0.0];
 /// Share of walls in what is near the tool from which the contact lies in a hollow, and fully so.
 const WALLS: [f64; 2] = [0.0, 0.1];
 
 impl FootprintScratch {
-    /// Mixes the tool's own normals into the sum of normals, over a sharp edge that bulges.
+    /// Mixes the tool's own normals into the sum of normals.
     pub(super) fn turn_to_tool(&mut self, tool: &PlacedShape<'_>, sums: &mut Sums) {
-        let (share, share_by) = sums.sharpness(tool.shape.thickness());
+        let (share, share_by) = sums.share_of_tool(tool.shape.thickness());
         if share == 0.0 {
             return;
         }
@@ -61,28 +62,28 @@ impl NearPiece {
 }
 
 impl Sums {
-    /// Share to which the pieces are a sharp edge that bulges, and its derivatives: with mean normal `n` and place `x`, the
-    /// pieces' normals spread by `1 - n^2`, and `mean(n_i . x_i) - n . x` is positive where they open like a fan.
-    fn sharpness(&self, thickness: f64) -> (f64, [DVec3; 2]) {
+    /// Share of the tool's normals, and its derivatives: with mean normal `n` and place `x`, the bulge `mean(n_i . x_i) - n . x` is
+    /// positive over an edge, and negative in a crease.
+    fn share_of_tool(&self, thickness: f64) -> (f64, [DVec3; 2]) {
         let inverse = 1.0 / self.weight;
         let (normal, place, offset) = (self.normal * inverse, self.place * inverse, self.offset * inverse);
-        let (fan, fan_slope) = smooth_step((offset - normal.dot(place)) / thickness, BULGING);
+        let (bulging, bulge_slope) = smooth_step((offset - normal.dot(place)) / thickness, BULGING);
         let by = [0, 1].map(|k| {
             let weight_by = self.weight_by[k];
             let normal_by = (self.normal_by[k] - outer(normal, weight_by)) * inverse;
             let place_by = (self.place_by[k] - outer(place, weight_by)) * inverse;
             let offset_by = (self.offset_by[k] - weight_by * offset) * inverse;
-            let fan_by = offset_by - normal_by.transpose() * place - place_by.transpose() * normal;
-            fan_by * (fan_slope / thickness)
+            let bulge_by = offset_by - normal_by.transpose() * place - place_by.transpose() * normal;
+            bulge_by * (bulge_slope / thickness)
         });
         // Beside a wall the contact's pieces end as at an edge.
         let all = self.weight + self.walls;
         let (hollow, slope) = smooth_step(self.walls / all, WALLS);
         let by = [0, 1].map(|k| {
             let walls_by = (self.walls_by[k] * self.weight - self.weight_by[k] * self.walls) / (all * all);
-            by[k] * (1.0 - hollow) - walls_by * (slope * fan)
+            by[k] * (1.0 - hollow) - walls_by * (slope * bulging)
         });
-        (fan * (1.0 - hollow), by)
+        (bulging * (1.0 - hollow), by)
     }
 }
 

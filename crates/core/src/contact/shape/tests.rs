@@ -219,6 +219,7 @@ fn sizes_that_are_none_are_refused() {
 fn the_gradient_turns_as_its_differences_do() {
     let (vertices, triangles) = sphere_mesh(0.008, 3);
     let mut all = shapes();
+    let vertices: Vec<[f64; 3]> = vertices.iter().map(DVec3::to_array).collect();
     all.push(ToolShape::surface(&vertices, &triangles).unwrap());
     for shape in all {
         let size = shape.thickness();

@@ -22,6 +22,7 @@ use glam::DVec3;
 use super::response::LocalResponse;
 use crate::contact::local::{DEEPEST_FIT, STRAIN_RATIOS};
 use crate::contact::shape::ToolShape;
+use crate::math::log;
 use crate::simulation::contacts::Contact;
 use crate::simulation::tool::ToolModel;
 
@@ -136,7 +137,7 @@ fn local_error(tool: &ToolModel, response: &LocalResponse) -> f64 {
 fn sticking(poisson: f64) -> f64 {
     let left = 1.0 - 2.0 * poisson;
     // It vanishes as the square of `left`.
-    if left < 1e-3 { 0.0 } else { (1.0 - poisson) * left.mul_add(2.0, 1.0).ln() / left - 1.0 }
+    if left < 1e-3 { 0.0 } else { (1.0 - poisson) * log(left.mul_add(2.0, 1.0)) / left - 1.0 }
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use glam::{DMat3, DVec3};
 use super::half_space::{HalfSpace, Indentation};
 use crate::contact::footprint::Footprint;
 use crate::contact::shape::ToolShape;
+use crate::math::pow;
 
 /// Largest `s`: beyond it the factor of the force stays.
 const DEEPEST: f64 = 1.25;
@@ -35,7 +36,7 @@ pub fn correct_shape(
     }
     let (length, by_normal) = radius_along(semi_axes, rotation, footprint.normal);
     let unit = half_space.modulus * length.powi(3);
-    let s = (15.0 / 8.0 * energy / unit).powf(0.2);
+    let s = pow(15.0 / 8.0 * energy / unit, 0.2);
     let within = s.min(DEEPEST);
     // Beyond the largest s, at the energy U_m, G = U_m h_m + g_m (U - U_m).
     let (mut force_factor, mut energy_factor, mut slope, mut by_s, mut power) = (1.0, 1.0, 0.0, 0.0, 1.0);
