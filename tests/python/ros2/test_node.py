@@ -110,8 +110,8 @@ class Node:
         return
 
 
-@pytest.fixture
-def node(monkeypatch, block, block_green):
+def node_of(patch: pytest.MonkeyPatch, built: BuiltScene):
+    """The example's node with a scene, on stand-ins for the modules of ROS 2."""
     modules = {
         "rclpy": {},
         "rclpy.node": {"Node": Node},
@@ -123,15 +123,20 @@ def node(monkeypatch, block, block_green):
     for name, contents in modules.items():
         module = types.ModuleType(name)
         vars(module).update(contents)
-        monkeypatch.setitem(sys.modules, name, module)
+        patch.setitem(sys.modules, name, module)
     spec = importlib.util.spec_from_file_location("palpate_node", NODE)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    patch.setattr(palpate.Scene, "read", lambda path: built)
+    return module.PalpateNode()
+
+
+@pytest.fixture
+def node(monkeypatch, block, block_green):
     scene = Scene(body={"model": "beam"}, tool={"radius": 0.006}, device={"ramp": 0.0}, view={"strain_limit": 0})
-    monkeypatch.setattr(palpate.Scene, "read", lambda path: BuiltScene.of(scene, block, block_green))
-    made = module.PalpateNode()
-    yield made
-    made.close()
+    running = node_of(monkeypatch, BuiltScene.of(scene, block, block_green))
+    yield running
+    running.close()
 
 
 def pose(z: float):
