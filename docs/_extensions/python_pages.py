@@ -23,6 +23,7 @@ CHAPTERS = {
     "Scenes and the force loop": ("Scene", "Simulation", "Frame", "Contact", "pack"),
     "Contact as a sensor": ("Sensor", "SensorContacts"),
     "Fit to measurements": ("fit", "Fit", "FittedParameter", "Indentations"),
+    "Notebooks": ("widget",),
     "Devices": ("Device", "DeviceLimits", "Reading"),
     "Recordings": (
         *("Recording", "RecordingStatus", "replay", "Replayed", "Difference", "rerun", "compare", "Comparison"),

@@ -118,7 +118,7 @@ def test_motions_under_the_local_law_are_in_contact(monkeypatch, plates):
     names = list(tick._motions(press_centres(plates[SMALL][0], [(0.0, 0.0)])[0]))
     assert len(names) == 11
     for name in names:
-        play = tick._local_play(SMALL, name)
+        play = tick.local_play(SMALL, name)
         upright = np.broadcast_to(np.array(play.orientation), (*play.path.shape[:2], 4))
         forces = play.simulation.play(play.path, orientations=upright).forces
         touching = (np.linalg.norm(forces.reshape(len(forces), -1, 3), axis=2) > 0)[-tick.TICKS :]

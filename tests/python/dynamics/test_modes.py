@@ -83,7 +83,7 @@ def test_modes_of_another_body_are_refused(block, tmp_path):
     heavier = palpate.Body(block.mesh, material=palpate.Material(10e3, 0.4, 1100.0), fixed=block.fixed_nodes)
     with pytest.raises(palpate.StoreError, match="materials"):
         palpate.ModalBasis.load(path, body=heavier)
-    with pytest.raises(palpate.StoreError, match="consistent mass matrix, the lumped"):
+    with pytest.raises(palpate.StoreError, match="consistent mass matrix, but the lumped"):
         palpate.ModalBasis.load(path, mass="lumped")
     nodes = block.mesh.nodes.copy()
     nodes[-1] *= 1.0 + 1e-12

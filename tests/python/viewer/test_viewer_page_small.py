@@ -90,7 +90,7 @@ def test_a_press_on_the_inside_of_a_cut_is_answered(chromium, block_program):
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         page.mouse.down()
         page.mouse.up()
-        page.get_by_text("The cut shows the inside, which no tool reaches").wait_for()
+        page.get_by_text("No tool reaches the inside that the cut shows").wait_for()
 
 
 def test_a_press_goes_on_with_another_tool(chromium, block_program):

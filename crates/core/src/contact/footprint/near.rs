@@ -5,7 +5,6 @@ use glam::{DMat3, DVec3};
 use super::{OtherPlanes, Plane, PressedSurface};
 use crate::contact::shape::ToolShape;
 use crate::contact::{SurfaceQuery, Tessellation};
-use crate::tensor::{across, outer, skew};
 
 /// Motion of a tool, over its thickness, below which the near pieces stay the same.
 const MOVED: f64 = 1e-3;
@@ -56,10 +55,6 @@ pub struct NearPiece {
     pub distance: f64,
     /// Its derivatives by the tool's position, and by its rotation about its origin, m.
     pub by_pose: [DVec3; 2],
-    /// The tool's own normal, from the piece towards the tool, where it has been found.
-    pub tool_normal: DVec3,
-    /// Its derivatives by the tool's position and rotation.
-    pub tool_normal_by: [DMat3; 2],
     /// Cosine between the normal and the direction to the tool's viewpoint.
     pub facing_cosine: f64,
     /// Its derivatives by the tool's position and rotation.
@@ -79,8 +74,6 @@ pub struct NearPieces {
     pub margin: f64,
     /// The plane to which walls have been flattened, beside which others.
     pub(super) flattened_to: Option<(Plane, OtherPlanes)>,
-    /// Whether the pieces have the tool's normals.
-    has_tool_normals: bool,
     /// Key of the latest search, and the present position of the tool, m.
     key: Option<SearchKey>,
     position: DVec3,
@@ -106,7 +99,6 @@ impl Default for NearPieces {
             centre: DVec3::ZERO,
             margin: 0.0,
             flattened_to: None,
-            has_tool_normals: false,
             key: None,
             position: DVec3::ZERO,
         }
@@ -165,25 +157,6 @@ impl PlacedShape<'_> {
         by_pose[1] += arm.cross(self.contact_normal) * rise;
         (distance, by_pose)
     }
-
-    /// The tool's normal at a point, and its derivatives by position and rotation.
-    ///
-    /// With the gradient `g` of the distance, which turns by `H`, and the projection `P` across the contact's normal above the
-    /// tool's middle, the normal is `-P g`.
-    fn normal(&self, point: DVec3, centre: DVec3) -> (DVec3, [DMat3; 2]) {
-        let normal = self.contact_normal;
-        let above = (point - centre).dot(normal);
-        let at = point - normal * above.max(0.0) - self.position;
-        let (gradient, turning) = self.shape.turning_gradient(self.rotation.transpose() * at);
-        let turning = self.rotation * turning * self.rotation.transpose();
-        let gradient = self.rotation * gradient;
-        if above <= 0.0 {
-            return (-gradient, [turning, skew(gradient) - turning * skew(at)]);
-        }
-        let level = across(normal);
-        let lifted = outer(normal, (centre - self.position).cross(normal)) + skew(at);
-        (-(level * gradient), [level * turning * level, level * (skew(gradient) - turning * lifted)])
-    }
 }
 
 impl NearPieces {
@@ -220,27 +193,13 @@ impl NearPieces {
         self.centre += displacement;
         for near in self.pieces.iter_mut().chain(&mut self.opposite) {
             near.distance += near.by_pose[0].dot(displacement);
-            near.tool_normal += near.tool_normal_by[0] * displacement;
             near.facing_cosine += near.facing_cosine_by[0].dot(displacement);
-        }
-    }
-
-    /// Finds the tool's normals at the pieces that count, once after a search.
-    pub(super) fn find_tool_normals(&mut self, tool: &PlacedShape<'_>) {
-        if self.has_tool_normals {
-            return;
-        }
-        self.has_tool_normals = true;
-        let (centre, margin) = (self.centre, self.margin);
-        for near in self.pieces.iter_mut().filter(|near| near.distance < margin + MOVED * tool.shape.thickness()) {
-            (near.tool_normal, near.tool_normal_by) = tool.normal(near.middle, centre);
         }
     }
 
     fn search(&mut self, pressed: &PressedSurface, query: &SurfaceQuery, tool: &PlacedShape<'_>) {
         let (fine, margin) = (&pressed.fine, pressed.margin);
         self.flattened_to = None;
-        self.has_tool_normals = false;
         self.pieces.clear();
         self.opposite.clear();
         (self.centre, self.margin) = (tool.centre(), margin);
@@ -301,8 +260,6 @@ fn near_piece(
         contact_share: 1.0,
         distance,
         by_pose,
-        tool_normal: DVec3::ZERO,
-        tool_normal_by: [DMat3::ZERO; 2],
         facing_cosine,
         facing_cosine_by,
     }
