@@ -35,8 +35,9 @@ def running(*options, cwd):
     finally:
         process.send_signal(signal.SIGINT)
         with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(20)
+            process.wait(60)
         process.kill()
+        process.wait()
 
 
 def wait_for_port(port: int, process, folder) -> None:
