@@ -30,7 +30,7 @@ from palpate.viewer.site import find_program
 HARNESS = Path(__file__).with_name("web_ticks.mjs")
 # A tick in a page may take so many times as long as a native one: measured 0.8 to 1.5.
 AIM = 3.0
-# Rounds, in each of which both sides play once after a play that warms them up.
+# Rounds. In a round each side plays once to warm up, and once that is timed.
 ROUNDS = 3
 
 
@@ -72,11 +72,12 @@ def measure(name: str) -> WebRow:
         folder.mkdir()
         built = BuiltScene(play.simulation.scene, play.simulation.bodies)
         (folder / SCENE_FILE).write_text(json.dumps(describe(built, folder, inside=False)))
+        expected = _native_forces(play).tobytes()
         for _ in range(ROUNDS):
             native.append(tick_times(play.simulation, play.path, 2, play.orientation)[1:])
             times, forces = _web_times(play, folder, Path(where))
             web.append(times[1:])
-            same &= forces.tobytes() == _native_forces(play).tobytes()
+            same &= forces.tobytes() == expected
     here, there = (np.concatenate(times)[:, chosen].min(axis=0) for times in (native, web))
     medians = float(np.median(here)), float(np.median(there))
     return WebRow(name, *medians, float(here.max()), float(there.max()), medians[1] / medians[0], same)

@@ -55,26 +55,9 @@ def read_columns(
     force_column: str | None = None,
     depth_column: str | None = None,
 ) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Read the columns of a CSV file of force against depth in SI units, and the name of each row's place.
+    """Return the columns of a CSV file in SI units, and the name of each row's place.
 
-    The header names the columns with their units, such as ``Force (N)``, ``Displacement [mm]`` or ``Depth um``; a row
-    of units may follow it. Columns of time, of a place's name, of its x, y and z, and of the indenter's radius or
-    diameter are read where they are. Text before the header is skipped. Signs are turned so that pressing is positive.
-
-    Parameters
-    ----------
-    path
-        The file; cells are parted by comma, semicolon, tab or blanks, with a decimal comma where that is clear.
-    force_unit, depth_unit
-        Units of these columns, instead of those of the header.
-    force_column, depth_column
-        Titles of these columns, where the words of the header are others.
-
-    Raises
-    ------
-    FitError
-        No such file, columns or units that are not clear, or a cell that is no number, with its line.
-
+    `Indentations.read` describes the file, the options and the errors.
     """
     path = Path(path)
     require_file(path, FitError)

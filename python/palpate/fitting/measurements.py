@@ -90,12 +90,13 @@ class Indentations(ComparedByValue):
 
         The header names the columns with their units, such as ``Force (N)``, ``Displacement [mm]`` or ``Depth um``; a
         row of units may follow it. Columns of time, of a place's name, of its x, y and z, and of the indenter's radius
-        or diameter are read where they are. Signs are turned so that pressing is positive.
+        or diameter are read where they are. Text before the header is skipped. Signs are turned so that pressing is
+        positive.
 
         Parameters
         ----------
         path
-            The file.
+            The file; cells are parted by comma, semicolon, tab or blanks, with a decimal comma where that is clear.
         force_unit, depth_unit
             Units of these columns, instead of those of the header.
         force_column, depth_column

@@ -1,4 +1,4 @@
-// Rows of numbers, stored by column, the first of which is a time. When there is no more room, the older half is dropped.
+// Rows of numbers, stored by column. The first column is a time. When there is no more room, the older half is dropped.
 
 export class Columns {
   private readonly columns: readonly Float64Array[];

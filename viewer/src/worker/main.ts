@@ -22,7 +22,7 @@ async function compiled(url: string): Promise<WebAssembly.Module> {
   return WebAssembly.compile(await answer.arrayBuffer());
 }
 
-/** Opens a scene in place of the one that runs, which goes on until then. */
+/** Replaces the running scene by another, once that is loaded. */
 async function open({ program: programUrl, url, name, models }: OpenScene): Promise<void> {
   module ??= compiled(programUrl);
   const [code, scene] = await Promise.all([module, fetchPackage(url)]);

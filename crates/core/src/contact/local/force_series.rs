@@ -8,8 +8,8 @@
 //!
 //! is added to the linear `f^T C_reg f / 2`.
 //!
-//! A plate that is clamped hardens as it bends. Its displacement `q = c_1 F + c_2 F^2 - c_3 F^3` has a maximum at about one thickness,
-//! whereas the series by `y`, `F = y + kappa y^3` with `kappa = c_3/c_1`, goes on. Where `c_3 > 0`, `F^2` and `F^3` are therefore
+//! A plate that is clamped hardens as it bends. Its displacement `q = c_1 F + c_2 F^2 - c_3 F^3` has a maximum at about one thickness.
+//! A series in `y`, where `F = y + kappa y^3` and `kappa = c_3/c_1`, has none. So where `c_3 > 0`, `F^2` and `F^3` are
 //! replaced by the `P_2(F)`, `P_3(F)` for which `q = c_1 y + c_2 y^2`: their displacements are `d(F P_2)/dF = 3 y^2` and, with
 //! `y = F - kappa h`, `d(F P_3)/dF = 4 h = 4 y^3`. They are `F^2` and `F^3` for small forces:
 //!
