@@ -7,6 +7,8 @@ import importlib
 import inspect
 import pkgutil
 import re
+import subprocess
+import sys
 import types
 
 import pytest
@@ -89,3 +91,11 @@ def test_attributes_of_objects_are_named_in_the_docstrings_of_their_classes(bloc
         # A public cached property keeps its value among the attributes, and has a docstring of its own.
         missing = {name for name in vars(thing) if not name.startswith("_") and not hasattr(kind, name)} - words
         assert not missing, f"the docstring of palpate.{kind.__name__} does not tell of {sorted(missing)}"
+
+
+def test_the_import_takes_no_library_that_a_press_can_do_without():
+    """Each of these takes longer to import than the rest of the package together."""
+    heavy = ("dask", "gymnasium", "matplotlib", "netgen", "pyvista", "scipy.optimize", "scipy.stats", "trimesh")
+    code = f"import sys, palpate; print(*[name for name in {heavy} if name in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == []

@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from palpate.errors import FitError
 from palpate.fitting.measurements import Indentations
@@ -209,6 +208,8 @@ class _Search:
         return best
 
     def _solve(self, free: Sequence[Unknown], start: np.ndarray) -> np.ndarray:
+        from scipy.optimize import least_squares
+
         if not len(start):
             return start
         low = np.array([u.low for u in free] + [-MOST_OFFSET] * self._touches)

@@ -8,9 +8,9 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from palpate.errors import FitError, PalpateWarning
 from palpate.fitting.measurements import Indentations
@@ -20,6 +20,9 @@ from palpate.palpation.press import standing_on
 from palpate.scene import BuiltBody, BuiltScene, Scene, mesh_of_body, unsolved_body
 from palpate.scene.series import with_series
 from palpate.simulation import Sensor, Simulation
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 # Depths of a computed press: closer together where the force begins, `(k/n)^2` of the deepest.
 DEPTHS = 90
@@ -115,6 +118,8 @@ class Presses:
         return curves
 
     def _press(self, built: BuiltScene) -> Curves:
+        from scipy.interpolate import PchipInterpolator
+
         simulation = Simulation(built)
         if not len(self.points):
             self._find_places(simulation)

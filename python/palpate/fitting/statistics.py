@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 # Neighbours that agree more than this many standard errors of white noise are correlated.
 CORRELATED = 2.0
@@ -36,6 +35,8 @@ def spread_of(jacobian: np.ndarray, residuals: np.ndarray, curve: np.ndarray, co
     1985), which holds for noise that grows with the force too. Residuals of a law that does not fit go along together:
     with the correlation `c` of neighbours there are as many independent rows as `n (1 - c)/(1 + c)`.
     """
+    from scipy.special import stdtrit  # Student's distribution without the half second that scipy.stats takes
+
     n, p = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0] = 1e-300
@@ -47,9 +48,8 @@ def spread_of(jacobian: np.ndarray, residuals: np.ndarray, curve: np.ndarray, co
     inflation = _inflation(residuals, curve)
     covariance = inflation * (weighted @ weighted.T) / np.outer(scale, scale)
     freedom = max(1.0, n / inflation - p)
-    return Spread(
-        covariance, float(student.ppf(0.5 + 0.5 * confidence, freedom)), singular[0] / singular[-1], inflation
-    )
+    quantile = float(stdtrit(freedom, 0.5 + 0.5 * confidence))
+    return Spread(covariance, quantile, singular[0] / singular[-1], inflation)
 
 
 def _inflation(residuals: np.ndarray, curve: np.ndarray) -> float:
