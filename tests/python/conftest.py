@@ -166,8 +166,8 @@ def private_cache(tmp_path, monkeypatch):
 
 @pytest.fixture
 def rounds(request):
-    """How many rounds a campaign takes: ``rounds(12)`` are 12 with ``--whole``, else a fourth of them."""
-    return lambda count: count if request.config.getoption("--whole") else -(-count // 4)
+    """How many rounds a campaign takes: ``rounds(12)`` are 12 with ``--whole``, else an eighth of them."""
+    return lambda count: count if request.config.getoption("--whole") else -(-count // 8)
 
 
 @pytest.fixture(scope="session")

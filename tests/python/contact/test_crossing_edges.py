@@ -196,10 +196,12 @@ def test_a_tool_crosses_an_edge_without_a_jump_and_keeps_its_contact(loops, cros
 def test_in_a_corner_a_tool_presses_both_walls(loops, tool):
     """Along the floor into a wall: what each does is nearly what it does alone."""
     path, lead = Crossing("concave", 90, tool, "across", 1e-3).path()
+    # Beginning and end of the way are what counts here: 32 um a tick over it.
+    path, start = np.vstack([path[:lead:4], path[lead::8]]), -(-lead // 4)
     simulation = loops.loop("concave 90", tool)
-    both, above = (played(simulation, path + lift * UP, ACROSS).forces[lead:] for lift in (0.0, 1.5e-3))
+    both, above = (played(simulation, path + lift * UP, ACROSS).forces[start:] for lift in (0.0, 1.5e-3))
     along, alone = both[-1, 0], above[-1, 0]
-    assert np.abs(both[:100, 0]).max() < 0.02 * both[0, 2], "the wall is felt from afar"
+    assert np.abs(both[:12, 0]).max() < 0.02 * both[0, 2], "the wall is felt from afar"
     assert alone < -5e-3 and abs(above[-1, 2]) < 0.2 * abs(alone), "the wall alone presses back"
     assert abs(along / alone - 1) < 0.15
     assert abs(both[-1, 2] / both[0, 2] - 1) < 0.15
@@ -232,7 +234,7 @@ EVERY = crossings(["convex", "ridge", "concave", "valley"], [30, 60, 90, 120, 15
 
 # Of the eight poses of an edge and of the five angles each share has all.
 @pytest.mark.slow
-@pytest.mark.campaign(3)
+@pytest.mark.campaign(7)
 @pytest.mark.parametrize("crossing", EVERY, ids=str)
 def test_every_tool_crosses_edges_of_every_angle(loops, crossing):
     wrong = judged(loops, crossing)

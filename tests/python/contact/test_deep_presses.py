@@ -109,8 +109,8 @@ def press(
 @pytest.mark.campaign(3)
 @pytest.mark.parametrize("tool", ["sphere", "capsule", "punch", pytest.param("file", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["torus", *(pytest.param(name, marks=pytest.mark.slow) for name in ("star", "cup"))])
-def test_places_of_deep_presses_stay_on_the_body_and_forces_finite(loops, name, tool):
-    wrong = presses(loops, name, tool, range(10))
+def test_places_of_deep_presses_stay_on_the_body_and_forces_finite(loops, name, tool, rounds):
+    wrong = presses(loops, name, tool, range(rounds(24)))
     assert not wrong, "; ".join(wrong)
 
 

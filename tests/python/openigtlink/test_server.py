@@ -211,9 +211,9 @@ def test_a_port_in_use_is_refused_by_its_number(server, simulation):
 
 @pytest.mark.slow
 @pytest.mark.timeout(200)
-def test_sixty_a_second_for_a_minute(server, simulation):
+def test_sixty_a_second_for_a_minute(server, simulation, rounds):
     """A pyigtl client moves the tool sixty times a second and gets a force for each."""
-    seconds, sent, got = 60.0, 0, []
+    seconds, sent, got = rounds(60), 0, []
     with client_of(server) as client:
         begun = time.monotonic()
         while (now := time.monotonic() - begun) < seconds:
