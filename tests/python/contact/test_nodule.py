@@ -18,8 +18,8 @@ MIDDLE, TOP, DEPTH, DEEPER = 0.04, 0.04, 1.5e-3, 0.2e-3
 SOFT = palpate.Material(5e3, 0.45)
 # Young's modulus of the nodule, Pa, and its radius, m, 10 mm deep: contrasts of 6, 12 and 27 per cent.
 NODULES = ((11e3, 5e-3), (26e3, 5e-3), (13.5e3, 7e-3))
-# What `contrasts` finds for the last one, and `HiddenBall(0.01, 5e-3, (ASIDE, 0.0))` beside the second: their elements take
-# a minute, and are none of ours.
+# What `contrasts` finds for the last one, and `HiddenBall(0.01, 5e-3, (ASIDE, 0.0))` beside the second: their elements
+# take a minute, and are none of ours.
 LARGE = [np.array([0.266, 0.293])]
 ASIDE, BESIDE = 5e-3, np.array([0.0696, 0.0930])
 # Largest difference from the direct contrasts.
