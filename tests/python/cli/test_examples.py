@@ -76,6 +76,7 @@ def test_two_fingers_on_two_bodies(two_bodies):
     assert 0.5 * apart[0, 2] < beside[0, 2] < 0.95 * apart[0, 2] and beside[1, 2] > 0.03
 
 
+@pytest.mark.slow
 def test_two_bodies_run_headless(tmp_path, shared_cache):
     for name in ("two_bodies.toml", "block.obj"):
         shutil.copy(ROOT / "examples" / name, tmp_path)

@@ -216,6 +216,7 @@ palpate.precompute(body, path={str(path)!r}, progress=show)
     assert "a.palpate.partial" not in os.listdir(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [0.25, 0.8], ids=["for a part of the columns", "for all columns, not for the store"])
 def test_a_full_disk_leaves_what_is_finished(room, undisturbed, tmp_path):
     """A limit of the size of a file is met as the end of a disk is."""

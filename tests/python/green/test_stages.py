@@ -124,6 +124,7 @@ palpate.precompute(body, precision='f32', first='x > 7cm', path={path!r}, progre
 """
 
 
+@pytest.mark.slow
 def test_killed_in_every_stage_it_goes_on_to_the_same_bits_and_is_readable_all_the_time(tmp_path):
     path, cells = tmp_path / "a.palpate", (14, 11, 11)
     program = child_program(cells, GROWING.format(path=str(path)))

@@ -45,6 +45,7 @@ def middle(mesh: palpate.TetMesh, name: str) -> np.ndarray:
     return (centroids * mesh.volumes[own, None]).sum(axis=0) / mesh.volumes[own].sum()
 
 
+@pytest.mark.slow
 def test_two_segments_of_an_oblique_scan(tmp_path):
     labels, affine = oblique()
     path = write_nrrd(tmp_path / "ct.seg.nrrd", labels, affine, NAMES)

@@ -51,6 +51,7 @@ def field_of(shape: trimesh.Trimesh) -> SolidField:
     return SolidField(vertices, oriented(vertices, faces))
 
 
+@pytest.mark.slow
 def test_a_broken_surface_is_filled_without_an_option_more(tmp_path):
     surface, volume = with_a_bar()
     surface.export(tmp_path / "scan.stl")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from browser import MARKS, Program, opened, press, settled_force, until, wheel
 
 pytestmark = MARKS
@@ -21,6 +22,7 @@ def press_15_mm(page) -> None:
     settled_force(page)
 
 
+@pytest.mark.slow
 def test_a_deep_press_of_a_neo_hookean_liver_states_its_error(chromium, cache):
     program = Program(cache, "liver")
     with opened(chromium, program) as page:

@@ -36,6 +36,7 @@ def slide_to(page, name: str, value: float) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_stylus_lies_on_the_body_and_is_turned_by_hand(page):
     assert page.get_by_test_id("tilt").is_hidden()  # a sphere is the same from all sides
     choose(page, "capsule")

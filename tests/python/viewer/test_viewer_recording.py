@@ -89,6 +89,7 @@ def test_what_the_button_recorded_is_the_session(recorded):
     assert not recording.active[-1].any()
 
 
+@pytest.mark.slow
 def test_the_time_line_shows_the_force_of_each_tick(replay, recorded):
     recording = palpate.Recording.load(recorded[0])
     pause(replay)

@@ -96,6 +96,7 @@ def test_a_file_is_read_and_filled_and_its_unit_is_asked_for(ball, saves):
     asyncio.run(session())
 
 
+@pytest.mark.slow
 def test_what_is_painted_is_touched_and_saved_and_runs_again_with_the_same_store(ball, saves, shared_cache):
     async def session():
         async with empty_page(saves) as (server, client):

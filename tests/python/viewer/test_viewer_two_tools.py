@@ -62,6 +62,7 @@ def pair(cache):
         started.stop()
 
 
+@pytest.mark.slow
 def test_two_tools_on_two_bodies(chromium, pair):
     with opened(chromium, pair) as page:
         assert not page.get_by_test_id("pinned-line").is_visible()

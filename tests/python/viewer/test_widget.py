@@ -60,6 +60,7 @@ def test_the_widget_runs_the_scene_to_the_bit(chromium, built, tmp_path):
     assert np.array(forces).tobytes() == native_forces(built, positions).tobytes()
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_the_widget(shared_cache):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     cell = nbformat.v4.new_code_cell(f"import palpate\npalpate.widget({str(BLOCK)!r})")
