@@ -10,6 +10,8 @@
 //! Nothing here reads a clock, starts threads of its own (rayon in the offline part apart) or touches a file other than
 //! the stores of Green's functions and modes and what is kept beside them.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod arrays_file;
 #[cfg(feature = "offline")]
 pub mod capacitance;

@@ -1,6 +1,8 @@
 //! Haptic devices behind one trait. A driver knows poses and wrenches, nothing of bodies: in the frame of the person in front
 //! of it ([`Frame`]), which a scene maps to its own.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod device;
 pub mod emulated;
 #[cfg(feature = "drivers")]

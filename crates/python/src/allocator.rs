@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use palpate_core::{Error, Result};
 
 /// Smallest block that is taken from the system and given back to it by itself, bytes.
-#[cfg(target_env = "gnu")]
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
 const MAPPED: libc::c_int = 4 << 20;
 /// What may stay free at the end of small blocks, bytes: once the size above is set it would be 128 kB, and a fifth of the
 /// time of a body of 1404 nodes went into giving pages back and taking them again.
-#[cfg(target_env = "gnu")]
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
 const TRIM_THRESHOLD: libc::c_int = 64 << 20;
 
 /// Gives large blocks back to the system as soon as they are freed.
@@ -24,7 +24,7 @@ pub fn return_large_blocks() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         // SAFETY: mallopt only sets parameters of the allocator.
-        #[cfg(target_env = "gnu")]
+        #[cfg(all(target_os = "linux", target_env = "gnu"))]
         unsafe {
             libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED);
             libc::mallopt(libc::M_TRIM_THRESHOLD, TRIM_THRESHOLD);

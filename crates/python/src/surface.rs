@@ -3,7 +3,7 @@
 use glam::DVec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use palpate_core::Error;
-use palpate_core::contact::SurfaceQuery;
+use palpate_core::contact::{SurfaceQuery, is_thin_at};
 use palpate_core::mesh::Surface;
 use pyo3::prelude::*;
 
@@ -40,5 +40,10 @@ impl SurfaceSearch {
         let found = py.detach(|| points.into_iter().map(find).collect::<Result<Vec<_>, _>>());
         let found = found.map_err(|e| to_python(py, e))?;
         Ok(found.iter().flat_map(DVec3::to_array).collect::<Vec<_>>().into_pyarray(py))
+    }
+
+    /// Whether the body ends within a thickness below a point of its surface, along the inward normal.
+    fn is_thin_at(&self, point: [f64; 3], normal: [f64; 3], thickness: f64) -> bool {
+        is_thin_at(&self.query, &self.surface, point.into(), normal.into(), thickness)
     }
 }

@@ -7,6 +7,8 @@
 //! C interface alike; [`PreparedScene::continue_with`] exchanges it under a running loop. Meshing and finite elements stay with the
 //! Python package.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod body;
 mod graph;
 mod load;

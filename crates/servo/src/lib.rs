@@ -4,6 +4,8 @@
 //! callback may call it instead, and an offline run calls it without a clock ([`run`]): the same input gives the same bits
 //! in all of them.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod change;
 mod clock;
 mod commands;

@@ -12,6 +12,10 @@ pub fn frame(session: &mut Session) -> Value {
     let settings = session.scene.settings;
     let latest = session.latest();
     let (status, state) = (&latest.status, &latest.state);
+    let mut thin = vec![false; model.tools.len()];
+    for (contact, _) in state.contacts.iter().filter(|(contact, _)| is_local(contact)) {
+        thin[contact.tool] |= model.bodies[contact.body].is_thin_below(contact, &model.tools[contact.tool].shape);
+    }
     let tools = (0..model.tools.len()).map(|tool| {
         let device = status.readings[tool].pose;
         let limited = status.limited[tool];
@@ -30,13 +34,12 @@ pub fn frame(session: &mut Session) -> Value {
             "wanted": limited.then(|| device.position.to_array()),
             "force": status.wrenches[tool].force.to_array(),
             "refused": state.tools[tool].refused.iter().flatten().next().map(|refusal| refusal.message()),
-            "thin": false,
+            "thin": thin[tool],
         })
     });
     let tools: Vec<Value> = tools.collect();
     let contact = |contact: &Contact| {
-        let local = contact.mode == Mode::Press && contact.law == LawKind::LOCAL;
-        let own = |number: f64| local.then_some(number);
+        let own = |number: f64| is_local(contact).then_some(number);
         json!({
             "tool": contact.tool,
             "body": contact.body,
@@ -68,6 +71,11 @@ pub fn frame(session: &mut Session) -> Value {
         "recorded": recorded,
         "body_time": times,
     })
+}
+
+/// Whether a contact follows the local law, which grabs do not.
+fn is_local(contact: &Contact) -> bool {
+    contact.mode == Mode::Press && contact.law == LawKind::LOCAL
 }
 
 /// Displacements of the surface of a body (3s), m, in its frame.

@@ -3,6 +3,8 @@
 //! The interface is a dozen C functions (`exports`) over a [`Session`]: numbers and JSON in and out of the module's memory,
 //! so that no generator of bindings has to match the compiler.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod command;
 mod exports;
 mod frame;

@@ -141,6 +141,10 @@ class GreensFunction:
         """Find the closest points (n, 3), m, of the untouched surface to points (n, 3), m."""
         return self._surface_search.closest(np.asarray(points, dtype=float)).reshape(-1, 3)
 
+    def is_thin_at(self, point: Sequence[float], normal: Sequence[float], thickness: float) -> bool:
+        """Whether the body ends within a thickness, m, below a point (3,), m, of its surface with an outward normal (3,)."""
+        return self._surface_search.is_thin_at(point, normal, thickness)
+
     @cached_property
     def strain_measure(self) -> StrainMeasure:
         """Measure of the largest strain of answers: by elements; of a bare store or a large body, by the surface."""

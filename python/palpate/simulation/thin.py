@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from palpate.green import GreensFunction
 from palpate.scene import BuiltBody, ToolTable
 from palpate.simulation.frame import Contact
 
 # From this thickness on, over the tool's radius, a layer on a table is as accurate as a block: docs/accuracy.md.
 THICK = 1.5
-# Depths below the contact at which the nearest surface is looked for, over the thickness.
-DEPTHS = np.linspace(0.1, 0.95, 8)
-# Least cosine between the way down and the direction to a surface that ends the part below.
-BELOW = 0.7
 
 
 def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies: Sequence[BuiltBody]) -> list[bool]:
@@ -24,19 +17,10 @@ def thin_places(contacts: Sequence[Contact], tools: Sequence[ToolTable], bodies:
     for contact in contacts:
         if contact.radius > 0 and not thin[contact.tool]:
             green, thickness = bodies[contact.body].green, THICK * size(tools[contact.tool])
-            thin[contact.tool] = is_thin_at(green, contact._own_point, contact._own_normal, thickness)
+            thin[contact.tool] = green.is_thin_at(contact._own_point, contact._own_normal, thickness)
     return thin
 
 
 def size(tool: ToolTable) -> float:
     """Radius of a tool, m; of an ellipsoid the smallest semi-axis."""
     return min(tool.semi_axes) if tool.semi_axes is not None else tool.radius or 0.0
-
-
-def is_thin_at(green: GreensFunction, point: np.ndarray, normal: np.ndarray, thickness: float) -> bool:
-    """Whether the body ends within a thickness, m, below a point (3,) of its surface, along the inward normal."""
-    places = point - np.multiply.outer(DEPTHS * thickness, normal)
-    ways = green.closest_on_surface(places) - places
-    distances = np.linalg.norm(ways, axis=1)
-    ahead = -(ways @ normal) >= BELOW * distances
-    return bool((ahead & (DEPTHS * thickness + distances < thickness)).any())

@@ -17,6 +17,7 @@ mod regular_store;
 pub mod shape;
 pub mod smooth;
 mod tessellation;
+mod thin;
 mod touch_patch;
 
 pub(crate) use closest::barycentric;
@@ -32,4 +33,5 @@ pub use refusal::Refusal;
 pub use regular::{CompliantBody, FanFields, Moduli, RegularCompliance, centre_of, known_fans};
 pub use regular_store::remove_compliance_files;
 pub use tessellation::Tessellation;
+pub use thin::{is_thin_at, thickness_for};
 pub use touch_patch::TouchPatch;

@@ -10,6 +10,7 @@ use crate::contact::local::StrainLaw;
 use crate::contact::smooth::{Fan, SmoothSurface};
 use crate::contact::{PatchGeometry, PatchScratch, SeriesFields, centre_of, wide_patch_weights};
 use crate::green::{Problem, Progress};
+use crate::math::cbrt;
 use crate::mesh::{Surface, node_elements};
 use crate::{Error, Result};
 
@@ -123,7 +124,7 @@ impl<'a> SeriesPlan<'a> {
         let hardening = (-third / compliance).max(0.0);
         // The displacement of order four that c_1 y + c_2 y^2 lacks.
         let fifth = at.fifth + 0.4 * hardening * second;
-        let ending = (fifth.abs() / (0.5 * LARGEST_REST * compliance)).cbrt();
+        let ending = cbrt(fifth.abs() / (0.5 * LARGEST_REST * compliance));
         let ending = ending.max(softest(compliance, [2.0 * second, 3.0 * third]));
         // So far of y.
         let ending = if ending > 0.0 { ending / (1.0 + hardening / (ending * ending)) } else { 0.0 };

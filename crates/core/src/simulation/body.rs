@@ -4,9 +4,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::contacts::Contact;
 use super::input::Placement;
+use crate::contact::shape::ToolShape;
 use crate::contact::smooth::{DrawnSurface, Fan, FootPoint, Neighbourhood, SmoothSurface};
-use crate::contact::{Moduli, PatchGeometry, SeriesFields, SurfacePoint, SurfaceQuery, barycentric, known_fans};
+use crate::contact::{
+    Moduli, PatchGeometry, SeriesFields, SurfacePoint, SurfaceQuery, barycentric, is_thin_at, known_fans, thickness_for,
+};
 use crate::dynamics::ModalModel;
 use crate::green::GreensFunction;
 use crate::math::sincos;
@@ -169,6 +173,11 @@ impl BodyModel {
             return Err(Error::Invalid(format!("the modes have {rows} rows, the surface has {dofs} dofs")));
         }
         self.preparing(|prepared| prepared.dynamics = Some(dynamics))
+    }
+
+    /// Whether the body below a contact, in the body's frame, is too thin for the local law under a tool of this shape.
+    pub fn is_thin_below(&self, contact: &Contact, shape: &ToolShape) -> bool {
+        is_thin_at(&self.query, &self.loaded, contact.point, contact.normal, thickness_for(shape))
     }
 
     /// Adds prepared data, before they are shared.

@@ -8,6 +8,8 @@
 //! `exp(-a t) (y cos wt + (y' + a y) sin(wt) / w)` with `a = b / 2m`, `w^2 = k/m - a^2`; beyond critical damping the functions are
 //! hyperbolic. With `k = 0` it is a mass in a viscous medium.
 
+use libm::{exp, expm1, sincos};
+
 /// Longest time between two looks at the sign of the velocity, s. Turns are found to the bit between two looks; one that is
 /// begun and undone within is missed, which a mass on muscles, of 40 Hz at most, does not make.
 const SIGN_CHECK_INTERVAL: f64 = 0.25e-3;
@@ -123,7 +125,7 @@ impl Axis {
     fn in_viscous_medium(&self, state: State, t: f64) -> State {
         let (z, acceleration) = (self.damping / self.mass * t, self.force / self.mass);
         // (1 - exp(-z)) / z and (z - 1 + exp(-z)) / z^2.
-        let first = if z == 0.0 { 1.0 } else { -(-z).exp_m1() / z };
+        let first = if z == 0.0 { 1.0 } else { -expm1(-z) / z };
         let second = if z < 1e-2 {
             0.5 - z / 6.0 * (1.0 - z / 4.0 * (1.0 - z / 5.0 * (1.0 - z / 6.0 * (1.0 - z / 7.0))))
         } else {
@@ -131,7 +133,7 @@ impl Axis {
         };
         State {
             position: state.position + state.velocity * t * first + acceleration * t * t * second,
-            velocity: state.velocity * (-z).exp() + acceleration * t * first,
+            velocity: state.velocity * exp(-z) + acceleration * t * first,
         }
     }
 }
@@ -142,13 +144,14 @@ fn decaying(a: f64, w_squared: f64, t: f64) -> (f64, f64) {
     if wt < 1e-4 {
         // Within rounding of both, from either side of critical damping.
         let x = w_squared * t * t;
-        let decay = (-a * t).exp();
+        let decay = exp(-a * t);
         (decay * (1.0 - x / 2.0), decay * t * (1.0 - x / 6.0))
     } else if w_squared > 0.0 {
-        let decay = (-a * t).exp();
-        (decay * wt.cos(), decay * wt.sin() * t / wt)
+        let decay = exp(-a * t);
+        let (sine, cosine) = sincos(wt);
+        (decay * cosine, decay * sine * t / wt)
     } else {
-        let (slow, fast) = ((wt - a * t).exp(), (-wt - a * t).exp());
+        let (slow, fast) = (exp(wt - a * t), exp(-wt - a * t));
         (0.5 * (slow + fast), 0.5 * (slow - fast) * t / wt)
     }
 }

@@ -12,6 +12,7 @@
 //! `theta' = angular velocity`: exact for turns about one axis, and right to the second order of `theta` otherwise.
 
 use glam::{DQuat, DVec3};
+use libm::{exp, sincos};
 
 use crate::{Pose, Twist};
 
@@ -43,7 +44,7 @@ impl Hand {
         let (offset, linear) = decay(self.pose.position - target.position, self.twist.linear, period);
         let (angle, angular) = decay(self.pose.rotation_from(&target), self.twist.angular, period);
         self.pose.position = target.position + offset;
-        self.pose.orientation = (DQuat::from_scaled_axis(angle) * target.orientation).normalize();
+        self.pose.orientation = (rotation_of(angle) * target.orientation).normalize();
         self.twist = Twist { linear, angular };
     }
 }
@@ -54,9 +55,19 @@ fn settled(vector: DVec3) -> DVec3 {
     DVec3::new(of(vector.x), of(vector.y), of(vector.z))
 }
 
+/// Rotation by a vector, rad along its axis.
+fn rotation_of(vector: DVec3) -> DQuat {
+    let angle = vector.length();
+    if angle == 0.0 {
+        return DQuat::IDENTITY;
+    }
+    let (sine, cosine) = sincos(0.5 * angle);
+    DQuat::from_vec4((vector * (sine / angle)).extend(cosine))
+}
+
 /// Offset from the target and its rate after a period.
 fn decay(offset: DVec3, rate: DVec3, period: f64) -> (DVec3, DVec3) {
-    let (decay, omega) = ((-period / TIME_CONSTANT).exp(), 1.0 / TIME_CONSTANT);
+    let (decay, omega) = (exp(-period / TIME_CONSTANT), 1.0 / TIME_CONSTANT);
     let slope = rate + omega * offset;
     (settled((offset + slope * period) * decay), settled((rate - omega * slope * period) * decay))
 }
