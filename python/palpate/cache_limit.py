@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import shutil
 import weakref
@@ -15,6 +14,12 @@ from typing import NamedTuple
 from palpate.cache import CachedFile, cache_directory, cached_files
 from palpate.errors import StoreError
 from palpate.units import memory
+
+try:
+    import fcntl
+except ImportError:
+    # Windows has no such locks: it does not delete a file that a process has open.
+    fcntl = None
 
 # Without a limit of their own: so many bytes, or this part of the disk where that is less.
 DEFAULT_LIMIT, DEFAULT_PART = 10e9, 0.1
@@ -99,7 +104,8 @@ def hold(path: Path | None, user: object) -> None:
     with contextlib.suppress(OSError):
         stream = os.open(path, os.O_RDONLY)
         weakref.finalize(user, os.close, stream)
-        fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        if fcntl is not None:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
 
 
 def kept_by_this_process() -> int:
@@ -132,13 +138,18 @@ class _Group:
             for file in self.files:
                 if file.being_written or not _locked(file.path, locks):
                     return False
-            for file in self.files:
-                file.path.unlink(missing_ok=True)
+            try:
+                for file in self.files:
+                    file.path.unlink(missing_ok=True)
+            except PermissionError:
+                return False
         return True
 
 
 def _locked(path: Path, locks: contextlib.ExitStack) -> bool:
     """Lock a file until the stack ends; False where a process holds it."""
+    if fcntl is None:
+        return True
     try:
         stream = locks.enter_context(path.open("rb"))
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

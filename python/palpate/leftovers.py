@@ -12,6 +12,7 @@ import contextlib
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 _NAMES = (re.compile(r"(?P<name>.+)\.(?P<process>\d+)\.(new|partial)"), re.compile(r"\.(?P<process>\d+)\.(?P<name>.+)"))
@@ -39,6 +40,8 @@ def is_leftover(file: Path, name: str | None = None) -> bool:
 
 
 def _runs(process: int) -> bool:
+    if sys.platform == "win32":
+        return _runs_on_windows(process)
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -47,3 +50,19 @@ def _runs(process: int) -> bool:
         # Somebody else's process; or no process at all, and no file of ours.
         return True
     return True
+
+
+def _runs_on_windows(process: int) -> bool:
+    """Ask for the exit code: ``os.kill`` would end the process there, or the program that asks."""
+    import ctypes
+
+    limited_information, still_active, refused = 0x1000, 259, 5
+    kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+    kernel.OpenProcess.restype = ctypes.c_void_p
+    handle = kernel.OpenProcess(limited_information, False, process)
+    if not handle:
+        return ctypes.get_last_error() == refused
+    code = ctypes.c_ulong()
+    known = kernel.GetExitCodeProcess(ctypes.c_void_p(handle), ctypes.byref(code))
+    kernel.CloseHandle(ctypes.c_void_p(handle))
+    return not known or code.value == still_active

@@ -142,7 +142,7 @@ class GreensFunction:
         return self._surface_search.closest(np.asarray(points, dtype=float)).reshape(-1, 3)
 
     def is_thin_at(self, point: Sequence[float], normal: Sequence[float], thickness: float) -> bool:
-        """Whether the body ends within a thickness, m, below a point (3,), m, of its surface with an outward normal (3,)."""
+        """Whether the body ends within a thickness, m, below a point (3,), m, of its surface with normal (3,)."""
         return self._surface_search.is_thin_at(point, normal, thickness)
 
     @cached_property

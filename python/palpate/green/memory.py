@@ -8,10 +8,15 @@ from pathlib import Path
 from palpate.errors import BodyError
 from palpate.units import memory as memory_units
 
+# Linux describes this process here.
+_PROCESS = Path("/proc/self/statm")
+
 
 def memory_in_use() -> int:
-    """Bytes that this process holds in memory now."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    """Bytes that this process holds in memory now; 0 where the system does not report them."""
+    if not _PROCESS.exists():
+        return 0
+    return int(_PROCESS.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def peak_memory() -> int:
@@ -22,6 +27,8 @@ def peak_memory() -> int:
 
 def available_memory() -> int | None:
     """Bytes that this machine can still give, as far as the system reports it; None where it does not."""
+    if not _PROCESS.exists():
+        return None
     lines = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
     kilobytes = lines.get("MemAvailable", "").split()
     return 1024 * int(kilobytes[0]) if kilobytes else None

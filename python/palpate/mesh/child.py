@@ -38,9 +38,17 @@ def run_limited(command: list[str], time_limit: float, watch: Callable[[], None]
         return None
     finally:
         if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
+            _kill(process)
             process.wait()
         process.stdin.close()
+
+
+def _kill(process: subprocess.Popen) -> None:
+    """End a child, and its own children where the system has process groups."""
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
 
 
 def failure_of(status: int | None, time_limit: float) -> str | None:

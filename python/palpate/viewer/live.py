@@ -48,6 +48,13 @@ def open_replay(
     open_viewer(ViewerServer(session, host=host, port=port), browser=browser, hint=REPLAY)
 
 
+def _on_signal(loop: asyncio.AbstractEventLoop, number: signal.Signals, happened: asyncio.Event) -> None:
+    try:
+        loop.add_signal_handler(number, happened.set)
+    except NotImplementedError:  # Windows
+        signal.signal(number, lambda *_: loop.call_soon_threadsafe(happened.set))
+
+
 async def _serve(server: ViewerServer, browser: bool, hint: str, preparation: Preparation | None = None) -> None:
     await server.start()
     try:
@@ -61,7 +68,7 @@ async def _serve(server: ViewerServer, browser: bool, hint: str, preparation: Pr
         finished = asyncio.Event()
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, finished.set)
+            _on_signal(loop, number, finished)
         if preparation is None:
             await finished.wait()
             return

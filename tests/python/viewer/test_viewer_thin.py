@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from browser import MARKS, Program, drawn, opened, press, until
 from conftest import box_mesh
@@ -36,14 +38,17 @@ PLATE, BLOCK = 0, 1
 WORDS = "Thinner than 1.5 tool radii: force up to 60 % too small"
 
 
-@pytest.fixture(scope="module")
-def table(cache, tmp_path_factory):
-    """A thin plate beside a block."""
-    folder = tmp_path_factory.mktemp("thin")
+def scene_file(folder: Path) -> Path:
+    """Write the scene, a thin plate beside a block, and its meshes."""
     box_mesh((10, 10, 2), (0.06, 0.06, 0.006), jitter=0).write(folder / "plate.vtu")
     box_mesh((10, 10, 4), (0.06, 0.06, 0.025), jitter=0).write(folder / "block.vtu")
     (folder / "thin.toml").write_text(SCENE)
-    started = Program(cache, str(folder / "thin.toml"), command="run")
+    return folder / "thin.toml"
+
+
+@pytest.fixture(scope="module")
+def table(cache, tmp_path_factory):
+    started = Program(cache, str(scene_file(tmp_path_factory.mktemp("thin"))), command="run")
     yield started
     assert started.stop() == 0
 
