@@ -58,6 +58,9 @@ def _on_signal(loop: asyncio.AbstractEventLoop, number: signal.Signals, happened
 async def _serve(server: ViewerServer, browser: bool, hint: str, preparation: Preparation | None = None) -> None:
     await server.start()
     try:
+        finished = asyncio.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            _on_signal(asyncio.get_running_loop(), number, finished)
         address, *others = server.addresses
         print(f"Palpate is at {address}", flush=True)
         for other in others:
@@ -65,10 +68,6 @@ async def _serve(server: ViewerServer, browser: bool, hint: str, preparation: Pr
         print(hint, flush=True)
         if browser and _has_desktop():
             await asyncio.to_thread(webbrowser.open, server.address)
-        finished = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            _on_signal(loop, number, finished)
         if preparation is None:
             await finished.wait()
             return
