@@ -36,16 +36,12 @@ youngs_modulus = "40kPa"
 """
 
 
-def layers_file(folder: Path) -> Path:
-    """Write the scene of a block whose right half is stiffer."""
-    scene = folder / "layers.toml"
-    scene.write_text(LAYERS.format(block=Path(__file__).parents[3] / "examples" / "block.obj"))
-    return scene
-
-
 @pytest.fixture(scope="module")
 def layered(cache, tmp_path_factory):
-    started = Program(cache, str(layers_file(tmp_path_factory.mktemp("scene"))), command="run")
+    """A block whose right half is stiffer."""
+    scene = tmp_path_factory.mktemp("scene") / "layers.toml"
+    scene.write_text(LAYERS.format(block=Path(__file__).parents[3] / "examples" / "block.obj"))
+    started = Program(cache, str(scene), command="run")
     yield started
     assert started.stop() == 0
 

@@ -10,13 +10,10 @@ from browser import MARKS, opened
 from web_site import served
 
 import palpate
-from palpate.cli.impulse import impulse_scene
 from palpate.scene import model_scene
 from palpate.viewer.site import write_site
 from viewer import test_viewer_controls as controls
-from viewer import test_viewer_look as look
 from viewer import test_viewer_page as pages
-from viewer import test_viewer_page_motion as motion
 from viewer import test_viewer_thin as thin
 from viewer import test_viewer_two_tools as two_tools
 
@@ -31,25 +28,17 @@ QUICK = [
 ]
 LONG = [
     controls.test_a_number_is_typed_and_a_double_click_brings_the_default,
-    look.test_a_range_is_locked_where_it_is_or_where_it_is_typed,
-    look.test_a_screenshot_carries_force_legend_and_scale,
-    pages.test_a_press_is_held_at_the_chosen_strain,
     pages.test_deformation_drawn_larger_is_marked,
     pages.test_felt_stiffness_is_the_slope_of_force_against_depth,
-    pages.test_fields_have_a_legend,
     pages.test_friction_bounds_the_force_along_the_surface,
     pages.test_stiffness_scales_the_force_at_once,
     pages.test_the_depth_is_told_by_wheel_second_button_and_shift,
-    two_tools.test_a_second_finger_feels_the_dent_of_the_first,
 ]
 # Those of scenes of their own, by the name of the scene.
 OTHERS = [
-    (look.test_a_cut_is_plane_and_closed, "layers"),
-    (look.test_regions_and_materials_have_colours_and_names, "layers"),
     (thin.test_a_thin_part_is_noticed_while_it_is_pressed, "thin"),
     (two_tools.test_two_tools_on_two_bodies, "pair"),
     (two_tools.test_a_pinned_tool_by_buttons, "pair"),
-    (motion.test_a_click_strikes_in_motion, "beam"),
 ]
 
 
@@ -59,10 +48,8 @@ def site(cache, tmp_path_factory):
     files = tmp_path_factory.mktemp("scenes")
     scenes = {
         "liver": model_scene("liver", paper=True),
-        "layers": palpate.Scene.read(look.layers_file(files)),
         "thin": palpate.Scene.read(thin.scene_file(files)),
         "pair": palpate.Scene(body=two_tools.TWO_LIVERS, tool=[{}, {}]),
-        "beam": impulse_scene("beam", paper=True),
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(cache))
@@ -90,8 +77,8 @@ def test_of_the_page(page, test):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("test", LONG, ids=lambda test: test.__name__)
-def test_of_the_page_that_takes_long(page, tmp_path, test):
-    test(page, tmp_path) if "tmp_path" in inspect.signature(test).parameters else test(page)
+def test_of_the_page_that_takes_long(page, test):
+    test(page)
 
 
 @pytest.mark.slow
@@ -100,8 +87,5 @@ def test_of_the_page_of_another_scene(chromium, site, test, scene):
     program = SimpleNamespace(address=f"{site}/index.html?scene={scene}")
     if "size" in inspect.signature(test).parameters:
         test(chromium, program, (1280, 720))
-    elif scene == "beam":
-        with opened(chromium, program) as page:
-            test(page)
     else:
         test(chromium, program)
