@@ -20,7 +20,6 @@ export function paintControls(prefix: string, brush: string, painting: Painting,
     format: (radius) => `${Math.round(radius)} px`,
     units: { px: 1 },
     usual: "px",
-    fallback: () => null,
     choose: (radius) => painting.setBrush(radius),
     showError,
   });

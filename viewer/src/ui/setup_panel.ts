@@ -200,7 +200,7 @@ export class SetupPanel {
 
   private lengthSlider(id: string, name: string, choose: (value: number) => void): Slider {
     const showError = this.notice;
-    return new Slider({ id, name, format: millimetres, units: LENGTHS, usual: "mm", fallback: () => null, choose, showError });
+    return new Slider({ id, name, format: millimetres, units: LENGTHS, usual: "mm", choose, showError });
   }
 
   private modulusSlider(): Slider {
@@ -216,7 +216,6 @@ export class SetupPanel {
         fromTrack: (place) => Number((own() * Math.exp(low + place * (high - low))).toPrecision(3)),
       },
       bounds: () => [FACTOR_LEAST * own(), FACTOR_MOST * own()],
-      fallback: () => null,
       choose: (modulus) => this.setup.moveNodule({ youngs_modulus: modulus }),
       showError: this.notice,
     });
