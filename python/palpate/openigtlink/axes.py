@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 MILLIMETRES = 1e3
 
@@ -35,6 +34,8 @@ class Axes:
 
     def pose_from_wire(self, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position, m, and unit quaternion w x y z in the scene."""
+        from scipy.spatial.transform import Rotation
+
         own = np.linalg.inv(self._placement) @ matrix
         turned = own[:3, :3] * np.outer(self._signs, self._signs)
         x, y, z, w = Rotation.from_matrix(turned).as_quat(canonical=True)
@@ -42,6 +43,8 @@ class Axes:
 
     def pose_to_wire(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Matrix (4, 4), mm, of a position, m, and a unit quaternion in the scene."""
+        from scipy.spatial.transform import Rotation
+
         own = np.eye(4)
         w, x, y, z = orientation
         own[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * np.outer(self._signs, self._signs)

@@ -106,7 +106,7 @@ class ShownBody:
 
 
 def body_header(name: str, drawn: DrawnSurface, nodes: int, triangles: int) -> dict[str, Any]:
-    """Entry of the scene message for a surface of so many nodes and triangles, of which no more is known."""
+    """Entry of the scene message for a surface with nothing but so many nodes and triangles."""
     return {
         "name": name,
         "title": title_of(name),
