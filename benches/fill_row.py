@@ -37,7 +37,8 @@ def main(name: str, way: str) -> None:
 
 def _filled(case: Case, given: Given, path: Path, way: str) -> dict[str, Any]:
     import palpate
-    from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
+    from palpate.mesh.fill_job import FillOptions
+    from palpate.mesh.tetrahedralize import tetrahedralize_with
 
     options = FillOptions(None if way == "auto" else "netgen", max_volume_loss=0.9)
     limit = NETGEN_LIMIT if way == "netgen" else 300.0

@@ -3,14 +3,88 @@
 from __future__ import annotations
 
 import tempfile
+import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
+import scipy.sparse
 import typer
 
 from benches.output import count_of
+from palpate.body import Body
 from palpate.green import Plan, plan
-from palpate.validation.verify.surface import SurfaceErrors, cube, surface_errors
+from palpate.validation.verify.surface import cube, direct_columns, in_stages, largest_errors, random_nodes
+
+
+@dataclass(frozen=True)
+class SurfaceErrors:
+    """Columns of some nodes beside direct solutions.
+
+    Attributes
+    ----------
+    tets, surface_nodes
+        Of the body.
+    precompute_s, direct_s
+        Time of all columns in stages, and of the factor and columns of the direct solver, s.
+    store_bytes
+        Of the file.
+    largest
+        Largest error of a displacement, over the largest displacement of its column.
+    stated
+        Largest of that error over the one that the answer itself states.
+    stages
+        Stores on the way.
+
+    """
+
+    tets: int
+    surface_nodes: int
+    precompute_s: float
+    direct_s: float
+    store_bytes: int
+    largest: float
+    stated: float
+    stages: int
+
+
+def surface_errors(body: Body, precision: str, path: Path) -> SurfaceErrors:
+    """Compute all columns of a body and compare those of random nodes."""
+    begun = time.perf_counter()
+    green, stages = in_stages(body, precision, path)
+    took = time.perf_counter() - begun
+    chosen = random_nodes(body, green)
+    begun = time.perf_counter()
+    direct = direct_columns(body, chosen, dissected(body))
+    direct_s = time.perf_counter() - begun
+    errors = largest_errors(green, chosen, direct)
+    size = path.stat().st_size
+    return SurfaceErrors(len(body.mesh.tets), len(green.surface_nodes), took, direct_s, size, *errors, stages)
+
+
+def dissected(body: Body) -> np.ndarray:
+    """Nodes (n,) by nested dissection: both halves of the longest side, then those that part them (George, 1973)."""
+    mesh = body.mesh
+    edges = np.concatenate([mesh.tets[:, [a, b]] for a in range(4) for b in range(a)])
+    links = scipy.sparse.coo_array((np.ones(len(edges), bool), edges.T), shape=(len(mesh.nodes),) * 2).tocsr()
+    links = (links + links.T).tocsr()
+
+    def order(nodes: np.ndarray) -> list[np.ndarray]:
+        if len(nodes) <= 40:
+            return [nodes]
+        positions = mesh.nodes[nodes]
+        axis = int(np.ptp(positions, axis=0).argmax())
+        high = positions[:, axis] > np.median(positions[:, axis])
+        if not high.any():
+            return [nodes]
+        low_nodes, high_nodes = nodes[~high], nodes[high]
+        beside = np.zeros(len(mesh.nodes), bool)
+        beside[high_nodes] = True
+        parting = np.asarray(links[low_nodes] @ beside.astype(np.int64)) > 0
+        return [*order(low_nodes[~parting]), *order(high_nodes), low_nodes[parting]]
+
+    return np.concatenate(order(np.arange(len(mesh.nodes))))
 
 
 def run(tets: int, precision: str, folder: Path | None = None) -> tuple[Plan, SurfaceErrors]:

@@ -34,7 +34,7 @@ from palpate.figures import empty_figure, write_figure
 from palpate.progress import progress_reporter
 from palpate.simulation import Simulation
 from palpate.validation.verify.contact.loop import loop_of
-from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
+from palpate.validation.verify.contact.reference import Block, body_on_table, top_middle, top_nodes
 from palpate.validation.verify.solution import green_of
 
 PERIOD = 1e-3
@@ -113,8 +113,7 @@ class Spring:
         tool = {"shape": "sphere", "radius": self.radius, "contact": "patch", "contact_radius": 0.015}
         self._loop_on = lambda device: loop_of(body, green, [tool], device)
         self._loop = self._loop_on(None)
-        low, high = body.mesh.bounds
-        self.place = np.array([*(low + high)[:2] / 2, high[2]])
+        self.place = top_middle(body)
         self.matrix = self._measured()
         values, vectors = np.linalg.eigh(self.matrix)
         self._modulus = self._loop.youngs_modulus

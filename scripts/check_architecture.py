@@ -60,7 +60,7 @@ PACKAGE = "the package itself"
 # What in backquotes can only be a name of code: with `::` or a dot, in CamelCase, or words joined by underscores;
 # symbols of formulas are shorter.
 CODE_NAME = re.compile(
-    r"\w+((::|\.)[A-Za-z_]\w*)+(\(\))?|[A-Z][a-z0-9]+([A-Z][a-z0-9]*)+|[a-z0-9]{2,}(_[a-z0-9]{2,})+(\(\))?"
+    r"\w+((::|\.)[A-Za-z_]\w*)+(\(\))?|[A-Za-z][a-z0-9]+([A-Z][a-z0-9]*)+|[a-z0-9]{2,}(_[a-z0-9]{2,})+(\(\))?"
 )
 
 

@@ -260,3 +260,13 @@ def test_imports_of_what_is_not_installed_are_found(python, text):
 def test_long_files_are_found_in_crates_below_another_crate(check, tmp_path):
     write(tmp_path / "crates/emulators/vendor/src/lib.rs", "\n" * 501)
     assert check.length_problems() == ["crates/emulators/vendor/src/lib.rs has more than 500 lines"]
+
+
+@pytest.mark.parametrize("name", ["takeFrames", "TetMesh", "guarded_tick", "Settings::controls", "palpate.Error"])
+def test_names_of_code_are_looked_for(check, name):
+    assert check.CODE_NAME.fullmatch(name)
+
+
+@pytest.mark.parametrize("text", ["step", "u_i", "mu F_n", "F/d", "liver"])
+def test_words_and_symbols_are_no_names_of_code(check, text):
+    assert not check.CODE_NAME.fullmatch(text)

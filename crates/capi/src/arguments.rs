@@ -11,7 +11,7 @@ fn null(name: &str) -> Refusal {
 }
 
 /// Refuses a length in bytes that nothing in memory has, and no slice may have.
-fn require_size<T>(count: usize, name: &str) -> Outcome<()> {
+fn require_size<T>(count: usize, name: &str) -> Outcome {
     match count.checked_mul(size_of::<T>()) {
         Some(bytes) if bytes <= isize::MAX as usize => Ok(()),
         _ => Err(Refusal::argument(format!("{name} has {count} elements, more than memory holds"))),
@@ -98,7 +98,7 @@ pub unsafe fn path<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a Path> 
 ///
 /// # Safety
 /// The place is null or may be written.
-pub unsafe fn store_handle<T>(object: T, place: *mut *mut T, name: &str) -> Outcome<()> {
+pub unsafe fn store_handle<T>(object: T, place: *mut *mut T, name: &str) -> Outcome {
     if place.is_null() {
         return Err(null(name));
     }
@@ -111,18 +111,19 @@ pub unsafe fn store_handle<T>(object: T, place: *mut *mut T, name: &str) -> Outc
 ///
 /// # Safety
 /// The pointer is null or came from [`store_handle`], and nobody uses it any more.
-pub unsafe fn free_handle<T>(pointer: *mut T) {
+pub unsafe fn free_handle<T>(pointer: *mut T) -> Outcome {
     if !pointer.is_null() {
         // SAFETY: the caller's.
         drop(unsafe { Box::from_raw(pointer) });
     }
+    Ok(())
 }
 
 /// Refuses a length other than the one that there is.
 ///
 /// # Errors
 /// Both lengths, by name.
-pub fn require_count(name: &str, given: usize, wanted: usize) -> Outcome<()> {
+pub fn require_count(name: &str, given: usize, wanted: usize) -> Outcome {
     match given == wanted {
         true => Ok(()),
         false => Err(Refusal::argument(format!("{name} is {given}, it must be {wanted}"))),

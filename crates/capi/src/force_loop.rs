@@ -81,7 +81,7 @@ impl FrameSide {
     }
 
     /// Refuses devices of the program that cannot be ticked with a time between two ticks, s.
-    pub fn check_period(&self, period: f64) -> Outcome<()> {
+    pub fn check_period(&self, period: f64) -> Outcome {
         if let Runner::Thread { .. } = self.runner {
             return Err(running());
         }
@@ -89,7 +89,7 @@ impl FrameSide {
     }
 
     /// Changes a setting of a tool or body, or of the scene (rank 0); one that is refused changes nothing.
-    pub fn set(&mut self, name: &str, rank: usize, value: f64) -> Outcome<()> {
+    pub fn set(&mut self, name: &str, rank: usize, value: f64) -> Outcome {
         let mut settings = self.prepared.settings;
         settings.set(name, rank, value)?;
         self.runner.handle().set(settings)?;
@@ -150,7 +150,7 @@ impl Loop {
         }
     }
 
-    fn start(&self) -> Outcome<()> {
+    fn start(&self) -> Outcome {
         let mut frame = self.frame();
         if let Runner::Thread { .. } = frame.runner {
             return Err(Refusal::state("the loop's own thread runs already"));
@@ -164,7 +164,7 @@ impl Loop {
         Ok(())
     }
 
-    fn stop(&self) -> Outcome<()> {
+    fn stop(&self) -> Outcome {
         let mut frame = self.frame();
         if let Runner::Program { .. } = frame.runner {
             return Ok(());
@@ -176,7 +176,7 @@ impl Loop {
         Ok(())
     }
 
-    fn change(&self, graph: &SceneGraph) -> Outcome<()> {
+    fn change(&self, graph: &SceneGraph) -> Outcome {
         if graph.number != self.scene {
             // Its handles are other bodies and tools.
             return Err(Refusal::argument("scene is not the one that the loop was made of"));
@@ -223,8 +223,7 @@ pub unsafe extern "C" fn palpate_loop_new(scene: *const SceneGraph, force_loop: 
         // SAFETY: the caller's pointer.
         let new_loop = Loop::new(unsafe { shared(scene, "scene") }?)?;
         // SAFETY: the caller's pointer.
-        unsafe { store_handle(new_loop, force_loop, "loop") }?;
-        Ok(Status::PalpateOk)
+        unsafe { store_handle(new_loop, force_loop, "loop") }
     })
 }
 
@@ -232,31 +231,22 @@ pub unsafe extern "C" fn palpate_loop_new(scene: *const SceneGraph, force_loop: 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_free(force_loop: *mut Loop) {
     // SAFETY: the caller's pointer.
-    catching_panics(|| unsafe {
-        free_handle(force_loop);
-        Ok(Status::PalpateOk)
-    });
+    catching_panics(|| unsafe { free_handle(force_loop) });
 }
 
 /// Starts a thread of the loop's own at the rate of the scene, with simulated devices that palpate_loop_set_target moves.
 /// Tools are out of the scene until then. The program cannot tick until palpate_loop_stop.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_start(force_loop: *mut Loop) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointer.
-        unsafe { shared(force_loop, "loop") }?.start()?;
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointer.
+    catching_panics(|| unsafe { shared(force_loop, "loop")?.start() })
 }
 
 /// Stops that thread. The loop is at rest then, and for the program to tick; settings stay. Once more, it does nothing.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_stop(force_loop: *mut Loop) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointer.
-        unsafe { shared(force_loop, "loop") }?.stop()?;
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointer.
+    catching_panics(|| unsafe { shared(force_loop, "loop")?.stop() })
 }
 
 /// Exchanges the bodies and tools of a loop for those of its scene as it is now, while the loop's own thread runs: contacts
@@ -267,8 +257,7 @@ pub unsafe extern "C" fn palpate_loop_change(force_loop: *mut Loop, scene: *cons
     catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (own, scene) = unsafe { (shared(force_loop, "loop")?, shared(scene, "scene")?) };
-        own.change(scene)?;
-        Ok(Status::PalpateOk)
+        own.change(scene)
     })
 }
 
@@ -306,7 +295,7 @@ pub unsafe extern "C" fn palpate_loop_set_target(force_loop: *mut Loop, tool: u3
         };
         let (active, grab) = (target.active != 0, target.grab != 0);
         targets[tool].set(simulated::Target { pose, velocity, active, grab });
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 

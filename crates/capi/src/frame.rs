@@ -179,8 +179,7 @@ pub unsafe extern "C" fn palpate_loop_get_frame(force_loop: *mut Loop, frame: *m
         let tools = side.prepared.tools.len();
         let filled = Frame::of(side.refresh(), tools);
         // SAFETY: the caller's pointer.
-        unsafe { versioned_struct::write(&filled, frame) }?;
-        Ok(Status::PalpateOk)
+        unsafe { versioned_struct::write(&filled, frame) }
     })
 }
 
@@ -228,7 +227,7 @@ unsafe fn put_contacts<T>(
     let found = || side.latest.state.contacts.iter();
     *count = found().count();
     values.iter_mut().zip(found()).for_each(|(to, (contact, _))| *to = value(&side.prepared, contact));
-    Ok(Status::PalpateOk)
+    Ok(())
 }
 
 fn record(prepared: &PreparedScene, contact: &Contact) -> ContactRecord {
@@ -267,7 +266,7 @@ pub unsafe extern "C" fn palpate_loop_get_surface_size(
         let surface = &side.prepared.model.bodies[side.body(body)?].green().surface;
         nodes.into_iter().for_each(|count| *count = surface.positions.len());
         triangles.into_iter().for_each(|count| *count = surface.triangles.len());
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -287,7 +286,7 @@ pub unsafe extern "C" fn palpate_loop_get_triangles(
         require_count("triangles", triangles, surface.triangles.len())?;
         // SAFETY: the caller's pointer, to `triangles` of three numbers.
         unsafe { array_mut(nodes, 3 * triangles, "nodes") }?.copy_from_slice(surface.triangles.as_flattened());
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -337,5 +336,5 @@ unsafe fn put_positions(own: *const Loop, body: u32, positions: *mut f64, nodes:
         places.iter_mut().zip(displacements.chunks_exact(3)).for_each(|(p, u)| *p += DVec3::from_slice(u));
     }
     out.iter_mut().zip(places).for_each(|(to, p)| *to = body.placement.point_to_world(p).to_array());
-    Ok(Status::PalpateOk)
+    Ok(())
 }

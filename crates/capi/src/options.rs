@@ -308,7 +308,7 @@ impl SceneOptions {
     ///
     /// # Errors
     /// The one that is, by name.
-    pub fn apply_to(&self, scene: &mut Scene) -> Outcome<()> {
+    pub fn apply_to(&self, scene: &mut Scene) -> Outcome {
         let mut limits = scene.limits;
         (limits.max_force, limits.max_slew, limits.ramp) = (self.max_force, self.max_slew, self.ramp);
         (limits.max_torque, limits.max_torque_slew) = (self.max_torque, self.max_torque_slew);
@@ -362,17 +362,13 @@ pub unsafe extern "C" fn palpate_device_limits_known(
             return Err(Refusal::argument(format!("no device '{name}' is known: there are {}", names.join(", "))));
         };
         // SAFETY: the caller's pointer.
-        unsafe { versioned_struct::write_as(&DeviceOptions::of(*found), limits, struct_size) }?;
-        Ok(Status::PalpateOk)
+        unsafe { versioned_struct::write_as(&DeviceOptions::of(*found), limits, struct_size) }
     })
 }
 
 /// # Safety
 /// The pointer is null or points to `struct_size` bytes.
 unsafe fn init<T: VersionedStruct>(options: *mut T, struct_size: usize) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's.
-        unsafe { versioned_struct::write_as(&T::default(), options, struct_size) }?;
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's.
+    catching_panics(|| unsafe { versioned_struct::write_as(&T::default(), options, struct_size) })
 }

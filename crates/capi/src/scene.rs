@@ -34,11 +34,8 @@ impl SceneGraph {
 /// Makes a scene without bodies and tools.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_new(scene: *mut *mut SceneGraph) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointer.
-        unsafe { store_handle(SceneGraph::new(Scene::default()), scene, "scene") }?;
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointer.
+    catching_panics(|| unsafe { store_handle(SceneGraph::new(Scene::default()), scene, "scene") })
 }
 
 /// Reads a scene that `palpate pack` has written (the folder), or a bare store (.palpate) with a tool that suits it.
@@ -49,8 +46,7 @@ pub unsafe extern "C" fn palpate_scene_load(file: *const c_char, scene: *mut *mu
         let file = unsafe { path(file, "file") }?;
         let loaded = Scene::load(file)?;
         // SAFETY: the caller's pointer.
-        unsafe { store_handle(SceneGraph::new(loaded), scene, "scene") }?;
-        Ok(Status::PalpateOk)
+        unsafe { store_handle(SceneGraph::new(loaded), scene, "scene") }
     })
 }
 
@@ -58,10 +54,7 @@ pub unsafe extern "C" fn palpate_scene_load(file: *const c_char, scene: *mut *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_free(scene: *mut SceneGraph) {
     // SAFETY: the caller's pointer.
-    catching_panics(|| unsafe {
-        free_handle(scene);
-        Ok(Status::PalpateOk)
-    });
+    catching_panics(|| unsafe { free_handle(scene) });
 }
 
 /// Adds a body made of a store, four at most. `options` may be null: at the origin. `body` gets its handle, or is null.
@@ -87,7 +80,7 @@ pub unsafe extern "C" fn palpate_scene_add_body(
         }
         let id = scene.scene.add_body(body)?;
         handle.into_iter().for_each(|handle| *handle = id.0);
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -110,7 +103,7 @@ pub unsafe extern "C" fn palpate_scene_place_body(
         };
         require_place(*position, *orientation)?;
         match scene.scene.place_body(BodyId(body), placement(*position, *orientation)) {
-            true => Ok(Status::PalpateOk),
+            true => Ok(()),
             false => Err(unknown("body", body)),
         }
     })
@@ -123,7 +116,7 @@ pub unsafe extern "C" fn palpate_scene_remove_body(scene: *mut SceneGraph, body:
         // SAFETY: the caller's pointer.
         let scene = unsafe { exclusive(scene, "scene") }?;
         scene.scene.remove_body(BodyId(body)).ok_or_else(|| unknown("body", body))?;
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -142,7 +135,7 @@ pub unsafe extern "C" fn palpate_scene_add_tool(
         // SAFETY: the caller's vertices and triangles.
         let id = scene.scene.add_tool(unsafe { options.tool() }?)?;
         handle.into_iter().for_each(|handle| *handle = id.0);
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -153,7 +146,7 @@ pub unsafe extern "C" fn palpate_scene_remove_tool(scene: *mut SceneGraph, tool:
         // SAFETY: the caller's pointer.
         let scene = unsafe { exclusive(scene, "scene") }?;
         scene.scene.remove_tool(ToolId(tool)).ok_or_else(|| unknown("tool", tool))?;
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -169,7 +162,7 @@ pub unsafe extern "C" fn palpate_scene_set_device(
         // SAFETY: the caller's pointers.
         let (scene, limits) = unsafe { (exclusive(scene, "scene")?, versioned_struct::read(limits)?) };
         match scene.scene.set_device(ToolId(tool), limits.limits()) {
-            true => Ok(Status::PalpateOk),
+            true => Ok(()),
             false => Err(unknown("tool", tool)),
         }
     })
@@ -178,11 +171,8 @@ pub unsafe extern "C" fn palpate_scene_set_device(
 /// Reads limits and scheduling of a scene. Set struct_size before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_get_options(scene: *const SceneGraph, options: *mut SceneOptions) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointers.
-        unsafe { versioned_struct::write(&SceneOptions::of(&shared(scene, "scene")?.scene), options) }?;
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointers.
+    catching_panics(|| unsafe { versioned_struct::write(&SceneOptions::of(&shared(scene, "scene")?.scene), options) })
 }
 
 /// Changes limits and scheduling of a scene, for loops that are made from now on.
@@ -191,8 +181,7 @@ pub unsafe extern "C" fn palpate_scene_set_options(scene: *mut SceneGraph, optio
     catching_panics(|| {
         // SAFETY: the caller's pointers.
         let (scene, options) = unsafe { (exclusive(scene, "scene")?, versioned_struct::read(options)?) };
-        options.apply_to(&mut scene.scene)?;
-        Ok(Status::PalpateOk)
+        options.apply_to(&mut scene.scene)
     })
 }
 
@@ -208,7 +197,7 @@ pub unsafe extern "C" fn palpate_scene_get_counts(
         let (scene, bodies, tools) = unsafe { (&shared(scene, "scene")?.scene, bodies.as_mut(), tools.as_mut()) };
         bodies.into_iter().for_each(|count| *count = scene.bodies().count());
         tools.into_iter().for_each(|count| *count = scene.tools().count());
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -216,7 +205,7 @@ fn unknown(what: &str, handle: u32) -> Refusal {
     Refusal::argument(format!("the scene has no {what} of the handle {handle}"))
 }
 
-fn require_place(position: [f64; 3], orientation: [f64; 4]) -> Outcome<()> {
+fn require_place(position: [f64; 3], orientation: [f64; 4]) -> Outcome {
     if !position.iter().all(|x| x.is_finite()) {
         return Err(Refusal::argument(format!("position is {position:?}, it must be finite")));
     }

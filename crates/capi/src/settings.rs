@@ -22,8 +22,7 @@ unsafe fn set(
         // SAFETY: the caller's.
         let mut side = unsafe { shared(force_loop, "loop") }?.frame();
         let rank = rank(&side)?;
-        side.set(name, rank, value)?;
-        Ok(Status::PalpateOk)
+        side.set(name, rank, value)
     })
 }
 
@@ -114,16 +113,13 @@ pub unsafe extern "C" fn palpate_loop_strike(
             radius,
             duration,
         })?;
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
 /// Lets go of everything, brings bodies in motion to rest and clears a fault; forces ramp in anew.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_loop_reset(force_loop: *mut Loop) -> Status {
-    catching_panics(|| {
-        // SAFETY: the caller's pointer.
-        unsafe { shared(force_loop, "loop") }?.frame().handle().reset()?;
-        Ok(Status::PalpateOk)
-    })
+    // SAFETY: the caller's pointer.
+    catching_panics(|| unsafe { Ok(shared(force_loop, "loop")?.frame().handle().reset()?) })
 }

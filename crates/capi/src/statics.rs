@@ -68,7 +68,7 @@ pub unsafe extern "C" fn palpate_store_touch(
         *force = touch.force.to_array();
         all.into_iter().for_each(|all| all.copy_from_slice(&touch.displacements));
         error_out.into_iter().for_each(|error_out| *error_out = touch.error);
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn palpate_store_solve(
         u.into_iter().for_each(|u| u.copy_from_slice(&answer.displacements));
         f.into_iter().for_each(|f| f.copy_from_slice(&answer.forces));
         error_out.into_iter().for_each(|error_out| *error_out = answer.error);
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 

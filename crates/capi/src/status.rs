@@ -64,17 +64,23 @@ impl From<Error> for Refusal {
     }
 }
 
+impl From<()> for Status {
+    fn from((): ()) -> Self {
+        Self::PalpateOk
+    }
+}
+
 /// Result of what stands behind a function.
-pub type Outcome<T = Status> = Result<T, Refusal>;
+pub type Outcome<T = ()> = Result<T, Refusal>;
 
 thread_local! {
     static LAST: RefCell<CString> = RefCell::new(CString::default());
 }
 
 /// Runs what stands behind a function: a refusal leaves its message, a panic stays inside.
-pub fn catching_panics(run: impl FnOnce() -> Outcome) -> Status {
+pub fn catching_panics<T: Into<Status>>(run: impl FnOnce() -> Outcome<T>) -> Status {
     match catch_unwind(AssertUnwindSafe(run)) {
-        Ok(Ok(status)) => status,
+        Ok(Ok(done)) => done.into(),
         Ok(Err(refusal)) => {
             set_last_error(refusal.message);
             refusal.status

@@ -63,8 +63,7 @@ pub unsafe extern "C" fn palpate_store_load(file: *const c_char, store: *mut *mu
         let file = unsafe { path(file, "file") }?;
         let green = Arc::new(GreensFunction::load(file, None)?);
         // SAFETY: the caller's pointer.
-        unsafe { store_handle(Store { green }, store, "store") }?;
-        Ok(Status::PalpateOk)
+        unsafe { store_handle(Store { green }, store, "store") }
     })
 }
 
@@ -72,10 +71,7 @@ pub unsafe extern "C" fn palpate_store_load(file: *const c_char, store: *mut *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_store_free(store: *mut Store) {
     // SAFETY: the caller's pointer.
-    catching_panics(|| unsafe {
-        free_handle(store);
-        Ok(Status::PalpateOk)
-    });
+    catching_panics(|| unsafe { free_handle(store) });
 }
 
 /// Says what a store holds.
@@ -99,8 +95,7 @@ pub unsafe extern "C" fn palpate_store_get_info(store: *const Store, info: *mut 
             ..StoreInfo::default()
         };
         // SAFETY: the caller's pointer.
-        unsafe { versioned_struct::write(&filled, info) }?;
-        Ok(Status::PalpateOk)
+        unsafe { versioned_struct::write(&filled, info) }
     })
 }
 
@@ -114,7 +109,7 @@ pub unsafe extern "C" fn palpate_store_get_positions(store: *const Store, positi
         // SAFETY: the caller's pointer, to `nodes` of three numbers.
         let out = unsafe { array_mut(positions, 3 * nodes, "positions") }?;
         out.iter_mut().zip(rest.iter().flat_map(|p| p.to_array())).for_each(|(to, x)| *to = x);
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -128,6 +123,6 @@ pub unsafe extern "C" fn palpate_store_get_triangles(store: *const Store, nodes:
         // SAFETY: the caller's pointer, to `triangles` of three numbers.
         let out = unsafe { array_mut(nodes, 3 * triangles, "nodes") }?;
         out.copy_from_slice(surface.triangles.as_flattened());
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }

@@ -49,7 +49,7 @@ pub unsafe extern "C" fn palpate_loop_check_period(force_loop: *const Loop, peri
         require_period(period)?;
         // SAFETY: the caller's pointer.
         unsafe { shared(force_loop, "loop") }?.frame().check_period(period)?;
-        Ok(Status::PalpateOk)
+        Ok(())
     })
 }
 
@@ -102,7 +102,7 @@ fn reading(input: &DeviceReading, now_ns: u64) -> Reading {
     }
 }
 
-fn require_period(period: f64) -> Outcome<()> {
+fn require_period(period: f64) -> Outcome {
     if period > 0.0 && period.is_finite() {
         return Ok(());
     }

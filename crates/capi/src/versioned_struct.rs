@@ -74,7 +74,7 @@ pub unsafe fn read_or_default<T: VersionedStruct>(from: *const T) -> Outcome<T> 
 ///
 /// # Safety
 /// The pointer is null or points to a struct of the size that it states.
-pub unsafe fn write<T: VersionedStruct>(value: &T, to: *mut T) -> Outcome<()> {
+pub unsafe fn write<T: VersionedStruct>(value: &T, to: *mut T) -> Outcome {
     if to.is_null() {
         return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
     }
@@ -88,7 +88,7 @@ pub unsafe fn write<T: VersionedStruct>(value: &T, to: *mut T) -> Outcome<()> {
 ///
 /// # Safety
 /// The pointer is null or points to `size` bytes.
-pub unsafe fn write_as<T: VersionedStruct>(value: &T, to: *mut T, size: usize) -> Outcome<()> {
+pub unsafe fn write_as<T: VersionedStruct>(value: &T, to: *mut T, size: usize) -> Outcome {
     if to.is_null() {
         return Err(Refusal::argument(format!("{} is a null pointer", T::NAME)));
     }

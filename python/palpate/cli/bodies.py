@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from palpate.body import Body, Loads, Material
     from palpate.mesh import TetMesh
-    from palpate.mesh.tetrahedralize import FillOptions
+    from palpate.mesh.fill_job import FillOptions
     from palpate.progress import Reporter
 
 
@@ -151,7 +151,7 @@ def fill_options(
     mesher: Mesher | None, part: str | None, max_volume_loss: str | None, segments: Sequence[str] | None = None
 ) -> FillOptions:
     """Options of filling, as they were typed."""
-    from palpate.mesh.tetrahedralize import FillOptions
+    from palpate.mesh.fill_job import FillOptions
 
     given: dict[str, Any] = {"mesher": None if mesher is None else mesher.value}
     given["segments"] = tuple(table["name"] for table in segment_tables(segments))
@@ -181,7 +181,8 @@ def read_any(
     """
     from palpate.errors import MeshError
     from palpate.mesh import TetMesh
-    from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
+    from palpate.mesh.fill_job import FillOptions
+    from palpate.mesh.tetrahedralize import tetrahedralize_with
     from palpate.units import length
 
     if is_surface(path) or is_segmentation(path):

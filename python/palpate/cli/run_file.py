@@ -69,24 +69,8 @@ class RunOptions:
 
 # Of the loop, whatever the file.
 OF_LOOP = {"cpus", "priority", "device"}
-FLAGS = {
-    "radius": "--radius",
-    "fix": "--fix",
-    "fixed": "--fix",
-    "youngs_modulus": "-E",
-    "poissons_ratio": "--nu",
-    "density": "--density",
-    "unit": "--unit",
-    "max_size": "--max-size",
-    "element": "--element",
-    "mesher": "--mesher",
-    "part": "--part",
-    "max_volume_loss": "--max-volume-loss",
-    "segment": "--segment",
-    "cpus": "--cpus",
-    "priority": "--priority",
-    "device": "--device",
-}
+FLAGS = {field.name: f"--{field.name.replace('_', '-')}" for field in fields(RunOptions)}
+FLAGS |= {"fixed": "--fix", "youngs_modulus": "-E", "poissons_ratio": "--nu"}
 
 
 def surface_of(file: Path, options: RunOptions) -> tuple[np.ndarray, np.ndarray] | None:

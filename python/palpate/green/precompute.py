@@ -201,6 +201,6 @@ def _watchers(
 def _warn_of_inaccuracy(green: GreensFunction) -> GreensFunction:
     """Warn of a store in which touches may be wrong."""
     if not green.touch_error <= WARNED:
-        said = f"touches of this body may be wrong by {error_text(green.touch_error)}"
-        warnings.warn(f"{said}: {remedy(green.touch_error, green.precision)}", PrecisionWarning, stacklevel=3)
+        text = f"touches of this body may be wrong by {error_text(green.touch_error)}"
+        warnings.warn(f"{text}: {remedy(green.touch_error, green.precision)}", PrecisionWarning, stacklevel=3)
     return green

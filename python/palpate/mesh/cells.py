@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.errors import MeshError
+from palpate.mesh.elements import corner_volumes, longest_edges
 
 # Faces by the corners of each shape, all outward or all inward; those with three corners repeat the last.
 FACES = {
@@ -96,12 +97,8 @@ def _joined(corners: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _check_straight(nodes: np.ndarray, tets: np.ndarray, cell: np.ndarray, kind: str, first: int, count: int) -> None:
     """Refuse cells that their tetrahedra do not fill once."""
-    a, b, c, d = (nodes[tets[:, k]] for k in range(4))
-    volumes = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
-    longest = np.max(
-        [np.linalg.norm(x - y, axis=1) for x, y in ((a, b), (a, c), (a, d), (b, c), (b, d), (c, d))], axis=0
-    )
-    sides = np.where(np.abs(volumes) <= FLAT * longest**3, 0, np.sign(volumes))
+    volumes = corner_volumes(nodes, tets)
+    sides = np.where(np.abs(volumes) <= FLAT * longest_edges(nodes, tets) ** 3, 0, np.sign(volumes))
     low, high = np.full(count, 2.0), np.full(count, -2.0)
     np.minimum.at(low, cell, sides)
     np.maximum.at(high, cell, sides)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate import _native
-from palpate.mesh.elements import AT_CORNERS, DIAGONALS, EDGES, INSIDE, unique_edges
+from palpate.mesh.elements import AT_CORNERS, DIAGONALS, EDGES, INSIDE, corner_volumes, unique_edges
 from palpate.mesh.tetmesh import TetMesh
 
 # A curved element's least determinant in parts of its largest, in which straight ones have 1.
@@ -123,7 +123,6 @@ def _subelements(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
 def _shapes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Mean ratios (m,): 1 for a regular tetrahedron, 0 for a flat one, negative where inverted (Liu and Joe 1994)."""
     corners = nodes[tets]
-    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
-    volumes = np.einsum("ij,ij->i", np.cross(a, b), c) / 6
+    volumes = corner_volumes(nodes, tets)
     edges = corners[:, EDGES[:, 0]] - corners[:, EDGES[:, 1]]
     return np.sign(volumes) * 12 * np.cbrt(9 * volumes**2) / np.einsum("eij,eij->e", edges, edges)

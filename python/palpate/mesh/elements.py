@@ -50,6 +50,18 @@ def drawing_tets(tets: np.ndarray) -> np.ndarray:
     return tets[:, PARTS[tets.shape[1]]].reshape(-1, 4)
 
 
+def corner_volumes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Volume between the corners of each element, (m,), negative where they are inverted."""
+    a, b, c, d = (nodes[tets[:, k]] for k in range(4))
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+
+
+def longest_edges(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Longest distance between two corners of each element, (m,)."""
+    corners = nodes[tets[:, :4]]
+    return np.max([np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in EDGES], axis=0)
+
+
 def smallest_dihedral_angles(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Smallest dihedral angle of each element, (m,) degrees, by its corners; negative where these are inverted."""
     areas = area_vectors(nodes[tets[:, FACES[4]]])

@@ -21,10 +21,11 @@ import numpy as np
 from palpate._native import end_with_parent
 from palpate.errors import Error, MeshError, UnclearUnitError
 from palpate.mesh.files import WRITERS
+from palpate.mesh.fill_job import FillOptions
 from palpate.mesh.size import COMMON_UNITS, scale_of
 from palpate.mesh.surface_file import SURFACE_ENDINGS, load_surface
 from palpate.mesh.tetmesh import TetMesh
-from palpate.mesh.tetrahedralize import STAGES, FillOptions, tetrahedralize_with
+from palpate.mesh.tetrahedralize import STAGES, tetrahedralize_with
 from palpate.segmentation.default_segments import default_segments, selectors
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
 from palpate.segmentation.reading import load_label_map

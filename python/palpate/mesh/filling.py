@@ -6,32 +6,26 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate import _native
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import OUT_OF_PROCESSOR_TIME, failure_of, run_limited
 from palpate.mesh.curve import curve, refine
-from palpate.mesh.fit import GOOD_LOSS, Fit
+from palpate.mesh.fill_job import PARTS, FillJob, length_text
+from palpate.mesh.fit import GOOD_LOSS, Fit, mean_edge
 from palpate.mesh.surface_state import SurfaceState
 from palpate.mesh.tetmesh import TetMesh
+from palpate.mesh.triangles import closest_on
 
 if TYPE_CHECKING:
     import trimesh
 
-Ball = tuple[tuple[float, float, float], float, float]
-Element = Literal["linear", "quadratic"]  # with 4 and 10 nodes
-
-# Into so many parts the longest side is divided where no size is given. 10-node elements twice as large have as many
-# nodes as the 4-node ones, and a smaller error.
-PARTS = {"linear": 15.0, "quadratic": 7.5}
-# Where that is too coarse for the shape, elements become smaller by up to this factor, in so many attempts: all of them
-# where more than this share of the volume is lost, for such a mesh does not tell where.
+# Where the default size is too coarse for the shape, elements become smaller by up to this factor, in so many attempts:
+# all of them where more than this share of the volume is lost, for such a mesh does not tell where.
 FINEST, ATTEMPTS, LOST = 4.0, 5, 0.05
 # Attempts at a size that is given.
 ATTEMPTS_GIVEN = 2
@@ -64,14 +58,8 @@ class Filling:
         Of the surface in messages.
     surface
         The surface, m, and what is known of it.
-    element
-        What it is filled with.
-    size
-        Longest edge wanted, m; None: chosen by the shape.
-    refine
-        Finer balls.
-    time_limit
-        Of the mesher, s, in all its runs.
+    job
+        What is asked for.
     processor_limit
         Of one run, s of processor time, which other programs do not change; None: as long as it takes.
 
@@ -79,10 +67,7 @@ class Filling:
 
     name: str
     surface: SurfaceState
-    element: Element
-    size: float | None
-    refine: Sequence[Ball]
-    time_limit: float
+    job: FillJob
     processor_limit: float | None = None
 
     @property
@@ -104,15 +89,15 @@ class Filling:
             A mesher that failed, or a mesh that loses a part of the body, and why.
 
         """
-        size = self.extent / PARTS[self.element] if self.size is None else self.size
+        size = self.extent / PARTS[self.job.element] if self.job.size is None else self.job.size
         halvings = self._halvings(size)
         found: tuple[TetMesh, Fit] | None = None
         points, local = np.empty((0, 3)), np.empty(0)
-        patience = self.time_limit if self._crossing is None else min(self.time_limit, TIME_LIMIT)
+        patience = self.job.time_limit if self._crossing is None else min(self.job.time_limit, TIME_LIMIT)
         deadline = time.monotonic() + patience
-        for _ in range(ATTEMPTS if self.size is None else ATTEMPTS_GIVEN):
+        for _ in range(ATTEMPTS if self.job.size is None else ATTEMPTS_GIVEN):
             # Where a size is given, parts that NETGEN's larger elements miss are got back by smaller ones there.
-            least = size / 2**halvings if self.size is not None else self.extent / PARTS[self.element] / FINEST
+            least = size / 2**halvings if self.job.size is not None else self.extent / PARTS[self.job.element] / FINEST
             attempt = self._tetrahedra((size, halvings), points, local, deadline)
             fit = Fit.of(attempt, self.shape) if isinstance(attempt, TetMesh) else None
             if fit is not None and (found is None or abs(fit.loss) < abs(found[1].loss)):
@@ -143,10 +128,10 @@ class Filling:
         """Warn of what the mesh loses, or refuse it."""
         if fit.is_good(size):
             return
-        what = "the mesh" if self.size is None else f"with elements of {_length(size)} the mesh"
+        what = "the mesh" if self.job.size is None else f"with elements of {length_text(size)} the mesh"
         change = f"{'loses' if fit.loss > 0 else 'adds'} {100 * abs(fit.loss):.1f} % of the volume"
-        message = f"{self.name}: {what} {change} and lies up to {_length(fit.gaps.max())} off the surface"
-        smaller = f"elements of {_length(fit.size_for_good(min(size, _mean_edge(mesh))))} (--max-size) should do"
+        message = f"{self.name}: {what} {change} and lies up to {length_text(fit.gaps.max())} off the surface"
+        smaller = f"elements of {length_text(fit.size_for_good(min(size, mean_edge(mesh))))} (--max-size) should do"
         if abs(fit.loss) > VOLUME_TOLERANCE:
             raise MeshError(f"{message}; {self._crossing or f'they are too large for it, {smaller}'}")
         warnings.warn(f"{message}; {self._crossing or f'for less, {smaller}'}", MeshWarning, stacklevel=5)
@@ -157,8 +142,8 @@ class Filling:
         if crossing is not None:
             return crossing
         return (
-            f"NETGEN {failures} with elements of {_length(size)}, though the surface does not intersect itself: try "
-            f"elements of {_length(size / 2)}, or {WRAP_HINT}"
+            f"NETGEN {failures} with elements of {length_text(size)}, though the surface does not intersect itself: "
+            f"try elements of {length_text(size / 2)}, or {WRAP_HINT}"
         )
 
     @property
@@ -182,7 +167,7 @@ class Filling:
             "size": size / unit,
             "processor_limit": self.processor_limit or 0.0,
             "balls": np.reshape(
-                [[*((np.array(c) - origin) / extent), r / extent, h / unit] for c, r, h in self.refine], (-1, 5)
+                [[*((np.array(c) - origin) / extent), r / extent, h / unit] for c, r, h in self.job.refine], (-1, 5)
             ),
             "points": np.column_stack([(points[smaller] - origin) / extent, local[smaller] / unit]),
         }
@@ -192,7 +177,7 @@ class Filling:
         mesh = TetMesh(result[0] * extent + origin, result[1])
         for _ in range(halvings):
             mesh = refine(mesh, self._projected)
-        return curve(mesh, self._projected) if self.element == "quadratic" else mesh
+        return curve(mesh, self._projected) if self.job.element == "quadratic" else mesh
 
     def _run(self, job: dict[str, np.ndarray | float], deadline: float) -> tuple[np.ndarray, np.ndarray] | str:
         """Nodes and tetrahedra, or how the mesher failed."""
@@ -204,7 +189,7 @@ class Filling:
             for route in ("remesh", "keep"):
                 command = [sys.executable, "-m", "palpate.mesh.netgen_child", route, str(surface_file), str(mesh_file)]
                 status = run_limited(command, max(deadline - time.monotonic(), 0.0))
-                failure = failure_of(status, self.time_limit)
+                failure = failure_of(status, self.job.time_limit)
                 if failure is None and mesh_file.exists():
                     with np.load(mesh_file) as result:
                         return result["nodes"], result["tets"]
@@ -214,16 +199,4 @@ class Filling:
         return f"{failures[0]} when remeshing the surface, and {failures[1]} when keeping it,"
 
     def _projected(self, points: np.ndarray) -> np.ndarray:
-        search = _native.SurfaceSearch(
-            np.ascontiguousarray(self.shape.vertices, dtype=np.float64), self.shape.faces.astype(np.uint32)
-        )
-        return search.closest(np.ascontiguousarray(points)).reshape(-1, 3)
-
-
-def _mean_edge(mesh: TetMesh) -> float:
-    corners = mesh.nodes[mesh.surface_faces[:, :3]]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
-
-
-def _length(metres: float) -> str:
-    return f"{1e3 * metres:.3g} mm"
+        return closest_on(self.shape.vertices, self.shape.faces)(points)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate import _native
 from palpate.mesh.tetmesh import TetMesh
+from palpate.mesh.triangles import closest_on
 
 if TYPE_CHECKING:
     import trimesh
@@ -80,6 +80,11 @@ class Fit:
 
 def distances(mesh: TetMesh, points: np.ndarray) -> np.ndarray:
     """Distances of points from the surface of a mesh, m."""
-    faces = np.searchsorted(mesh.surface_nodes, mesh.surface_triangles).astype(np.uint32)
-    search = _native.SurfaceSearch(np.ascontiguousarray(mesh.nodes[mesh.surface_nodes]), faces)
-    return np.linalg.norm(search.closest(points).reshape(-1, 3) - points, axis=1)
+    faces = np.searchsorted(mesh.surface_nodes, mesh.surface_triangles)
+    return np.linalg.norm(closest_on(mesh.nodes[mesh.surface_nodes], faces)(points) - points, axis=1)
+
+
+def mean_edge(mesh: TetMesh) -> float:
+    """Mean length of the edges of the surface, m."""
+    corners = mesh.nodes[mesh.surface_faces[:, :3]]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate import _native
 from palpate.errors import MeshError
 from palpate.mesh.elements import FACES
 from palpate.mesh.snap import snap
 from palpate.mesh.tetmesh import TetMesh
+from palpate.mesh.triangles import closest_on
 
 # Nodes are put on an inner boundary from at most this part of the size of the elements there.
 REACH = 0.4
@@ -95,8 +95,7 @@ class InnerRegions:
         """Closest points on the boundary that is nearest; a point that is far from all stays."""
         best, result = np.full(len(points), np.inf), points.copy()
         for region in self.regions if len(points) else ():
-            search = _native.SurfaceSearch(np.ascontiguousarray(region.vertices), region.faces.astype(np.uint32))
-            closest = search.closest(np.ascontiguousarray(points)).reshape(-1, 3)
+            closest = closest_on(region.vertices, region.faces)(points)
             away = np.linalg.norm(closest - points, axis=1)
             nearer = away < np.minimum(best, REACH * region.size)
             best[nearer], result[nearer] = away[nearer], closest[nearer]

@@ -5,6 +5,7 @@ Lengths in parts of the longest side of the surface. Used in the mesher's own pr
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,7 +27,9 @@ def inner_triangles(
 
     shells: list[Triangles] = []
     for own_vertices, own_faces, size in reversed(inner):
-        points, triangles = _simplified(own_vertices, own_faces, SIMPLIFIED * size)
+        points, triangles = np.ascontiguousarray(own_vertices), np.ascontiguousarray(own_faces, dtype=np.int64)
+        with contextlib.suppress(ValueError):
+            points, triangles = simplified(points, triangles, SIMPLIFIED * size)
         clear = within_surface(points, vertices, faces)
         for other in ((vertices, faces), *shells):
             squared = igl.point_mesh_squared_distance(points, np.ascontiguousarray(other[0]), other[1])[0]
@@ -53,13 +56,20 @@ def within_surface(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) 
     return np.abs(np.asarray(winding).ravel()) > 0.5
 
 
-def _simplified(vertices: np.ndarray, faces: np.ndarray, moved: float) -> Triangles:
-    """Fewer triangles that lie at most this far off; the same ones if they bound no manifold."""
+def simplified(vertices: np.ndarray, faces: np.ndarray, moved: float) -> Triangles:
+    """Fewer triangles that lie at most this far off.
+
+    Raises
+    ------
+    ValueError
+        Triangles that bound no manifold, and why.
+
+    """
     from manifold3d import Error, Manifold, Mesh
 
     solid = Manifold(Mesh(np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32)))
     if solid.status() != Error.NoError:
-        return np.ascontiguousarray(vertices), np.ascontiguousarray(faces, dtype=np.int64)
+        raise ValueError(str(solid.status()))
     simple = solid.simplify(moved).to_mesh()
     points = np.asarray(simple.vert_properties, dtype=np.float64)[:, :3]
     return np.ascontiguousarray(points), np.asarray(simple.tri_verts, dtype=np.int64)

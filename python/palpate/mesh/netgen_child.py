@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate._native import end_with_parent
+from palpate.mesh.triangles import area_vectors, units
 
 if TYPE_CHECKING:
     from netgen.meshing import Mesh, MeshingParameters
@@ -95,8 +96,7 @@ def _ball_points(centre: np.ndarray, radius: float, spacing: float) -> np.ndarra
 
 def _write_stl(path: Path, corners: np.ndarray) -> None:
     record = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    record["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    record["normal"] = units(area_vectors(corners))
     record["corners"] = corners
     with path.open("wb") as file:
         file.write(b"palpate".ljust(80) + np.uint32(len(corners)).tobytes() + record.tobytes())

@@ -5,17 +5,18 @@ from __future__ import annotations
 import functools
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from palpate.errors import MeshWarning
-from palpate.mesh.filling import PARTS, Ball, Element
+from palpate.errors import MeshError, MeshWarning
+from palpate.mesh.fill_job import PARTS, Ball, Element, FillJob
 from palpate.mesh.inner import InnerRegion, InnerRegions
 from palpate.mesh.label_process import label_arrays
 from palpate.mesh.surface_file import SurfaceFile
 from palpate.mesh.tetmesh import TetMesh
-from palpate.mesh.wrapping import Which, Wrapping
+from palpate.mesh.wrapping import Wrapping
 from palpate.segmentation.smoothing import inside_field
 
 Draw = Callable[[np.ndarray, np.ndarray], None]
@@ -26,19 +27,7 @@ SIZE_WITHIN = {"linear": 0.35, "quadratic": 0.4}
 THINNEST = 0.05
 
 
-def segmented(
-    element: Element,
-    path: str | os.PathLike[str],
-    segments: Sequence[str | int],
-    unit: str | None,
-    size: float | None,
-    refine: Sequence[Ball],
-    part: Which,
-    max_volume_loss: float,
-    time_limit: float,
-    stage: Callable[[str], None],
-    drawn: Draw | None = None,
-) -> TetMesh:
+def segmented(path: str | os.PathLike[str], unit: str | None, job: FillJob, drawn: Draw | None = None) -> TetMesh:
     """Fill chosen segments of a label map; several become regions with their names.
 
     ``drawn`` is called with the boundary, vertices (k, 3), m, and triangles, before it is filled.
@@ -51,29 +40,19 @@ def segmented(
     """
     import trimesh
 
-    found = label_arrays("boundaries", path, unit, segments, time_limit)
+    if job.options.mesher == "netgen":
+        raise MeshError(f"{path}: NETGEN fills surfaces; leave out mesher = 'netgen' for a segmentation")
+    found = label_arrays("boundaries", path, unit, job.options.segments, job.time_limit)
     name = str(path)
     if drawn is not None:
         drawn(found["vertices"], found["faces"])
     shape = trimesh.Trimesh(found["vertices"], found["faces"], process=False)
     longest = float(np.ptp(found["vertices"], axis=0).max())
-    size = longest / PARTS[element] if size is None else size
-    inner, balls = _inner(found, element, size)
+    size = longest / PARTS[job.element] if job.size is None else job.size
+    inner, balls = _inner(found, job.element, size)
     _note_boundaries(name, found)
-    reason = "bounds smoothed segments"
-    wrapping = Wrapping(
-        SurfaceFile(name, shape),
-        reason,
-        element,
-        size,
-        [*refine, *balls],
-        part,
-        max_volume_loss,
-        time_limit,
-        stage,
-        inner,
-    )
-    mesh = wrapping.mesh()
+    job = replace(job, size=size, refine=[*job.refine, *balls])
+    mesh = Wrapping(SurfaceFile(name, shape), "bounds smoothed segments", job, inner).mesh()
     if inner is None:
         return TetMesh(mesh.nodes, mesh.tets, mesh.regions, {str(found["names"][0]): 0})
     inner.require_elements(name, mesh)

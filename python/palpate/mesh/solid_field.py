@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.mesh.triangles import area_vectors, areas, units
+
 # Surfaces of more triangles are thinned out on a grid of so many cells along the longest side.
 MOST_TRIANGLES, THINNED = 150_000, 200
 # Vertices of other surfaces are the same in cells of this part of the longest side.
@@ -57,7 +59,7 @@ def _thinned(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         return np.ones(len(vertices), dtype=bool)
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    needles = 2 * _areas(vertices, faces) < NEEDLE * longest**2
+    needles = 2 * areas(vertices, faces) < NEEDLE * longest**2
     chosen = np.zeros(len(vertices), dtype=bool)
     if needles.sum() > MOST_NEEDLES:
         chosen[faces[needles]] = True
@@ -75,7 +77,7 @@ def oriented(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         turned, patch = igl.bfs_orient(faces)
         patch = np.asarray(patch).ravel()
         kept = (np.asarray(turned) == faces).all(axis=1)
-        area = _areas(vertices, faces)
+        area = areas(vertices, faces)
         turned = np.where(kept[:, None], faces, faces[:, ::-1])
         against = np.bincount(patch, area * ~kept) > np.bincount(patch, area * kept)
         turned = np.where(against[patch][:, None], turned[:, ::-1], turned)
@@ -96,8 +98,7 @@ def _outward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     # Of an open part by its own middle.
     middle = np.column_stack([np.bincount(part, corners[:, :, k].mean(axis=1)) for k in range(3)])
     middle /= np.maximum(np.bincount(part), 1)[:, None]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6.0
-    volume = np.bincount(part, signed - np.einsum("ij,ij->i", middle[part], normals))
+    volume = np.bincount(part, signed - np.einsum("ij,ij->i", middle[part], area_vectors(corners) / 3.0))
     inverted = np.argsort(volume)[:MOST_INVERTED]
     for number in inverted[volume[inverted] < 0]:
         own = part == number
@@ -106,11 +107,6 @@ def _outward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         if inside < 0.5:
             faces = np.where(own[:, None], faces[:, ::-1], faces)
     return faces
-
-
-def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    corners = vertices[faces]
-    return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,15 +180,14 @@ class SolidField:
 
     def samples(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) spread over the triangles, and their unit normals (k, 3)."""
-        area = _areas(self.vertices, self.faces)
+        area = areas(self.vertices, self.faces)
         total = np.cumsum(area)
         random = np.random.default_rng(0)
         chosen = np.searchsorted(total, (np.arange(count) + random.uniform(size=count)) / count * total[-1])
         corners = self.vertices[self.faces[np.minimum(chosen, len(area) - 1)]]
         u, v = np.sqrt(random.uniform(size=(count, 1))), random.uniform(size=(count, 1))
         points = (1 - u) * corners[:, 0] + u * (1 - v) * corners[:, 1] + u * v * corners[:, 2]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        return points, units(area_vectors(corners))
 
     def boundary_samples(self, count: int, step: float) -> np.ndarray:
         """Points (k, 3) on triangles with the inside on one side and the outside on the other, ``step`` away."""

@@ -17,7 +17,9 @@ from palpate.mesh.elements import (
     FACES,
     MIRRORED,
     boundary_faces,
+    corner_volumes,
     drawing_triangles,
+    longest_edges,
     smallest_dihedral_angles,
     unique_edges,
 )
@@ -252,9 +254,8 @@ def _drop_orphans(nodes: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.n
 
 def _orient(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Turn inverted elements round; refuse those without volume, and folded ones."""
-    volumes = _corner_volumes(nodes, tets)
-    p = nodes[tets[:, :4]]
-    longest = np.max([np.linalg.norm(p[:, i] - p[:, j], axis=1) for i, j in EDGES], axis=0)
+    volumes = corner_volumes(nodes, tets)
+    longest = longest_edges(nodes, tets)
     flat = np.flatnonzero(np.abs(volumes) <= DEGENERATE * longest**3)
     if flat.size:
         raise MeshError(f"{len(flat)} tetrahedra have no volume (first: tetrahedron {flat[0]}); mesh the body again")
@@ -305,9 +306,3 @@ def _check_middles(nodes: np.ndarray, tets: np.ndarray) -> None:
             f"tetrahedron {element} does not share node {tets[element, 4 + edge]}, in the middle between nodes {a} "
             f"and {b}, with its neighbours"
         )
-
-
-def _corner_volumes(nodes: np.ndarray, tets: np.ndarray) -> np.ndarray:
-    """Volume between the corners, negative where they are inverted."""
-    a, b, c, d = (nodes[tets[:, k]] for k in range(4))
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0

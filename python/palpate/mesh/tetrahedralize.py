@@ -4,29 +4,27 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.errors import MeshError
-from palpate.mesh.filling import Ball, Element, Filling, MesherFailedError
+from palpate.mesh.fill_job import Ball, Element, FillJob, FillOptions, Mesher, Which
+from palpate.mesh.filling import Filling, MesherFailedError
 from palpate.mesh.segmented import Draw, segmented
 from palpate.mesh.size import scale_of
 from palpate.mesh.surface_file import SurfaceFile, load_surface
 from palpate.mesh.surface_state import BY_HAND, MOST_FOR_NETGEN, SurfaceState, require_closed, require_finite
 from palpate.mesh.tetmesh import TetMesh
-from palpate.mesh.wrapping import Which, Wrapping
+from palpate.mesh.wrapping import Wrapping
 from palpate.progress import Reporter, progress_reporter
 from palpate.segmentation.endings import SEGMENTATION_ENDINGS, is_segmentation
-from palpate.units import length, share
+from palpate.units import length
 from palpate.vectors import three_numbers
 
 if TYPE_CHECKING:
     import trimesh
-
-Mesher = Literal["netgen", "wrap"]
 
 TIME_LIMIT = 300.0  # s
 # Seconds of processor time that a run of NETGEN gets at a size of its own before the surface is wrapped: which mesher
@@ -37,40 +35,6 @@ STAGES = (
     *("reading", "checking", "looking for the inside", "wrapping", "filling with tetrahedra"),
     "fitting to the surface",
 )
-
-
-@dataclass(frozen=True)
-class FillOptions:
-    """How a surface is filled.
-
-    Attributes
-    ----------
-    mesher
-        ``"netgen"`` on the surface itself, ``"wrap"``: a new surface around what the triangles enclose, filled by
-        fTetWild; None: NETGEN where the surface is closed, of one part, and not hard for it.
-    part
-        Part of the solid by its rank in volume, from 1 on, or ``"all"``, for a surface that is wrapped.
-    max_volume_loss
-        Share of the volume that a wrapped mesh may lose, or text such as ``"10%"``.
-    segments
-        Names or labels of the segments of a label map.
-
-    """
-
-    mesher: Mesher | None = None
-    part: Which = 1
-    max_volume_loss: float | str = 0.05
-    segments: tuple[str | int, ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.mesher not in (None, "netgen", "wrap"):
-            raise MeshError(f"mesher must be 'netgen' or 'wrap', got '{self.mesher}'")
-        whole = isinstance(self.part, int) and not isinstance(self.part, bool) and self.part >= 1
-        if not (whole or self.part == "all"):
-            raise MeshError(f"part must be a number from 1 on or 'all', got '{self.part}'")
-        object.__setattr__(self, "max_volume_loss", share(self.max_volume_loss))
-        if not 0 <= float(self.max_volume_loss) < 1:
-            raise MeshError(f"max_volume_loss must be at least 0 and below 1, got {self.max_volume_loss}")
 
 
 def tetrahedralize(
@@ -163,16 +127,13 @@ def tetrahedralize_with(
     with progress_reporter(title, progress) as report:
         stage = _stages(report)
         stage("reading")
-        options = options or FillOptions()
+        job = FillJob(element, size, refine, options or FillOptions(), time_limit, stage)
         if isinstance(surface, (str, os.PathLike)) and is_segmentation(surface):
-            name, mesh = (
-                str(surface),
-                _of_segments(element, surface, size, unit, refine, options, time_limit, stage, drawn),
-            )
+            name, mesh = str(surface), segmented(surface, unit, job, drawn)
         else:
-            given = _scaled(surface, unit, options)
+            given = _scaled(surface, unit, job.options)
             stage("checking")
-            name, mesh = given.name, _filled(given, element, size, refine, options, time_limit, stage)
+            name, mesh = given.name, _filled(given, job)
     mesh.warn_of_flat_elements(name)
     return mesh
 
@@ -187,23 +148,6 @@ def _scaled(surface: str | os.PathLike[str] | trimesh.Trimesh, unit: str | None,
     return SurfaceFile(loaded.name, shape, loaded.part_names, loaded.part_of_face)
 
 
-def _of_segments(
-    element: Element,
-    path: str | os.PathLike[str],
-    size: float | None,
-    unit: str | None,
-    refine: Sequence[Ball],
-    options: FillOptions,
-    time_limit: float,
-    stage: Callable[[str], None],
-    drawn: Draw | None,
-) -> TetMesh:
-    if options.mesher == "netgen":
-        raise MeshError(f"{path}: NETGEN fills surfaces; leave out mesher = 'netgen' for a segmentation")
-    loss = float(options.max_volume_loss)
-    return segmented(element, path, options.segments, unit, size, refine, options.part, loss, time_limit, stage, drawn)
-
-
 def _stages(report: Reporter | None) -> Callable[[str], None]:
     """Return a function that reports a stage by its name."""
 
@@ -215,32 +159,23 @@ def _stages(report: Reporter | None) -> Callable[[str], None]:
     return stage
 
 
-def _filled(
-    given: SurfaceFile,
-    element: Element,
-    size: float | None,
-    refine: Sequence[Ball],
-    options: FillOptions,
-    time_limit: float,
-    stage: Callable[[str], None],
-) -> TetMesh:
+def _filled(given: SurfaceFile, job: FillJob) -> TetMesh:
     """Tetrahedra by the mesher that is asked for, or by the one that suits the surface."""
+    options = job.options
     surface, reason = _chosen(given, options)
     if surface is not None:
         if options.part not in (1, "all"):
             raise MeshError(f"{given.name}: there is no part {options.part}: the surface has 1")
-        stage("filling with tetrahedra")
-        own = options.mesher is None and size is None
-        patience = PATIENCE if own else None
+        job.stage("filling with tetrahedra")
+        own = options.mesher is None and job.size is None
         try:
-            return Filling(given.name, surface, element, size, refine, time_limit, patience).mesh()
+            return Filling(given.name, surface, job, PATIENCE if own else None).mesh()
         except MeshError as error:
             # At a size that is given, a mesh too coarse for the shape is the size's fault.
             if options.mesher == "netgen" or not (own or isinstance(error, MesherFailedError)):
                 raise
             reason = "could not be filled by NETGEN"
-    loss = float(options.max_volume_loss)
-    return Wrapping(given, reason, element, size, refine, options.part, loss, time_limit, stage).mesh()
+    return Wrapping(given, reason, job).mesh()
 
 
 def _chosen(given: SurfaceFile, options: FillOptions) -> tuple[SurfaceState | None, str]:

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.mesh.inner_triangles import simplified
 from palpate.mesh.solid_field import Grid, SolidField
+from palpate.mesh.triangles import areas, volume_within
 
 # Parts below this share of the largest are crumbs, and so are cavities of fewer cells.
 CRUMB, LEAST_CAVITY = 0.01, 64
@@ -113,7 +115,7 @@ def _wrap(field: SolidField, labels: np.ndarray, part: int | None, cells: int, m
     if whole:
         # Exact, less what was left out.
         others = sum(parts[rank].volume for rank in range(len(parts)) if rank not in wanted)
-        volume = _enclosed(field) - others
+        volume = abs(volume_within(field.vertices, field.faces)) - others
     elif part is None or len(parts) == 1:
         volume += crumbs
     fine = _around(field, grid, label, kept, cells)
@@ -147,18 +149,12 @@ def _require_one_side(field: SolidField, cell: float) -> None:
 def _closed_share(field: SolidField, vertices: np.ndarray, faces: np.ndarray, cell: float) -> float:
     """Share of the area of a wrap without a triangle of the surface near."""
     corners = vertices[faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    total = np.cumsum(areas)
+    total = np.cumsum(areas(vertices, faces))
     random = np.random.default_rng(0)
     chosen = np.minimum(np.searchsorted(total, random.uniform(size=WRAP_SAMPLES) * total[-1]), len(faces) - 1)
     weights = random.dirichlet(np.ones(3), WRAP_SAMPLES)
     points = np.einsum("ik,ikj->ij", weights, corners[chosen])
     return float((field.distances(points) > LOST_WALL * cell).mean())
-
-
-def _enclosed(field: SolidField) -> float:
-    corners = field.vertices[field.faces]
-    return abs(float(np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2])) / 6.0)
 
 
 def _parts(grid: Grid, field: SolidField, labels: np.ndarray) -> tuple[np.ndarray, list[Part], float]:
@@ -242,16 +238,14 @@ def _band(grid: Grid) -> Grid:
 
 def _zero(grid: Grid, moved: float) -> tuple[np.ndarray, np.ndarray]:
     """Zero of a field as a closed manifold of few triangles, which lies this far off it at most."""
-    from manifold3d import Error, Manifold, Mesh
     from skimage.measure import marching_cubes
 
     vertices, faces, _, _ = marching_cubes(grid.values, 0.0, spacing=(grid.cell,) * 3)
-    solid = Manifold(Mesh(np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32)))
-    if solid.status() != Error.NoError:
-        raise WrapError(f"its wrap is no manifold ({solid.status()})")
-    simple = solid.simplify(moved).to_mesh()
-    vertices = np.asarray(simple.vert_properties, dtype=np.float64)[:, :3] + grid.origin
-    return vertices, np.asarray(simple.tri_verts, dtype=np.int64)
+    try:
+        vertices, faces = simplified(vertices, faces, moved)
+    except ValueError as status:
+        raise WrapError(f"its wrap is no manifold ({status})") from None
+    return vertices + grid.origin, faces
 
 
 def _beside_and_lost(

@@ -5,28 +5,26 @@ from __future__ import annotations
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from palpate import _native
 from palpate.errors import MeshError, MeshWarning
 from palpate.mesh.child import failure_of, run_limited
 from palpate.mesh.curve import curve, refine
 from palpate.mesh.elements import face_parts
-from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, PARTS, Ball, Element, Filling, MesherFailedError
-from palpate.mesh.fit import GOOD_LOSS, distances
+from palpate.mesh.fill_job import PARTS, FillJob, length_text
+from palpate.mesh.filling import IN_CUBE, MOST_BY_NETGEN, Filling, MesherFailedError
+from palpate.mesh.fit import GOOD_LOSS, distances, mean_edge
 from palpate.mesh.inner import InnerRegions, faces_between
 from palpate.mesh.size import size_text
 from palpate.mesh.snap import snap
 from palpate.mesh.surface_file import SurfaceFile
 from palpate.mesh.surface_state import SurfaceState
 from palpate.mesh.tetmesh import TetMesh
-
-Which = int | Literal["all"]
+from palpate.mesh.triangles import closest_on
 
 # Cells of the grid along the longest side, at least and at most, and in an element.
 CELLS, MOST_CELLS, CELLS_IN_ELEMENT = 80, 200, 5.0
@@ -53,14 +51,8 @@ class Wrapping:
         Triangles, m.
     reason
         Why it is wrapped, after "the surface".
-    element, size, refine, time_limit
-        As of :class:`palpate.mesh.filling.Filling`.
-    part
-        Part of the solid by its rank in volume from 1 on, or ``"all"``.
-    max_volume_loss
-        Share of the volume that the mesh may lose.
-    stage
-        Is called with the name of what is being done.
+    job
+        What is asked for.
     inner
         Regions whose boundaries elements follow.
 
@@ -68,13 +60,7 @@ class Wrapping:
 
     surface: SurfaceFile
     reason: str
-    element: Element
-    size: float | None
-    refine: Sequence[Ball]
-    part: Which
-    max_volume_loss: float
-    time_limit: float
-    stage: Callable[[str], None]
+    job: FillJob
     inner: InnerRegions | None = None
 
     @property
@@ -96,14 +82,14 @@ class Wrapping:
         origin, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
         if not extent > 0:
             raise MeshError(f"{self.name}: all of its points coincide")
-        size = extent / PARTS[self.element] if self.size is None else self.size
+        size = extent / PARTS[self.job.element] if self.job.size is None else self.job.size
         arrays = self._run(origin, extent, size)
         wrap = _Wrapped(arrays, origin, extent)
         halvings = int(wrap.volume * IN_CUBE / size**3 > MOST_BY_NETGEN)
         if halvings:
             arrays = self._run(origin, extent, 2 * size)
         mesh = self._tetrahedra(arrays, wrap, size)
-        self.stage("fitting to the surface")
+        self.job.stage("fitting to the surface")
         reach = min(REACH_CELLS * wrap.cell, REACH_ELEMENT * size)
         project = wrap.projection(reach)
         mesh = snap(mesh, project)
@@ -113,7 +99,7 @@ class Wrapping:
         if self.inner is not None:
             mesh = self.inner.snapped(self.inner.marked(mesh))
             within = faces_between(mesh), self.inner.project
-        if self.element == "quadratic":
+        if self.job.element == "quadratic":
             mesh = curve(mesh, project, within)
         self._report(mesh, wrap, extent)
         return mesh
@@ -121,8 +107,8 @@ class Wrapping:
     def _run(self, origin: np.ndarray, extent: float, size: float) -> dict[str, np.ndarray]:
         """Results of the child, in a unit box; without tetrahedra where fTetWild failed or is not there."""
         faces = np.asarray(self.surface.shape.faces)
-        labels = self.surface.part_of_face
-        balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.refine]
+        labels, part = self.surface.part_of_face, self.job.options.part
+        balls = [[*((np.array(c) - origin) / extent), r / extent, h / extent] for c, r, h in self.job.refine]
         cells = np.clip(CELLS_IN_ELEMENT * extent / size, CELLS, MOST_CELLS)
         with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
             surface_file, mesh_file, stages = (Path(folder) / name for name in ("surface.npz", "mesh.npz", "stages"))
@@ -132,20 +118,20 @@ class Wrapping:
                 faces=faces,
                 labels=labels if len(labels) == len(faces) else np.full(len(faces), -1),
                 size=size / extent,
-                part=0 if self.part == "all" else self.part,
+                part=0 if part == "all" else part,
                 cells=int(cells),
                 balls=np.reshape(balls, (-1, 5)),
                 **({} if self.inner is None else self.inner.job(origin, extent)),
             )
             command = [sys.executable, "-m", "palpate.mesh.wrap_child", *map(str, (surface_file, mesh_file, stages))]
-            status = run_limited(command, self.time_limit, lambda: self._watch(stages))
+            status = run_limited(command, self.job.time_limit, lambda: self._watch(stages))
             found: dict[str, np.ndarray] = {}
             if mesh_file.exists():
                 with np.load(mesh_file) as result:
                     found = dict(result)
         if "reason" in found:
             raise MeshError(f"{self.name}: the surface cannot be filled: {found['reason']}")
-        failure = failure_of(status, self.time_limit)
+        failure = failure_of(status, self.job.time_limit)
         if "volume" not in found:
             raise MeshError(
                 f"{self.name}: the surface could not be wrapped: its process {failure or 'returned no tetrahedra'}"
@@ -166,16 +152,16 @@ class Wrapping:
         if stages.exists():
             lines = stages.read_text().splitlines()
             if lines:
-                self.stage(lines[-1])
+                self.job.stage(lines[-1])
 
     def _tetrahedra(self, arrays: dict[str, np.ndarray], wrap: _Wrapped, size: float) -> TetMesh:
         if len(arrays["nodes"]):
             mesh = TetMesh(arrays["nodes"] * wrap.extent + wrap.origin, arrays["tets"])
-            return mesh if self.part == "all" else _without_crumbs(self.name, mesh)
+            return mesh if self.job.options.part == "all" else _without_crumbs(self.name, mesh)
         import trimesh
 
         shape = trimesh.Trimesh(wrap.to_metres(arrays["vertices"]), arrays["faces"], process=False)
-        filling = Filling(self.name, SurfaceState.of(shape), "linear", size, self.refine, self.time_limit)
+        filling = Filling(self.name, SurfaceState.of(shape), replace(self.job, element="linear", size=size))
         with warnings.catch_warnings():
             # What is lost is measured when its nodes are on the given surface.
             warnings.simplefilter("ignore", MeshWarning)
@@ -192,9 +178,9 @@ class Wrapping:
         loss = 1.0 - mesh.volume / wrap.volume
         gap = float(distances(mesh, wrap.points).max()) if len(wrap.points) else 0.0
         change = f"{'loses' if loss > 0 else 'adds'} {100 * abs(loss):.1f} % of the volume"
-        what = f"the mesh {change} and lies up to {_length(gap)} off the surface"
-        finer = f"--max-size {_length(0.5 * _mean_edge(mesh)).replace(' ', '')} makes a finer one"
-        if abs(loss) > self.max_volume_loss:
+        what = f"the mesh {change} and lies up to {length_text(gap)} off the surface"
+        finer = f"--max-size {length_text(0.5 * mean_edge(mesh)).replace(' ', '')} makes a finer one"
+        if abs(loss) > float(self.job.options.max_volume_loss):
             allow = f"--max-volume-loss {np.ceil(100 * abs(loss)):.0f}% takes it"
             raise MeshError(f"{self.name}: the surface {self.reason}; {what}: {finer}, {allow}")
         self._warn(f"the surface {self.reason} and was wrapped; {what}{f'; {finer}' if abs(loss) > GOOD_LOSS else ''}")
@@ -204,15 +190,16 @@ class Wrapping:
         if wrap.lost_share > LEAST_LOST_SHARE:
             place = wrap.lost_points[0]
             self._warn(
-                f"walls thinner than about {_length(2 * wrap.cell)} were lost, {100 * wrap.lost_share:.1f} % of the "
-                f"surface, as near ({', '.join(f'{1e3 * x:.4g}' for x in place)}) mm"
+                f"walls thinner than about {length_text(2 * wrap.cell)} were lost, {100 * wrap.lost_share:.1f} % of "
+                f"the surface, as near ({', '.join(f'{1e3 * x:.4g}' for x in place)}) mm"
             )
 
     def _report_parts(self, wrap: _Wrapped) -> None:
-        if self.part == "all" or len(wrap.parts) == 1:
+        part = self.job.options.part
+        if part == "all" or len(wrap.parts) == 1:
             return
         total = sum(volume for volume, *_ in wrap.parts)
-        left_out = [rank for rank in range(len(wrap.parts)) if rank != self.part - 1]
+        left_out = [rank for rank in range(len(wrap.parts)) if rank != part - 1]
         for rank in left_out[:MOST_NAMED]:
             volume, middle, sides, label = wrap.parts[rank]
             title = f", '{self.surface.part_names[label]}'" if label >= 0 else ""
@@ -243,8 +230,8 @@ class _Wrapped:
             )
         ]
         used = np.unique(arrays["target"])
-        self._target = np.ascontiguousarray(self.to_metres(arrays["target_vertices"][used]))
-        self._faces = np.searchsorted(used, arrays["target"]).astype(np.uint32)
+        self._target = self.to_metres(arrays["target_vertices"][used])
+        self._faces = np.searchsorted(used, arrays["target"])
 
     def to_metres(self, points: np.ndarray) -> np.ndarray:
         """Points of the unit box, m."""
@@ -252,12 +239,12 @@ class _Wrapped:
 
     def projection(self, reach: float) -> Callable[[np.ndarray], np.ndarray]:
         """Closest points of the given surface, where that is not farther than ``reach``; else the points themselves."""
-        search = _native.SurfaceSearch(self._target, self._faces) if len(self._faces) else None
+        closest_to = closest_on(self._target, self._faces) if len(self._faces) else None
 
         def project(points: np.ndarray) -> np.ndarray:
-            if search is None or len(points) == 0:
+            if closest_to is None or len(points) == 0:
                 return points
-            closest = search.closest(np.ascontiguousarray(points)).reshape(-1, 3)
+            closest = closest_to(points)
             near = np.linalg.norm(closest - points, axis=1) <= reach
             return np.where(near[:, None], closest, points)
 
@@ -279,12 +266,3 @@ def _without_crumbs(name: str, mesh: TetMesh) -> TetMesh:
     )
     used = np.unique(mesh.tets[kept])
     return TetMesh(mesh.nodes[used], np.searchsorted(used, mesh.tets[kept]), mesh.regions[kept])
-
-
-def _mean_edge(mesh: TetMesh) -> float:
-    corners = mesh.nodes[mesh.surface_faces[:, :3]]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
-
-
-def _length(metres: float) -> str:
-    return f"{1e3 * metres:.3g} mm"

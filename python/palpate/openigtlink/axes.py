@@ -34,14 +34,20 @@ class Axes:
 
     def pose_from_wire(self, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position, m, and unit quaternion w x y z in the scene."""
+        from scipy.spatial.transform import Rotation
+
         own = np.linalg.inv(self._placement) @ matrix
         turned = own[:3, :3] * np.outer(self._signs, self._signs)
-        return self._signs * own[:3, 3] / MILLIMETRES, _quaternion(turned)
+        x, y, z, w = Rotation.from_matrix(turned).as_quat(canonical=True)
+        return self._signs * own[:3, 3] / MILLIMETRES, np.array([w, x, y, z])
 
     def pose_to_wire(self, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Matrix (4, 4), mm, of a position, m, and a unit quaternion in the scene."""
+        from scipy.spatial.transform import Rotation
+
         own = np.eye(4)
-        own[:3, :3] = _rotation(orientation) * np.outer(self._signs, self._signs)
+        w, x, y, z = orientation
+        own[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * np.outer(self._signs, self._signs)
         own[:3, 3] = self._signs * np.asarray(position) * MILLIMETRES
         return self._placement @ own
 
@@ -52,29 +58,3 @@ class Axes:
     def vector_to_wire(self, vector: np.ndarray) -> np.ndarray:
         """Vector of the scene in the axes of the wire, in its own unit; torques too, because both are right-handed."""
         return self._placement[:3, :3] @ (self._signs * vector)
-
-
-def _quaternion(rotation: np.ndarray) -> np.ndarray:
-    """Find the unit quaternion w x y z of a rotation as the eigenvector of Bar-Itzhack's matrix: for any angle."""
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    matrix = np.array(
-        [
-            [a + e + i, h - f, c - g, d - b],
-            [h - f, a - e - i, b + d, c + g],
-            [c - g, b + d, e - a - i, f + h],
-            [d - b, c + g, f + h, i - a - e],
-        ]
-    )
-    found = np.linalg.eigh(matrix)[1][:, -1]
-    return found if found[0] >= 0 else -found
-
-
-def _rotation(quaternion: np.ndarray) -> np.ndarray:
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -13,8 +13,8 @@ from palpate.body import Material, parse
 from palpate.errors import BodyError, UnitError
 from palpate.fields import STRAIN_LIMIT
 from palpate.mesh import TetMesh
+from palpate.mesh.fill_job import Element, FillOptions, Mesher
 from palpate.mesh.surface_file import SURFACE_ENDINGS
-from palpate.mesh.tetrahedralize import Element, FillOptions, Mesher
 from palpate.scene.devices import DeviceTable, check_tables, device_ranks
 from palpate.scene.dynamics import DynamicsTable
 from palpate.scene.loads import LoadTable

@@ -19,6 +19,7 @@ from palpate.cluster import require_version, use_threads_of_worker
 from palpate.errors import Error, PalpateWarning
 from palpate.green import GreensFunction
 from palpate.mesh import TetMesh
+from palpate.mesh.triangles import closest_on
 from palpate.scene import mesh_of_body, unsolved_body
 from palpate.scene.default_radius import PART_OF_BODY, default_contact_radius
 from palpate.scene.regions import MaterialTable
@@ -193,15 +194,15 @@ def _with_reference(material: MaterialTable) -> MaterialTable:
 def _touched_nodes(body: Body, presses: Sequence[PressTable]) -> np.ndarray:
     """Nodes of all surface faces that a patch reaches."""
     mesh = body.mesh
-    corners = np.searchsorted(mesh.surface_nodes, mesh.surface_triangles).astype(np.uint32)
-    search = _native.SurfaceSearch(mesh.nodes[mesh.surface_nodes], corners)
+    corners = np.searchsorted(mesh.surface_nodes, mesh.surface_triangles)
+    landed_from = closest_on(mesh.nodes[mesh.surface_nodes], corners)
     faces = mesh.nodes[mesh.surface_faces]
     centres = faces.mean(axis=1)
     sizes = np.linalg.norm(faces - centres[:, None], axis=2).max(axis=1)
     touched = np.zeros(len(faces), dtype=bool)
     for press in presses:
         radius = PART_OF_BODY * float(np.ptp(mesh.nodes, axis=0).max()) if press.radius is None else press.radius
-        landed = search.closest(np.array([press.point]))
+        landed = landed_from(np.array([press.point]))[0]
         touched |= np.linalg.norm(centres - landed, axis=1) <= MARGIN * (sizes + radius)
     return np.unique(mesh.surface_faces[touched])
 

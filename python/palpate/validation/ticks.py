@@ -17,7 +17,7 @@ from palpate.body import Body
 from palpate.errors import SimulationError
 from palpate.green import GreensFunction
 from palpate.simulation import Simulation
-from palpate.validation.verify.contact.reference import Block, body_on_table, top_nodes
+from palpate.validation.verify.contact.reference import Block, body_on_table, top_middle, top_nodes
 from palpate.validation.verify.solution import green_of
 
 KINDS = ("begin", "held", "sliding", "abrupt", "release")
@@ -72,8 +72,7 @@ def plate(cells: tuple[int, int, int]) -> tuple[Body, GreensFunction]:
 
 def press_centres(body: Body, shifts: Sequence[Sequence[float]]) -> np.ndarray:
     """Centres of spheres pressed into a plate, (tools, 3) m, shifted by (tools, 2), m, from the middle of its top."""
-    low, high = body.mesh.bounds
-    return np.array([[*(low + high)[:2] / 2 + shift, high[2] + RADIUS - DEPTH] for shift in np.asarray(shifts)])
+    return top_middle(body) + [[*shift, RADIUS - DEPTH] for shift in np.asarray(shifts)]
 
 
 def strokes(along: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -105,29 +105,22 @@ class Choices:
             A message that makes no sense, or a value that the body cannot take.
 
         """
-        known = {"unit", "painted", "plane", "tissue", "radius", "nodule", "segments"}
+        readers: dict[str, Callable[[], Any]] = {
+            "unit": lambda: _one_of(message, "unit", COMMON_UNITS),
+            "painted": lambda: _flag(message, "painted"),
+            "plane": lambda: _plane(message, high - low),
+            "tissue": lambda: _one_of(message, "tissue", [tissue.name for tissue in TISSUES]),
+            "radius": lambda: _radius(message, "radius", high - low),
+            "nodule": lambda: _nodule(message, low, high),
+            "segments": lambda: _segments(message, self.segments),
+        }
         keys = set(message) - {"type"}
-        if not keys or not keys <= known:
-            raise ViewerError(f"setup takes {', '.join(sorted(known))}")
-        change: dict[str, Any] = {}
-        sides = high - low
-        if "unit" in message:
-            change["unit"] = _one_of(message, "unit", COMMON_UNITS)
-        if "painted" in message:
-            change["painted"] = _flag(message, "painted")
-        if "plane" in message:
-            change["plane"] = _plane(message, sides)
-        if "tissue" in message:
-            name = _one_of(message, "tissue", [tissue.name for tissue in TISSUES])
-            tissue = tissue_named(name)
-            material = {"youngs_modulus": tissue.youngs_modulus, "poissons_ratio": tissue.poissons_ratio}
-            change |= {"tissue": name, **material}
-        if "radius" in message:
-            change["radius"] = _radius(message, "radius", sides)
-        if "nodule" in message:
-            change["nodule"] = _nodule(message, low, high)
-        if "segments" in message:
-            change["segments"] = _segments(message, self.segments)
+        if not keys or not keys <= readers.keys():
+            raise ViewerError(f"setup takes {', '.join(sorted(readers))}")
+        change = {key: read() for key, read in readers.items() if key in keys}
+        if "tissue" in change:
+            tissue = tissue_named(change["tissue"])
+            change |= {"youngs_modulus": tissue.youngs_modulus, "poissons_ratio": tissue.poissons_ratio}
         return replace(self, **change)
 
 

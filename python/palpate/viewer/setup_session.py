@@ -13,7 +13,7 @@ from palpate.mesh import TetMesh
 from palpate.viewer.drawn_surface import drawn_triangles
 from palpate.viewer.messages import encode, numbered
 from palpate.viewer.setup_body import SetupBody
-from palpate.viewer.shown_body import title_of
+from palpate.viewer.shown_body import body_arrays, body_header, title_of
 
 # Of a page without a body, m: what the camera's distances follow.
 EMPTY_SIZE = 0.1
@@ -109,33 +109,8 @@ class ShownSurface:
         self.name, self.size = name, float(np.ptp(positions, axis=0).max())
         drawn = drawn_triangles(positions, triangles, np.zeros(len(triangles), dtype=np.int64))
         count = len(drawn.nodes)
-        self.header = {
-            "name": name,
-            "title": title_of(name),
-            "nodes": count,
-            "tets": 0,
-            "surface_nodes": len(positions),
-            "triangles": len(triangles),
-            "drawn": None if drawn.is_whole else {"triangles": len(drawn.triangles), "deviation": drawn.deviation},
-            "youngs_modulus": None,
-            "poissons_ratio": None,
-            "position": [0.0, 0.0, 0.0],
-            "orientation": [1.0, 0.0, 0.0, 0.0],
-            "fields": [],
-            "regions": [],
-        }
-        nothing = np.zeros(0)
-        self.arrays: dict[str, tuple[str, np.ndarray]] = {
-            "nodes": ("f4", positions[drawn.nodes]),
-            "tets": ("u4", np.zeros((0, 4))),
-            "tet_regions": ("u4", nothing),
-            "surface_triangles": ("u4", drawn.triangles),
-            "triangle_regions": ("u4", drawn.regions),
-            "surface_nodes": ("u4", np.arange(count)),
-            "fixed_nodes": ("u4", nothing),
-            "free": ("f4", np.zeros((count, 3))),
-            "owners": ("u4", nothing if drawn.owners is None else drawn.owners),
-        }
+        self.header = body_header(name, drawn, len(positions), len(triangles))
+        self.arrays = body_arrays(drawn, positions[drawn.nodes], np.arange(count), np.zeros((count, 3)))
 
 
 def _outside(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:

@@ -65,13 +65,9 @@ class ShownBody:
         green, body = self.built.green, self.built.body
         outer = int(green.surface_nodes.max()) + 1
         return {
-            "name": self.built.name,
-            "title": title_of(self.built.name),
+            **body_header(self.built.name, self.drawn, len(green.surface_nodes), len(green.surface_triangles)),
             "nodes": len(body.mesh.nodes) if body is not None and green.follows_inside else outer,
             "tets": len(body.mesh.tets) if body is not None and green.follows_inside else 0,
-            "surface_nodes": len(green.surface_nodes),
-            "triangles": len(green.surface_triangles),
-            "drawn": None if self.drawn.is_whole else self._drawn_header(),
             "youngs_modulus": youngs_modulus,
             "poissons_ratio": self.poissons_ratio,
             "position": list(self.built.position),
@@ -80,9 +76,6 @@ class ShownBody:
             "regions": [] if body is None else regions_of(body)[0],
         }
 
-    def _drawn_header(self) -> dict[str, Any]:
-        return {"triangles": len(self.drawn.triangles), "deviation": self.drawn.deviation}
-
     def arrays(self) -> dict[str, tuple[str, np.ndarray]]:
         """Arrays of the scene message, in the body's frame.
 
@@ -90,17 +83,8 @@ class ShownBody:
         """
         drawn, green = self.drawn, self.built.green
         nodes, tets, regions, surface, fixed = self._mesh() if drawn.is_whole else self._outside()
-        return {
-            "nodes": ("f4", nodes),
-            "tets": ("u4", tets),
-            "tet_regions": ("u4", regions),
-            "surface_triangles": ("u4", surface[drawn.triangles]),
-            "triangle_regions": ("u4", drawn.regions),
-            "surface_nodes": ("u4", surface),
-            "fixed_nodes": ("u4", fixed),
-            "free": ("f4", green.free_displacements[drawn.nodes]),
-            "owners": ("u4", np.zeros(0) if drawn.owners is None else drawn.owners),
-        }
+        inside = {"tets": ("u4", tets), "tet_regions": ("u4", regions), "fixed_nodes": ("u4", fixed)}
+        return body_arrays(drawn, nodes, surface, green.free_displacements[drawn.nodes]) | inside
 
     def _mesh(self) -> tuple[np.ndarray, ...]:
         """Nodes, tetrahedra, their regions, surface nodes and supported nodes, of a body that is drawn as it is."""
@@ -119,6 +103,43 @@ class ShownBody:
         green, rows = self.built.green, self.drawn.nodes
         fixed = np.flatnonzero(np.isin(green.surface_nodes[rows], green.fixed_nodes))
         return green.surface_positions[rows], np.zeros((0, 4)), np.zeros(0), np.arange(len(rows)), fixed
+
+
+def body_header(name: str, drawn: DrawnSurface, nodes: int, triangles: int) -> dict[str, Any]:
+    """Entry of the scene message for a surface with nothing but so many nodes and triangles."""
+    return {
+        "name": name,
+        "title": title_of(name),
+        "nodes": len(drawn.nodes),
+        "tets": 0,
+        "surface_nodes": nodes,
+        "triangles": triangles,
+        "drawn": None if drawn.is_whole else {"triangles": len(drawn.triangles), "deviation": drawn.deviation},
+        "youngs_modulus": None,
+        "poissons_ratio": None,
+        "position": [0.0, 0.0, 0.0],
+        "orientation": [1.0, 0.0, 0.0, 0.0],
+        "fields": [],
+        "regions": [],
+    }
+
+
+def body_arrays(
+    drawn: DrawnSurface, nodes: np.ndarray, surface: np.ndarray, free: np.ndarray
+) -> dict[str, tuple[str, np.ndarray]]:
+    """Arrays of the scene message for positions, m, surface nodes among them, and their free displacements, m."""
+    nothing = np.zeros(0)
+    return {
+        "nodes": ("f4", nodes),
+        "tets": ("u4", np.zeros((0, 4))),
+        "tet_regions": ("u4", nothing),
+        "surface_triangles": ("u4", surface[drawn.triangles]),
+        "triangle_regions": ("u4", drawn.regions),
+        "surface_nodes": ("u4", surface),
+        "fixed_nodes": ("u4", nothing),
+        "free": ("f4", free),
+        "owners": ("u4", nothing if drawn.owners is None else drawn.owners),
+    }
 
 
 def regions_of(body: Body) -> tuple[list[dict[str, Any]], np.ndarray]:

@@ -10,9 +10,10 @@ import trimesh
 from label_maps import ball, ellipsoid, labels_of, write_nrrd
 
 import palpate
+from palpate.mesh.fill_job import FillJob, FillOptions
 from palpate.mesh.inner import InnerRegion, InnerRegions
 from palpate.mesh.surface_file import SurfaceFile
-from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
+from palpate.mesh.tetrahedralize import tetrahedralize_with
 from palpate.mesh.wrapping import Wrapping
 from palpate.scene import BuiltScene
 from palpate.validation.verify.contact.loop import UNLIMITED, straight
@@ -66,7 +67,8 @@ def analytic() -> palpate.TetMesh:
     surface = SurfaceFile("analytic", liver)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", palpate.MeshWarning)
-        return Wrapping(surface, "", "quadratic", 0.016, balls, 1, 0.05, 300, lambda _: None, inner).mesh()
+        job = FillJob("quadratic", 0.016, balls, FillOptions(), 300, lambda _: None)
+        return Wrapping(surface, "", job, inner).mesh()
 
 
 @pytest.mark.slow

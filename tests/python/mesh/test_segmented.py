@@ -10,9 +10,10 @@ from command_line import refused, run
 from label_maps import ball, ellipsoid, labels_of, turned, write_nifti, write_nrrd
 
 import palpate
+from palpate.mesh.fill_job import FillOptions
 from palpate.mesh.inner import faces_between
 from palpate.mesh.label_summary import label_summary
-from palpate.mesh.tetrahedralize import FillOptions, tetrahedralize_with
+from palpate.mesh.tetrahedralize import tetrahedralize_with
 from palpate.progress import Reporter
 
 pytest.importorskip("pytetwild", reason="pytetwild has no wheel for macOS", exc_type=ImportError)

@@ -20,3 +20,25 @@ export function designScale(): number {
 export function press(id: string, pressed: boolean): void {
   byId(id).setAttribute("aria-pressed", String(pressed));
 }
+
+/** Disables controls, or enables them. */
+export function disable(ids: readonly string[], disabled: boolean): void {
+  for (const id of ids) byId<HTMLButtonElement>(id).disabled = disabled;
+}
+
+/** A new element with its properties, and what is in it. */
+export function create<Tag extends keyof HTMLElementTagNameMap>(
+  tag: Tag,
+  properties: Partial<HTMLElementTagNameMap[Tag]> = {},
+  ...content: (Node | string)[]
+): HTMLElementTagNameMap[Tag] {
+  const element = Object.assign(document.createElement(tag), properties);
+  element.append(...content);
+  return element;
+}
+
+/** Lists named things in a select, unless it lists them already. */
+export function list(select: HTMLSelectElement, things: readonly { name: string; title: string }[]): void {
+  if ([...select.options].map(({ value }) => value).join() === things.map(({ name }) => name).join()) return;
+  select.replaceChildren(...things.map(({ name, title }) => new Option(title, name)));
+}

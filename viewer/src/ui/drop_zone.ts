@@ -3,7 +3,7 @@
 import type { Setup } from "../setup";
 import { inControl } from "../store";
 import type { Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId, disable, setText } from "./dom";
 
 export class DropZone {
   private readonly input = byId<HTMLInputElement>("file-input");
@@ -27,7 +27,7 @@ export class DropZone {
     store.subscribe(["setup", "status", "role", "connection"], (state) => {
       const { setup: setupState, status } = state;
       byId("empty").hidden = !setupState?.editing || setupState.body !== null || Boolean(status?.text);
-      byId<HTMLButtonElement>("file-choose").disabled = !inControl(state);
+      disable(["file-choose"], !inControl(state));
     });
   }
 

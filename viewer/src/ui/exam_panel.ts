@@ -4,7 +4,7 @@ import type { Control } from "../control";
 import type { ExamMessage } from "../net/protocol";
 import { inControl } from "../store";
 import type { Store } from "../store";
-import { byId, press, setText } from "./dom";
+import { byId, create, disable, press, setText } from "./dom";
 import { ForceTone } from "./force_tone";
 
 export class ExamPanel {
@@ -20,7 +20,7 @@ export class ExamPanel {
     store.subscribe(["exam"], ({ exam }) => this.show(exam));
     store.subscribe(["exam", "answering", "role", "connection"], (state) => {
       const able = inControl(state) && !state.answering && state.exam?.result === null;
-      for (const id of ["exam-mark", "exam-none"]) byId<HTMLButtonElement>(id).disabled = !able;
+      disable(["exam-mark", "exam-none"], !able);
     });
     store.subscribe(["frame", "exam"], ({ frame, exam }) => {
       if (exam) this.tone.play(exam.result ? 0 : (frame?.loudness ?? 0));
@@ -39,13 +39,8 @@ export class ExamPanel {
     byId("exam-answers").hidden = result !== null;
     byId("exam-result").hidden = result === null;
     if (!result) return;
-    byId("exam-lines").replaceChildren(...result.lines.map(lineElement));
+    byId("exam-lines").replaceChildren(...result.lines.map((line) => create("p", {}, line)));
     byId<HTMLImageElement>("exam-plot").src = result.plot;
   }
 }
 
-function lineElement(text: string): HTMLElement {
-  const line = document.createElement("p");
-  line.textContent = text;
-  return line;
-}

@@ -1,7 +1,7 @@
 // What pointer, fingers and keys do, over the page; `?` opens and ends it.
 
 import { KEYS } from "../input/keyboard";
-import { byId } from "./dom";
+import { byId, create } from "./dom";
 
 export function toggleHelp(): void {
   const help = byId<HTMLDialogElement>("help");
@@ -20,11 +20,6 @@ export function fillHelp(): void {
 }
 
 function row(key: string, what: string): HTMLElement {
-  const [line, cap, cell] = [document.createElement("div"), document.createElement("dt"), document.createElement("dd")];
-  const shown = document.createElement("kbd");
-  shown.textContent = key === "Escape" ? "Esc" : key;
-  cap.append(shown);
-  cell.textContent = what;
-  line.append(cap, cell);
-  return line;
+  const cap = create("kbd", {}, key === "Escape" ? "Esc" : key);
+  return create("div", {}, create("dt", {}, cap), create("dd", {}, what));
 }

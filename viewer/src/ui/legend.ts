@@ -6,7 +6,7 @@ import { grouped } from "../regions";
 import type { Group } from "../regions";
 import { ColorMap } from "../scene/color_map";
 import type { State, Store } from "../store";
-import { byId, press, setText } from "./dom";
+import { byId, create, press, setText } from "./dom";
 import { MINUS, parseQuantity, pascals, sizeText } from "./numbers";
 
 /** Units that take over where the numbers would get long: from this value on, divided by the factor. */
@@ -160,11 +160,7 @@ function titleOf({ body, region }: Group, { scene, coloring, settings }: Readonl
 }
 
 function entry(color: string | null, title: string): HTMLElement {
-  const row = document.createElement("p");
-  row.className = "legend-key";
-  const swatch = document.createElement("span");
-  swatch.className = "key key-group";
+  const swatch = create("span", { className: "key key-group" });
   if (color) swatch.style.backgroundColor = color;
-  row.append(swatch, title);
-  return row;
+  return create("p", { className: "legend-key" }, swatch, title);
 }

@@ -3,7 +3,7 @@
 import type { Control } from "../control";
 import type { ModeMessage, MotionScene } from "../net/protocol";
 import type { Store, Tab } from "../store";
-import { byId, press, setText } from "./dom";
+import { byId, create, press, setText } from "./dom";
 import { hertz, newtonSeconds } from "./numbers";
 import { Slider } from "./slider";
 
@@ -84,15 +84,9 @@ export class MotionPanel {
   }
 
   private modeButton(number: number, frequency: number): HTMLButtonElement {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.setAttribute("aria-pressed", "false");
-    button.setAttribute("aria-label", `Mode ${number}, ${hertz(frequency)}`);
-    const rank = document.createElement("small");
-    rank.textContent = String(number);
-    button.append(rank, hertz(frequency));
-    button.onclick = () => this.control.showMode(number);
-    return button;
+    const onclick = () => this.control.showMode(number);
+    const named = { ariaPressed: "false", ariaLabel: `Mode ${number}, ${hertz(frequency)}` };
+    return create("button", { type: "button", ...named, onclick }, create("small", {}, String(number)), hertz(frequency));
   }
 }
 

@@ -5,7 +5,7 @@ import type { ConnectionState } from "../net/carrier";
 import type { StatusMessage } from "../net/protocol";
 import { inControl } from "../store";
 import type { Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId, create, setText } from "./dom";
 import { duration } from "./numbers";
 
 const CONNECTION_WORDS: Record<ConnectionState, string> = {
@@ -86,16 +86,6 @@ function showFault(fault: string | null): void {
 }
 
 function noticeBanner(text: string, dismiss: () => void): HTMLElement {
-  const notice = document.createElement("div");
-  notice.className = "banner banner-notice";
-  const words = document.createElement("span");
-  words.textContent = text;
-  const close = document.createElement("button");
-  close.type = "button";
-  close.className = "close";
-  close.textContent = "×";
-  close.setAttribute("aria-label", "Dismiss this message");
-  close.onclick = dismiss;
-  notice.append(words, close);
-  return notice;
+  const close = create("button", { type: "button", className: "close", ariaLabel: "Dismiss this message", onclick: dismiss }, "×");
+  return create("div", { className: "banner banner-notice" }, create("span", {}, text), close);
 }

@@ -4,33 +4,23 @@ import { NOT_READY, NOT_TOUCHABLE, PAINTED, READY, WAITING, countStates, isGrowi
 import type { Painting } from "../painting";
 import { inControl } from "../store";
 import type { State, Store } from "../store";
-import { brushSlider } from "./brush_slider";
-import { byId, press, setText } from "./dom";
+import { paintControls } from "./paint_controls";
+import { byId, disable, setText } from "./dom";
 import { duration } from "./numbers";
-import type { Slider } from "./slider";
 
 const STATES = { ready: READY, waiting: WAITING, painted: PAINTED, later: NOT_READY, never: NOT_TOUCHABLE } as const;
 
 export class PaintPanel {
-  private readonly brush: Slider;
-
   constructor(store: Store, painting: Painting) {
-    this.brush = brushSlider("brush", painting, () => this.brush.show(store.get().brushRadius));
-    byId("paint-brush").onclick = () => painting.choose("brush");
-    byId("paint-lasso").onclick = () => painting.choose("lasso");
-    byId("paint-undo").onclick = () => painting.undo();
-    byId("paint-clear").onclick = () => painting.clear();
+    // A size that cannot be read leaves the brush as it is.
+    paintControls("paint", "brush", painting, store, () => undefined);
     byId("paint-compute").onclick = () => painting.compute();
-    store.subscribe(["paintTool"], ({ paintTool }) => {
-      for (const tool of ["brush", "lasso"]) press(`paint-${tool}`, tool === paintTool);
-      byId("brush-field").hidden = paintTool !== "brush";
-    });
-    store.subscribe(["brushRadius"], ({ brushRadius }) => this.brush.show(brushRadius));
+    store.subscribe(["paintTool"], ({ paintTool }) => (byId("brush-field").hidden = paintTool !== "brush"));
     store.subscribe(["computed", "scene", "strokes", "exam"], (state) => this.show(state));
     store.subscribe(["strokes", "role", "connection"], (state) => {
       const nothing = state.strokes.length === 0 || !inControl(state);
-      for (const id of ["undo", "clear", "compute"]) byId<HTMLButtonElement>(`paint-${id}`).disabled = nothing;
-      for (const id of ["brush", "lasso"]) byId<HTMLButtonElement>(`paint-${id}`).disabled = !inControl(state);
+      disable(["paint-undo", "paint-clear", "paint-compute"], nothing);
+      disable(["paint-brush", "paint-lasso"], !inControl(state));
     });
   }
 

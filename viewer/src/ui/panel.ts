@@ -5,7 +5,7 @@ import { NO_INSIDE, hasInside, noCutReason } from "../control";
 import type { Viewport } from "../scene/viewport";
 import { CUT_SHARE, inControl } from "../store";
 import type { Axis, Layer, Store } from "../store";
-import { byId, press, setText } from "./dom";
+import { byId, disable, press, setText } from "./dom";
 import { download, takePicture } from "./screenshot";
 import { Slider } from "./slider";
 import { readStored, writeStored } from "./storage";
@@ -70,9 +70,9 @@ export class Panel {
     store.subscribe(["pinned", "pinNext"], ({ pinned, pinNext }) => press("pin", pinNext || pinned.length > 0));
     store.subscribe(["role", "connection", "pinned", "pressing"], (state) => {
       const watching = state.role !== "control";
-      for (const id of ["reset", "fault-reset", "grab", "pin"]) byId<HTMLButtonElement>(id).disabled = watching;
+      disable(["reset", "fault-reset", "grab", "pin"], watching);
       const nothing = state.pinned.length === 0 && !state.pressing;
-      byId<HTMLButtonElement>("unpin").disabled = nothing || !inControl(state);
+      disable(["unpin"], nothing || !inControl(state));
     });
     store.subscribe(["scene"], ({ scene }) => {
       // A finger sees no hints: pressed all the same, the button says why.

@@ -4,7 +4,7 @@ import type { Control } from "../control";
 import type { RecordedMessage, RecordingStatus } from "../net/session_messages";
 import { inControl } from "../store";
 import type { Store } from "../store";
-import { byId, press, setText } from "./dom";
+import { byId, disable, press, setText } from "./dom";
 import { bytes } from "./numbers";
 
 export class RecordButton {
@@ -17,7 +17,7 @@ export class RecordButton {
     store.subscribe(["scene", "exam", "role", "connection"], (state) => {
       byId("record").hidden = state.scene?.replay != null || state.exam !== null || state.role !== "control";
       byId("recording-stop").hidden = state.role !== "control";
-      for (const id of ["record", "recording-stop"]) byId<HTMLButtonElement>(id).disabled = !inControl(state);
+      disable(["record", "recording-stop"], !inControl(state));
     });
   }
 }

@@ -1,7 +1,7 @@
 // Screenshot of the scene with the legend, the force and the scale over it.
 
 import type { Viewport } from "../scene/viewport";
-import { byId } from "./dom";
+import { byId, create } from "./dom";
 import { themeColor } from "./theme";
 
 /** What is written over the picture, but for notices and hints. */
@@ -10,9 +10,7 @@ const OVERLAY_IDS = ["readout", "legend", "scale", "scale-banner", "mode-banner"
 /** As PNG, null where the browser cannot. */
 export function takePicture(viewport: Viewport): Promise<Blob | null> {
   const { canvas } = viewport;
-  const picture = document.createElement("canvas");
-  picture.width = canvas.width;
-  picture.height = canvas.height;
+  const picture = create("canvas", { width: canvas.width, height: canvas.height });
   const context = picture.getContext("2d")!;
   paintBackdrop(context, picture.width, picture.height);
   // In one go: the browser may clear what it has shown.
@@ -105,9 +103,7 @@ function paintText(context: CanvasRenderingContext2D, text: string, box: DOMRect
 
 export function download(blob: Blob, sceneName: string): void {
   const stamp = new Date().toISOString().slice(0, 19).replaceAll(":", "").replace("T", "-");
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = `palpate-${sceneName}-${stamp}.png`;
+  const link = create("a", { href: URL.createObjectURL(blob), download: `palpate-${sceneName}-${stamp}.png` });
   link.click();
   // The download has read the address by then.
   window.setTimeout(() => URL.revokeObjectURL(link.href), 1000);

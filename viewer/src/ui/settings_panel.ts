@@ -4,7 +4,7 @@
 import type { Control } from "../control";
 import { groupings } from "../regions";
 import type { State, Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId, list, setText } from "./dom";
 import { pascals, percent } from "./numbers";
 import { Slider } from "./slider";
 
@@ -49,7 +49,7 @@ export class SettingsPanel {
     });
     store.subscribe(["models"], ({ models }) => {
       byId("model-row").hidden = models.length === 0;
-      this.model.replaceChildren(...models.map(({ name, title }) => new Option(title, name)));
+      list(this.model, models);
     });
     // A model that was refused or cancelled is not the one that is shown.
     store.subscribe(["models", "scene", "status"], ({ scene, status }) => {
@@ -80,10 +80,7 @@ export class SettingsPanel {
     const fields = scene?.bodies[body]?.fields ?? [];
     const groups = groupings(scene);
     const offered = [STRAINED, ...fields, ...groups.map((by) => ({ name: GROUPED + by, title: GROUPING_TITLES[by] }))];
-    const listed = [...this.field.options].map(({ value }) => value);
-    if (listed.join() !== offered.map(({ name }) => name).join()) {
-      this.field.replaceChildren(...offered.map(({ name, title }) => new Option(title, name)));
-    }
+    list(this.field, offered);
     const shown = fields.find(({ name }) => name === field) ?? fields[0];
     if (coloring === "strained") this.field.value = STRAINED.name;
     else if (coloring !== "field") this.field.value = GROUPED + coloring;

@@ -6,8 +6,8 @@ import { editedBody, hindrance } from "../setup";
 import type { Setup } from "../setup";
 import { inControl } from "../store";
 import type { State, Store } from "../store";
-import { brushSlider } from "./brush_slider";
-import { byId, press, setText } from "./dom";
+import { paintControls } from "./paint_controls";
+import { byId, create, disable, list, press, setText } from "./dom";
 import { millimetres, pascals, sizeText } from "./numbers";
 import { Slider } from "./slider";
 
@@ -33,7 +33,6 @@ const [FACTOR_LEAST, FACTOR_MOST] = [0.1, 100];
 
 export class SetupPanel {
   private readonly depth: Slider;
-  private readonly brush: Slider;
   private readonly radius: Slider;
   private readonly noduleRadius: Slider;
   private readonly noduleModulus: Slider;
@@ -50,13 +49,9 @@ export class SetupPanel {
     this.radius = this.lengthSlider("setup-radius", "Tool radius", (radius) => setup.choose({ radius }));
     this.noduleRadius = this.lengthSlider("nodule-radius", "Nodule", (radius) => setup.moveNodule({ radius }));
     this.noduleModulus = this.modulusSlider();
-    this.brush = brushSlider("setup-brush-size", painting, notice);
+    paintControls("setup", "setup-brush-size", painting, store, notice);
     this.listen(painting);
     store.subscribe(["setup", "status", "role", "connection", "strokes"], (state) => this.show(state));
-    store.subscribe(["paintTool"], ({ paintTool }) => {
-      for (const tool of ["brush", "lasso"]) press(`setup-${tool}`, tool === paintTool);
-    });
-    store.subscribe(["brushRadius"], ({ brushRadius }) => this.brush.show(brushRadius));
   }
 
   private listen(painting: Painting): void {
@@ -72,10 +67,6 @@ export class SetupPanel {
       setup.choose({ painted: true });
       if (store.get().paintTool === null) painting.choose("brush");
     };
-    byId("setup-brush").onclick = () => painting.choose("brush");
-    byId("setup-lasso").onclick = () => painting.choose("lasso");
-    byId("setup-undo").onclick = () => painting.undo();
-    byId("setup-clear").onclick = () => painting.clear();
     this.tissue.onchange = () => setup.choose({ tissue: this.tissue.value });
     this.unit.onchange = () => setup.choose({ unit: this.unit.value });
     byId("setup-nodule").onclick = () => setup.toggleNodule();
@@ -108,7 +99,7 @@ export class SetupPanel {
     setText(byId("setup-size"), sizeText(body.size));
     const counts = `${body.nodes.toLocaleString("en")} nodes, ${body.tets.toLocaleString("en")} tetrahedra`;
     setText(byId("setup-mesh"), body.filled ? counts : "being filled with tetrahedra");
-    byId("setup-notes").replaceChildren(...body.notes.map(noteLine));
+    byId("setup-notes").replaceChildren(...body.notes.map((note) => create("li", {}, note)));
     this.showUnit(body);
     this.showSupports(state, body);
     this.showMaterial(setup, body);
@@ -146,13 +137,9 @@ export class SetupPanel {
   }
 
   private unitButton(unit: string, size: string): HTMLElement {
-    const button = document.createElement("button");
-    button.type = "button";
+    const onclick = () => this.setup.choose({ unit });
+    const button = create("button", { type: "button", onclick }, create("b", {}, unit), ` ${size}`);
     button.dataset["testid"] = `unit-${unit}`;
-    const name = document.createElement("b");
-    name.textContent = unit;
-    button.append(name, ` ${size}`);
-    button.onclick = () => this.setup.choose({ unit });
     return button;
   }
 
@@ -165,16 +152,12 @@ export class SetupPanel {
     for (const { id, axis, above } of SIDES) press(`side-${id}`, axis === plane.axis && above === plane.above);
     bound(this.depth, 0.002 * body.size[plane.axis], DEPTH_MOST * body.size[plane.axis]);
     this.depth.show(plane.depth);
-    for (const id of ["setup-undo", "setup-clear"]) if (strokes.length === 0) byId<HTMLButtonElement>(id).disabled = true;
+    if (strokes.length === 0) disable(["setup-undo", "setup-clear"], true);
   }
 
   private showMaterial(setup: SetupMessage, body: SetupBody): void {
     const tissues = setup.tissues;
-    const names = [...(body.tissue === null ? [""] : []), ...tissues.map(({ name }) => name)];
-    if ([...this.tissue.options].map(({ value }) => value).join() !== names.join()) {
-      const other = body.tissue === null ? [new Option("As set while touching", "")] : [];
-      this.tissue.replaceChildren(...other, ...tissues.map(({ name, title }) => new Option(title, name)));
-    }
+    list(this.tissue, [...(body.tissue === null ? [{ name: "", title: "As set while touching" }] : []), ...tissues]);
     this.tissue.value = body.tissue ?? "";
     const chosen = tissues.find(({ name }) => name === body.tissue);
     const spread = chosen && chosen.spread > 0 ? ` ± ${pascals(chosen.spread)}` : "";
@@ -195,14 +178,10 @@ export class SetupPanel {
   }
 
   private segmentRow(name: string, tissues: readonly Tissue[]): HTMLElement {
-    const [row, title, select] = [document.createElement("label"), document.createElement("span"), document.createElement("select")];
-    row.className = "row";
-    title.textContent = name;
+    const select = create("select", { onchange: () => this.setup.chooseSegment(name, select.value) });
     select.dataset["testid"] = `segment-${name}`;
-    select.replaceChildren(...tissues.map((tissue) => new Option(tissue.title, tissue.name)));
-    select.onchange = () => this.setup.chooseSegment(name, select.value);
-    row.append(title, select);
-    return row;
+    list(select, tissues);
+    return create("label", { className: "row" }, create("span", {}, name), select);
   }
 
   private showSaved({ saved }: SetupBody): void {
@@ -221,7 +200,7 @@ export class SetupPanel {
 
   private lengthSlider(id: string, name: string, choose: (value: number) => void): Slider {
     const showError = this.notice;
-    return new Slider({ id, name, format: millimetres, units: LENGTHS, usual: "mm", fallback: () => null, choose, showError });
+    return new Slider({ id, name, format: millimetres, units: LENGTHS, usual: "mm", choose, showError });
   }
 
   private modulusSlider(): Slider {
@@ -237,7 +216,6 @@ export class SetupPanel {
         fromTrack: (place) => Number((own() * Math.exp(low + place * (high - low))).toPrecision(3)),
       },
       bounds: () => [FACTOR_LEAST * own(), FACTOR_MOST * own()],
-      fallback: () => null,
       choose: (modulus) => this.setup.moveNodule({ youngs_modulus: modulus }),
       showError: this.notice,
     });
@@ -250,12 +228,6 @@ function bound({ input }: Slider, low: number, high: number): void {
   input.step = String(step);
   input.min = String(Math.max(step, Math.round(low / step) * step));
   input.max = String(Math.floor(high / step) * step);
-}
-
-function noteLine(note: string): HTMLElement {
-  const line = document.createElement("li");
-  line.textContent = note;
-  return line;
 }
 
 /** A path as a shell takes it. */

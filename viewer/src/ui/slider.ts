@@ -19,8 +19,8 @@ export interface SliderOptions {
   scale?: { toTrack(value: number): number; fromTrack(place: number): number };
   /** Values that may be typed; the ends of the slider if left out. */
   bounds?(): [low: number, high: number];
-  /** What a double click leads back to; null where there is nothing to go back to. */
-  fallback(): number | null;
+  /** What a double click leads back to; null, or left out, where there is nothing to go back to. */
+  fallback?(): number | null;
   choose(value: number): void;
   /** Of a number that could not be read. */
   showError(text: string): void;
@@ -55,7 +55,7 @@ export class Slider {
     if (document.activeElement !== this.number) this.number.value = this.text;
     // The longest number fits, and what it stands beside keeps its room.
     this.number.size = Math.max(4, this.text.length);
-    const back = this.options.fallback();
+    const back = this.options.fallback?.() ?? null;
     this.input.title = back === null ? "" : `Double click: back to ${this.options.format(back)}`;
   }
 
@@ -68,7 +68,7 @@ export class Slider {
   }
 
   private goBack(): void {
-    const back = this.options.fallback();
+    const back = this.options.fallback?.() ?? null;
     if (back !== null && !this.input.disabled) this.options.choose(back);
   }
 

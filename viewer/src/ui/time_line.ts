@@ -4,7 +4,7 @@ import type { Control } from "../control";
 import type { ReplayFrame, ReplayScene } from "../net/session_messages";
 import { Handle, Way, clock, marksOf, stepped, verdict } from "../replay";
 import type { Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId, create, setText } from "./dom";
 
 const SPEEDS: [label: string, speed: number][] = [
   ["1x", 1],
@@ -26,13 +26,7 @@ export class TimeLine {
     byId("timeline-back").onclick = () => this.step(-1);
     byId("timeline-forward").onclick = () => this.step(1);
     this.place.addEventListener("input", () => this.goTo(this.place.valueAsNumber));
-    this.speeds = SPEEDS.map(([label, speed]) => {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.textContent = label;
-      button.onclick = () => control.replay({ speed });
-      return button;
-    });
+    this.speeds = SPEEDS.map(([label, speed]) => create("button", { type: "button", onclick: () => control.replay({ speed }) }, label));
     byId("timeline-speeds").append(...this.speeds);
     // A button that was clicked gives the keys back: the space bar would press it again.
     byId("timeline").addEventListener("click", ({ detail, target }) => {
@@ -54,13 +48,9 @@ export class TimeLine {
     byId("timeline-note").hidden = replay.note === null;
     setText(byId("timeline-note"), replay.note ?? "");
     const marks = marksOf(replay).map(({ place, tick, kind, text }) => {
-      const mark = document.createElement("button");
-      mark.type = "button";
-      mark.className = `mark mark-${kind}`;
+      const named = { className: `mark mark-${kind}`, title: text, ariaLabel: text };
+      const mark = create("button", { type: "button", ...named, onclick: () => this.goTo(tick) });
       mark.style.left = `${100 * place}%`;
-      mark.title = text;
-      mark.setAttribute("aria-label", text);
-      mark.onclick = () => this.goTo(tick);
       return mark;
     });
     byId("timeline-marks").replaceChildren(...marks);

@@ -5,7 +5,7 @@ import { TILT_MAX, firstPosture } from "../control";
 import type { Control } from "../control";
 import { shownTool } from "../store";
 import type { State, Store } from "../store";
-import { byId, setText } from "./dom";
+import { byId, list, setText } from "./dom";
 import { degrees, millimetres } from "./numbers";
 import { Slider } from "./slider";
 
@@ -63,10 +63,7 @@ export class ToolPanel {
     const header = state.scene?.tools[tool];
     if (!header) return;
     byId("shape-row").hidden = header.shapes.length < 2;
-    const listed = [...this.shape.options].map(({ value }) => value);
-    if (listed.join() !== header.shapes.map(({ name }) => name).join()) {
-      this.shape.replaceChildren(...header.shapes.map(({ name, title }) => new Option(title, name)));
-    }
+    list(this.shape, header.shapes);
     // One that was cancelled is not the one that the tool has.
     if (!state.status?.text) this.shape.value = state.settings?.shape[tool] ?? header.shape;
   }

@@ -52,7 +52,7 @@ fn without_force<B: Bench>(rig: &mut Rig<B>, disturbance: Disturbance) -> Result
         let asked_after = began.elapsed().as_secs_f64();
         let (reading, _) = spring.tick(device, now_ns);
         if reading.is_ok_and(|reading| !reading.pose.is_finite()) {
-            return ControlFlow::Break(Err("a position that is no number was told as if it were one".to_owned()));
+            return ControlFlow::Break(Err("a reading has a position that is no number, without a fault".to_owned()));
         }
         let Some(fault) = spring.fault else {
             if asked_after > most {

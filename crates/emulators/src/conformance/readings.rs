@@ -96,7 +96,7 @@ fn buttons<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
         for pressed in [Buttons(1 << button), Buttons(0)] {
             let seen = rig.settle(Spring::to(rig.facts.middle), move |bench| bench.press(pressed))?;
             if seen.reading.buttons != pressed {
-                return Err(format!("{pressed:?} held, {:?} said", seen.reading.buttons));
+                return Err(format!("{pressed:?} held, {:?} reported", seen.reading.buttons));
             }
         }
     }
@@ -104,7 +104,7 @@ fn buttons<B: Bench>(rig: &mut Rig<B>) -> CheckResult {
     let seen = rig.settle(Spring::to(rig.facts.middle), move |bench| bench.press(all))?;
     rig.settle(Spring::to(rig.facts.middle), |bench| bench.press(Buttons(0)))?;
     if seen.reading.buttons != all || (all.grab() && !seen.reading.buttons.grab()) {
-        return Err(format!("{all:?} held, {:?} said", seen.reading.buttons));
+        return Err(format!("{all:?} held, {:?} reported", seen.reading.buttons));
     }
     Ok(())
 }

@@ -21,8 +21,7 @@ def plot_convergence(
         axes.loglog(size, error, "o-", color=color, label=f"{name}: order {observed:.2f}")
         slope = error[-1] * (size / size[-1]) ** orders[name]
         axes.loglog(size, slope, "--", color="0.6", linewidth=0.9, zorder=0)
-    axes.set_xlabel("element size / size of the body")
-    axes.set_ylabel("relative error of displacement, L2")
+    axes.set(xlabel="element size / size of the body", ylabel="relative error of displacement, L2")
     axes.set_title("a smooth displacement; dashed: orders 2 and 3", loc="left")
     axes.legend(frameon=False)
     write_figure(figure, path)
@@ -38,9 +37,7 @@ def plot_felt_stiffness(
     for (name, (nodes, patch, node)), color in zip(series.items(), COLORS, strict=False):
         axes.plot(nodes, patch, "o-", color=color, label=f"patch, {name}")
         axes.plot(nodes, node, "s:", color=color, markersize=4, label=f"single node, {name}")
-    axes.set_xlabel("node spacings along an edge of the cube")
-    axes.set_ylabel("felt stiffness [N/m]")
-    axes.set_ylim(bottom=0)
+    axes.set(xlabel="node spacings along an edge of the cube", ylabel="felt stiffness [N/m]", ylim=(0, None))
     axes.set_title("only a patch has a stiffness of its own", loc="left")
     axes.legend(frameon=False)
     write_figure(figure, path)

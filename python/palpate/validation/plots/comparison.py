@@ -26,7 +26,5 @@ def plot_comparison(a: Recording, b: Recording, names: tuple[str, str], path: Pa
         lower.plot(time, difference, color=color, linewidth=1.2, label=f"tool {tool}")
     upper.set_ylabel("force on the device [N]")
     upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=tools + 1, frameon=False)
-    lower.set_ylabel("difference [N]")
-    lower.set_xlabel("time [s]")
-    lower.set_ylim(bottom=0)
+    lower.set(ylabel="difference [N]", xlabel="time [s]", ylim=(0, None))
     write_figure(figure, path)

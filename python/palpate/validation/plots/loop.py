@@ -22,10 +22,7 @@ def plot_wakeups(wakeup_us: np.ndarray, title: str, path: Path) -> None:
         value = float(np.quantile(wakeup_us, share))
         label = f"{'median' if share == 0.5 else 'p99.9'}: {value:.0f} us"
         axes.axvline(value, color=COLORS[0], linewidth=1.2, linestyle=style, label=label)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlabel("time from a deadline to the begin of its tick [us]")
-    axes.set_ylabel("ticks")
+    axes.set(xscale="log", yscale="log", xlabel="time from a deadline to the begin of its tick [us]", ylabel="ticks")
     axes.set_title(title, loc="left")
     axes.legend(edgecolor="none")
     write_figure(figure, path)

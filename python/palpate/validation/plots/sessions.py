@@ -24,9 +24,7 @@ def plot_log(log: np.ndarray, path: Path, title: str) -> None:
     upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, frameon=False)
     lower.plot(time, log["compute_us"], color="tab:purple", linewidth=0.8, label="computing")
     lower.plot(time, log["wakeup_us"], color="0.6", linewidth=0.6, label="wake-up delay", zorder=0)
-    lower.set_yscale("log")
-    lower.set_ylabel("time of a tick [us]")
-    lower.set_xlabel("time [s]")
+    lower.set(yscale="log", ylabel="time of a tick [us]", xlabel="time [s]")
     lower.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, frameon=False)
     write_figure(figure, path)
 
@@ -37,8 +35,7 @@ def plot_history(time: np.ndarray, displacements: np.ndarray, path: Path, title:
     axes = figure.subplots()
     for axis, color in enumerate(("tab:red", "tab:green", "tab:blue")):
         axes.plot(time, 1e3 * displacements[:, axis], color=color, linewidth=1.3, label="xyz"[axis])
-    axes.set_ylabel("displacement [mm]")
-    axes.set_xlabel("time [s]")
+    axes.set(ylabel="displacement [mm]", xlabel="time [s]")
     axes.set_title(title, loc="left")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False)
     write_figure(figure, path)

@@ -13,7 +13,7 @@ from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import closed_forms, measures
 from palpate.validation.verify.contact.closed_paths import ClosedPaths
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight
-from palpate.validation.verify.contact.reference import SOFT, Block, finer_in_the_middle, top_nodes
+from palpate.validation.verify.contact.reference import SOFT, Block, finer_in_the_middle, top_middle, top_nodes
 from palpate.validation.verify.contact.sliding import flat_loop
 from palpate.validation.verify.solution import green_of
 
@@ -39,8 +39,7 @@ def friction() -> Outcome:
 def dragged(mu: float, drags: int = 60, ticks: int = 500) -> tuple[np.ndarray, np.ndarray]:
     """Return forces on the device and normals (n, 3) of random drags over the flat block."""
     simulation, body = flat_loop((10, 10, 5), quadratic=True, friction=mu)
-    low, high = body.mesh.bounds
-    centre = np.array([[*(low + high)[:2] / 2, high[2]]])
+    centre = top_middle(body)[None]
     paths = ClosedPaths.over(centre, RADIUS, paths=drags, ticks=ticks, slide=0.015, depth=(5e-4, 2e-3), seed=3)
     forces = simulation.play(paths.script()[0]).forces.reshape(-1, 3)
     return forces, np.tile([0.0, 0.0, 1.0], (len(forces), 1))
@@ -70,8 +69,7 @@ def partial_slip(mu: float, body: Body | None = None, depth: float = 1e-3) -> Pa
     """Press into a deep block, then shift by one and a half times what makes it slip."""
     body = body or deep_block()
     simulation = loop_of(body, green_of(body, touch=top_nodes(body, 0.03)), [sphere(RADIUS, mu)])
-    low, high = body.mesh.bounds
-    top = np.array([*(low + high)[:2] / 2, high[2] + RADIUS])
+    top = top_middle(body) + (0, 0, RADIUS)
     normal, contact_radius = closed_forms.sneddon_sphere(depth, RADIUS, DEEP.plane_modulus)
     stiffness = closed_forms.mindlin_stiffness(contact_radius, SOFT.youngs_modulus, SOFT.poissons_ratio)
     shifts = np.linspace(0, 1.5 * 1.5 * mu * normal / stiffness, TICKS)

@@ -11,7 +11,7 @@ from palpate.body import Body
 from palpate.green import GreensFunction
 from palpate.scene import BodyMotion, BuiltScene, Scene
 from palpate.simulation import Simulation
-from palpate.validation.verify.contact.reference import top_nodes
+from palpate.validation.verify.contact.reference import top_middle, top_nodes
 from palpate.validation.verify.solution import green_of
 
 # A device that renders anything at once: what is measured is the law, not the safety stage.
@@ -87,7 +87,6 @@ def pressed(body: Body, tool: Mapping[str, Any], height: float, depths: np.ndarr
     The tool's origin is ``height`` over its lowest point, m; nodes within a ``reach`` of the middle may be touched.
     """
     simulation = loop_of(body, green_of(body, touch=top_nodes(body, reach)), [tool])
-    low, high = body.mesh.bounds
-    top = np.array([*(low + high)[:2] / 2, high[2] + height])
+    top = top_middle(body) + (0, 0, height)
     lead = straight(top + (0, 0, 1e-3), top, 5e-5)
     return simulation.run(np.vstack([lead, top - np.outer(depths, (0, 0, 1))]))[len(lead) :, 2]

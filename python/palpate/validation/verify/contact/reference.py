@@ -141,9 +141,15 @@ def finer_in_the_middle(block: Block, cell: float, reach: float, *, quadratic: b
     return quiet_body(mesh, block.material, mesh.nodes[:, 2] < 1e-9)
 
 
+def top_middle(body: Body) -> np.ndarray:
+    """Middle of the top, (3,) m."""
+    low, high = body.mesh.bounds
+    return np.array([*(low + high)[:2] / 2, high[2]])
+
+
 def top_nodes(body: Body, reach: float = np.inf) -> np.ndarray:
     """Nodes of the top within a distance of its middle along x and y, m."""
     nodes = body.mesh.nodes
-    low, high = body.mesh.bounds
-    near = (np.abs(nodes[:, :2] - (low + high)[:2] / 2) < reach * (1 + 1e-9)).all(axis=1)
-    return np.flatnonzero(near & (nodes[:, 2] > high[2] - 1e-9))
+    x, y, top = top_middle(body)
+    near = (np.abs(nodes[:, :2] - (x, y)) < reach * (1 + 1e-9)).all(axis=1)
+    return np.flatnonzero(near & (nodes[:, 2] > top - 1e-9))

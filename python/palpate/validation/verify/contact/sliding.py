@@ -13,7 +13,7 @@ from palpate.validation.verify.check import Check, Outcome
 from palpate.validation.verify.contact import measures
 from palpate.validation.verify.contact.curves import Curve, away_from_supports, section, touches_nothing_else
 from palpate.validation.verify.contact.loop import loop_of, sphere, straight, swept, touch_heights
-from palpate.validation.verify.contact.reference import Block, body_on_table, finer_in_the_middle, top_nodes
+from palpate.validation.verify.contact.reference import Block, body_on_table, finer_in_the_middle, top_middle, top_nodes
 from palpate.validation.verify.solution import green_of, quiet_body
 
 RADIUS, DEPTH = 0.01, 1e-3
@@ -63,8 +63,7 @@ def ripple() -> Outcome:
 def jumps() -> Outcome:
     """Sweep in steps of a micrometre across nodes, edges and changes of patch; and press, micrometre by micrometre."""
     simulation, body = flat_loop((10, 10, 5), quadratic=True)
-    low, high = body.mesh.bounds
-    middle = np.array([*(low + high)[:2] / 2, high[2]])
+    middle = top_middle(body)
     found = {
         "flat, along an edge": micro_sweep(simulation, middle - (6e-3, 0, 0), middle + (6e-3, 0, 0), RADIUS - DEPTH),
         "flat, across": micro_sweep(simulation, middle - (4e-3, 6e-3, 0), middle + (4e-3, 6e-3, 0), RADIUS - DEPTH),
@@ -86,8 +85,7 @@ def flat_loop(cells: tuple[int, int, int], *, quadratic: bool, friction: float =
 
 def flat_slide(simulation: Simulation, body: Body, length: float = 0.04) -> Slide:
     """Slide over the middle of the top, at an angle to the edges of the elements."""
-    low, high = body.mesh.bounds
-    middle = np.array([*(low + high)[:2] / 2, high[2]])
+    middle = top_middle(body)
     along = length / 2 * np.array([np.cos(0.3), np.sin(0.3), 0.0])
     points = straight(middle - along, middle + along, 1e-4)
     normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
