@@ -107,10 +107,12 @@ class Crossing:
             ends, height = (-3e-3, 3e-3), -low
         else:
             ends, height = (-1.5e-3, 1.5e-3), wedge.touch(self.tool, rotation, -middle)
-        x = np.arange(*ends, STEP) - middle
+        x, low = np.arange(*ends, STEP) - middle, height - self.depth
+        # It comes down from where it is outside of the body, in a crease from above the wall that it is nearer to.
+        outside = wedge.touch(self.tool, rotation, x[0]) if self.kind == "valley" else height
         y = 0.5 * EDGE_LENGTH + 1.7e-3 - rotation.apply(UP)[1] * 0.5 * TOOLS[self.tool].get("length", 0.0)
-        across = np.column_stack([x, np.full_like(x, y), np.full_like(x, height - self.depth)])
-        down = np.arange(self.depth + LEAD, 0, -10e-6)[:, None] * UP
+        across = np.column_stack([x, np.full_like(x, y), np.full_like(x, low)])
+        down = np.arange(outside + LEAD - low, 0, -10e-6)[:, None] * UP
         return np.vstack([across[0] + down, across]), len(down)
 
 
@@ -131,15 +133,14 @@ def deepest_without_force(crossing: Crossing, path: np.ndarray, forces: np.ndarr
     return max(depths, default=0.0) / RADII[crossing.tool]
 
 
-# Not reached yet (docs/accuracy.md): how many times more than allowed a force may jump, and be lost, meanwhile.
+# Not reached yet (docs/accuracy.md): how many times more than allowed a force may jump meanwhile.
 OPEN = {
-    ("ridge", 30, "ellipsoid", "across"): (1.2, 1),
-    ("ridge", 30, "capsule", "along"): (4, 1),
-    ("ridge", 30, "capsule", "yawed"): (8, 1),
-    ("ridge", 30, "capsule", "tilted"): (2, 1),
-    ("ridge", 60, "capsule", "along"): (5, 1),
-    ("valley", 30, "capsule", "yawed"): (1, 2),
-    ("concave", 120, "capsule", "yawed"): (2, 1),
+    ("ridge", 30, "ellipsoid", "across"): 1.2,
+    ("ridge", 30, "capsule", "along"): 4,
+    ("ridge", 30, "capsule", "yawed"): 8,
+    ("ridge", 30, "capsule", "tilted"): 2,
+    ("ridge", 60, "capsule", "along"): 5,
+    ("concave", 120, "capsule", "yawed"): 2,
 }
 
 
@@ -152,8 +153,7 @@ def judged(loops: Loops, crossing: Crossing) -> str | None:
     if found.size.max() == 0:
         return f"{crossing}: no force anywhere"
     key = (crossing.kind, crossing.degrees, crossing.tool, crossing.pose)
-    most_jump, most_lost = OPEN.get(key, (1, 1))
-    if jump <= most_jump and lost <= most_lost * DEEP:
+    if jump <= OPEN.get(key, 1) and lost <= DEEP:
         return None
     return f"{crossing}: jumps {jump:.3g} times what is allowed, no force {lost:.2g} radii deep"
 
@@ -177,6 +177,7 @@ QUICK = [
     Crossing("convex", 90, "thick capsule", "across", 2e-3),
     Crossing("convex", 90, "punch", "upright", 1e-3),
     Crossing("ridge", 60, "punch", "upright", 0.5e-3),
+    Crossing("valley", 30, "capsule", "yawed", 1e-3),
     Crossing("ridge", 90, "capsule", "along", 0.5e-3),
     Crossing("concave", 90, "sphere", "upright", 1e-3),
     Crossing("concave", 90, "capsule", "across", 1e-3),

@@ -14,7 +14,7 @@ STEP, DEEP, ABOVE = 10e-6, 1e-3, 0.5e-3
 # The largest force of a tick over that at the end, and a force that no hand feels, N.
 MOST, UNFELT = 3.0, 1e-3
 # Not reached yet (docs/accuracy.md): how large a force one of a tool's touches may compute meanwhile.
-OPEN = {"kidney in full": 6.0, "liver in full": 6.0, "cup": 6.0}
+OPEN = {"kidney in full": 6.0}
 HELD = {
     "sphere": ["upright"],
     "ellipsoid": ["lying", "upright"],

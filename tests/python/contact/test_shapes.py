@@ -108,6 +108,18 @@ def test_a_rounded_punch_is_sneddons_in_series_with_the_block(block):
     assert force[2] == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.parametrize("radius", [0.003, 0.004])
+def test_an_upright_punch_on_a_plane_has_no_force_sideways(block, radius):
+    """Wherever it stands and however it is turned about its axis, on elements five times as wide as the punch."""
+    simulation = simulation_of(block, shape="punch", radius=radius, rounding=0.3 * radius)
+    down = np.linspace(-2e-4, 1e-3, 40)[:, None] * [0, 0, 1]
+    for x, y, yaw in np.random.default_rng(0).uniform((-0.01, -0.01, 0.0), (0.01, 0.01, 2 * np.pi), (10, 3)):
+        turned = np.tile([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)], (40, 1))
+        forces = simulation.play(TOP + [x, y, 0.0] - down, turned).forces
+        assert forces[-1, 2] > 0.05
+        assert np.linalg.norm(forces[:, :2], axis=1).max() <= 1e-3 * forces[-1, 2]
+
+
 def test_a_finger_pad_is_a_second_half_space_in_series(block):
     """Hertz for two elastic bodies; the pad does not change its volume: `1/E* = (1 - nu^2)/E + (1 - 1/4)/E_pad`."""
     radius, depth, pad = 0.008, 4e-4, 15e3
