@@ -274,7 +274,7 @@ mod tests {
     /// The displacement of a cubic spring `F = 2 q - 0.3 q^2 + 5 q^3` up to the third order gives the spring.
     #[test]
     fn a_cubic_spring_is_found_from_its_series() {
-        let (first, second, third) = (2.0, -0.3, 5.0);
+        let (first, second, third) = (2.0f64, -0.3f64, 5.0f64);
         let compliance = 1.0 / first;
         let q2 = -second * compliance.powi(3);
         let q3 = (2.0 * second * second - first * third) * compliance.powi(5);
