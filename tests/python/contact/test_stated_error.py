@@ -68,7 +68,7 @@ def test_a_round_ellipsoid_has_the_force_and_the_work_of_a_sphere(tmp_path):
     forces = -recording.forces
     work = np.cumsum((0.5 * (forces[1:] + forces[:-1]) * np.diff(path, axis=0)).sum(axis=1))
     assert abs(work[-1]) < 2e-3 * work.max()
-    assert 0.01 < contacts["error"].max() < 0.1
+    assert 0.01 < contacts["error"].max() < 0.12
 
 
 @pytest.mark.slow
