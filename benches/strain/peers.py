@@ -22,7 +22,7 @@ from palpate.validation.ticks import tick_times
 from palpate.validation.verify.contact.loop import sphere
 
 # The body, and the edges of its elements below the sphere, m. At larger ratios of Poisson 4-node elements lock.
-COLUMN, CELL = "column 0.3", 0.004
+COLUMN, CELL = "column 0.3", 0.006
 # Loads of Drake over the forces of the reference, between which its force at a depth is interpolated.
 LOADS = np.array([0.5, 1.0, 2.0, 3.5])
 # Ticks of a press by Palpate.
